@@ -1,0 +1,87 @@
+"""The error tree: every failure that a user can meet is one of these.
+
+    ManiTwinError
+    ├── UsageError            wrong arguments, a path that is not there                      exit 2
+    │   └── ConfigError       a configuration that cannot be used
+    ├── InputError            an input that cannot be read: ends as a rejected twin          exit 3
+    ├── Rejected              an answer, not an accident: kept with its reason               exit 3
+    ├── TwinError             a finished twin folder that cannot be read or written
+    └── BackendError          something else failed; the item stays resumable                exit 4
+        ├── Unavailable       it does not answer, or is not installed
+        ├── RateLimited       it asks to wait
+        ├── BadReply          it answered something that cannot be used
+        └── RendererMissing   no Vulkan device to render with
+
+A message names the file or the thing, the cause and the remedy, and lists what would be valid.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Iterable
+
+
+class ManiTwinError(Exception):
+    """Base of every error that this package raises on purpose."""
+
+
+class UsageError(ManiTwinError):
+    """A command or call that cannot be carried out as it was given."""
+
+
+class ConfigError(UsageError):
+    """A configuration with an unknown key or a value outside its range."""
+
+
+class TwinError(ManiTwinError):
+    """A finished twin folder that is incomplete, altered or of an unknown schema."""
+
+
+class Rejected(ManiTwinError):
+    """The decision not to make a twin of this input.
+
+    ``reason`` is one of ``manitwin.twin.REJECTION_REASONS[stage]``; ``detail`` is one line for a person.
+    ``stage`` is needed only where two stages share the reason.
+    """
+
+    def __init__(self, reason: str, detail: str, stage: str | None = None):
+        super().__init__(f"{reason}: {detail}")
+        self.reason, self.detail, self.stage = reason, detail, stage
+
+    def __reduce__(self) -> tuple[type, tuple[str, str, str | None]]:
+        return type(self), (self.reason, self.detail, self.stage)
+
+
+class InputError(Rejected):
+    """An input that cannot be read, or is not what it claims to be."""
+
+    def __init__(self, reason: str, detail: str, stage: str | None = "input"):
+        super().__init__(reason, detail, stage)
+
+
+class BackendError(ManiTwinError):
+    """A model, simulator or service that could not do its work; the item can be resumed."""
+
+
+class Unavailable(BackendError):
+    """A backend that is not installed, not running or does not answer."""
+
+
+class RateLimited(BackendError):
+    """A backend that asks to be called later."""
+
+
+class BadReply(BackendError):
+    """A backend whose answer cannot be used."""
+
+
+class RendererMissing(Unavailable):
+    """No Vulkan device that SAPIEN can render with."""
+
+
+def choose_from(kind: str, name: str, valid: Iterable[str]) -> str:
+    """Describe an unknown name: the nearest valid one first, then all of them."""
+    valid = sorted(valid)
+    near = get_close_matches(name, valid, n=1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    return f"unknown {kind} {name!r}{hint} Valid: {', '.join(valid)}"

@@ -1,0 +1,60 @@
+"""Rigid transforms as 4x4 matrices and quaternions in wxyz order."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+OBJECT_TO_GLTF = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+"""Z-up object frame to the Y-up frame of glTF 2.0 (section 3.4): (x, y, z) -> (x, z, -y)."""
+
+GLTF_TO_OBJECT = OBJECT_TO_GLTF.T
+
+
+def quaternion_wxyz(rotation: np.ndarray) -> np.ndarray:
+    """Convert rotation matrices ``(..., 3, 3)`` to unit quaternions ``(..., 4)`` wxyz with w >= 0."""
+    return Rotation.from_matrix(rotation).as_quat(canonical=True, scalar_first=True)
+
+
+def rotation_from_quaternion_wxyz(quaternion: np.ndarray) -> np.ndarray:
+    """Convert quaternions ``(..., 4)`` wxyz to rotation matrices ``(..., 3, 3)``."""
+    return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+
+
+def transform(rotation: np.ndarray | None = None, translation: np.ndarray | None = None) -> np.ndarray:
+    """Build a 4x4 transform from a rotation ``(3, 3)`` and a translation ``(3,)``; what is not given is the identity."""
+    pose = np.eye(4)
+    if rotation is not None:
+        pose[:3, :3] = rotation
+    if translation is not None:
+        pose[:3, 3] = translation
+    return pose
+
+
+def inverse(pose: np.ndarray) -> np.ndarray:
+    """Invert rigid transforms ``(..., 4, 4)``."""
+    result = np.zeros_like(pose)
+    rotation = np.swapaxes(pose[..., :3, :3], -1, -2)
+    result[..., :3, :3] = rotation
+    result[..., :3, 3] = -np.einsum("...ij,...j->...i", rotation, pose[..., :3, 3])
+    result[..., 3, 3] = 1.0
+    return result
+
+
+def transform_points(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Apply a 4x4 transform to points ``(N, 3)``."""
+    return points @ pose[:3, :3].T + pose[:3, 3]
+
+
+def rotation_between(source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Return the smallest rotation ``(3, 3)`` that turns direction ``source`` into ``target`` (Rodrigues)."""
+    a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
+    axis, cosine = np.cross(a, b), float(a @ b)
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-12:
+        if cosine > 0:
+            return np.eye(3)
+        other = np.eye(3)[int(np.abs(a).argmin())]
+        axis = np.cross(a, other)
+        return Rotation.from_rotvec(np.pi * axis / np.linalg.norm(axis)).as_matrix()
+    return Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_matrix()

@@ -1,0 +1,36 @@
+"""Points on surfaces, and far-apart subsets of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+
+def sample_surface(mesh: trimesh.Trimesh, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sample points uniformly by area.
+
+    Returns points ``(count, 3)`` m, the outward unit normals of their faces ``(count, 3)`` and face indices ``(count,)``.
+    Source: paper, "Candidate Point Sampling"; barycentric sampling of Osada et al. 2002, eq. 1.
+    """
+    cumulative = np.cumsum(mesh.area_faces)
+    faces = np.searchsorted(cumulative, rng.random(count) * cumulative[-1])
+    faces = np.minimum(faces, len(mesh.faces) - 1)
+    root, along = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
+    a, b, c = np.swapaxes(mesh.triangles[faces], 0, 1)
+    return (1 - root) * a + root * (1 - along) * b + root * along * c, mesh.face_normals[faces], faces
+
+
+def farthest_point_sampling(points: np.ndarray, count: int, start: int = 0) -> np.ndarray:
+    """Return indices of ``count`` of the points ``(N, D)``, each the farthest from those before it (paper, eq. 1).
+
+    Starts at index ``start``; returns all indices where there are no more than ``count`` points.
+    """
+    if len(points) <= count:
+        return np.arange(len(points))
+    chosen = np.empty(count, dtype=np.int64)
+    chosen[0] = start
+    nearest = np.full(len(points), np.inf)
+    for i in range(1, count):
+        nearest = np.minimum(nearest, ((points - points[chosen[i - 1]]) ** 2).sum(1))
+        chosen[i] = int(nearest.argmax())
+    return chosen

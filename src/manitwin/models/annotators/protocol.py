@@ -1,0 +1,100 @@
+"""The protocol of an annotator: the four questions that the paper asks a VLM."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import trimesh
+
+from manitwin.twin import Estimate, FunctionalPoint, GraspPoint, Language
+
+
+@dataclass(frozen=True)
+class Subject:
+    """The object as an annotator sees it.
+
+    ``solid`` is the repaired watertight mesh and ``parts`` are the textured visual meshes, both in the object frame (Z-up),
+    metres as far as known: ``metric`` says whether the scale is declared or only guessed. ``views`` are eight pictures.
+    """
+
+    name: str | None
+    solid: trimesh.Trimesh
+    parts: tuple[trimesh.Trimesh, ...]
+    metric: bool
+    views: tuple[Path, ...]
+    seed: int
+
+
+@dataclass(frozen=True)
+class QualityVerdict:
+    """The two criteria of the paper's gate; None means not judged, and never means passed."""
+
+    single_object: bool | None
+    visual_quality: bool | None
+    detail: str
+
+
+@dataclass(frozen=True)
+class PhysicalEstimates:
+    """What an annotator believes of size, mass, friction and how the mass is spread.
+
+    ``longest_axis_m`` is the longest axis of the oriented box (None: keep the scale as it is). ``wall_thickness_m`` is given
+    for hollow things whose mesh is only an outer skin (None: the mesh is the solid matter, or full). ``mass_kg`` may be
+    None where only ``bulk_density_kg_m3`` (mass per volume of the repaired mesh) is known: one of both is given.
+    """
+
+    longest_axis_m: Estimate | None
+    mass_kg: Estimate | None
+    bulk_density_kg_m3: Estimate | None
+    friction_static: Estimate
+    friction_dynamic: Estimate
+    restitution: Estimate
+    material: str
+    wall_thickness_m: float | None
+
+
+@dataclass(frozen=True)
+class PointsRequest:
+    """The numbered candidates, and pictures on which they are marked."""
+
+    subject: Subject
+    positions_m: np.ndarray
+    normals: np.ndarray
+    marked_views: tuple[Path, ...]
+    visible: tuple[tuple[int, ...], ...]
+    center_of_mass_m: np.ndarray
+    max_opening_m: float
+
+
+@dataclass(frozen=True)
+class SelectedPoints:
+    """2-4 functional and 2-3 grasp points, each at a candidate."""
+
+    functional: tuple[FunctionalPoint, ...]
+    grasp: tuple[GraspPoint, ...]
+
+
+class Annotator(Protocol):
+    """Answer the paper's four questions about an object. Raises BackendError where it cannot answer."""
+
+    name: str
+    model: str | None
+
+    def judge_quality(self, subject: Subject) -> QualityVerdict:
+        """Judge whether this is one coherent object, free of severe artifacts."""
+        ...
+
+    def estimate_physical(self, subject: Subject) -> PhysicalEstimates:
+        """Estimate size, mass and friction."""
+        ...
+
+    def describe(self, subject: Subject, material: str, extents_m: np.ndarray) -> Language:
+        """Describe category, color, material, size, shape and function in words."""
+        ...
+
+    def select_points(self, request: PointsRequest) -> SelectedPoints:
+        """Choose functional and grasp points among the candidates."""
+        ...

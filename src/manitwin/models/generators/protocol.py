@@ -1,0 +1,64 @@
+"""The protocol of a 3D generator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class GenerationRequest:
+    """What a generator is asked for.
+
+    ``rgba`` is the matted photo, ``(H, W, 4) uint8`` upright sRGB whose alpha is the object's mask, or None where ``text`` is
+    given. ``name`` is what the user says it is. ``seed`` makes the answer repeatable where the generator can.
+    """
+
+    rgba: np.ndarray | None
+    text: str | None
+    name: str | None
+    seed: int
+
+
+@dataclass(frozen=True)
+class JobState:
+    """Where a job stands; ``message`` says why it failed, in the generator's own words."""
+
+    state: Literal["queued", "running", "done", "failed"]
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class Generated:
+    """A mesh file (GLB, glTF Y-up, any scale) and what the generator says about how it was made."""
+
+    path: Path
+    model: str | None
+    notes: dict[str, Any] = field(default_factory=dict)
+    metric: bool = False
+
+
+class Generator(Protocol):
+    """Turn an image or a text into a mesh.
+
+    ``submit`` returns a job id that survives a restart of this process wherever the generator can keep it; ``fetch`` may be
+    called once ``poll`` says done and writes below ``folder``. Raises BackendError, or Rejected where the input is at fault.
+    """
+
+    name: str
+    model: str | None
+
+    def submit(self, request: GenerationRequest) -> str:
+        """Start a job and return its id."""
+        ...
+
+    def poll(self, job_id: str) -> JobState:
+        """Return where the job stands."""
+        ...
+
+    def fetch(self, job_id: str, folder: Path) -> Generated:
+        """Write the finished mesh below ``folder``."""
+        ...

@@ -1,0 +1,1 @@
+"""Where a gripper may hold an object: proposals, before any physics."""

@@ -1,0 +1,89 @@
+"""What a stage is, and the handle on a twin in the making that it works on.
+
+Artifacts have names. A bare word (``physical``) is a field: JSON. A name with a suffix (``solid.npz``) is a file, one that
+ends in ``/`` (``views/``) a folder. Each is written by exactly one stage and read by those that declare it.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field as dataclass_field
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
+
+from pydantic import BaseModel
+
+from manitwin.errors import ManiTwinError
+
+Resource = Literal["cpu", "gpu", "vlm", "generator"]
+
+
+def is_field(name: str) -> bool:
+    """Tell a field (JSON) from a file or folder artifact by its name."""
+    return not name.endswith("/") and "." not in name
+
+
+@dataclass(frozen=True)
+class Item:
+    """One input as the user gave it.
+
+    ``file`` is an absolute path, or None where ``text`` is given. ``units`` and ``up`` are what the user said ('auto': unsaid).
+    """
+
+    file: str | None
+    text: str | None = None
+    name: str | None = None
+    units: Literal["m", "cm", "mm", "auto"] = "auto"
+    up: Literal["y", "z", "auto"] = "auto"
+    license: str | None = None
+    attribution: str | None = None
+
+
+@dataclass
+class Draft:
+    """A twin in the making: fields and paths, by artifact name. Cheap to send to another process."""
+
+    twin_id: str
+    item: Item
+    seed: int
+    fields: dict[str, Any] = dataclass_field(default_factory=dict)
+    paths: dict[str, Path] = dataclass_field(default_factory=dict)
+
+    def field(self, name: str) -> Any:
+        """Return the JSON value of a field artifact; raises ManiTwinError where no stage has written it."""
+        if name not in self.fields:
+            raise ManiTwinError(f"no stage has written field {name!r}; there are: {', '.join(sorted(self.fields)) or 'none'}")
+        return self.fields[name]
+
+    def path(self, name: str) -> Path:
+        """Return the path of a file or folder artifact; raises ManiTwinError where no stage has written it."""
+        if name not in self.paths:
+            raise ManiTwinError(f"no stage has written {name!r}; there are: {', '.join(sorted(self.paths)) or 'none'}")
+        return self.paths[name]
+
+
+@runtime_checkable
+class Stage(Protocol):
+    """One step of the paper.
+
+    ``run`` writes its files below ``folder`` under their artifact names, and returns its fields. It may raise ``Rejected``.
+    It is a pure function of what it ``reads``, ``settings``, ``backend``, ``model``, ``draft.item`` and ``draft.seed``.
+    """
+
+    name: ClassVar[str]
+    version: ClassVar[str]
+    reads: ClassVar[tuple[str, ...]]
+    writes: ClassVar[tuple[str, ...]]
+    needs: ClassVar[Resource]
+    settings: BaseModel
+    backend: str
+    model: str | None
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Do the step."""
+        ...
+
+
+def dump_json(value: Any) -> str:
+    """Return JSON text that is the same for equal values: sorted keys, no NaN or infinity."""
+    return json.dumps(value, sort_keys=True, indent=1, allow_nan=False) + "\n"
