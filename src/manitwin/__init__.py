@@ -1,1 +1,20 @@
 """Turn a photo, a text or a mesh into a data-generation-ready digital twin."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from manitwin.api import BuildReport, build, load, schema
+    from manitwin.loaded_twin import Twin
+
+__all__ = ["BuildReport", "Twin", "build", "load", "schema"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the public names when they are first used, so that `manitwin --help` answers at once."""
+    if name not in __all__:
+        raise AttributeError(f"module 'manitwin' has no attribute {name!r}; it has {', '.join(__all__)}")
+    from manitwin import api
+
+    return getattr(api, name)

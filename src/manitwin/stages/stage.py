@@ -1,12 +1,12 @@
 """What a stage is, and the handle on a twin in the making that it works on.
 
 Artifacts have names. A bare word (``physical``) is a field: JSON. A name with a suffix (``solid.npz``) is a file, one that
-ends in ``/`` (``views/``) a folder. Each is written by exactly one stage and read by those that declare it.
+ends in ``/`` (``views/``) a folder. Each is written by exactly one stage and read by those that declare it; a name in
+``reads`` that ends in ``?`` is read where it is there.
 """
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field as dataclass_field
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
@@ -82,8 +82,3 @@ class Stage(Protocol):
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Do the step."""
         ...
-
-
-def dump_json(value: Any) -> str:
-    """Return JSON text that is the same for equal values: sorted keys, no NaN or infinity."""
-    return json.dumps(value, sort_keys=True, indent=1, allow_nan=False) + "\n"

@@ -1,0 +1,167 @@
+"""Set up everything in ``.venv``: the locked packages, this package, and a Vulkan driver to render with.
+
+Runs on the system's Python alone (3.11+), on Debian 12 or Ubuntu 24.04. The second run takes a second: a stamp in the
+environment holds the digest of the lock and of ``pyproject.toml``. What needs root is installed when it may be, else the one
+command to run is said.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+VENV = ROOT / ".venv"
+STAMP = VENV / "manitwin-setup.sha256"
+SHARED_LIBRARIES = {"libGL.so.1": "libgl1", "libgthread-2.0.so.0": "libglib2.0-0", "libX11.so.6": "libx11-6", "libxcb.so.1": "libxcb1"}
+BACKPORTS = Path("/etc/apt/sources.list.d/manitwin-backports.sources")
+
+
+def say(text: str) -> None:
+    print(f"setup: {text}", flush=True)
+
+
+def stop(text: str) -> None:
+    sys.exit(f"setup: {text}")
+
+
+def as_root(command: list[str]) -> list[str] | None:
+    """Return the command as this user may run it as root without a password, or None."""
+    if os.geteuid() == 0:
+        return command
+    sudo = shutil.which("sudo")
+    if sudo and subprocess.run([sudo, "-n", "true"], capture_output=True).returncode == 0:
+        return [sudo, "-n", "env", "DEBIAN_FRONTEND=noninteractive", *command]
+    return None
+
+
+def distribution() -> tuple[str, str]:
+    """Return the id and code name of the distribution ('debian', 'bookworm')."""
+    release = Path("/etc/os-release")
+    fields = dict(line.split("=", 1) for line in release.read_text().splitlines() if "=" in line) if release.is_file() else {}
+    return fields.get("ID", "").strip('"'), fields.get("VERSION_CODENAME", "").strip('"')
+
+
+def apt_install(packages: list[str], why: str, extra: list[str] | None = None, before: str = "") -> bool:
+    """Install Debian packages; where that is not allowed, say the one command that does. Returns whether they are there."""
+    arguments = ["apt-get", "install", "-y", "--no-install-recommends", *(extra or []), *packages]
+    command = as_root(arguments)
+    by_hand = f"{before}sudo apt-get update && sudo {' '.join(arguments)}"
+    if shutil.which("apt-get") is None or command is None:
+        say(f"{why}. Run this, then again: {by_hand}")
+        return False
+    update = as_root(["apt-get", "update", "-qq"])
+    environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    for step in (update, command):
+        done = subprocess.run(step or [], capture_output=True, text=True, env=environment)
+        if done.returncode != 0 and step is command:
+            say(f"{why}; apt-get failed: {done.stderr.strip().splitlines()[-1] if done.stderr.strip() else 'no message'}. By hand: {by_hand}")
+            return False
+    return True
+
+
+def make_environment() -> None:
+    """Create the virtual environment, with pip in it."""
+    if (VENV / "bin" / "python").exists() and subprocess.run([VENV / "bin" / "python", "-m", "pip", "--version"], capture_output=True).returncode == 0:
+        return
+    shutil.rmtree(VENV, ignore_errors=True)
+    try:
+        import ensurepip  # noqa: F401
+    except ImportError:
+        version = f"python{sys.version_info.major}.{sys.version_info.minor}-venv"
+        if not apt_install([version], f"this Python cannot make virtual environments without {version}"):
+            sys.exit(1)
+    say("making .venv")
+    subprocess.run([sys.executable, "-m", "venv", str(VENV)], check=True)
+
+
+def wanted_digest() -> str:
+    """Digest what decides the content of the environment."""
+    parts = [(ROOT / name).read_bytes() for name in ("requirements.lock", "pyproject.toml")]
+    return hashlib.sha256(b"\0".join([*parts, sys.version.encode()])).hexdigest()
+
+
+def install_packages() -> None:
+    """Install the locked packages, by hash, and this package in place."""
+    digest = wanted_digest()
+    if STAMP.is_file() and STAMP.read_text() == digest:
+        return
+    pip = [str(VENV / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    say("installing the locked packages (a few minutes, once)")
+    subprocess.run([*pip, "--require-hashes", "-r", str(ROOT / "requirements.lock")], check=True)
+    subprocess.run([*pip, "--no-deps", "--no-build-isolation", "-e", str(ROOT)], check=True)
+    STAMP.write_text(digest)
+
+
+def missing_libraries() -> list[str]:
+    """Return the Debian packages of shared libraries that the wheels expect and this system lacks."""
+    known = subprocess.run(["/sbin/ldconfig", "-p"], capture_output=True, text=True).stdout
+    return [package for library, package in SHARED_LIBRARIES.items() if library not in known]
+
+
+def install_libraries() -> None:
+    """Install the few system libraries that the wheels expect."""
+    packages = missing_libraries()
+    if packages and not apt_install(packages, f"system libraries are missing: {', '.join(packages)}"):
+        sys.exit(1)
+
+
+def can_render() -> bool:
+    """Ask the package's own probe whether a Vulkan device can render."""
+    probe = [str(VENV / "bin" / "python"), "-m", "manitwin.render.device"]
+    return subprocess.run(probe, capture_output=True).returncode == 0
+
+
+def debian_mirror() -> str:
+    """Return the mirror that this system already installs Debian from."""
+    lists = [Path("/etc/apt/sources.list"), *sorted(Path("/etc/apt/sources.list.d").glob("*"))]
+    for path in (p for p in lists if p.is_file() and p != BACKPORTS):
+        for line in path.read_text(errors="replace").splitlines():
+            words = line.split()
+            if words[:1] == ["URIs:"] or (words[:1] == ["deb"] and "bookworm" in words):
+                mirror = next(word for word in words[1:] if "://" in word or word.startswith("/"))
+                if mirror.rstrip("/").endswith("/debian"):
+                    return mirror
+    stop("no Debian mirror is named in /etc/apt; add bookworm-backports by hand, then run this again")
+    raise AssertionError("unreachable")
+
+
+def install_renderer() -> None:
+    """Install Mesa's lavapipe where no Vulkan device can render: from backports on Debian 12, whose own is too old."""
+    if can_render():
+        return
+    name, codename = distribution()
+    extra: list[str] = []
+    by_hand = ""
+    if (name, codename) == ("debian", "bookworm"):
+        extra = ["-t", "bookworm-backports"]
+        source = (
+            f"Types: deb\nURIs: {debian_mirror()}\nSuites: bookworm-backports\nComponents: main\n"
+            "Signed-By: /usr/share/keyrings/debian-archive-keyring.gpg\n"
+        )
+        by_hand = f"printf '{source.encode('unicode_escape').decode()}' | sudo tee {BACKPORTS} && "
+        writer = as_root(["tee", str(BACKPORTS)])
+        if writer is not None and not BACKPORTS.exists():
+            subprocess.run(writer, input=source, text=True, check=True, stdout=subprocess.DEVNULL)
+    say("no Vulkan device can render: installing Mesa's lavapipe")
+    if not apt_install(["mesa-vulkan-drivers", "libvulkan1"], "no Vulkan device can render", extra, by_hand):
+        sys.exit(1)
+    if not can_render():
+        stop("Mesa is installed, but no Vulkan device can render; run .venv/bin/manitwin doctor for the reason")
+
+
+def main() -> None:
+    if sys.version_info < (3, 11):
+        stop(f"Python 3.11 or newer is needed, this is {sys.version.split()[0]}; name one with: make PYTHON=python3.12 setup")
+    make_environment()
+    install_packages()
+    install_libraries()
+    install_renderer()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,86 @@
+"""What a program imports: build twins and load them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from manitwin.config import BuildConfig, load_config
+from manitwin.errors import UsageError
+from manitwin.executors.local import StageStarted, build_all
+from manitwin.loaded_twin import Twin
+from manitwin.manifest import collect_items
+from manitwin.pipeline import ItemResult
+
+
+@dataclass(frozen=True)
+class BuildReport:
+    """What became of every item of a build, in the order in which they ended."""
+
+    results: list[ItemResult]
+    remarks: list[str] = field(default_factory=list)
+
+    def count(self, status: str) -> int:
+        """Return how many items ended as 'accepted', 'rejected' or 'unfinished'."""
+        return sum(result.status == status for result in self.results)
+
+    @property
+    def exit_code(self) -> int:
+        """0 all accepted, 3 some rejected, 4 some unfinished and resumable."""
+        return 4 if self.count("unfinished") else 3 if self.count("rejected") else 0
+
+
+def build(
+    inputs: str | Path | Iterable[str | Path],
+    out: str | Path,
+    *,
+    name: str | None = None,
+    units: str = "auto",
+    up: str = "auto",
+    license: str | None = None,
+    attribution: str | None = None,
+    jobs: int | None = None,
+    seed: int | None = None,
+    config: BuildConfig | str | Path | None = None,
+    on_start: Callable[[int], None] = lambda total: None,
+    on_stage: Callable[[StageStarted], None] = lambda event: None,
+    on_result: Callable[[ItemResult], None] = lambda result: None,
+) -> BuildReport:
+    """Build twins from images, meshes, folders and manifests into the folder ``out``.
+
+    ``units`` m|cm|mm|auto and ``up`` y|z|auto hold for all inputs whose manifest row does not say otherwise. A finished twin
+    of the same configuration and seed is not built again. Raises UsageError for wrong arguments; what happens to one item is
+    in the report and never raised.
+    """
+    settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
+    if seed is not None:
+        settings = settings.model_copy(update={"seed": seed})
+    if jobs is not None and jobs < 1:
+        raise UsageError(f"jobs is {jobs}; give 1 or more")
+    given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
+    items, remarks = collect_items(given, name=name, units=units, up=up, license=license, attribution=attribution)
+    place = Path(out)
+    if place.exists() and not place.is_dir():
+        raise UsageError(f"{out}: a file; give a folder to write twins into")
+    place.mkdir(parents=True, exist_ok=True)
+    on_start(len(items))
+    results: list[ItemResult] = []
+    for result in build_all(items, place.resolve(), settings, jobs=jobs or os.cpu_count() or 1, on_stage=on_stage):
+        results.append(result)
+        on_result(result)
+    return BuildReport(results, remarks)
+
+
+def load(folder: str | Path, verify: bool = False) -> Twin:
+    """Load a finished twin; with ``verify``, check the digest of every file. Raises TwinError."""
+    return Twin(folder, verify=verify)
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON Schema of twin.json."""
+    from manitwin.twin import TwinRecord
+
+    return TwinRecord.model_json_schema()

@@ -1,0 +1,124 @@
+"""Put a finished twin folder together, accepted or rejected, and rename it into place."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import shutil
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manitwin.errors import Rejected
+from manitwin.files.source_files import pack_source
+from manitwin.geometry.hull_reduction import hull_to_obj
+from manitwin.stage_runner import StageCost
+from manitwin.stages.stage import Draft, Stage
+from manitwin.store import RUN, canonical_json, replace_folder, seal, write_bytes_atomically
+from manitwin.twin import REJECTION_REASONS, Rejection, TwinRecord
+
+
+def assemble(
+    draft: Draft,
+    *,
+    kind: str,
+    stages: list[Stage],
+    costs: dict[str, StageCost],
+    config_sha256: str,
+    rejected: Rejected | None,
+    rejecting_stage: str | None,
+    fresh: Path,
+    place: Path,
+) -> TwinRecord:
+    """Write the twin's folder at ``fresh`` and rename it to ``place``; returns its record.
+
+    ``stages`` are those that ran, the rejecting one included. Where ``rejected`` is given, only the source and the reason
+    are kept.
+    """
+    shutil.rmtree(fresh, ignore_errors=True)
+    fresh.mkdir(parents=True)
+    source = _write_source(draft, kind, fresh)
+    record: dict[str, Any] = {
+        "twin_id": draft.twin_id,
+        "name": draft.item.name,
+        "status": "rejected" if rejected else "accepted",
+        "rejection": _rejection(rejected, rejecting_stage).model_dump() if rejected else None,
+        "source": source,
+        "provenance": {
+            "manitwin_version": version("manitwin"),
+            "config_sha256": config_sha256,
+            "seed": draft.seed,
+            "stages": {s.name: {"version": s.version, "backend": s.backend, "model": s.model} for s in stages},
+        },
+        "quality": {"checks": draft.fields.get("gate", {}).get("checks", [])},
+    }
+    if rejected is None:
+        _write_accepted(draft, fresh)
+        record |= _accepted_sections(draft)
+    run = {
+        "stages": {name: vars(cost) for name, cost in costs.items()},
+        "host": {"machine": platform.machine(), "system": platform.system(), "python": platform.python_version()},
+    }
+    write_bytes_atomically(fresh / RUN, canonical_json(run).encode())
+    sealed = seal(fresh, record)
+    replace_folder(fresh, place)
+    return sealed
+
+
+def _write_source(draft: Draft, kind: str, folder: Path) -> dict[str, Any]:
+    item = draft.item
+    if item.file is None:
+        name, content = "prompt.txt", (item.text or "").encode()
+    else:
+        name, content = pack_source(Path(item.file))
+    (folder / name).write_bytes(content)
+    return {
+        "kind": kind,
+        "file": name,
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "prompt": item.text,
+        "license": item.license or "unknown",
+        "attribution": item.attribution,
+    }
+
+
+def _rejection(rejected: Rejected, stage: str | None) -> Rejection:
+    named = rejected.stage or stage or ""
+    if rejected.reason not in REJECTION_REASONS.get(named, frozenset()):
+        named = next((s for s, reasons in REJECTION_REASONS.items() if rejected.reason in reasons), named)
+    return Rejection(stage=named, reason=rejected.reason, detail=rejected.detail)
+
+
+def _write_accepted(draft: Draft, folder: Path) -> None:
+    for name in ("visual.glb", "grasps.parquet", "card.png"):
+        shutil.copyfile(draft.path(name), folder / name)
+    (folder / "views").mkdir()
+    for artifact in ("views/", "marked/"):
+        for picture in sorted(draft.path(artifact).iterdir()):
+            shutil.copyfile(picture, folder / "views" / picture.name)
+    (folder / "collision").mkdir()
+    with np.load(draft.path("hulls.npz")) as hulls:
+        for index, name in enumerate(sorted(hulls.files)):
+            (folder / "collision" / f"hull_{index:02d}.obj").write_bytes(hull_to_obj(hulls[name]))
+
+
+def _accepted_sections(draft: Draft) -> dict[str, Any]:
+    geometry, collision, points = draft.field("geometry"), draft.field("collision"), draft.field("points")
+    mesh = {key: geometry[key] for key in ("vertices", "faces", "watertight", "components", "euler_number", "repairs")}
+    with np.load(draft.path("solid.npz")) as solid:
+        triangles = solid["vertices"][solid["faces"]]
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    mesh["volume_m3"] = float(np.einsum("ij,ij->", triangles[:, 0], cross) / 6)
+    mesh["area_m2"] = float(np.linalg.norm(cross, axis=1).sum() / 2)
+    mesh["hulls"] = {key: value for key, value in collision.items() if key not in ("method", "notes")}
+    return {
+        "mesh": mesh,
+        "physical": draft.field("physical"),
+        "language": draft.field("language"),
+        "points": {"candidates": draft.field("candidates"), **points},
+        "grasps": draft.field("grasps"),
+        "placements": draft.field("placements"),
+        "quality": draft.field("quality"),
+    }

@@ -1,0 +1,129 @@
+"""What to build: files, folders and CSV or JSONL manifests, as a list of items."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Literal, cast, get_args
+
+from manitwin.errors import UsageError, choose_from
+from manitwin.files.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
+from manitwin.stages.stage import Item
+
+MANIFEST_SUFFIXES = frozenset({".csv", ".jsonl"})
+COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution")
+
+Units = Literal["m", "cm", "mm", "auto"]
+Up = Literal["y", "z", "auto"]
+
+
+def collect_items(
+    inputs: Iterable[str | Path],
+    *,
+    name: str | None = None,
+    units: str = "auto",
+    up: str = "auto",
+    license: str | None = None,
+    attribution: str | None = None,
+) -> tuple[list[Item], list[str]]:
+    """Turn what a user typed into items, in order, without repeats.
+
+    The keyword arguments hold for every item whose manifest row does not say otherwise. Returns the items and remarks for
+    the user. Raises UsageError for a path that is not there, a manifest that cannot be read, or an unknown value.
+    """
+    defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
+    items: dict[Item, None] = {}
+    remarks: list[str] = []
+    for given in inputs:
+        path = Path(given)
+        if not path.exists():
+            raise UsageError(f"{given}: not there; give an image, a mesh, a folder, or a .csv or .jsonl manifest")
+        if path.is_dir():
+            found = [_item({"file": str(p)}, Path.cwd(), defaults, str(path)) for p in files_in_folder(path)]
+            if not found:
+                raise UsageError(f"{given}: no image or mesh in this folder; known: {', '.join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))}")
+        elif path.suffix.lower() in MANIFEST_SUFFIXES:
+            found = list(_manifest_items(path, defaults, remarks))
+        else:
+            found = [_item({"file": str(path)}, Path.cwd(), defaults, str(path))]
+        items.update(dict.fromkeys(found))
+    return list(items), remarks
+
+
+def files_in_folder(folder: Path) -> list[Path]:
+    """Return the inputs below a folder, sorted; beside a mesh, images are its textures and no inputs of their own."""
+    chosen: list[Path] = []
+    by_parent: dict[Path, list[Path]] = {}
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts):
+            by_parent.setdefault(path.parent, []).append(path)
+    for siblings in by_parent.values():
+        meshes = [p for p in siblings if p.suffix.lower() in MESH_SUFFIXES]
+        chosen += meshes or [p for p in siblings if p.suffix.lower() in IMAGE_SUFFIXES]
+    return sorted(chosen)
+
+
+def _manifest_items(path: Path, defaults: dict[str, Any], remarks: list[str]) -> Iterator[Item]:
+    rows = list(_rows(path))
+    if not rows:
+        raise UsageError(f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}")
+    ignored = sorted({str(key) for _, row in rows for key in row} - set(COLUMNS))
+    for column in ignored:
+        near = get_close_matches(column.lower(), COLUMNS, n=1, cutoff=0.75)
+        if near:
+            raise UsageError(f"{path}: unknown column {column!r}; did you mean {near[0]!r}? Valid: {', '.join(COLUMNS)}")
+    if ignored:
+        remarks.append(f"{path}: columns not used: {', '.join(ignored)}")
+    for line, row in rows:
+        yield _item(row, path.parent, defaults, f"{path}:{line}")
+
+
+def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path}: not UTF-8 text ({error.reason} at byte {error.start}); save the manifest as UTF-8") from error
+    if path.suffix.lower() == ".csv":
+        reader = csv.DictReader(text.splitlines())
+        for row in reader:
+            if None in row:
+                raise UsageError(f"{path}:{reader.line_num}: more values than columns; quote values that hold a comma")
+            yield reader.line_num, row
+        return
+    for number, line in enumerate(text.splitlines(), 1):
+        if not line.strip():
+            continue
+        try:
+            row = json.loads(line)
+        except json.JSONDecodeError as error:
+            raise UsageError(f"{path}:{number}: not JSON ({error.msg}); each line is one object") from error
+        if not isinstance(row, dict):
+            raise UsageError(f"{path}:{number}: a line is one JSON object with 'file' or 'text', not {type(row).__name__}")
+        yield number, row
+
+
+def _item(row: dict[str, Any], folder: Path, defaults: dict[str, Any], where: str) -> Item:
+    values = {**defaults, **{key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")}}
+    file, text = values.get("file"), values.get("text")
+    if (file is None) == (text is None):
+        raise UsageError(f"{where}: a row has either 'file' or 'text'")
+    if file is not None:
+        path = Path(file) if Path(file).is_absolute() else folder / file
+        if not path.is_file():
+            raise UsageError(f"{where}: {path} is not there; paths are absolute or relative to the manifest")
+        file = str(path.resolve())
+    for key, kind in (("units", Units), ("up", Up)):
+        if values[key] not in get_args(kind):
+            raise UsageError(f"{where}: {choose_from(key, str(values[key]), get_args(kind))}")
+    return Item(
+        file=file,
+        text=text,
+        name=values["name"] or None,
+        units=cast(Units, values["units"]),
+        up=cast(Up, values["up"]),
+        license=values["license"],
+        attribution=values["attribution"],
+    )

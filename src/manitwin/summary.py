@@ -1,0 +1,71 @@
+"""A twin as a page of text."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from manitwin.loaded_twin import Twin
+from manitwin.twin import Estimate, GraspSummary, TwinRecord
+
+
+def estimate_text(estimate: Estimate, unit: str = "") -> str:
+    """Write an Estimate as a person reads it: value, interval, source."""
+    return f"{estimate.value:.3g}{unit} ({estimate.low:.3g} to {estimate.high:.3g}, {estimate.source})"
+
+
+def print_summary(twin: Twin, console: Console) -> None:
+    """Print what a twin is, weighs, is for and how it may be held."""
+    record = twin.record
+    head = record.language.caption if record.language else record.name or "unnamed"
+    console.print(f"{record.twin_id}  {record.status}  {head}", style="bold", markup=False)
+    if record.rejection is not None:
+        console.print(f"{record.rejection.stage}: {record.rejection.reason}: {record.rejection.detail}", markup=False)
+    table = Table(show_header=False, box=None, pad_edge=False)
+    for name, value in _rows(record):
+        table.add_row(name, value)
+    console.print(table)
+    failed = [check for check in record.quality.checks if check.passed is not True]
+    for check in failed:
+        verdict = "not judged" if check.passed is None else "finding"
+        console.print(f"{verdict}: {check.name}: {check.message}", markup=False)
+
+
+def _rows(record: TwinRecord) -> list[tuple[str, str]]:
+    rows = [("source", f"{record.source.kind} {record.source.file}, licence {record.source.license}")]
+    if record.physical is not None:
+        physical = record.physical
+        centimetres = " x ".join(f"{100 * side:.1f}" for side in physical.extents_m)
+        center = ", ".join(f"{1000 * x:.0f}" for x in physical.center_of_mass_m)
+        moments = ", ".join(f"{m:.2e}" for m in np.linalg.eigvalsh(np.array(physical.inertia_kg_m2)))
+        rows += [
+            ("size", f"{centimetres} cm (scaled by {physical.scale_applied:.4g})"),
+            ("mass", estimate_text(physical.mass_kg, " kg")),
+            ("friction", estimate_text(physical.friction_static)),
+            ("material", physical.material),
+            ("centre of mass", f"({center}) mm, {physical.mass_distribution}"),
+            ("moments", f"{moments} kg m2"),
+        ]
+    if record.mesh is not None:
+        hulls = record.mesh.hulls
+        rows.append(("mesh", f"{record.mesh.faces} faces, {hulls.count} hulls, error p95 {1000 * hulls.surface_error_p95_m:.1f} mm"))
+        rows += [("repair", repair) for repair in record.mesh.repairs]
+    if record.points is not None:
+        rows += [(f"point {p.id}", f"{p.label}: {p.description}") for p in record.points.functional]
+        rows += [(f"point {p.id}", f"{p.type}: {p.scenario}") for p in record.points.grasp]
+    if record.grasps is not None:
+        rows += _grasp_rows(record.grasps)
+    for placement in record.placements or []:
+        way = "upright" if placement.upright else "lying"
+        rows.append(("rests", f"{way}, probability {placement.probability:.2f}, radius {100 * placement.collision_radius_m:.1f} cm"))
+    return rows
+
+
+def _grasp_rows(grasps: GraspSummary) -> list[tuple[str, str]]:
+    failures = ", ".join(f"{number} {outcome}" for outcome, number in sorted(grasps.failures.items())) or "none"
+    unfiltered = "not tried" if grasps.unfiltered_success_rate is None else f"{100 * grasps.unfiltered_success_rate:.0f} %"
+    return [
+        ("grasps", f"{grasps.verified} of {grasps.simulated} verified with {grasps.gripper} (unfiltered {unfiltered})"),
+        ("failures", failures),
+    ]
