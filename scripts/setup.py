@@ -17,7 +17,13 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 STAMP = VENV / "manitwin-setup.sha256"
-SHARED_LIBRARIES = {"libGL.so.1": "libgl1", "libgthread-2.0.so.0": "libglib2.0-0", "libX11.so.6": "libx11-6", "libxcb.so.1": "libxcb1"}
+SHARED_LIBRARIES = {
+    "libGL.so.1": "libgl1",
+    "libgthread-2.0.so.0": "libglib2.0-0",
+    "libX11.so.6": "libx11-6",
+    "libxcb.so.1": "libxcb1",
+    "libvulkan.so.1": "libvulkan1",
+}
 BACKPORTS = Path("/etc/apt/sources.list.d/manitwin-backports.sources")
 
 
@@ -92,8 +98,9 @@ def install_packages() -> None:
         return
     pip = [str(VENV / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     say("installing the locked packages (a few minutes, once)")
-    subprocess.run([*pip, "--require-hashes", "-r", str(ROOT / "requirements.lock")], check=True)
-    subprocess.run([*pip, "--no-deps", "--no-build-isolation", "-e", str(ROOT)], check=True)
+    for what in (["--require-hashes", "-r", str(ROOT / "requirements.lock")], ["--no-deps", "--no-build-isolation", "-e", str(ROOT)]):
+        if subprocess.run([*pip, *what]).returncode != 0:
+            stop("pip could not install the packages, for the reason above; mend it, then run the same command again")
     STAMP.write_text(digest)
 
 
