@@ -38,6 +38,7 @@ from manitwin.stages.views import ViewsStage
 from manitwin.store import RECORD, WORK, read_record, sha256_of_json
 from manitwin.twin import TwinRecord
 
+REPORT = "error.txt"
 Kind = Literal["image", "text", "mesh"]
 Status = Literal["accepted", "rejected", "unfinished"]
 
@@ -56,17 +57,11 @@ class ItemResult:
 
 def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
     """Return the stages of the paper's pipeline for a kind of input, in order."""
-    generator = create("generator", config.generator)
     annotator = create("annotator", config.annotator)
-    grasper = create("grasper", config.grasper)
-    simulator = create("simulator", config.simulator)
     gripper = load_gripper(config.gripper)
-    generation: list[Stage] = [GenerateStage(config.generate, generator)]
-    if kind == "image":
-        generation.insert(0, PhotoStage(config.matting))
     return [
-        *(generation if kind != "mesh" else []),
-        MeshStage(config.mesh, config.repair),
+        *_generation(kind, config),
+        MeshStage(config.mesh),
         ViewsStage(config.views),
         GateStage(config.gate, annotator),
         PhysicalStage(config.physical, annotator),
@@ -74,11 +69,18 @@ def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
         CaptionStage(config.caption, annotator),
         CandidatesStage(config.candidates),
         PointsStage(config.points, annotator, gripper),
-        GraspsStage(config.grasps, grasper, gripper),
-        VerifyStage(config.verify, simulator, gripper),
+        GraspsStage(config.grasps, create("grasper", config.grasper), gripper),
+        VerifyStage(config.verify, create("simulator", config.simulator), gripper),
         PlacementStage(config.placement),
         FinishStage(config.finish, gripper),
     ]
+
+
+def _generation(kind: Kind, config: BuildConfig) -> list[Stage]:
+    if kind == "mesh":
+        return []
+    photo: list[Stage] = [PhotoStage(config.matting)] if kind == "image" else []
+    return [*photo, GenerateStage(config.generate, create("generator", config.generator))]
 
 
 def config_sha256(config: BuildConfig) -> str:
@@ -119,7 +121,7 @@ def build_item(item: Item, out: Path, config: BuildConfig, on_stage: Callable[[s
     except ManiTwinError as error:
         return ItemResult(item, identity, "unfinished", f"{type(error).__name__}: {error}", None)
     except Exception as error:
-        report = work / "error.txt"
+        report = work / REPORT
         report.write_text(traceback.format_exc())
         detail = f"a defect in manitwin: {type(error).__name__}: {error}; the traceback is in {report}"
         return ItemResult(item, identity, "unfinished", " ".join(detail.split()), None)
@@ -136,6 +138,7 @@ def _only_one(work: Path) -> Iterator[None]:
             raise BlockingIOError(f"another run is building {work.name} now; wait for it, then run again") from error
         for stale in work.glob("*/.*"):  # a stage that was cut off in the middle
             shutil.rmtree(stale, ignore_errors=True)
+        (work / REPORT).unlink(missing_ok=True)
         yield
 
 

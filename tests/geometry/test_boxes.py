@@ -1,0 +1,61 @@
+import numpy as np
+import pytest
+import trimesh
+
+from manitwin.geometry.boxes import oriented_bounding_box, smallest_enclosing_circle
+from manitwin.geometry.poses import inverse, transform_points
+
+
+def test_box_of_a_turned_box_is_the_box() -> None:
+    for seed in range(5):
+        turn = trimesh.transformations.random_rotation_matrix(rand=np.random.default_rng(seed).random(3))
+        turn[:3, 3] = [0.1, -0.3, 0.2]
+        points = transform_points(turn, trimesh.creation.box((0.05, 0.11, 0.23)).vertices)
+        extents_m, obb_to_object = oriented_bounding_box(points)
+        assert np.sort(extents_m) == pytest.approx([0.05, 0.11, 0.23])
+        assert obb_to_object[:3, 3] == pytest.approx([0.1, -0.3, 0.2])
+        assert np.linalg.det(obb_to_object[:3, :3]) == pytest.approx(1.0)
+        local = transform_points(inverse(obb_to_object), points)
+        assert np.abs(local).max(0) == pytest.approx(extents_m / 2)
+
+
+def test_box_keeps_the_names_of_the_axes_it_is_aligned_with() -> None:
+    extents_m, obb_to_object = oriented_bounding_box(trimesh.creation.box((0.3, 0.1, 0.2)).vertices)
+    assert extents_m == pytest.approx([0.3, 0.1, 0.2])
+    assert obb_to_object == pytest.approx(np.eye(4), abs=1e-9)
+
+
+def test_box_is_never_larger_than_the_axis_aligned_one() -> None:
+    points = np.random.default_rng(3).normal(size=(200, 3)) * [1, 2, 3]
+    assert np.prod(oriented_bounding_box(points)[0]) <= np.prod(np.ptp(points, axis=0)) + 1e-12
+
+
+def test_circle_of_a_rectangle_has_half_its_diagonal() -> None:
+    center, radius = smallest_enclosing_circle(np.array([[0, 0], [0.3, 0], [0.3, 0.4], [0, 0.4], [0.1, 0.1]]))
+    assert center == pytest.approx([0.15, 0.2])
+    assert radius == pytest.approx(0.25)
+
+
+def test_circle_of_an_acute_triangle_is_its_circumcircle_and_of_an_obtuse_one_its_longest_side() -> None:
+    corners = np.array([[0, 0], [1, 0], [0.5, np.sqrt(3) / 2]])
+    assert smallest_enclosing_circle(corners)[1] == pytest.approx(1 / np.sqrt(3))
+    assert smallest_enclosing_circle(np.array([[0, 0], [1, 0], [0.4, 0.1]]))[1] == pytest.approx(0.5)
+
+
+def test_circle_is_the_minimum_found_by_search() -> None:
+    from scipy.optimize import minimize
+
+    points = np.random.default_rng(4).normal(size=(60, 2))
+    _, radius = smallest_enclosing_circle(points)
+
+    def largest(center: np.ndarray) -> float:
+        return float(np.linalg.norm(points - center, axis=1).max())
+
+    searched = minimize(largest, points.mean(0), method="Nelder-Mead", options={"xatol": 1e-9, "fatol": 1e-12})
+    assert radius == pytest.approx(searched.fun, abs=1e-6)
+
+
+def test_circle_of_points_on_a_line_and_of_one_point() -> None:
+    center, radius = smallest_enclosing_circle(np.array([[0, 0], [1, 1], [3, 3.0]]))
+    assert center == pytest.approx([1.5, 1.5]) and radius == pytest.approx(1.5 * np.sqrt(2))
+    assert smallest_enclosing_circle(np.array([[2.0, 5.0]]))[1] == 0
