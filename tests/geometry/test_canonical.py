@@ -119,13 +119,18 @@ def test_y_up_maps_to_z_up_without_spinning() -> None:
         (2.0, {"file_unit_m": 1.0}, 1.0, False, "unknown"),  # -1..1, as generators write it
         (0.7, {"file_unit_m": 1.0, "expected_m": (0.08, 0.13)}, 1.0, True, "declared"),
         (0.7, {"expected_m": (0.08, 0.13)}, 1.0, False, "unknown"),
-        (1e6, {}, 1.0, False, "unknown"),
     ],
 )
 def test_units(longest: float, given: dict, factor: float, metric: bool, source: str) -> None:
     unit = decide_unit(longest, **given)
     assert (unit.factor, unit.metric, unit.source) == (factor, metric, source)
     assert (unit.finding is None) == (source in ("user", "declared", "assumed"))
+
+
+def test_size_that_no_unit_makes_plausible_is_kept_for_the_gate_to_refuse() -> None:
+    unit = decide_unit(1e6)
+    assert (unit.factor, unit.metric) == (1.0, True)
+    assert unit.finding is not None and "no usual unit" in unit.finding
 
 
 def test_finding_names_the_unit_that_was_taken() -> None:
