@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from handmade import hammer, screwdriver
 
+from handmade import hammer, screwdriver
 from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.elongation import HeadEnd, LongAxis, long_axis
 from manitwin.geometry.sampling import sample_surface

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from handmade import cup
 
+from handmade import cup
 from manitwin.geometry.local_thickness import local_thickness
 
 

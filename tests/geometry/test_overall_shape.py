@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from handmade import cylinder, hammer
 
+from handmade import cylinder, hammer
 from manitwin.geometry.overall_shape import overall_shape
 
 TILTED = trimesh.transformations.rotation_matrix(0.6, [1, 0.4, 0.2])

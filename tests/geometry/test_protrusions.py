@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from handmade import cup, cylinder, mug
 
+from handmade import cup, cylinder, mug
 from manitwin.geometry.protrusions import round_body
 from manitwin.geometry.sampling import sample_surface
 
@@ -14,7 +14,7 @@ from manitwin.geometry.sampling import sample_surface
 def samples(mesh: trimesh.Trimesh, turn_deg: float = 0.0, shift_m: tuple[float, float] = (0.0, 0.0)) -> np.ndarray:
     points, _, _ = sample_surface(mesh, 6000, np.random.default_rng(0))
     turn = trimesh.transformations.rotation_matrix(np.radians(turn_deg), [0, 0, 1])
-    return trimesh.transform_points(points, turn) + [*shift_m, 0.0]
+    return trimesh.transform_points(points, turn) + np.array([*shift_m, 0.0])
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 90.0, 179.0, -120.0])

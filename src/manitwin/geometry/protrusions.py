@@ -1,0 +1,142 @@
+"""What sticks out sideways from an upright round body: handles and spouts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_HEIGHTS = 24
+_DIRECTIONS = 36
+_OUT_BY = 1.12  # times the body's radius at that height
+_OUT_BY_SHARE = 0.03  # plus this share of the body's largest radius, so that relief and seams do not count
+_BODY_DIRECTIONS = 0.6  # a slice with fewer directions occupied is not a slice of the body
+_WIDEST_PROTRUSION = 0.4  # of all directions: what is wider than that is the body's own shape
+
+
+@dataclass(frozen=True)
+class Protrusion:
+    """A part that sticks out of the body in one direction.
+
+    ``azimuth_rad`` is where, about the vertical through ``axis_xy_m``; ``reach_m`` how far out it goes beyond the body;
+    ``share`` its share of the surface samples.
+    """
+
+    azimuth_rad: float
+    half_width_rad: float
+    reach_m: float
+    share: float
+
+
+@dataclass(frozen=True)
+class RoundBody:
+    """A body about a vertical axis and what sticks out of it, the largest first.
+
+    ``heights_m (24,)`` and ``radius_m (24,)`` are the body's outline.
+    """
+
+    axis_xy_m: np.ndarray
+    heights_m: np.ndarray
+    radius_m: np.ndarray
+    protrusions: tuple[Protrusion, ...]
+
+    def radius_at(self, points_m: np.ndarray) -> np.ndarray:
+        """Return the body's radius (m) at the heights of points ``(N, 3)``."""
+        return np.interp(points_m[:, 2], self.heights_m, self.radius_m)
+
+    def outside_m(self, points_m: np.ndarray) -> np.ndarray:
+        """Return how far (m) points ``(N, 3)`` are outside the body's outline; negative inside."""
+        return np.hypot(*(points_m[:, :2] - self.axis_xy_m).T) - self._limit(points_m)
+
+    def azimuth(self, points_m: np.ndarray) -> np.ndarray:
+        """Return the direction (rad) of points ``(N, 3)`` about the axis."""
+        offset = points_m[:, :2] - self.axis_xy_m
+        return np.arctan2(offset[:, 1], offset[:, 0])
+
+    def belongs(self, points_m: np.ndarray, protrusion: Protrusion) -> np.ndarray:
+        """Tell which points ``(N, 3)`` are part of a protrusion."""
+        turn = np.abs((self.azimuth(points_m) - protrusion.azimuth_rad + np.pi) % (2 * np.pi) - np.pi)
+        return (self.outside_m(points_m) > 0) & (turn <= protrusion.half_width_rad)
+
+    def _limit(self, points_m: np.ndarray) -> np.ndarray:
+        return _OUT_BY * self.radius_at(points_m) + _OUT_BY_SHARE * self.radius_m.max()
+
+
+def round_body(surface_m: np.ndarray, axis_xy_m: np.ndarray | None = None) -> RoundBody:
+    """Measure the outline of a body about the vertical on surface samples ``(N, 3)``, and what sticks out of it.
+
+    At each height the radius is the median, over directions, of the outermost sample: a handle takes few directions.
+    The axis is fitted where it is not given (Kasa's circle fit, trimmed).
+    """
+    axis_xy_m = _fitted_axis(surface_m[:, :2]) if axis_xy_m is None else np.asarray(axis_xy_m, dtype=float)
+    offset = surface_m[:, :2] - axis_xy_m
+    radius = np.hypot(offset[:, 0], offset[:, 1])
+    direction = ((np.arctan2(offset[:, 1], offset[:, 0]) + np.pi) / (2 * np.pi) * _DIRECTIONS).astype(int) % _DIRECTIONS
+    low, high = surface_m[:, 2].min(), surface_m[:, 2].max()
+    level = np.clip(((surface_m[:, 2] - low) / max(high - low, 1e-9) * _HEIGHTS).astype(int), 0, _HEIGHTS - 1)
+    outermost = np.zeros((_HEIGHTS, _DIRECTIONS))
+    np.maximum.at(outermost, (level, direction), radius)
+    occupied = (outermost > 0).sum(1) >= _BODY_DIRECTIONS * _DIRECTIONS
+    heights = low + (np.arange(_HEIGHTS) + 0.5) * (high - low) / _HEIGHTS
+    if not occupied.any():
+        return RoundBody(axis_xy_m, heights, np.full(_HEIGHTS, float(np.median(radius))), ())
+    outline = np.array([np.median(row[row > 0]) if row.any() else np.nan for row in outermost])
+    outline = np.interp(heights, heights[occupied], outline[occupied])
+    body = RoundBody(axis_xy_m, heights, outline, ())
+    return RoundBody(axis_xy_m, heights, outline, _protrusions(body, surface_m))
+
+
+def _fitted_axis(points_xy_m: np.ndarray) -> np.ndarray:
+    kept = points_xy_m
+    center = kept.mean(0)
+    for _ in range(8):
+        system = np.column_stack([kept, np.ones(len(kept))])
+        solution, *_ = np.linalg.lstsq(system, (kept**2).sum(1), rcond=None)
+        center = solution[:2] / 2
+        distance = np.linalg.norm(points_xy_m - center, axis=1)
+        typical = float(np.median(distance))
+        kept = points_xy_m[distance < 1.3 * typical + 1e-9]
+    return center
+
+
+def _protrusions(body: RoundBody, surface_m: np.ndarray) -> tuple[Protrusion, ...]:
+    outside = body.outside_m(surface_m)
+    out = outside > 0
+    if not out.any():
+        return ()
+    azimuth = body.azimuth(surface_m[out])
+    sector = ((azimuth + np.pi) / (2 * np.pi) * _DIRECTIONS).astype(int) % _DIRECTIONS
+    counts = np.bincount(sector, minlength=_DIRECTIONS)
+    found = []
+    for run in _circular_runs(counts > 0):
+        if len(run) > _WIDEST_PROTRUSION * _DIRECTIONS:
+            continue
+        members = np.isin(sector, run % _DIRECTIONS)
+        reach = float(outside[out][members].max())
+        middle = run[0] + (len(run) - 1) / 2
+        found.append(
+            Protrusion(
+                azimuth_rad=float((middle + 0.5) / _DIRECTIONS * 2 * np.pi - np.pi),
+                half_width_rad=(len(run) / 2 + 0.5) / _DIRECTIONS * 2 * np.pi,
+                reach_m=reach,
+                share=float(counts[run % _DIRECTIONS].sum() / len(surface_m)),
+            )
+        )
+    return tuple(sorted(found, key=lambda p: -p.reach_m * p.share))
+
+
+def _circular_runs(flags: np.ndarray) -> list[np.ndarray]:
+    """Return the runs of true flags around a circle, as rising indices that may pass the end."""
+    count = len(flags)
+    if flags.all():
+        return [np.arange(count)]
+    start = int(np.flatnonzero(~flags)[0])
+    runs: list[list[int]] = []
+    for step in range(count):
+        index = start + step
+        if flags[index % count]:
+            if flags[(index - 1) % count] and runs:
+                runs[-1].append(index)
+            else:
+                runs.append([index])
+    return [np.array(run) for run in runs]

@@ -1,0 +1,235 @@
+"""What is usually true of things people handle: a table of priors, keyed by what a person calls the thing.
+
+The table is ``manitwin/data/priors/*.toml``: ``materials.toml`` (friction, restitution), ``forms.toml`` (shape, parts
+and how they are used, shared by many categories) and one file a domain with the categories. docs/priors.md says how it
+was made.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator
+from functools import cache
+from importlib import resources
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from manitwin.errors import ManiTwinError, choose_from
+from manitwin.geometry.elongation import HeadEnd
+from manitwin.geometry.features import Feature
+from manitwin.twin import Estimate, Finite, GraspType, Record
+
+VOCABULARY_FILES = ("materials", "forms")
+"""The files of the folder that are not a domain."""
+
+Distribution = Literal["full", "solid", "shell"]
+"""Full of its contents or of one matter; solid: the mesh is the matter itself; shell: hollow behind a closed skin."""
+
+
+class Interval(Record):
+    """A usual value and the interval that nearly all (about 19 of 20) such things are in."""
+
+    low: Finite
+    typical: Finite
+    high: Finite
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Interval:
+        if not 0 <= self.low <= self.typical <= self.high:
+            raise ValueError(f"not in order: {self.low}, {self.typical}, {self.high}")
+        return self
+
+    def estimate(self, source: str) -> Estimate:
+        """Return the typical value with the interval around it, said by ``source``."""
+        return Estimate(value=self.typical, low=self.low, high=self.high, source=source)
+
+
+def _interval_from_list(value: Any) -> Any:
+    if isinstance(value, list) and len(value) == 3:
+        return dict(zip(("low", "typical", "high"), value, strict=True))
+    return value
+
+
+LowTypicalHigh = Annotated[Interval, BeforeValidator(_interval_from_list)]
+
+
+class FunctionalPart(Record):
+    """A part with a use: ``feature`` says where it is, as geometry."""
+
+    label: str
+    description: str
+    feature: Feature
+
+
+class GraspPart(Record):
+    """A place to hold such a thing, how, and for what."""
+
+    type: GraspType
+    scenario: str
+    feature: Feature
+
+
+class Material(Record):
+    """Contact properties of a surface material; ``source`` says where they are from."""
+
+    friction_static: LowTypicalHigh
+    friction_dynamic: LowTypicalHigh
+    restitution: LowTypicalHigh
+    density_kg_m3: LowTypicalHigh
+    source: str
+
+
+class Form(Record):
+    """What a family of categories shares: shape, how it rests, and its parts."""
+
+    shape: str
+    stands: bool | None = None
+    container: bool
+    mass_distribution: Distribution
+    wall_thickness_m: float | None = None
+    head_end: HeadEnd = "wide"
+    functional: tuple[FunctionalPart, ...] = Field(min_length=2, max_length=4)
+    grasp: tuple[GraspPart, ...] = Field(min_length=2, max_length=3)
+
+
+class Prior(Form):
+    """What is usually true of one category of things.
+
+    ``longest_axis_m`` is that of the oriented box. ``bulk_density_kg_m3`` is mass per volume of a repaired scan, not of
+    the matter; None where a scan's volume says nothing of the mass. ``stands``: whether it is put down upright (None:
+    either). ``counter`` is what such things are counted by ('pair of'). ``measured`` names the published measurements;
+    ``sources`` says where the rest is from.
+    """
+
+    category: str
+    domain: str
+    aliases: tuple[str, ...]
+    longest_axis_m: LowTypicalHigh
+    mass_kg: LowTypicalHigh
+    bulk_density_kg_m3: LowTypicalHigh | None
+    material: str
+    surface: str
+    friction_static: LowTypicalHigh
+    friction_dynamic: LowTypicalHigh
+    restitution: LowTypicalHigh
+    function: str
+    counter: str | None = None
+    sources: tuple[str, ...] = Field(min_length=1)
+    measured: tuple[str, ...]
+
+    @property
+    def source(self) -> str:
+        """Who says so, as an Estimate's source."""
+        return f"prior:{self.category}"
+
+
+def _read(name: str) -> dict[str, Any]:
+    path = resources.files("manitwin") / "data" / "priors" / f"{name}.toml"
+    return tomllib.loads(path.read_text(encoding="utf-8"))
+
+
+def _domains() -> list[str]:
+    folder = resources.files("manitwin") / "data" / "priors"
+    names = (entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return sorted(name for name in names if name not in VOCABULARY_FILES)
+
+
+@cache
+def load_materials() -> dict[str, Material]:
+    """Return the contact materials by name."""
+    return {name: Material.model_validate(row) for name, row in _read("materials").items()}
+
+
+def _worded(parts: list[dict[str, Any]], category: str) -> list[dict[str, Any]]:
+    """Put the category's name where a form's wording leaves room for it."""
+    return [{key: value.replace("{object}", category) for key, value in part.items()} for part in parts]
+
+
+def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, Any], forms: dict[str, Any]) -> Prior:
+    materials = load_materials()
+    row = {**defaults, **row}
+    form_name, surface = row.pop("form"), row.pop("surface")
+    if form_name not in forms:
+        raise ManiTwinError(f"{domain}.toml [{category}]: {choose_from('form', form_name, forms)}")
+    if surface not in materials:
+        raise ManiTwinError(f"{domain}.toml [{category}]: {choose_from('surface material', surface, materials)}")
+    contact = materials[surface]
+    merged = {
+        "aliases": [], "measured": [], "bulk_density_kg_m3": None, "material": surface,
+        "friction_static": contact.friction_static, "friction_dynamic": contact.friction_dynamic,
+        "restitution": contact.restitution, **forms[form_name], **row,
+    }  # fmt: skip
+    for key in ("functional", "grasp"):
+        merged[key] = _worded(merged[key], category)
+    return Prior.model_validate({**merged, "category": category, "domain": domain, "surface": surface})
+
+
+@cache
+def load_priors() -> dict[str, Prior]:
+    """Return all priors by category; raises ManiTwinError or ValidationError where the table contradicts itself."""
+    forms = _read("forms")
+    priors: dict[str, Prior] = {}
+    for domain in _domains():
+        table = _read(domain)
+        defaults = table.pop("defaults", {})
+        for category, row in table.items():
+            if category in priors:
+                raise ManiTwinError(f"{domain}.toml [{category}]: is already in {priors[category].domain}.toml")
+            priors[category] = _prior(category, row, domain, defaults, forms)
+    return priors
+
+
+@cache
+def unknown_prior() -> Prior:
+    """Return the prior of a thing nobody has named: wide intervals, source ``prior:unknown``."""
+    return load_priors()["unknown"]
+
+
+def normalised(name: str) -> str:
+    """Return a name in lower case without punctuation, articles and what follows a comma or bracket."""
+    head = re.split(r"[,(\[;:]", name.lower(), maxsplit=1)[0]
+    words = re.sub(r"[^a-z0-9&+']+", " ", head.replace("’", "'").replace("'s ", " ").replace("'", "")).split()
+    return " ".join(words[1:] if words[:1] in (["a"], ["an"], ["the"]) and len(words) > 1 else words)
+
+
+def _singulars(phrase: str) -> Iterator[str]:
+    """Yield the phrase, and what its last word may be the plural of."""
+    yield phrase
+    for plural, singular in (("ives", "ife"), ("aves", "af"), ("ies", "y"), ("oes", "o"), ("es", ""), ("s", "")):
+        if phrase.endswith(plural) and len(phrase) > len(plural) + 1:
+            yield phrase.removesuffix(plural) + singular
+
+
+@cache
+def _index() -> dict[str, Prior]:
+    index: dict[str, Prior] = {}
+    for prior in load_priors().values():
+        for name in (prior.category, *prior.aliases):
+            key = normalised(name)
+            if key in index:
+                raise ManiTwinError(f"priors: {name!r} names both {index[key].category!r} and {prior.category!r}")
+            index[key] = prior
+    return index
+
+
+def lookup(name: str | None) -> Prior | None:
+    """Find the prior of what a person calls a thing; None where the table has no such thing.
+
+    Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'for', 'in' or 'from'; the whole
+    again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
+    which are mugs). The last word decides what a thing is: a mug rack is no mug. File names are never looked up: they
+    are not evidence.
+    """
+    if not name or not (phrase := normalised(name)):
+        return None
+    head = re.split(r" (?:of|with|for|in|without|from) ", phrase, maxsplit=1)[0].split()
+    words = phrase.split()
+    tries = [words, *(head[i:] for i in range(len(head))), *(words[i:] for i in range(1, len(words)))]
+    index = _index()
+    for part in tries:
+        for candidate in _singulars(" ".join(part)):
+            if candidate in index and index[candidate].category != "unknown":
+                return index[candidate]
+    return None

@@ -1,0 +1,115 @@
+"""Put an object into words: colour and size as measured, the rest from its prior and its shape."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.geometry.cavity import find_opening
+from manitwin.geometry.overall_shape import overall_shape
+from manitwin.models.annotators.priors import Prior, normalised
+from manitwin.models.annotators.protocol import Subject
+from manitwin.models.annotators.surface_color import UNTEXTURED, ColorShare, measure_colors
+from manitwin.twin import Language
+
+UNKNOWN_FUNCTION = "unknown function (no name given that the priors know)"
+
+# Up to this longest side (m).
+_SIZE_WORDS = ((0.03, "tiny"), (0.10, "palm-sized"), (0.20, "hand-sized"), (0.35, "medium-sized"), (np.inf, "large"))
+
+_A_NOT_AN = ("uk", "uni", "usb", "use", "ute", "eu", "one", "once")  # spelt with a vowel, spoken with a consonant
+_AN_NOT_A = ("hour", "honest", "heir", "mp3", "x-ray")
+
+
+def article(phrase: str) -> str:
+    """Return 'a' or 'an', as the first sound of a phrase asks for."""
+    first = phrase.lower()
+    if first.startswith(_AN_NOT_A) or (first[:1] in "aeiou" and not first.startswith(_A_NOT_AN)):
+        return "an"
+    return "a"
+
+
+def joined(words: list[str]) -> str:
+    """Join words as in a sentence: 'red', 'red and blue', 'red, blue and white'."""
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def size_words(extents_m: np.ndarray) -> str:
+    """Return extents ``(3,)`` as '21 x 16 x 7 cm, medium-sized', the longest first."""
+    longest, second, shortest = sorted((100 * float(e) for e in extents_m), reverse=True)
+    digits = 0 if shortest >= 3 else 1
+    numbers = " x ".join(f"{value:.{digits}f}" for value in (longest, second, shortest))
+    return f"{numbers} cm, {next(word for limit, word in _SIZE_WORDS if longest / 100 < limit)}"
+
+
+def describe(subject: Subject, prior: Prior | None, material: str, extents_m: np.ndarray) -> Language:
+    """Describe an object; ``prior`` is None where nobody has said what it is, and then the words say so."""
+    rng = np.random.default_rng(subject.seed)
+    colors = measure_colors(subject.parts, rng)
+    shape = _shape(subject, prior, rng)
+    size = size_words(extents_m)
+    category = _category(subject, prior)
+    captions = write_captions(category, prior, material, _color_words(colors), shape, size)
+    return Language(
+        category=category,
+        color=_color(colors),
+        material=material,
+        size=size,
+        shape=shape,
+        function=prior.function if prior is not None else UNKNOWN_FUNCTION,
+        caption=captions[0],
+        captions=captions,
+    )
+
+
+def _category(subject: Subject, prior: Prior | None) -> str:
+    if prior is not None:
+        return prior.category
+    return normalised(subject.name) or "unknown" if subject.name else "unknown"
+
+
+def _color(colors: list[ColorShare]) -> str:
+    if not colors:
+        return UNTEXTURED
+    if len(colors) == 1:
+        return colors[0].name
+    return ", ".join(f"{color.name} ({100 * color.share:.0f} %)" for color in colors)
+
+
+def _color_words(colors: list[ColorShare]) -> str:
+    return joined([color.name for color in colors]) if colors else ""
+
+
+def _shape(subject: Subject, prior: Prior | None, rng: np.random.Generator) -> str:
+    measured = overall_shape(subject.solid, rng)
+    if prior is not None:
+        proportion = measured.proportion
+        said = prior.shape.lower()
+        return prior.shape if proportion == "compact" or proportion in said else f"{prior.shape}, {proportion}"
+    opening = find_opening(subject.solid)
+    return f"{measured.word} and hollow, open at one side" if opening is not None else measured.word
+
+
+def write_captions(
+    category: str, prior: Prior | None, material: str, color: str, shape: str, size: str
+) -> list[str]:
+    """Return captions of differing length and style, the full sentence first; ``color`` may be empty: unknown."""
+    noun = "object" if category == "unknown" else category
+    if prior is not None and prior.counter:
+        noun = f"{prior.counter} {noun}"
+    colored = f"{color} {noun}".strip()
+    size_word = size.split(", ")[1]
+    numbers = size.split(", ")[0]
+    edible = prior is not None and prior.surface == "food skin"
+    made_of = "" if edible or material.startswith("unknown") else f" made of {material}"
+    use = f", used for {prior.function}" if prior is not None else ""
+    captions = [
+        f"{article(colored).capitalize()} {colored}{made_of}, about {numbers} in size{use}.",
+        f"{article(colored)} {colored}",
+        f"{article(size_word).capitalize()} {size_word} {noun} ({shape}).",
+        f"Pick up the {colored}.",
+        f"This {noun}{' is' + made_of + ' and' if made_of else ''} measures {numbers}. Its shape: {shape}."
+        + (f" Its color: {color}." if color else ""),
+    ]
+    if prior is not None:
+        captions.append(f"Something for {prior.function}: {article(colored)} {colored}.")
+    return captions

@@ -1,0 +1,36 @@
+"""The caption stage: category, color, material, size, shape and function in words (paper, "Semantic Captioning")."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from manitwin.config import CaptionConfig
+from manitwin.models.annotators.protocol import Annotator
+from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.subject import read_subject
+
+
+class CaptionStage:
+    """Ask the annotator for words."""
+
+    name: ClassVar[str] = "caption"
+    version: ClassVar[str] = "1"
+    reads: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "views/")
+    writes: ClassVar[tuple[str, ...]] = ("language",)
+    needs: ClassVar[Resource] = "cpu"
+
+    def __init__(self, settings: CaptionConfig, annotator: Annotator):
+        self.settings = settings
+        self._annotator = annotator
+        self.backend = annotator.name
+        self.model = annotator.model
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Return ``language``."""
+        physical = draft.field("physical")
+        subject = read_subject(draft, solid="solid.npz", visual="visual.glb", metric=True)
+        language = self._annotator.describe(subject, physical["material"], np.array(physical["extents_m"]))
+        return {"language": language.model_dump()}

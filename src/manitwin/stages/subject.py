@@ -1,0 +1,27 @@
+"""The object as the annotator's questions see it, read from what earlier stages left."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from manitwin.files.glb import read_glb
+from manitwin.models.annotators.protocol import Subject
+from manitwin.stages.object_arrays import load_solid
+from manitwin.stages.stage import Draft
+
+
+def read_subject(draft: Draft, *, solid: str, visual: str, metric: bool) -> Subject:
+    """Read the subject of a draft; ``solid`` and ``visual`` name the artifacts that hold the meshes."""
+    return Subject(
+        name=draft.item.name,
+        solid=load_solid(draft.path(solid)),
+        parts=tuple(read_glb(draft.path(visual))),
+        metric=metric,
+        views=pictures(draft.path("views/"), "rgb"),
+        seed=draft.seed,
+    )
+
+
+def pictures(folder: Path, kind: str) -> tuple[Path, ...]:
+    """Return the eight pictures of a kind ('rgb', 'marked') in the order of their numbers."""
+    return tuple(sorted(folder.glob(f"{kind}_*.webp")))

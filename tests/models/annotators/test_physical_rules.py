@@ -1,0 +1,101 @@
+"""Mass and size by rule, against closed forms and objects that were weighed."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from handmade import cup, cylinder, subject
+from manitwin.files.mesh_read import read_mesh
+from manitwin.geometry.repair import repair
+from manitwin.models.annotators.physical_rules import estimate_physical
+from manitwin.models.annotators.priors import load_priors, lookup
+from manitwin.models.annotators.rules import RulesAnnotator
+
+
+def mass(mesh: trimesh.Trimesh, name: str | None):
+    return RulesAnnotator().estimate_physical(subject(mesh, name)).mass_kg
+
+
+def test_a_full_drink_can_weighs_what_its_contents_and_metal_do() -> None:
+    # 330 ml at 1.04 kg/l and 13 g of aluminium; a 330 ml can is 66 mm wide and 115 mm high.
+    estimate = mass(cylinder(0.033, 0.115), "soda can")
+    assert estimate.value == pytest.approx(0.356, rel=0.12)
+    assert estimate.low <= 0.013 * 1.5 and estimate.high >= 0.36
+
+
+def test_a_larger_one_weighs_more() -> None:
+    small, large = mass(cylinder(0.03, 0.09), "can"), mass(cylinder(0.045, 0.135), "can")
+    assert large.value > 2 * small.value
+
+
+def test_mass_stays_in_the_categorys_interval_where_the_volume_says_more() -> None:
+    filled_in = cylinder(0.04, 0.1)
+    assert 2300 * filled_in.volume > lookup("mug").mass_kg.high
+    estimate = mass(filled_in, "mug")
+    assert lookup("mug").mass_kg.low <= estimate.low <= estimate.value <= estimate.high <= lookup("mug").mass_kg.high
+
+
+def test_a_thing_without_a_name_has_a_wide_interval_and_says_so() -> None:
+    mesh = cylinder(0.03, 0.1)
+    estimate = mass(mesh, None)
+    assert estimate.source == "prior:unknown"
+    assert estimate.low == pytest.approx(100 * mesh.volume) and estimate.high == pytest.approx(2000 * mesh.volume)
+
+
+def test_only_a_mesh_of_unknown_scale_gets_a_size() -> None:
+    mesh = cylinder(0.5, 1.5)
+    assert estimate_physical(subject(mesh, "can"), lookup("can")).longest_axis_m is None
+    said = estimate_physical(subject(mesh, "can", metric=False), lookup("can"))
+    assert said.longest_axis_m.source == "prior:can"
+    assert said.longest_axis_m.value == lookup("can").longest_axis_m.typical
+    assert lookup("can").mass_kg.low <= said.mass_kg.value <= lookup("can").mass_kg.high
+
+
+def test_a_closed_skin_of_a_hollow_thing_gets_a_wall_and_a_full_one_none() -> None:
+    ball = trimesh.creation.icosphere(radius=0.033)
+    assert estimate_physical(subject(ball, "tennis ball"), lookup("tennis ball")).wall_thickness_m == 0.003
+    assert estimate_physical(subject(ball, "baseball"), lookup("baseball")).wall_thickness_m is None
+    assert estimate_physical(subject(cup(), "cup"), lookup("cup")).wall_thickness_m is None
+
+
+def test_every_number_says_where_it_is_from() -> None:
+    mesh = trimesh.creation.box([0.05, 0.04, 0.03])
+    for prior in list(load_priors().values())[::6]:
+        said = estimate_physical(subject(mesh, None), prior)
+        for estimate in (said.mass_kg, said.friction_static, said.friction_dynamic, said.restitution):
+            assert np.isfinite(estimate.value) and estimate.value > 0
+            assert estimate.source.startswith("prior:") or estimate.source == "density*volume"
+
+
+@pytest.mark.slow
+@pytest.mark.shared_data
+def test_objects_that_were_weighed_are_in_the_interval_and_most_within_half(shared_data: Path) -> None:
+    with open(shared_data / "manifest.csv", newline="") as table:
+        rows = [row for row in csv.DictReader(table) if row["kind"] == "mesh" and row["mass_kg"]]
+    assert len(rows) == 13
+    near = 0
+    for row in rows:
+        parts = read_mesh(shared_data / row["file"]).parts
+        vertices, faces = trimesh.util.append_faces([p.vertices for p in parts], [p.faces for p in parts])
+        estimate = mass(repair(trimesh.Trimesh(vertices, faces, process=False)).mesh, row["category"])
+        true = float(row["mass_kg"])
+        assert estimate.low <= true <= estimate.high, (row["object_name"], estimate)
+        near += max(estimate.value / true, true / estimate.value) < 1.5
+    assert near >= 9
+
+
+@pytest.mark.shared_data
+def test_photographed_objects_that_were_weighed_are_in_their_categorys_interval(shared_data: Path) -> None:
+    with open(shared_data / "manifest.csv", newline="") as table:
+        rows = [row for row in csv.DictReader(table) if row["kind"] == "photo" and row["mass_kg"]]
+    outside = [
+        (row["category"], row["mass_kg"])
+        for row in rows
+        if not lookup(row["category"]).mass_kg.low <= float(row["mass_kg"]) <= lookup(row["category"]).mass_kg.high
+    ]
+    assert len(rows) >= 6 and len(outside) <= 1, outside

@@ -1,0 +1,122 @@
+"""The table of priors: whole, in order, physically possible, and true of published measurements."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from manitwin.errors import ManiTwinError
+from manitwin.models.annotators import priors
+from manitwin.models.annotators.priors import Interval, load_materials, load_priors, lookup
+
+# Calli et al. 2015, "The YCB Object and Model Set", and its list of object masses: kg.
+YCB = {
+    "chips can": 0.205, "coffee can": 0.414, "cracker box": 0.411, "sugar box": 0.514, "can": 0.349,
+    "bottle": 0.603, "tuna can": 0.171, "pudding box": 0.187, "gelatin box": 0.097, "potted meat can": 0.370,
+    "banana": 0.066, "strawberry": 0.018, "apple": 0.068, "lemon": 0.029, "peach": 0.033, "pear": 0.049,
+    "orange": 0.047, "plum": 0.025, "pitcher": 0.178, "bleach cleanser": 1.131, "windex bottle": 1.022,
+    "wine glass": 0.133, "bowl": 0.147, "mug": 0.118, "sponge": 0.0062, "skillet": 0.950, "skillet lid": 0.652,
+    "plate": 0.279, "fork": 0.034, "spoon": 0.030, "knife": 0.031, "spatula": 0.0515, "power drill": 0.895,
+    "wood block": 0.729, "scissors": 0.082, "padlock": 0.304, "key": 0.0101, "large marker": 0.0158,
+    "marker": 0.0082, "adjustable wrench": 0.252, "phillips screwdriver": 0.097, "flat screwdriver": 0.0984,
+    "hammer": 0.665, "medium clamp": 0.059, "large clamp": 0.125, "mini soccer ball": 0.123, "softball": 0.191,
+    "baseball": 0.148, "tennis ball": 0.058, "racquetball": 0.041, "golf ball": 0.046, "chain": 0.098,
+    "foam brick": 0.028, "dice": 0.0052, "rubik's cube": 0.094,
+}  # fmt: skip
+
+# Standards and rules of games: (longest side m, mass kg or None).
+STANDARDS = {
+    "aa battery": (0.0505, None), "golf ball": (0.04267, 0.0459), "billiard ball": (0.05715, 0.163),
+    "hockey puck": (0.0762, 0.163), "id card": (0.0856, None), "drink can": (0.122, 0.345),
+}  # fmt: skip
+
+
+def test_the_table_has_at_least_200_categories_with_sources() -> None:
+    table = load_priors()
+    assert len(table) >= 200
+    assert all(prior.sources for prior in table.values())
+    assert sum(bool(prior.measured) for prior in table.values()) >= 40
+
+
+def test_every_prior_has_the_papers_number_of_parts() -> None:
+    for prior in load_priors().values():
+        assert 2 <= len(prior.functional) <= 4, prior.category
+        assert 2 <= len(prior.grasp) <= 3, prior.category
+        assert "{" not in "".join(part.description for part in prior.functional)
+
+
+def test_mass_density_and_size_agree_in_every_category() -> None:
+    """What a thing weighs at its bulk density must fit in its box."""
+    for prior in load_priors().values():
+        cube = prior.longest_axis_m.typical**3
+        if prior.bulk_density_kg_m3 is not None:
+            filled = prior.mass_kg.typical / prior.bulk_density_kg_m3.typical / cube
+            assert 5e-4 < filled < 1.15, (prior.category, filled)
+            assert prior.bulk_density_kg_m3.low >= 5 and prior.bulk_density_kg_m3.high <= 19_300, prior.category
+        assert 0.1 < prior.mass_kg.typical / cube < 8_000, prior.category
+        assert prior.longest_axis_m.low > 0 and prior.mass_kg.low > 0, prior.category
+
+
+def test_sliding_friction_is_below_static_friction() -> None:
+    for name, material in load_materials().items():
+        static, sliding = material.friction_static, material.friction_dynamic
+        assert (sliding.low, sliding.typical, sliding.high) < (static.low, static.typical, static.high), name
+        assert sliding.low > 0 and static.high <= 1.0, name
+
+
+def test_published_masses_are_in_the_intervals() -> None:
+    intervals = {name: lookup(name).mass_kg for name in YCB}
+    outside = [name for name, mass in YCB.items() if not intervals[name].low <= mass <= intervals[name].high]
+    assert len(outside) <= 2, outside
+
+
+@pytest.mark.parametrize("name", STANDARDS)
+def test_standard_sizes_are_in_the_intervals(name: str) -> None:
+    longest, mass = STANDARDS[name]
+    prior = lookup(name)
+    assert prior.longest_axis_m.low <= longest <= prior.longest_axis_m.high
+    assert mass is None or prior.mass_kg.low <= mass <= prior.mass_kg.high
+
+
+@pytest.mark.parametrize(
+    ("said", "category"),
+    [
+        ("mug", "mug"), ("Red Coffee Mugs", "mug"), ("a mug", "mug"), ("mug, white", "mug"),
+        ("the knives", "knife"),
+        ("bottle of water", "water bottle"), ("glass of water", "glass"), ("mug with a blue handle", "mug"),
+        ("8-inch frying pan", "frying pan"), ("tomatoes", "tomato"), ("boxes", "box"),
+        ("box of crackers", "cracker box"),
+        ("Phillips screwdriver", "screwdriver"), ("chef’s knife", "chef's knife"), ("Rubik's cube", "rubik's cube"),
+        ("scissors", "scissors"), ("eye glasses", "glasses"), ("can opener", "can opener"), ("headset", "headphones"),
+    ],
+)  # fmt: skip
+def test_lookup_understands_what_people_say(said: str, category: str) -> None:
+    prior = lookup(said)
+    assert prior is not None and prior.category == category
+
+
+@pytest.mark.parametrize("said", [None, "", "  ", "mug rack", "flux capacitor", "unknown", "mug_01.obj", "??"])
+def test_lookup_says_nothing_of_what_it_does_not_know(said: str | None) -> None:
+    assert lookup(said) is None
+
+
+def test_lookup_tells_what_stands_and_what_holds_things() -> None:
+    assert lookup("mug").stands and lookup("mug").container
+    assert lookup("fork").stands is False and not lookup("fork").container
+    assert not lookup("bottle").container
+
+
+def test_an_interval_out_of_order_is_refused() -> None:
+    with pytest.raises(ValidationError, match="not in order"):
+        Interval(low=2.0, typical=1.0, high=3.0)
+
+
+def test_an_unknown_form_is_named_with_the_nearest() -> None:
+    with pytest.raises(ManiTwinError, match="did you mean 'bottle'"):
+        priors._prior("flask", {"form": "botle", "surface": "glass"}, "test", {}, {"bottle": {}, "box": {}})
+
+
+def test_the_unknown_prior_is_wide_and_says_so() -> None:
+    unknown = priors.unknown_prior()
+    assert unknown.source == "prior:unknown"
+    assert unknown.bulk_density_kg_m3.high / unknown.bulk_density_kg_m3.low >= 20

@@ -1,0 +1,92 @@
+"""Colours by area of the surface, against colours that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from handmade import visual
+from manitwin.models.annotators.color_names import color_name, lab_from_srgb
+from manitwin.models.annotators.surface_color import measure_colors
+
+
+def textured_square(image: np.ndarray, u_range: tuple[float, float]) -> trimesh.Trimesh:
+    """A square that shows the columns ``u_range`` of an image, all of its rows."""
+    low, high = u_range
+    part = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]], process=False)
+    material = PBRMaterial(baseColorFactor=[255, 255, 255, 255], baseColorTexture=Image.fromarray(image))
+    part.visual = TextureVisuals(uv=np.array([[low, 0], [high, 0], [high, 1], [low, 1]]), material=material)
+    return part
+
+
+def halves(left: tuple[int, int, int], right: tuple[int, int, int]) -> np.ndarray:
+    image = np.zeros((64, 64, 3), np.uint8)
+    image[:, :32], image[:, 32:] = left, right
+    return image
+
+
+def names(part: trimesh.Trimesh) -> list[str]:
+    return [color.name for color in measure_colors((part,), np.random.default_rng(0))]
+
+
+def test_lab_agrees_with_published_values() -> None:
+    # Lindbloom's calculator, sRGB, D65.
+    lab = lab_from_srgb(np.array([[1.0, 0, 0], [0, 0, 1.0], [1.0, 1.0, 1.0]]))
+    assert lab == pytest.approx(np.array([[53.24, 80.09, 67.20], [32.30, 79.19, -107.86], [100, 0, 0]]), abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("rgb", "name"),
+    [
+        ((255, 0, 0), "red"), ((0, 128, 0), "green"), ((0, 0, 255), "blue"), ((255, 255, 0), "yellow"),
+        ((255, 255, 255), "white"), ((0, 0, 0), "black"), ((128, 128, 128), "grey"), ((245, 245, 220), "cream"),
+        ((0, 0, 139), "dark blue"), ((255, 165, 0), "orange"), ((139, 69, 19), "brown"), ((255, 192, 203), "pink"),
+        ((128, 0, 128), "purple"), ((64, 224, 208), "turquoise"), ((139, 0, 0), "dark red"),
+    ],
+)  # fmt: skip
+def test_css_colors_get_their_everyday_names(rgb: tuple[int, int, int], name: str) -> None:
+    assert color_name(lab_from_srgb(np.array(rgb) / 255)) == name
+
+
+def test_parts_of_the_texture_that_no_face_shows_do_not_count() -> None:
+    image = halves((200, 30, 30), (30, 60, 190))
+    assert names(textured_square(image, (0.02, 0.48))) == ["red"]
+    assert names(textured_square(image, (0.52, 0.98))) == ["blue"]
+
+
+def test_shares_are_by_area() -> None:
+    part = textured_square(halves((200, 30, 30), (30, 60, 190)), (0.1, 0.7))
+    shares = measure_colors((part,), np.random.default_rng(0))
+    assert [s.name for s in shares] == ["red", "blue"]
+    assert shares[0].share == pytest.approx(2 / 3, abs=0.04)
+
+
+def test_the_texture_is_right_side_up() -> None:
+    image = np.zeros((64, 64, 3), np.uint8)
+    image[:16], image[16:] = (200, 30, 30), (30, 60, 190)  # the upper quarter of the image is red
+    part = textured_square(image, (0, 1))
+    part.visual.uv[:, 1] = [0.8, 0.8, 0.98, 0.98]  # trimesh: v = 1 is the top of the image
+    assert names(part) == ["red"]
+
+
+def test_an_untextured_default_material_has_no_color() -> None:
+    box = trimesh.creation.box([1, 1, 1])
+    assert names(visual(box, baseColorFactor=[255, 255, 255, 255])) == []
+    assert names(visual(box, name="material_0", baseColorFactor=[204, 204, 204, 255])) == []
+
+
+def test_a_material_that_someone_chose_has_its_color() -> None:
+    box = trimesh.creation.box([1, 1, 1])
+    assert names(visual(box, name="porcelain", baseColorFactor=[255, 255, 255, 255])) == ["white"]
+    # glTF factors are linear: 0.5 linear is a light grey of 188
+    assert names(visual(box, baseColorFactor=[128, 128, 128, 255])) == ["light grey"]
+
+
+def test_colors_are_the_same_twice() -> None:
+    noise = np.random.default_rng(3).integers(0, 255, (64, 64, 3), dtype=np.uint8)
+    part = textured_square(noise, (0, 1))
+    assert measure_colors((part,), np.random.default_rng(0)) == measure_colors((part,), np.random.default_rng(0))

@@ -1,0 +1,79 @@
+"""Words: grammatical, true of the measurements, honest about what is not known."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+import trimesh
+
+from handmade import cylinder, mug, subject, visual
+from manitwin.models.annotators.priors import load_priors
+from manitwin.models.annotators.rules import RulesAnnotator
+from manitwin.models.annotators.words import article, joined, size_words, write_captions
+from manitwin.twin import Language
+
+
+def described(mesh: trimesh.Trimesh, name: str | None, *parts: trimesh.Trimesh, material: str = "ceramic") -> Language:
+    return RulesAnnotator().describe(subject(mesh, name, parts=parts), material, mesh.extents)
+
+
+@pytest.mark.parametrize(
+    ("phrase", "expected"),
+    [
+        ("mug", "a"), ("apple", "an"), ("orange mug", "an"), ("utensil holder", "a"), ("usb stick", "a"),
+        ("umbrella", "an"), ("hourglass", "an"), ("house", "a"), ("ukulele", "a"), ("egg", "an"), ("eraser", "an"),
+    ],
+)  # fmt: skip
+def test_article_follows_the_sound(phrase: str, expected: str) -> None:
+    assert article(phrase) == expected
+
+
+def test_lists_read_as_in_a_sentence() -> None:
+    assert joined(["red"]) == "red"
+    assert joined(["red", "blue", "white"]) == "red, blue and white"
+
+
+def test_size_words_state_the_extents_the_longest_first() -> None:
+    assert size_words(np.array([0.072, 0.164, 0.213])) == "21 x 16 x 7 cm, medium-sized"
+    assert size_words(np.array([0.121, 0.0194, 0.0189])) == "12.1 x 1.9 x 1.9 cm, hand-sized"
+
+
+def test_a_red_mug_is_described_as_one() -> None:
+    mesh = mug()
+    language = described(mesh, "coffee mug", visual(mesh, baseColorFactor=[160, 8, 8, 255]))
+    assert language.category == "mug" and language.color == "red" and language.material == "ceramic"
+    assert "handle" in language.shape and "hot drinks" in language.function
+    assert language.caption == "A red mug made of ceramic, about 12 x 10 x 8 cm in size, used for holding hot drinks."
+    assert len(language.captions) >= 4 and len(set(language.captions)) == len(language.captions)
+
+
+def test_without_a_color_none_is_claimed() -> None:
+    mesh = mug()
+    language = described(mesh, "mug", visual(mesh, baseColorFactor=[255, 255, 255, 255]))
+    assert language.color.startswith("unknown")
+    assert "unknown" not in " ".join(language.captions) and "white" not in " ".join(language.captions)
+
+
+def test_without_a_name_the_category_is_unknown_and_the_shape_is_measured() -> None:
+    mesh = cylinder(0.03, 0.1)
+    language = described(mesh, None, material="unknown material")
+    assert language.category == "unknown" and "cylindrical" in language.shape
+    assert language.function.startswith("unknown")
+    assert language.caption == "An object, about 10 x 6 x 6 cm in size."
+
+
+def test_a_name_that_the_table_does_not_have_is_kept() -> None:
+    assert described(cylinder(0.03, 0.1), "Flux Capacitor").category == "flux capacitor"
+
+
+def test_all_categories_give_whole_sentences() -> None:
+    for prior in load_priors().values():
+        size = "10 x 5 x 3 cm, palm-sized"
+        captions = write_captions(prior.category, prior, prior.material, "orange", prior.shape, size)
+        text = " ".join(captions)
+        assert not re.search(r"\b(a|an) (a|an)\b|  |\ba [aeio]\w|{|}| ,|\.\.", text, re.IGNORECASE), text
+        assert len(captions) >= 4
+        sentences = [caption for caption in captions if not caption.startswith("an orange")]
+        assert all(caption[0].isupper() and caption.endswith(".") for caption in sentences), text
