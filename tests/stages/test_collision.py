@@ -33,7 +33,9 @@ def test_cup_gets_hulls_that_keep_it_open(tmp_path: Path) -> None:
 
 
 def test_thing_without_an_opening_is_not_judged_on_it(tmp_path: Path) -> None:
-    field = CollisionStage(CollisionConfig()).run(_draft(tmp_path, trimesh.creation.box((0.1,) * 3)), tmp_path)["collision"]
+    field = CollisionStage(CollisionConfig()).run(_draft(tmp_path, trimesh.creation.box((0.1,) * 3)), tmp_path)[
+        "collision"
+    ]
     assert field["keeps_opening"] is None and field["cavity_kept"] is None
     assert field["surface_error_p95_m"] == pytest.approx(0, abs=1e-6)
     assert field["volume_ratio"] == pytest.approx(1.0)

@@ -66,7 +66,7 @@ def _set_down_in_mujoco(draft: Draft, placement: dict[str, Any]) -> tuple[float,
     xml = (
         '<mujoco><compiler boundmass="1e-9"/><option timestep="0.002" integrator="implicitfast" cone="elliptic"/>'
         f'<asset>{meshes}</asset><worldbody><geom type="plane" size="2 2 .1" {contact}/>'
-        f'<body><freejoint/>{inertial}{geoms}</body></worldbody></mujoco>'
+        f"<body><freejoint/>{inertial}{geoms}</body></worldbody></mujoco>"
     )
     model = mujoco.MjModel.from_xml_string(xml, {f"h{i}.obj": hull_to_obj(hull) for i, hull in enumerate(hulls)})
     data = mujoco.MjData(model)

@@ -1,0 +1,189 @@
+"""Pinhole cameras around an object, and where its points land in their pictures.
+
+Camera frame (OpenGL's): x right, y up, looking along -z. Pixel coordinates: x right, y down, the centre of the upper
+left pixel is (0.5, 0.5).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import cv2
+import numpy as np
+
+from manitwin.geometry.poses import inverse, transform_points
+
+# Eight views: every 45 degrees of azimuth. Four from the height of a person who looks at a thing on a table, three from
+# well above (into cavities) and one from below, all seen from another side than their neighbours.
+ORBIT_ELEVATIONS_DEG = (20.0, 50.0, 20.0, -35.0, 20.0, 50.0, 20.0, 65.0)
+ORBIT_FIRST_AZIMUTH_DEG = -60.0
+HERO_ELEVATION_DEG, HERO_FLAT_ELEVATION_DEG = 26.0, 50.0
+FLAT = 0.3  # height, in the longer side of the footprint, below which a thing lies rather than stands
+FILL = 0.88  # share of the picture's half width that the silhouette may reach
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera with square pixels and its principal point in the middle.
+
+    ``camera_to_object`` is ``(4, 4)``, OpenGL axes, translation in the object's unit of length; ``fov_y_rad`` is the
+    full vertical angle.
+    """
+
+    camera_to_object: np.ndarray
+    fov_y_rad: float
+    width_px: int
+    height_px: int
+
+    @property
+    def focal_px(self) -> float:
+        """The focal length in pixels, along both axes."""
+        return self.height_px / 2 / float(np.tan(self.fov_y_rad / 2))
+
+    @property
+    def position(self) -> np.ndarray:
+        """The projection centre ``(3,)`` in the object frame."""
+        return self.camera_to_object[:3, 3]
+
+    def scaled(self, factor: float) -> Camera:
+        """Return the camera that sees the same picture of the object scaled by ``factor`` about its origin."""
+        pose = self.camera_to_object.copy()
+        pose[:3, 3] *= factor
+        return Camera(pose, self.fov_y_rad, self.width_px, self.height_px)
+
+    def resized(self, width_px: int, height_px: int) -> Camera:
+        """Return the same camera with another picture size; the vertical angle stays."""
+        return Camera(self.camera_to_object, self.fov_y_rad, width_px, height_px)
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the camera as JSON values, for ``from_json``."""
+        return {
+            "camera_to_object": self.camera_to_object.tolist(),
+            "fov_y_rad": self.fov_y_rad,
+            "width_px": self.width_px,
+            "height_px": self.height_px,
+        }
+
+    @classmethod
+    def from_json(cls, value: dict[str, Any]) -> Camera:
+        """Read what ``to_json`` returned."""
+        pose = np.array(value["camera_to_object"], dtype=float)
+        return cls(pose, value["fov_y_rad"], value["width_px"], value["height_px"])
+
+
+def look_at(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Return ``camera_to_object (4, 4)`` of a camera at ``eye`` that looks at ``target``, +Z up in its picture.
+
+    Straight up or down, +Y is up in the picture.
+    """
+    backward = np.asarray(eye, dtype=float) - target
+    backward /= np.linalg.norm(backward)
+    up = np.array([0.0, 0.0, 1.0]) if abs(backward[2]) < 1 - 1e-9 else np.array([0.0, 1.0, 0.0])
+    right = np.cross(up, backward)
+    right /= np.linalg.norm(right)
+    pose = np.eye(4)
+    pose[:3, 0], pose[:3, 1], pose[:3, 2], pose[:3, 3] = right, np.cross(backward, right), backward, eye
+    return pose
+
+
+def framing_camera(
+    points: np.ndarray, *, azimuth_deg: float, elevation_deg: float, fov_y_deg: float, width_px: int, height_px: int
+) -> Camera:
+    """Return the camera from a given side that shows all points ``(N, 3)``, centred and as large as may be.
+
+    Equivariant to scale: points scaled by s give this camera scaled by s.
+    """
+    azimuth, elevation = np.deg2rad(azimuth_deg), np.deg2rad(elevation_deg)
+    backward = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+    center = (points.min(0) + points.max(0)) / 2
+    rotation = look_at(center + backward, center)[:3, :3]
+    seen = (points - center) @ rotation
+    tangent_y = FILL * np.tan(np.deg2rad(fov_y_deg) / 2)
+    tangents = np.array([tangent_y * width_px / height_px, tangent_y])
+    # |x - cx| <= t (d - z) for all points bounds d and cx from both sides; the least d is where both bounds meet.
+    upper, lower = (seen[:, :2] + seen[:, 2:] * tangents).max(0), (seen[:, :2] - seen[:, 2:] * tangents).min(0)
+    distance = float(((upper - lower) / (2 * tangents)).max())
+    offset = np.append((upper + lower) / 2, distance)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = rotation, center + rotation @ offset
+    return Camera(pose, float(np.deg2rad(fov_y_deg)), width_px, height_px)
+
+
+def orbit_cameras(points: np.ndarray, *, fov_y_deg: float, size_px: int) -> list[Camera]:
+    """Return eight cameras around ``points (N, 3)``: every 45 degrees, from the side, from above and from below.
+
+    Source: paper, "Physical Property Estimation" (8 multi-view renders); which elevations is our choice.
+    """
+    return [
+        framing_camera(
+            points,
+            azimuth_deg=ORBIT_FIRST_AZIMUTH_DEG + 45.0 * i,
+            elevation_deg=elevation,
+            fov_y_deg=fov_y_deg,
+            width_px=size_px,
+            height_px=size_px,
+        )
+        for i, elevation in enumerate(ORBIT_ELEVATIONS_DEG)
+    ]
+
+
+def hero_camera(points: np.ndarray, *, fov_y_deg: float, width_px: int, height_px: int) -> Camera:
+    """Return the camera, of twelve three-quarter views, that shows the object best: much of it, and large.
+
+    That is the largest silhouette in the object's unit. Flat things are seen from higher up, and turned towards the
+    picture's diagonal: there the area in the picture counts too.
+    """
+    extents = np.ptp(points, axis=0)
+    flat = extents[2] < FLAT * extents[:2].max()
+    elevation = HERO_FLAT_ELEVATION_DEG if flat else HERO_ELEVATION_DEG
+    best: tuple[float, Camera] | None = None
+    for azimuth in np.arange(-60.0, 300.0, 30.0):
+        camera = framing_camera(
+            points,
+            azimuth_deg=float(azimuth),
+            elevation_deg=elevation,
+            fov_y_deg=fov_y_deg,
+            width_px=width_px,
+            height_px=height_px,
+        )
+        seen = (points @ camera.camera_to_object[:3, :2]).astype(np.float32)
+        area = cv2.contourArea(cv2.convexHull(seen))
+        score = area**2 * silhouette_area_px(points, camera) if flat else area
+        if best is None or score > best[0] * 1.02:
+            best = score, camera
+    assert best is not None
+    return best[1]
+
+
+def silhouette_area_px(points: np.ndarray, camera: Camera) -> float:
+    """Return the area of the convex outline of points ``(N, 3)`` in the picture, in pixels."""
+    return float(cv2.contourArea(cv2.convexHull(project(points, camera)[0].astype(np.float32))))
+
+
+def project(points: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Project points ``(N, 3)`` in the object frame.
+
+    Returns pixel coordinates ``(N, 2)`` and depths ``(N,)``, the distance along the viewing axis in the points' unit.
+    Points behind the camera have a negative depth, and their pixels mean nothing.
+    """
+    seen = transform_points(inverse(camera.camera_to_object), points)
+    depth = -seen[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pixels = camera.focal_px * seen[:, :2] / depth[:, None] * [1, -1]
+    return pixels + np.array([camera.width_px, camera.height_px]) / 2, depth
+
+
+def pixel_rays(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rays through all pixel centres, row by row.
+
+    Origins ``(H*W, 3)`` and directions ``(H*W, 3)``, whose component along the viewing axis is 1: a ray parameter is a
+    depth.
+    """
+    x, y = np.meshgrid(np.arange(camera.width_px) + 0.5, np.arange(camera.height_px) + 0.5)
+    seen = np.stack(
+        [(x - camera.width_px / 2) / camera.focal_px, -(y - camera.height_px / 2) / camera.focal_px, -np.ones_like(x)],
+        -1,
+    ).reshape(-1, 3)
+    directions = seen @ camera.camera_to_object[:3, :3].T
+    return np.broadcast_to(camera.position, directions.shape), directions

@@ -1,0 +1,154 @@
+"""One picture of a twin: input | render | mesh and hulls | points and verified grasps, and the facts above.
+
+Source: the four columns of the paper's "Dataset Examples".
+"""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import trimesh
+from PIL import Image, ImageDraw, ImageFont
+
+from manitwin.render.cameras import hero_camera
+from manitwin.render.card_panels import (
+    DRAWN_GRASPS,
+    FUNCTIONAL,
+    GRASP,
+    GRASP_COLORS,
+    CardGrasp,
+    CardPoint,
+    clay_panel,
+    grasp_panel,
+    input_panel,
+    mesh_panel,
+    render_panel,
+)
+from manitwin.render.raycast import merged
+from manitwin.render.renderer import BACKDROP
+
+WIDTH, HEIGHT = 1600, 540
+MARGIN, GAP = 24, 16
+PANEL = (WIDTH - 2 * MARGIN - 3 * GAP) // 4
+TOP = 96
+FOV_Y_DEG = 24.0
+INK, GREY, PALE = (24, 28, 36), (112, 120, 132), (214, 218, 224)
+
+
+@dataclass(frozen=True)
+class CardText:
+    """What is written on a card: a title, a sentence, facts as (name, value) from left to right, and a footer."""
+
+    title: str
+    sentence: str
+    facts: Sequence[tuple[str, str]]
+    footer: str
+
+
+def make_card(
+    *,
+    parts: Sequence[trimesh.Trimesh],
+    solid: trimesh.Trimesh,
+    hulls: Sequence[np.ndarray],
+    points: Sequence[CardPoint],
+    grasps: Sequence[CardGrasp],
+    text: CardText,
+    photo: np.ndarray | None = None,
+    prompt: str | None = None,
+) -> bytes:
+    """Draw a twin's card and return it as PNG.
+
+    ``parts`` are the textured meshes, ``solid`` the repaired one, ``hulls`` the vertices ``(V, 3)`` of each collision
+    hull, all in the object frame in metres. The first column shows ``photo (H, W, 3 or 4) uint8`` or ``prompt``; where
+    the input was a mesh it shows the bare shape. Raises RendererMissing where nothing renders.
+    """
+    mesh = merged(list(parts))
+    hero = hero_camera(np.asarray(mesh.vertices), fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL)
+    if photo is not None:
+        first, caption = input_panel(photo, PANEL), "input photo"
+    elif prompt is not None:
+        first, caption = _prompt_panel(prompt), "input text"
+    else:
+        first, caption = clay_panel(mesh, hero), "input mesh, from behind"
+    drawn = min(len(grasps), DRAWN_GRASPS)
+    columns = (
+        (first, caption),
+        (render_panel(parts, mesh, hero), "twin as rendered"),
+        (mesh_panel(solid, hulls, hero), f"{len(solid.faces):,} triangles, {len(hulls)} convex collision hulls"),
+        (grasp_panel(parts, mesh, points, grasps, hero), f"points, and {drawn} of {len(grasps)} verified grasps"),
+    )
+    card = Image.new("RGB", (WIDTH, HEIGHT), "white")
+    draw = ImageDraw.Draw(card)
+    _header(draw, text)
+    for index, (picture, caption) in enumerate(columns):
+        left = MARGIN + index * (PANEL + GAP)
+        card.paste(Image.fromarray(picture), (left, TOP), _rounded_mask())
+        draw.text((left + 2, TOP + PANEL + 18), caption, fill=INK, font=_font(15), anchor="lm")
+    _legend(draw)
+    draw.text((MARGIN + 2, HEIGHT - 16), _shortened(text.footer, 1400, 12), fill=GREY, font=_font(12), anchor="lm")
+    stream = io.BytesIO()
+    card.save(stream, "PNG", compress_level=6)
+    return stream.getvalue()
+
+
+def _header(draw: ImageDraw.ImageDraw, text: CardText) -> None:
+    """Write the facts from the right edge, and the title in the room that is left."""
+    right = WIDTH - MARGIN
+    for name, value in reversed(text.facts):
+        width = max(_font(21).getlength(value), _font(13).getlength(name))
+        draw.text((right - width, 30), name, fill=GREY, font=_font(13), anchor="lm")
+        draw.text((right - width, 57), value, fill=INK, font=_font(21), anchor="lm")
+        right -= round(width) + 20
+        draw.line((right, 24, right, 68), fill=PALE, width=1)
+        right -= 20
+    room = right - MARGIN
+    draw.text((MARGIN, 38), _shortened(text.title, room, 34), fill=INK, font=_font(34), anchor="lm")
+    draw.text((MARGIN + 1, 72), _shortened(text.sentence, room, 15), fill=GREY, font=_font(15), anchor="lm")
+
+
+def _legend(draw: ImageDraw.ImageDraw) -> None:
+    """Explain the colours of the last column."""
+    x, y = WIDTH - MARGIN, HEIGHT - 16
+    for label, color in (("verified grasp", GRASP_COLORS[0]), ("grasp point", GRASP), ("functional point", FUNCTIONAL)):
+        x -= round(_font(12).getlength(label))
+        draw.text((x, y), label, fill=GREY, font=_font(12), anchor="lm")
+        x -= 14
+        draw.ellipse((x, y - 4, x + 8, y + 4), fill=color)
+        x -= 18
+
+
+def _prompt_panel(prompt: str) -> np.ndarray:
+    """Write the prompt in the middle of a panel."""
+    panel = Image.new("RGB", (PANEL, PANEL), BACKDROP)
+    lines = textwrap.wrap(f"“{prompt}”", 30)[:10]
+    ImageDraw.Draw(panel).multiline_text(
+        (PANEL / 2, PANEL / 2), "\n".join(lines), fill=INK, font=_font(20), anchor="mm", align="center", spacing=8
+    )
+    return np.asarray(panel)
+
+
+def _shortened(text: str, room_px: float, size_px: int) -> str:
+    """Cut a line to the room that it has."""
+    font = _font(size_px)
+    if font.getlength(text) <= room_px:
+        return text
+    while text and font.getlength(text + "...") > room_px:
+        text = text[:-1]
+    return text.rstrip() + "..."
+
+
+@cache
+def _rounded_mask() -> Image.Image:
+    mask = Image.new("L", (4 * PANEL, 4 * PANEL), 0)
+    ImageDraw.Draw(mask).rounded_rectangle((0, 0, 4 * PANEL - 1, 4 * PANEL - 1), radius=40, fill=255)
+    return mask.reduce(4)
+
+
+@cache
+def _font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size_px)

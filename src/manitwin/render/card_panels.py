@@ -1,0 +1,165 @@
+"""The pictures on a twin's card: what went in, how it looks, what it is made of, and how to hold it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import trimesh
+
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.sampling import farthest_point_sampling
+from manitwin.render.cameras import Camera, framing_camera, project, silhouette_area_px
+from manitwin.render.gripper_fork import Boxes, gripper_fork
+from manitwin.render.ground_shadow import ground_shadow
+from manitwin.render.markers import draw_markers
+from manitwin.render.raycast import cast_camera, visible_points
+from manitwin.render.renderer import BACKDROP, shared_renderer
+from manitwin.render.surfaces import plain_part
+from manitwin.render.wireframe import visible_edges
+
+CLAY = (214, 210, 203)
+WIRE = np.array([40, 46, 58], dtype=np.float32)
+FUNCTIONAL, GRASP = (232, 112, 12), (28, 92, 210)
+GRASP_COLORS = ((22, 148, 116), (43, 172, 146), (12, 122, 128), (64, 178, 116), (20, 136, 92), (84, 190, 168))
+# Twelve soft hues, neighbours far apart: those of the categorical set "Set3" of ColorBrewer (Brewer 2003).
+HULL_COLORS = (
+    (141, 211, 199), (251, 128, 114), (128, 177, 211), (253, 180, 98), (190, 186, 218), (179, 222, 105),
+    (252, 205, 229), (255, 237, 111), (188, 128, 189), (204, 235, 197), (217, 217, 217), (255, 255, 179),
+)  # fmt: skip
+DRAWN_GRASPS = 12
+
+
+@dataclass(frozen=True)
+class CardPoint:
+    """A functional or grasp point: its place and outward normal in the object frame, and what to write beside it."""
+
+    position_m: np.ndarray
+    normal: np.ndarray
+    label: str
+    functional: bool
+
+
+@dataclass(frozen=True)
+class CardGrasp:
+    """A verified grasp: ``gripper_to_object (4, 4)`` and the gripper's boxes at its opening, in the grasp frame."""
+
+    gripper_to_object: np.ndarray
+    boxes: Boxes
+
+
+def render_panel(parts: Sequence[trimesh.Trimesh], mesh: trimesh.Trimesh, hero: Camera) -> np.ndarray:
+    """Draw the object as it looks, on the ground."""
+    return _grounded(list(parts), mesh, hero)
+
+
+def clay_panel(mesh: trimesh.Trimesh, hero: Camera) -> np.ndarray:
+    """Draw the bare shape, without colours, seen from the other side."""
+    return _grounded([plain_part(mesh, CLAY)], mesh, _turned(hero, np.asarray(mesh.vertices), 180.0))
+
+
+def mesh_panel(solid: trimesh.Trimesh, hulls: Sequence[np.ndarray], hero: Camera) -> np.ndarray:
+    """Draw the convex collision hulls, each in its colour, under the edges of the solid mesh."""
+    camera = _turned(hero, np.concatenate([np.asarray(solid.vertices), *hulls]), 0.0)
+    shapes = [trimesh.Trimesh(hull, process=False).convex_hull for hull in hulls]
+    parts = [plain_part(shape, HULL_COLORS[i % len(HULL_COLORS)], roughness=0.9) for i, shape in enumerate(shapes)]
+    picture = shared_renderer().render(parts, [camera])[0].rgb.astype(np.float32)
+    depth, _, _ = cast_camera(RayCaster(solid), camera)
+    cover = visible_edges(solid, camera, depth)
+    # A fine mesh would be black: its lines together take away at most a quarter of the light.
+    strength = min(2.2, 0.25 * max(1, int((depth > 0).sum())) / max(1e-6, float(cover.sum())))
+    alpha = np.minimum(cover * strength, 0.85)[..., None]
+    return np.rint(picture * (1 - alpha) + WIRE * alpha).astype(np.uint8)
+
+
+def grasp_panel(
+    parts: Sequence[trimesh.Trimesh],
+    mesh: trimesh.Trimesh,
+    points: Sequence[CardPoint],
+    grasps: Sequence[CardGrasp],
+    hero: Camera,
+) -> np.ndarray:
+    """Draw the object with its points and a dozen of its verified grasps, far apart from each other."""
+    drawn = [
+        grasps[i] for i in diverse(np.array([g.gripper_to_object for g in grasps]).reshape(-1, 4, 4), DRAWN_GRASPS)
+    ]
+    rod_m = 0.012 * float(np.linalg.norm(mesh.extents)) + 0.001
+    forks = [gripper_fork(grasp.boxes, rod_m).apply_transform(grasp.gripper_to_object) for grasp in drawn]
+    everything = np.concatenate([mesh.vertices, *(fork.vertices for fork in forks)])
+    camera, seen = _telling_camera(mesh, everything, points, hero)
+    colored = [plain_part(fork, GRASP_COLORS[i % len(GRASP_COLORS)], roughness=0.5) for i, fork in enumerate(forks)]
+    picture = _grounded([*parts, *colored], mesh, camera)
+    shown = [point for point, visible in zip(points, seen, strict=True) if visible]
+    pixels, _ = project(np.array([point.position_m for point in shown]).reshape(-1, 3), camera)
+    colors = [FUNCTIONAL if point.functional else GRASP for point in shown]
+    return draw_markers(
+        picture, pixels, [point.label for point in shown], colors=colors, font_px=max(10, hero.height_px // 27)
+    )
+
+
+def input_panel(picture: np.ndarray, size_px: int) -> np.ndarray:
+    """Fit a photo ``(H, W, 3 or 4) uint8`` into the panel, whole, over the backdrop."""
+    scale = size_px / max(picture.shape[:2])
+    width, height = (max(1, round(side * scale)) for side in picture.shape[1::-1])
+    fitted = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC)
+    alpha = (
+        fitted[..., 3:].astype(np.float32) / 255 if fitted.shape[2] == 4 else np.ones((height, width, 1), np.float32)
+    )
+    panel = np.full((size_px, size_px, 3), BACKDROP, dtype=np.uint8)
+    top, left = (size_px - height) // 2, (size_px - width) // 2
+    over = fitted[..., :3] * alpha + np.array(BACKDROP, dtype=np.float32) * (1 - alpha)
+    panel[top : top + height, left : left + width] = np.rint(over).astype(np.uint8)
+    return panel
+
+
+def diverse(gripper_to_object: np.ndarray, count: int) -> np.ndarray:
+    """Return indices of up to ``count`` grasps ``(N, 4, 4)`` far from each other in place and approach direction."""
+    if not len(gripper_to_object):
+        return np.zeros(0, dtype=int)
+    tips = gripper_to_object[:, :3, 3] + 0.1 * gripper_to_object[:, :3, 2]
+    spread = max(float(np.linalg.norm(tips.max(0) - tips.min(0))), 1e-3)
+    return farthest_point_sampling(np.hstack([tips, 0.35 * spread * gripper_to_object[:, :3, 2]]), count)
+
+
+def _turned(hero: Camera, points: np.ndarray, turn_deg: float) -> Camera:
+    """Return the camera that frames ``points`` from the hero's elevation, turned about the vertical."""
+    x, y, z = hero.camera_to_object[:3, 2]
+    return framing_camera(
+        points,
+        azimuth_deg=float(np.rad2deg(np.arctan2(y, x))) + turn_deg,
+        elevation_deg=float(np.rad2deg(np.arcsin(z))),
+        fov_y_deg=float(np.rad2deg(hero.fov_y_rad)),
+        width_px=hero.width_px,
+        height_px=hero.height_px,
+    )
+
+
+def _telling_camera(
+    mesh: trimesh.Trimesh, everything: np.ndarray, points: Sequence[CardPoint], hero: Camera
+) -> tuple[Camera, np.ndarray]:
+    """Return the camera, of twelve around, that shows most points and shows them large, and which of them it sees."""
+    caster = RayCaster(mesh)
+    positions = np.array([point.position_m for point in points]).reshape(-1, 3)
+    normals = np.array([point.normal for point in points]).reshape(-1, 3)
+    tolerance_m = 0.01 * float(mesh.extents.max())
+    best: tuple[float, Camera, np.ndarray] | None = None
+    for turn in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6):
+        camera = _turned(hero, everything, 30.0 * turn)
+        seen = visible_points(positions, normals, camera, caster, tolerance_m)
+        # A point more is worth as much as a third of the panel.
+        share = silhouette_area_px(np.asarray(mesh.vertices), camera) / (hero.width_px * hero.height_px)
+        score = float(seen.sum()) + 3 * share
+        if best is None or score > best[0] + 1e-6:
+            best = score, camera, seen
+    assert best is not None
+    return best[1], best[2]
+
+
+def _grounded(parts: list[trimesh.Trimesh], mesh: trimesh.Trimesh, camera: Camera) -> np.ndarray:
+    """Draw parts over the shade that ``mesh`` throws on the ground."""
+    frame = shared_renderer().render(parts, [camera])[0]
+    shade = ground_shadow(mesh, camera)
+    behind = (1 - frame.coverage)[..., None] * (1 - shade)[..., None]
+    return np.rint(np.clip(frame.rgb - behind * np.array(BACKDROP), 0, 255)).astype(np.uint8)

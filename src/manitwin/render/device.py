@@ -1,0 +1,158 @@
+"""Which Vulkan device SAPIEN renders with: a GPU where one works, otherwise the CPU through Mesa's lavapipe.
+
+SAPIEN asks the Vulkan loader for a device at its first RenderSystem; the loader reads its environment variables then.
+So ``require_renderer`` must be called before. Each way is tried in a process of its own: a driver that crashes or hangs
+is an answer (no), not the end of this process. What was found is kept in an environment variable for the processes
+started from here.
+"""
+
+from __future__ import annotations
+
+import glob
+import json
+import os
+import platform
+import subprocess
+import sys
+from dataclasses import asdict, dataclass
+
+from manitwin.errors import RendererMissing, UsageError
+
+SWITCH = "MANITWIN_RENDER_DEVICE"
+"""Set to ``cpu`` to leave GPUs alone (some hang: vla-evaluation-harness#112); ``auto`` otherwise."""
+
+FOUND = "MANITWIN_RENDER_DEVICE_FOUND"
+LOADER_VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")
+"""What the Vulkan loader reads: the first since 1.3.207, the second before (LoaderInterfaceArchitecture.md)."""
+
+ICD_FOLDERS = (
+    "/usr/share/vulkan/icd.d",
+    "/etc/vulkan/icd.d",
+    "/usr/local/share/vulkan/icd.d",
+    "/usr/local/etc/vulkan/icd.d",
+)
+PROBE_SECONDS = 120.0  # a device that takes longer to make one small picture hangs, or is of no use
+
+# Creating a RenderSystem is where an unfit driver is refused. A GPU must also make a picture: without the right
+# libraries in a container it fails or hangs only there. Lavapipe is spared the picture: compiling its pipelines takes 6
+# CPU-seconds.
+_PROBE = """
+import sys
+import sapien.render as render
+print(render.get_device_summary())
+import sapien
+scene = sapien.Scene([render.RenderSystem()])
+if sys.argv[1] == "picture":
+    entity, camera = sapien.Entity(), render.RenderCameraComponent(16, 16)
+    entity.add_component(camera)
+    scene.add_entity(entity)
+    scene.update_render()
+    camera.take_picture()
+    camera.get_picture("Color")
+print("it renders")
+"""
+
+
+@dataclass(frozen=True)
+class RenderDevice:
+    """A device that renders, named by its driver; ``driver_file`` is pinned for the loader (None: its own choice)."""
+
+    name: str
+    driver_file: str | None
+
+    @property
+    def on_cpu(self) -> bool:
+        """Tell a software renderer from a GPU."""
+        return "llvmpipe" in self.name or "SwiftShader" in self.name
+
+
+def require_renderer() -> RenderDevice:
+    """Choose the device, set the Vulkan loader's environment for it, and return it.
+
+    Raises RendererMissing where nothing renders, and UsageError where MANITWIN_RENDER_DEVICE is neither auto nor cpu.
+    """
+    question = {"switch": _switch(), **{name: os.environ.get(name) for name in LOADER_VARIABLES}}
+    known = json.loads(os.environ.get(FOUND, "null"))
+    if known is not None and known["question"] == question:
+        return RenderDevice(**known["device"])
+    device = _first_working(question["switch"] == "cpu")
+    if device.driver_file is not None:
+        for name in LOADER_VARIABLES:
+            os.environ[name] = device.driver_file
+            question[name] = device.driver_file
+    os.environ[FOUND] = json.dumps({"question": question, "device": asdict(device)})
+    return device
+
+
+def renderer_summary() -> str:
+    """Describe the device that renders in one line; raises RendererMissing where nothing does."""
+    device = require_renderer()
+    kind = "on the CPU" if device.on_cpu else "GPU"
+    return f"{device.name}, {kind}, driver {device.driver_file or 'chosen by the loader'}"
+
+
+def _switch() -> str:
+    value = os.environ.get(SWITCH, "auto")
+    if value not in ("auto", "cpu"):
+        raise UsageError(f"{SWITCH}={value!r} is unknown; valid: auto, cpu")
+    return value
+
+
+def _first_working(cpu_only: bool) -> RenderDevice:
+    """Probe the ways to a device in the order of preference and return the first that renders."""
+    ways: list[str | None] = []
+    named = next((os.environ[name] for name in LOADER_VARIABLES if os.environ.get(name)), None)
+    if cpu_only and named is not None and "lvp" not in named:
+        named = None  # the switch is the stronger word
+    if named is not None:
+        ways.append(None)  # the user chose the driver: no other is tried
+    else:
+        if not cpu_only and (glob.glob("/dev/nvidia[0-9]*") or glob.glob("/dev/dri/renderD*") or glob.glob("/dev/dxg")):
+            ways.append(None)
+        ways += sorted(path for folder in ICD_FOLDERS for path in glob.glob(f"{folder}/lvp_icd*.json"))
+    causes = []
+    for driver_file in ways:
+        name, cause = _probe(driver_file, picture=driver_file is None and named is None)
+        if name is not None:
+            return RenderDevice(name, driver_file)
+        causes.append(f"{driver_file or named or 'the GPU driver'}: {cause}")
+    cause = "; ".join(causes) or "no Vulkan driver of Mesa's lavapipe is installed"
+    raise RendererMissing(f"nothing to render with ({cause}); {_remedy(named)}")
+
+
+def _probe(driver_file: str | None, *, picture: bool) -> tuple[str | None, str]:
+    """Try a device in a process of its own; returns its name (None: it does not render) and what went wrong."""
+    environment = dict(os.environ)
+    if driver_file is not None:
+        environment.update(dict.fromkeys(LOADER_VARIABLES, driver_file))
+    command = [sys.executable, "-W", "ignore", "-c", _PROBE, "picture" if picture else "device"]
+    try:
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PROBE_SECONDS)
+    except subprocess.TimeoutExpired:
+        return None, f"no picture in {PROBE_SECONDS:.0f} s"
+    if done.returncode != 0 or "it renders" not in done.stdout:
+        said = [line for line in done.stderr.strip().splitlines() if line.strip()]
+        return None, said[-1].strip() if said else f"the probe ended with code {done.returncode}"
+    names = [line.split(":", 1)[1].strip() for line in done.stdout.splitlines() if line.strip().startswith("GPU:")]
+    return (names or ["unnamed Vulkan device"])[0], ""
+
+
+def _remedy(named: str | None) -> str:
+    """Say the one command that brings a renderer to this system."""
+    if named is not None:
+        return f"unset {' and '.join(LOADER_VARIABLES)}, or point them at a driver that works"
+    release = platform.freedesktop_os_release() if os.path.exists("/etc/os-release") else {}
+    family = {release.get("ID", ""), *release.get("ID_LIKE", "").split()}
+    if release.get("VERSION_CODENAME") == "bookworm":
+        # Debian 12's own Mesa 22.3.6 is refused by SAPIEN 3.0.3; 25.0.7 of its backports works (measured).
+        return (
+            "run: echo \"deb $(apt-get indextargets --format '$(REPO_URI)' 'Codename: bookworm' | head -1)"
+            ' bookworm-backports main"'
+            " | sudo tee /etc/apt/sources.list.d/backports.list && sudo apt-get update"
+            " && sudo apt-get install -y -t bookworm-backports mesa-vulkan-drivers"
+        )
+    if family & {"debian", "ubuntu"}:
+        return "run: sudo apt-get install -y mesa-vulkan-drivers"
+    if "fedora" in family:
+        return "run: sudo dnf install -y mesa-vulkan-drivers"
+    return "install Mesa's Vulkan drivers with lavapipe, version 25 or newer"

@@ -1,0 +1,124 @@
+"""Numbered markers on a picture: a dot on each point, and its number beside it where there is room."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+import cv2
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+DOT = (226, 26, 92)
+INK = (18, 22, 30)
+PAPER = (255, 255, 255)
+DIRECTIONS = 16
+RINGS = (1.0, 1.35, 1.8, 2.4, 3.2, 4.2)  # how far a number may move from its dot, in heights of the number's box
+_SUBPIXEL = 4  # bits: OpenCV draws at sixteenths of a pixel
+
+
+def draw_markers(
+    picture: np.ndarray,
+    pixels: np.ndarray,
+    labels: Sequence[str],
+    *,
+    occupied: np.ndarray | None = None,
+    colors: Sequence[tuple[int, int, int]] | None = None,
+    font_px: int = 13,
+) -> np.ndarray:
+    """Draw a dot at each of ``pixels (N, 2)`` and its label in a box beside it.
+
+    Returns the picture ``(H, W, 3) uint8``. Boxes keep clear of dots and of each other as far as there is room, with a
+    line to their dot; where there is a choice they leave ``occupied (H, W) bool``, the object, uncovered. ``colors``
+    are those of dots and boxes (None: red dots, dark boxes). Equal input gives equal pixels.
+    """
+    dots, fills = colors or [DOT] * len(labels), colors or [INK] * len(labels)
+    sizes = np.array([_box_size(label, font_px) for label in labels], dtype=float).reshape(-1, 2)
+    centers = place_boxes(pixels, sizes, picture.shape[:2], occupied)
+    canvas = picture.copy()
+    for color, width in ((PAPER, 3), (INK, 1)):
+        for pixel, center in zip(pixels, centers, strict=True):
+            cv2.line(canvas, _fixed(pixel), _fixed(center), color, width, cv2.LINE_AA, _SUBPIXEL)
+    radius = font_px * 0.32
+    for pixel, dot in zip(pixels, dots, strict=True):
+        for color, size in ((PAPER, radius + 1.5), (dot, radius)):
+            cv2.circle(canvas, _fixed(pixel), round(size * 2**_SUBPIXEL), color, -1, cv2.LINE_AA, _SUBPIXEL)
+    image = Image.fromarray(canvas)
+    draw = ImageDraw.Draw(image)
+    for label, center, extent, fill in zip(labels, centers, sizes, fills, strict=True):
+        low = np.rint(center - extent / 2)
+        draw.rounded_rectangle((*low, *(low + extent - 1)), radius=font_px / 4, fill=fill, outline=PAPER)
+        draw.text(tuple(low + extent / 2), label, fill=PAPER, font=_font(font_px), anchor="mm")
+    return np.asarray(image)
+
+
+def place_boxes(
+    pixels: np.ndarray, sizes: np.ndarray, shape: tuple[int, int], occupied: np.ndarray | None = None
+) -> np.ndarray:
+    """Return centres ``(N, 2)`` for boxes of ``sizes (N, 2)`` near their points, overlapping as little as may be.
+
+    Greedy, the most crowded point first: the cheapest of 16 directions on rings around the point, by overlap with boxes
+    that are already there, dots covered, distance, and object covered.
+    """
+    count = len(pixels)
+    if not count:
+        return np.zeros((0, 2))
+    gap = sizes[:, 1].max()
+    angles = 2 * np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+    ring, angle = (a.reshape(-1) for a in np.meshgrid(np.array(RINGS), angles, indexing="ij"))
+    cover = _covered_share(occupied, sizes.mean(0)) if occupied is not None else np.zeros(shape)
+    apart = np.linalg.norm(pixels[:, None] - pixels[None], axis=2)
+    crowd = (1 / (apart + gap)).sum(1)
+    outward = pixels - pixels.mean(0)
+    outward = outward / np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-9)
+    centers, placed = np.zeros((count, 2)), np.zeros(count, dtype=bool)
+    for index in sorted(range(count), key=lambda i: (-crowd[i], i)):
+        half = sizes[index] / 2
+        direction = np.stack([np.cos(angle), np.sin(angle)], 1)
+        options = pixels[index] + direction * (ring[:, None] * gap + [half[0] - half[1], 0])
+        options = np.clip(options, half + 1, np.array(shape[::-1]) - half - 1)
+        cost = 0.35 * ring - 0.08 * direction @ outward[index]
+        cost += 0.5 * cover[options[:, 1].astype(int), options[:, 0].astype(int)]
+        cost += 8 * _overlap(options, half, centers[placed], sizes[placed] / 2).sum(1)
+        cost += 4 * _overlap(options, half, pixels, np.full((count, 2), gap * 0.3)).sum(1)
+        cost += 1.0 * _crossings(pixels[index], options, pixels[placed], centers[placed])
+        centers[index], placed[index] = options[int(cost.argmin())], True
+    return centers
+
+
+def _overlap(options: np.ndarray, half: np.ndarray, others: np.ndarray, other_half: np.ndarray) -> np.ndarray:
+    """Return the share ``(O, M)`` of a box at each option that lies under each other box."""
+    reach = half + other_half + 1.0
+    inside = np.clip(reach[None] - np.abs(options[:, None] - others[None]), 0, 2 * half)
+    return inside.prod(2) / (4 * half.prod())
+
+
+def _crossings(start: np.ndarray, ends: np.ndarray, starts: np.ndarray, stops: np.ndarray) -> np.ndarray:
+    """Count the lines from ``starts`` to ``stops`` that the line from ``start`` to each of ``ends (O, 2)`` crosses."""
+
+    def side(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+        return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
+
+    e, p, q = ends[:, None], starts[None], stops[None]
+    return ((side(start, e, p) * side(start, e, q) < 0) & (side(p, q, start) * side(p, q, e) < 0)).sum(1)
+
+
+def _covered_share(occupied: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Return for each pixel the share of a box of ``size`` around it that is occupied."""
+    return cv2.blur(occupied.astype(np.float32), (max(1, int(size[0])), max(1, int(size[1]))))
+
+
+@cache
+def _font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size_px)
+
+
+def _box_size(label: str, font_px: int) -> tuple[int, int]:
+    left, _, right, _ = _font(font_px).getbbox(label)
+    return int(right - left) + round(font_px * 0.55), round(font_px * 1.25)
+
+
+def _fixed(point: np.ndarray) -> tuple[int, int]:
+    """Return a point in OpenCV's fixed-point pixels, whose integers are pixel centres."""
+    x, y = np.rint((point - 0.5) * 2**_SUBPIXEL).astype(int)
+    return int(x), int(y)

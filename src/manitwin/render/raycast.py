@@ -1,0 +1,56 @@
+"""What a camera sees, by rays: exact depth, normals and faces, and whether a point is hidden."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.render.cameras import Camera, pixel_rays
+
+FACING_COSINE = 0.05  # a surface seen at less than 3 degrees is a line
+
+
+def cast_camera(caster: RayCaster, camera: Camera) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cast a ray through the centre of every pixel.
+
+    Returns depth along the viewing axis ``(H, W)`` (0 where nothing is hit), the hit faces' unit normals in the object
+    frame ``(H, W, 3)`` and face indices ``(H, W)`` (-1 where nothing is hit).
+    """
+    origins, directions = pixel_rays(camera)
+    length = np.linalg.norm(directions, axis=1)
+    distance, face = caster.first_hits(origins, directions / length[:, None])
+    hit = face >= 0
+    shape = (camera.height_px, camera.width_px)
+    depth = np.where(hit, distance, 0.0) / length
+    normals = np.where(hit[:, None], caster.face_normals[face], 0.0)
+    return depth.reshape(shape), normals.reshape(*shape, 3), face.reshape(shape)
+
+
+def visible_points(
+    points: np.ndarray, normals: np.ndarray, camera: Camera, caster: RayCaster, tolerance_m: float
+) -> np.ndarray:
+    """Tell which surface points ``(N, 3)`` with outward ``normals (N, 3)`` a camera sees; returns ``(N,) bool``.
+
+    A point is seen that lies in the picture and faces the camera, and at which the caster's mesh is the first thing on
+    the way: a hit within ``tolerance_m`` of the point. So a point off the mesh is not seen.
+    """
+    toward = points - camera.position
+    distance = np.linalg.norm(toward, axis=1)
+    toward = toward / distance[:, None]
+    facing = -(normals * toward).sum(1) > FACING_COSINE
+    seen = toward @ camera.camera_to_object[:3, :3]
+    tangent = np.tan(camera.fov_y_rad / 2) * np.array([camera.width_px / camera.height_px, 1.0])
+    inside = (np.abs(seen[:, :2]) < -seen[:, 2:] * tangent).all(1)
+    hit, _ = caster.first_hits(np.broadcast_to(camera.position, points.shape), toward)
+    return facing & inside & (np.abs(hit - distance) <= tolerance_m)
+
+
+def merged(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Return the bare geometry of visual parts as one mesh."""
+    offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
+    return trimesh.Trimesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + offset for part, offset in zip(parts, offsets, strict=True)]),
+        process=False,
+    )

@@ -1,0 +1,76 @@
+"""The card, and what is drawn on it."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+import trimesh
+from PIL import Image
+
+from manitwin.geometry.poses import transform
+from manitwin.render.card import HEIGHT, PANEL, WIDTH, CardText, make_card
+from manitwin.render.card_panels import GRASP, CardGrasp, CardPoint, diverse, input_panel
+from manitwin.render.renderer import BACKDROP
+from manitwin.render.surfaces import plain_part
+from manitwin.simulate.gripper import load_gripper
+
+TEXT = CardText("box", "a plain box", [("size", "60 x 40 x 100 mm"), ("mass", "0.2 kg")], "source box.obj")
+
+
+def box() -> trimesh.Trimesh:
+    return trimesh.creation.box([0.06, 0.04, 0.1]).apply_translation([0, 0, 0.05])
+
+
+def card(**changes: object) -> bytes:
+    gripper = load_gripper("panda")
+    down = np.diag([1.0, -1.0, -1.0])
+    grasps = [
+        CardGrasp(transform(down, np.array([x, 0.0, 0.16])), gripper.boxes(0.06))
+        for x in np.linspace(-0.005, 0.005, 20)
+    ]
+    points = [CardPoint(np.array([0.0, -0.02, 0.05]), np.array([0.0, -1.0, 0.0]), "side", False)]
+    arguments: dict[str, object] = {
+        "parts": [plain_part(box(), (180, 120, 60))],
+        "solid": box(),
+        "hulls": [np.asarray(box().vertices)],
+        "points": points,
+        "grasps": grasps,
+        "text": TEXT,
+    }
+    return make_card(**(arguments | changes))  # type: ignore[arg-type]
+
+
+def test_card_is_the_same_png_each_time_and_shows_its_point() -> None:
+    first = card()
+    assert card() == first
+    image = np.asarray(Image.open(io.BytesIO(first)))
+    assert image.shape == (HEIGHT, WIDTH, 3)
+    last_column = image[:, WIDTH - 24 - PANEL : WIDTH - 24]
+    assert (last_column == GRASP).all(2).sum() > 50
+
+
+def test_card_shows_the_photo_or_the_prompt_in_the_first_column() -> None:
+    photo = np.zeros((300, 200, 3), dtype=np.uint8)
+    photo[..., 2] = 255
+    with_photo = np.asarray(Image.open(io.BytesIO(card(photo=photo))))[:, 24 : 24 + PANEL]
+    with_prompt = np.asarray(Image.open(io.BytesIO(card(prompt="a plain box"))))[:, 24 : 24 + PANEL]
+    assert (with_photo == (0, 0, 255)).all(2).sum() > 0.6 * PANEL * PANEL
+    assert not (with_prompt == (0, 0, 255)).all(2).any()
+
+
+def test_photo_keeps_its_shape_and_its_matte() -> None:
+    photo = np.zeros((100, 50, 4), dtype=np.uint8)
+    photo[:50] = (255, 0, 0, 255)
+    panel = input_panel(photo, 200)
+    assert (panel[50, 100] == (255, 0, 0)).all()
+    assert (panel[150, 100] == BACKDROP).all()
+    assert (panel[50, 20] == BACKDROP).all()
+
+
+def test_diverse_grasps_come_from_all_clusters() -> None:
+    rng = np.random.default_rng(0)
+    poses = np.tile(np.eye(4), (90, 1, 1))
+    poses[:, :3, 3] = rng.normal(0, 0.002, (90, 3)) + np.repeat(np.eye(3) * 0.2, 30, axis=0)
+    chosen = diverse(poses, 3)
+    assert sorted(chosen // 30) == [0, 1, 2]
