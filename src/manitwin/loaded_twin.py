@@ -68,7 +68,7 @@ class Twin:
         """The convex collision hulls."""
         self.physical  # noqa: B018
         files = sorted((self.folder / "collision").glob("hull_*.obj"))
-        return [trimesh.load(path, force="mesh", process=False) for path in files]
+        return [trimesh.load_mesh(path, process=False) for path in files]
 
     def grasps(self, verified_only: bool = True, gripper: str | None = None) -> Grasps:
         """Return the grasps of a gripper (by default the one that the twin was verified with).

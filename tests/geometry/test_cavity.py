@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 import trimesh
-from real_meshes import VESSELS, cup, load_real_mesh
 
 from manitwin.geometry.cavity import cavity_volume, find_opening
+from real_meshes import VESSELS, cup, load_real_mesh
 
 INSIDE_M3 = np.pi * 0.037**2 * 0.097  # of the cup of radius 40, height 100, wall 3 mm
 

@@ -3,13 +3,13 @@ import io
 import numpy as np
 import pytest
 import trimesh
-from real_meshes import VESSELS, cup, load_real_mesh, mesh_rows
 from scipy.spatial import QhullError
 
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.convex_decomposition import Decomposition, convex_decomposition
 from manitwin.geometry.hull_error import hull_error
 from manitwin.geometry.hull_reduction import hull_to_obj
+from real_meshes import VESSELS, cup, load_real_mesh, mesh_rows
 
 
 def _decompose(mesh: trimesh.Trimesh) -> Decomposition:
@@ -73,7 +73,9 @@ def test_mesh_that_is_no_manifold_gets_a_hull_a_component_and_says_so() -> None:
 
 
 def test_more_components_than_hulls_are_merged() -> None:
-    crowd = [trimesh.creation.box((0.01,) * 3).apply_translation((0.03 * (i % 7), 0.03 * (i // 7), 0)) for i in range(40)]
+    crowd = [
+        trimesh.creation.box((0.01,) * 3).apply_translation((0.03 * (i % 7), 0.03 * (i // 7), 0)) for i in range(40)
+    ]
     found = _decompose(trimesh.util.concatenate(crowd))
     assert len(found.hulls) == 32
 

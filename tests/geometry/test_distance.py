@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 import trimesh
-from real_meshes import load_real_mesh
 
 from manitwin.geometry.distance import closest_faces, contains, distance_to_surface, signed_distance
+from real_meshes import load_real_mesh
 
 
 def _segment_distance(points: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:

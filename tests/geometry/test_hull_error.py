@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 import trimesh
-from real_meshes import cup
 
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.hull_error import hull_error, hull_union, inside_any_hull
+from real_meshes import cup
 
 
 def _box(low: tuple[float, float, float], high: tuple[float, float, float]) -> np.ndarray:

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 import trimesh
-from real_meshes import cup
 
 from manitwin.geometry.mass_properties import shell_mass_properties, solid_mass_properties
+from real_meshes import cup
 
 
 def test_solid_box_off_the_origin_is_the_closed_form() -> None:

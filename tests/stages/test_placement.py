@@ -70,7 +70,7 @@ def _set_down_in_mujoco(draft: Draft, placement: dict[str, Any]) -> tuple[float,
     )
     model = mujoco.MjModel.from_xml_string(xml, {f"h{i}.obj": hull_to_obj(hull) for i, hull in enumerate(hulls)})
     data = mujoco.MjData(model)
-    start = np.array(placement["position_m"]) + [0, 0, 0.001]
+    start = np.add(placement["position_m"], [0, 0, 0.001])
     data.qpos[:3], data.qpos[3:] = start, placement["quaternion_wxyz"]
     mujoco.mj_step(model, data, 1000)
     cosine = min(1.0, abs(float(np.dot(data.qpos[3:], placement["quaternion_wxyz"]))))

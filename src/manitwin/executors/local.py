@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, TimeoutError
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,7 @@ def build_all(
     try:
         for item in items:
             future = pool.schedule(_build_in_worker, args=(item, out, config), timeout=config.item_timeout_s)
-            future.add_done_callback(lambda f, item=item: done.put(_result(f, item, config)))
+            future.add_done_callback(partial(_hand_over, item, config, done))
         for _ in items:
             yield done.get()
         pool.close()
@@ -76,6 +77,10 @@ def build_all(
         stop.set()
         listener.join()
         events.close()
+
+
+def _hand_over(item: Item, config: BuildConfig, done: queue.Queue[ItemResult], future: Any) -> None:
+    done.put(_result(future, item, config))
 
 
 def _result(future: Any, item: Item, config: BuildConfig) -> ItemResult:

@@ -75,9 +75,21 @@ class Stage(Protocol):
     reads: ClassVar[tuple[str, ...]]
     writes: ClassVar[tuple[str, ...]]
     needs: ClassVar[Resource]
-    settings: BaseModel
-    backend: str
-    model: str | None
+
+    @property
+    def settings(self) -> BaseModel:
+        """The stage's own slice of the configuration."""
+        ...
+
+    @property
+    def backend(self) -> str:
+        """Which backend does the work."""
+        ...
+
+    @property
+    def model(self) -> str | None:
+        """Which model, gripper or weights the backend uses."""
+        ...
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Do the step."""

@@ -1,0 +1,75 @@
+"""Write docs/configuration.md from the settings themselves, so that the page cannot be out of date.
+
+    python docs/make_configuration.py            writes the page
+    python docs/make_configuration.py --check    exits 1 where the page differs
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import cast
+
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
+
+from manitwin.config import BuildConfig
+
+PAGE = Path(__file__).parent / "configuration.md"
+INTRODUCTION = """# Settings
+
+A TOML file given with `--config run.toml`. What it does not say keeps its default; an unknown key is an error that names the
+nearest one. A changed section re-runs its stage and what follows, and nothing else.
+
+```toml
+seed = 1
+
+[verify]
+force_n = 40.0
+```
+
+This page is written by `python docs/make_configuration.py`.
+"""
+
+
+def rows(model: type[BaseModel], prefix: str = "") -> list[str]:
+    """Return a table row for every plain setting of a section, nested ones with their path."""
+    found = []
+    for name, field in model.model_fields.items():
+        annotation = field.annotation
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            found += rows(annotation, f"{prefix}{name}.")
+        else:
+            found.append(f"| `{prefix}{name}` | `{_default(field)}` | {_range(field)} |")
+    return found
+
+
+def _default(field: FieldInfo) -> str:
+    value = field.default
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _range(field: FieldInfo) -> str:
+    signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+    limits = [f"{sign} {getattr(rule, name):g}" for rule in field.metadata for name, sign in signs.items() if hasattr(rule, name)]
+    return ", ".join(limits)
+
+
+def page() -> str:
+    """Return the whole page."""
+    sections = {n: f.annotation for n, f in BuildConfig.model_fields.items() if isinstance(f.annotation, type) and issubclass(f.annotation, BaseModel)}
+    plain = [f"| `{n}` | `{_default(f)}` | {_range(f)} |" for n, f in BuildConfig.model_fields.items() if n not in sections]
+    text = [INTRODUCTION, "## General\n", "| setting | default | range |", "|---|---|---|", *plain, ""]
+    for name, section in sections.items():
+        model = cast(type[BaseModel], section)
+        table = rows(model)
+        text += [f"## [{name}]\n", " ".join((model.__doc__ or "").split()).replace("``", "`"), ""]
+        if table:
+            text += ["| setting | default | range |", "|---|---|---|", *table, ""]
+    return "\n".join(text)
+
+
+if __name__ == "__main__":
+    if "--check" in sys.argv[1:]:
+        sys.exit(0 if PAGE.is_file() and PAGE.read_text() == page() else "docs/configuration.md is out of date: python docs/make_configuration.py")
+    PAGE.write_text(page())

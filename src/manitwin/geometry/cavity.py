@@ -1,0 +1,160 @@
+"""Open cavities: what a container can hold, measured by looking into it."""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+from manitwin.geometry.hull_reduction import hull_volume
+from manitwin.geometry.poses import rotation_between
+
+# Measured on 25 real meshes: the shallowest vessel (a plate) has depth 4.4 % of the longest side and the smallest (a
+# shoe) holds 5.4 % of its convex hull; the largest hollow that is none (a can's lid) holds 3.9 %, and sideways (a
+# clamp's jaws) 5.2 %.
+_MIN_DEPTH_SHARE = 0.04
+_MIN_VOLUME_SHARE = 0.05
+_MIN_VOLUME_SHARE_SIDEWAYS = 0.10
+
+
+@dataclass(frozen=True)
+class Opening:
+    """The largest hollow that would hold water, in the object frame.
+
+    ``axis (3,)`` points out of it, ``center_m (3,)`` is the middle of its rim, ``rim_radius_m`` the radius of a
+    circle with the rim's area, ``volume_m3`` what it holds to the brim, ``depth_m`` from the brim to its deepest point.
+    """
+
+    axis: np.ndarray
+    center_m: np.ndarray
+    rim_radius_m: float
+    volume_m3: float
+    depth_m: float
+
+
+def cavity_volume(
+    mesh: trimesh.Trimesh, up: np.ndarray, hull: trimesh.Trimesh | None = None, cells: int = 120
+) -> float:
+    """Return the volume (m3) between the convex hull and the first surface met from ``up (3,)``.
+
+    ``hull`` is the mesh's convex hull where it is known already. The grid has ``cells`` along the longer side.
+    """
+    hull = mesh.convex_hull if hull is None else hull
+    grid = _look_grid(hull, np.asarray(up, dtype=float), cells)
+    return grid.volume_between(grid.heights(RayMeshIntersector(mesh)), grid.heights(RayMeshIntersector(hull)))
+
+
+def find_opening(mesh: trimesh.Trimesh, cells: int = 64) -> Opening | None:
+    """Return the largest opening of a mesh, or None where nothing would hold water.
+
+    It looks along the mesh's own axes and its principal ones. An opening is a basin of the height field seen from
+    outside: at least 4 % of the longest side deep and 5 % of the convex hull's volume large, 10 % where it does not
+    open upward. Source: priority flood (Barnes, Lehman and Mulla 2014).
+    """
+    if hull_volume(np.asarray(mesh.vertices)) == 0:
+        return None
+    hull = mesh.convex_hull
+    mesh_rays, hull_rays = RayMeshIntersector(mesh), RayMeshIntersector(hull)
+    best: Opening | None = None
+    for axis in _candidate_axes(hull):
+        least_m3 = hull.volume * (_MIN_VOLUME_SHARE if axis[2] > 0.99 else _MIN_VOLUME_SHARE_SIDEWAYS)
+        if best is not None:
+            least_m3 = max(least_m3, best.volume_m3 * 1.02)
+        grid = _look_grid(hull, axis, cells)
+        heights = grid.heights(mesh_rays)
+        if grid.volume_between(heights, grid.heights(hull_rays)) < least_m3:
+            continue
+        opening = _basin(grid, heights)
+        if (
+            opening is not None
+            and opening.volume_m3 >= least_m3
+            and opening.depth_m >= _MIN_DEPTH_SHARE * mesh.extents.max()
+        ):
+            best = opening
+    return best
+
+
+@dataclass(frozen=True)
+class _LookGrid:
+    """Parallel rays down ``-up`` over a square grid: ``origins (R, 3)`` above the mesh, in rows of ``shape``."""
+
+    origins: np.ndarray
+    shape: tuple[int, int]
+    up: np.ndarray
+    cell_m: float
+
+    def heights(self, surface: RayMeshIntersector) -> np.ndarray:
+        """Return the height along ``up`` of the first surface met, in the grid's shape; NaN where there is none."""
+        directions = np.repeat(-self.up[None], len(self.origins), axis=0)
+        _, rays, locations = surface.intersects_id(self.origins, directions, multiple_hits=False, return_locations=True)
+        heights = np.full(len(self.origins), np.nan)
+        if len(rays):
+            heights[rays] = locations @ self.up
+        return heights.reshape(self.shape)
+
+    def volume_between(self, lower: np.ndarray, upper: np.ndarray) -> float:
+        """Return the volume (m3) between two height fields, where both are."""
+        return float(np.nansum(np.maximum(upper - lower, 0))) * self.cell_m**2
+
+
+def _look_grid(hull: trimesh.Trimesh, up: np.ndarray, cells: int) -> _LookGrid:
+    up = up / np.linalg.norm(up)
+    rotation = rotation_between(up, np.array([0.0, 0, 1]))
+    local = hull.vertices @ rotation.T
+    low, high = local.min(0), local.max(0)
+    cell = float((high - low)[:2].max()) / cells
+    x, y = (np.arange(low[a] + cell / 2, high[a], cell) for a in range(2))
+    grid_x, grid_y = np.meshgrid(x, y, indexing="ij")
+    above = np.full(grid_x.size, high[2] + (high - low).max())
+    return _LookGrid(np.stack([grid_x.ravel(), grid_y.ravel(), above], axis=1) @ rotation, grid_x.shape, up, cell)
+
+
+def _candidate_axes(hull: trimesh.Trimesh) -> list[np.ndarray]:
+    """Return the object's axes, +Z first, and those principal axes that differ from them by more than 10 degrees."""
+    axes = [np.array(a, dtype=float) for a in ((0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))]
+    for principal in hull.principal_inertia_vectors:
+        for axis in (principal, -principal):
+            if max(float(axis @ other) for other in axes) < np.cos(np.radians(10)):
+                axes.append(axis)
+    return axes
+
+
+def _basin(grid: _LookGrid, heights: np.ndarray) -> Opening | None:
+    """Return the deepest basin of a height field, or None where all runs off."""
+    if not np.isfinite(heights).any():
+        return None
+    level = _flooded(heights)
+    depth = np.where(np.isfinite(heights), level - heights, 0.0)
+    wet = depth > 0.01 * grid.cell_m
+    if not wet.any():
+        return None
+    deepest = np.unravel_index(int(depth.argmax()), depth.shape)
+    pool = wet & (np.abs(level - level[deepest]) < 1e-9)
+    rim = grid.origins.reshape(*grid.shape, 3)[pool].mean(0)
+    center = rim - grid.up * (rim @ grid.up - level[deepest])
+    area = pool.sum() * grid.cell_m**2
+    return Opening(
+        grid.up, center, float(np.sqrt(area / np.pi)), float(depth[pool].sum()) * grid.cell_m**2, float(depth[deepest])
+    )
+
+
+def _flooded(heights: np.ndarray) -> np.ndarray:
+    """Return the water level of every cell when all basins are full; the border and cells that are NaN drain."""
+    rows, columns = heights.shape
+    beside = np.isnan(heights)
+    drains = beside.copy()
+    drains[[0, -1]], drains[:, [0, -1]] = True, True
+    heights = np.where(beside, np.nanmin(heights) - 1.0, heights)
+    level = np.where(drains, heights, np.inf)
+    queue = [(float(heights[i, j]), int(i), int(j)) for i, j in np.argwhere(drains)]
+    heapq.heapify(queue)
+    while queue:
+        height, i, j = heapq.heappop(queue)
+        for a, b in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
+            if 0 <= a < rows and 0 <= b < columns and np.isinf(level[a, b]):
+                level[a, b] = max(height, float(heights[a, b]))
+                heapq.heappush(queue, (float(level[a, b]), a, b))
+    return level

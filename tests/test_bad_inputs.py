@@ -1,0 +1,157 @@
+"""Every file of the shared bad inputs behaves as its manifest asks, one by one, through the whole command."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import manitwin
+import manitwin.config
+from manitwin.pipeline import ItemResult
+from manitwin.twin import TwinRecord
+
+pytestmark = pytest.mark.shared_data
+
+REJECTED = {
+    "truncated.jpg": ("input", {"unreadable"}, "truncated"),
+    "zero_byte.png": ("input", {"empty"}, "empty"),
+    "text_renamed.png": ("input", {"wrong_type"}, "image"),
+    "animated.gif": ("input", {"animated"}, "animated"),
+    "animated.webp": ("input", {"animated"}, "animated"),
+    "several_objects.jpg": ("generate", {"several_objects"}, "objects"),
+    "blank_white.png": ("generate", {"no_object"}, "object"),
+    "one_pixel.png": ("input", {"too_small"}, "1"),
+    "nan_vertices.obj": ("input", {"not_finite"}, "50"),
+    "zero_faces.obj": ("input", {"no_faces"}, "face"),
+    "scene_four_objects.glb": ("gate", {"several_objects"}, "4"),
+}
+NAMES = {
+    "cmyk.jpg": "fork",
+    "gray16.png": "flashlight",
+    "exif_rotated.jpg": "hammer",
+    "rgba_garbage_under_alpha.png": "orange",
+    "nonmanifold.obj": "toy",
+    "millimetres.obj": "spatula",
+    "missing_texture.obj": "box",
+}
+
+
+@pytest.fixture(scope="module")
+def results(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, ItemResult]:
+    """Build all of them, and the upright originals that some are compared with, in one command."""
+    folder = tmp_path_factory.mktemp("bad")
+    with (shared_data / "bad" / "manifest.csv").open() as stream:
+        files = [row["file"] for row in csv.DictReader(stream)]
+    assert set(files) == set(REJECTED) | set(NAMES)
+    rows = [(shared_data / "bad" / file, NAMES.get(file, "")) for file in files]
+    rows += [(shared_data / "photos" / "claw_hammer.jpg", "hammer"), (shared_data / "photos" / "steel_fork.jpg", "fork")]
+    rows += [(shared_data / "meshes" / "toy_dinosaur" / "dinosaur_figure.obj", "toy")]
+    manifest = folder / "manifest.csv"
+    manifest.write_text("file,name\n" + "".join(f"{file},{name}\n" for file, name in rows))
+    config = manitwin.config.BuildConfig(grasps={"simulated": 10, "unfiltered": 2})
+    report = manitwin.build(manifest, folder / "out", config=config)
+    assert report.count("unfinished") == 0, [r.detail for r in report.results if r.status == "unfinished"]
+    left = {p.name for p in (folder / "out").iterdir()} - {".work"}
+    assert left == {r.twin_id for r in report.results}, "every input ends in a folder, and nothing else is there"
+    return {Path(r.item.file or "").name: r for r in report.results}
+
+
+def record(result: ItemResult) -> TwinRecord:
+    assert result.folder is not None
+    return manitwin.load(result.folder, verify=True).record
+
+
+@pytest.mark.parametrize("file", sorted(REJECTED))
+def test_unusable_input_is_rejected_with_its_reason(results: dict[str, ItemResult], file: str) -> None:
+    stage, reasons, word = REJECTED[file]
+    found = record(results[file])
+    assert found.rejection is not None
+    assert (found.rejection.stage, found.rejection.reason in reasons) == (stage, True), found.rejection
+    assert word in found.rejection.detail
+    assert file in found.rejection.detail or stage != "input"
+    assert "\n" not in found.rejection.detail
+
+
+def test_millimetres_are_told_from_metres(results: dict[str, ItemResult]) -> None:
+    found = record(results["millimetres.obj"])
+    assert found.physical is not None
+    assert max(found.physical.extents_m) == pytest.approx(0.24, abs=0.002)
+    assert any("mm" in check.message or "millimet" in check.message for check in found.quality.checks)
+
+
+def test_missing_texture_is_a_finding(results: dict[str, ItemResult]) -> None:
+    found = record(results["missing_texture.obj"])
+    assert found.physical is not None
+    assert sorted(found.physical.extents_m) == pytest.approx([0.02, 0.06, 0.09], abs=1e-4)
+    assert any("mtl" in check.message for check in found.quality.checks if check.passed is False)
+
+
+def test_damaged_dinosaur_has_the_volume_of_the_clean_one(results: dict[str, ItemResult]) -> None:
+    damaged, clean = record(results["nonmanifold.obj"]), record(results["dinosaur_figure.obj"])
+    assert damaged.mesh is not None and clean.mesh is not None
+    assert damaged.mesh.volume_m3 == pytest.approx(clean.mesh.volume_m3, rel=0.02)
+    assert damaged.mesh.repairs and not clean.mesh.repairs
+
+
+def test_exif_rotation_gives_the_twin_of_the_upright_photo(results: dict[str, ItemResult]) -> None:
+    turned, upright = results["exif_rotated.jpg"], results["claw_hammer.jpg"]
+    assert turned.status == upright.status
+    a, b = record(turned), record(upright)
+    if a.physical is None or b.physical is None:
+        assert a.rejection is not None and b.rejection is not None and a.rejection.reason == b.rejection.reason
+        return
+    assert a.physical.extents_m == pytest.approx(b.physical.extents_m, rel=0.02)
+
+
+def test_cmyk_photo_keeps_its_colours(results: dict[str, ItemResult]) -> None:
+    converted, original = results["cmyk.jpg"], results["steel_fork.jpg"]
+    assert converted.status == original.status
+    a, b = record(converted), record(original)
+    if a.language is not None and b.language is not None:
+        assert a.language.color == b.language.color
+
+
+def test_colour_under_transparent_pixels_never_shows(results: dict[str, ItemResult]) -> None:
+    found = record(results["rgba_garbage_under_alpha.png"])
+    assert found.language is not None and found.status == "accepted"
+    assert not {"magenta", "pink", "purple"} & set(found.language.color.split())
+    assert "orange" in found.language.color
+    folder = results["rgba_garbage_under_alpha.png"].folder
+    assert folder is not None
+    for view in sorted((folder / "views").glob("rgb_*.webp")):
+        red, green, blue = np.moveaxis(np.asarray(Image.open(view).convert("RGB"), int), -1, 0)
+        assert not ((red > 180) & (green < 60) & (blue > 180)).any()
+
+
+def test_sixteen_bit_photo_is_scaled_not_clipped(results: dict[str, ItemResult]) -> None:
+    result = results["gray16.png"]
+    found = record(result)
+    if found.status == "rejected":
+        assert found.rejection is not None and found.rejection.stage == "generate"
+        return
+    assert found.language is not None and found.language.color != "white"
+
+
+def test_source_is_kept_byte_for_byte(results: dict[str, ItemResult], shared_data: Path) -> None:
+    folder = results["zero_byte.png"].folder
+    assert folder is not None
+    assert (folder / "source.png").read_bytes() == b""
+    original = shared_data / "bad" / "text_renamed.png"
+    rejected = results["text_renamed.png"].folder
+    assert rejected is not None and (rejected / "source.png").read_bytes() == original.read_bytes()
+
+
+def test_a_rejected_input_is_not_tried_again(results: dict[str, ItemResult], shared_data: Path, tmp_path: Path) -> None:
+    folder = results["one_pixel.png"].folder
+    assert folder is not None
+    shutil.copytree(folder, tmp_path / folder.name)
+    config = manitwin.config.BuildConfig(grasps={"simulated": 10, "unfiltered": 2})
+    report = manitwin.build(shared_data / "bad" / "one_pixel.png", tmp_path, config=config)
+    assert [r.reused for r in report.results] == [True]
+    assert json.loads((tmp_path / folder.name / "twin.json").read_text())["status"] == "rejected"

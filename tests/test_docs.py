@@ -1,0 +1,46 @@
+"""What the documents say is run, and what they show is there."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_and_pictures_lead_somewhere(page: Path) -> None:
+    targets = re.findall(r"\]\(([^)#]+)", page.read_text())
+    missing = [t for t in targets if "://" not in t and not (page.parent / t).exists()]
+    assert not missing
+
+
+def test_settings_page_is_that_of_the_code() -> None:
+    done = subprocess.run([sys.executable, ROOT / "docs" / "make_configuration.py", "--check"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_readme_commands_are_those_that_ci_and_tests_run() -> None:
+    blocks = re.findall(r"```(?:sh)?\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    commands = {line.split("#")[0].strip() for block in blocks for line in block.splitlines() if line.strip()}
+    make_targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert {c.split()[1] for c in commands if c.startswith("make ")} <= make_targets
+    assert "make test" in (ROOT / ".ci" / "run").read_text()
+    # the others are run here, on the help of the command they name: that it exists and takes these options
+    for command in commands:
+        if "manitwin" in command.split()[0]:
+            words = command.split()
+            done = subprocess.run([sys.executable, "-m", "manitwin.cli", words[1], "--help"], capture_output=True, text=True)
+            assert done.returncode == 0, command
+            assert all(option in done.stdout for option in words if option.startswith("--")), command
+
+
+def test_python_examples_of_the_docs_compile() -> None:
+    for page in PAGES:
+        for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL):
+            compile(block, page.name, "exec")
