@@ -1,0 +1,34 @@
+"""First hits of many rays on a triangle mesh (Embree)."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+
+MILLIMETRES = 1000.0  # Embree works in float32 with absolute tolerances: objects of a hand's size want larger units
+
+
+class RayCaster:
+    """A mesh prepared for rays."""
+
+    def __init__(self, mesh: trimesh.Trimesh):
+        self._scene = EmbreeScene()
+        self._mesh = TriangleMesh(self._scene, (mesh.triangles * MILLIMETRES).astype(np.float32))
+        self.face_normals = mesh.face_normals
+
+    def first_hits(self, origins_m: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the distance (m; inf: nothing) and the face (-1: nothing) of each ray's first hit.
+
+        ``origins_m`` and ``directions`` are ``(N, 3)``, the directions of unit length.
+        """
+        if not len(origins_m):
+            return np.zeros(0), np.zeros(0, dtype=np.int64)
+        hits = self._scene.run(
+            np.ascontiguousarray(origins_m * MILLIMETRES, dtype=np.float32),
+            np.ascontiguousarray(directions, dtype=np.float32),
+            output=1,
+        )
+        face = hits["primID"].astype(np.int64)
+        return np.where(face >= 0, hits["tfar"].astype(float) / MILLIMETRES, np.inf), face
