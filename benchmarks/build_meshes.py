@@ -40,52 +40,55 @@ def label(file: Path, kind: str) -> str:
     return file.parent.name if kind == "mesh" else file.stem
 
 
+HEADER = f"{'object':22s} {'status':9s} {'prop':>5s} {'sim':>4s} {'ver':>4s} {'unf %':>6s} {'oct':>4s} {'r cm':>5s} {'CPU s':>6s}"
+
+
 def print_table(results: list, kind: str) -> list[dict]:
     """Print a row for each result; returns the figures of the rows."""
-    print(f"{'object':22s} {'status':9s} {'prop':>5s} {'sim':>4s} {'ver':>4s} {'unf %':>6s} {'oct':>4s} {'r cm':>5s} {'CPU s':>6s}  failures or reason")
+    print(f"{HEADER}  failures or reason")
     figures = []
     for result in sorted(results, key=lambda r: r.item.file):
-        name = label(Path(result.item.file), kind)
-        if result.folder is None:
-            print(f"{name:22s} {result.status:9s} {result.detail}")
-            figures.append({"verified": 0, "simulated": 0, "cpu": {}, "accepted": False, "octants": 0})
-            continue
-        record = read_record(result.folder)
-        run = json.loads((result.folder / "run.json").read_text())
+        name = f"{label(Path(result.item.file), kind):22s} {result.status:9s}"
+        run = json.loads((result.folder / "run.json").read_text()) if result.folder else {"stages": {}}
         cpu = {stage: cost["cpu_seconds"] for stage, cost in run["stages"].items()}
-        grasps = record.grasps
+        grasps = read_record(result.folder).grasps if result.folder else None
         if grasps is None:
-            print(f"{name:22s} {result.status:9s} {'':37s} {sum(cpu.values()):6.1f}  {result.detail}")
+            print(f"{name} {'':32s} {sum(cpu.values()):6.1f}  {result.detail}")
             figures.append({"verified": 0, "simulated": 0, "cpu": cpu, "accepted": False, "octants": 0})
             continue
         unfiltered = 100 * (grasps.unfiltered_success_rate or 0.0)
         failures = ", ".join(f"{count} {outcome}" for outcome, count in grasps.failures.items())
         print(
-            f"{name:22s} {result.status:9s} {grasps.proposed:5d} {grasps.simulated:4d} {grasps.verified:4d} {unfiltered:6.0f}"
-            f" {grasps.approach_octants:4d} {100 * grasps.association_radius_m:5.1f} {sum(cpu.values()):6.1f}  {failures}"
+            f"{name} {grasps.proposed:5d} {grasps.simulated:4d} {grasps.verified:4d} {unfiltered:6.0f}"
+            f" {grasps.approach_octants:4d}"
+            f" {100 * grasps.association_radius_m:5.1f} {sum(cpu.values()):6.1f}  {failures}"
         )
-        figures.append(
-            {"verified": grasps.verified, "simulated": grasps.simulated, "cpu": cpu, "accepted": True, "octants": grasps.approach_octants}
-        )
+        row = {"verified": grasps.verified, "simulated": grasps.simulated, "octants": grasps.approach_octants}
+        figures.append({**row, "cpu": cpu, "accepted": True})
     return figures
 
 
 def print_summary(figures: list[dict]) -> None:
     """Print the figures over all objects, and CPU seconds by stage."""
     verified = np.array([f["verified"] for f in figures])
-    simulated = np.array([max(f["simulated"], GRASPS_WANTED if not f["verified"] else 0) for f in figures])
+    simulated = np.array([max(f["simulated"], 0 if f["verified"] else GRASPS_WANTED) for f in figures])
     accepted = sum(f["accepted"] for f in figures)
-    print(f"\naccepted {accepted}/{len(figures)}, with 20 verified or more {np.sum(verified >= 20)}, with 4 octants or more {sum(f['octants'] >= 4 for f in figures)}")
-    print(f"verified {verified.sum()}/{simulated.sum()} = {100 * verified.sum() / max(simulated.sum(), 1):.1f} % of the simulated (none held: 0 of {GRASPS_WANTED})")
+    many, wide = int(np.sum(verified >= 20)), sum(f["octants"] >= 4 for f in figures)
+    rate = 100 * verified.sum() / max(simulated.sum(), 1)
+    print(f"\naccepted {accepted}/{len(figures)}, {many} with 20 verified or more, {wide} with 4 approach octants or more")
+    print(f"verified {verified.sum()}/{simulated.sum()} = {rate:.1f} % of the simulated (none held counts 0 of {GRASPS_WANTED})")
     print(f"verified per object: median {np.median(verified):.0f}, 10th percentile {np.percentile(verified, 10):.0f}")
-    totals = np.array([sum(f["cpu"].values()) for f in figures if f["cpu"]])
-    stages = list(dict.fromkeys(stage for f in figures for stage in f["cpu"]))
-    for stage in stages:
-        seconds = [f["cpu"][stage] for f in figures if stage in f["cpu"]]
-        print(f"  {stage:12s} median {np.median(seconds):6.2f}  p90 {np.percentile(seconds, 90):6.2f}  max {max(seconds):6.2f} CPU-s")
-    print(f"  {'whole chain':12s} median {np.median(totals):6.2f}  p90 {np.percentile(totals, 90):6.2f}  max {totals.max():6.2f} CPU-s")
+    for stage in dict.fromkeys(stage for f in figures for stage in f["cpu"]):
+        print_seconds(stage, [f["cpu"][stage] for f in figures if stage in f["cpu"]])
+    print_seconds("whole chain", [sum(f["cpu"].values()) for f in figures if f["cpu"]])
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
     print(f"peak memory of a worker {peak:.0f} MB")
+
+
+def print_seconds(name: str, seconds: list[float]) -> None:
+    """Print how CPU seconds are spread."""
+    ninetieth = np.percentile(seconds, 90)
+    print(f"  {name:12s} median {np.median(seconds):6.2f}  p90 {ninetieth:6.2f}  max {max(seconds):6.2f} CPU-s")
 
 
 def main() -> None:
@@ -99,7 +102,9 @@ def main() -> None:
     arguments = parser.parse_args()
     only = set(filter(None, arguments.only.split(",")))
     manifest = write_manifest(arguments.data, arguments.out, arguments.kind, only)
-    report = manitwin.build(manifest, arguments.out / "twins", jobs=arguments.jobs, on_result=lambda r: print(".", end="", flush=True))
+    report = manitwin.build(
+        manifest, arguments.out / "twins", jobs=arguments.jobs, on_result=lambda r: print(".", end="", flush=True)
+    )
     print()
     print_summary(print_table(report.results, arguments.kind))
 

@@ -1,7 +1,7 @@
 """Write docs/configuration.md from the settings themselves, so that the page cannot be out of date.
 
-    python docs/make_configuration.py            writes the page
-    python docs/make_configuration.py --check    exits 1 where the page differs
+python docs/make_configuration.py            writes the page
+python docs/make_configuration.py --check    exits 1 where the page differs
 """
 
 from __future__ import annotations
@@ -51,14 +51,25 @@ def _default(field: FieldInfo) -> str:
 
 def _range(field: FieldInfo) -> str:
     signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
-    limits = [f"{sign} {getattr(rule, name):g}" for rule in field.metadata for name, sign in signs.items() if hasattr(rule, name)]
+    limits = [
+        f"{sign} {getattr(rule, name):g}"
+        for rule in field.metadata
+        for name, sign in signs.items()
+        if hasattr(rule, name)
+    ]
     return ", ".join(limits)
 
 
 def page() -> str:
     """Return the whole page."""
-    sections = {n: f.annotation for n, f in BuildConfig.model_fields.items() if isinstance(f.annotation, type) and issubclass(f.annotation, BaseModel)}
-    plain = [f"| `{n}` | `{_default(f)}` | {_range(f)} |" for n, f in BuildConfig.model_fields.items() if n not in sections]
+    sections = {
+        n: f.annotation
+        for n, f in BuildConfig.model_fields.items()
+        if isinstance(f.annotation, type) and issubclass(f.annotation, BaseModel)
+    }
+    plain = [
+        f"| `{n}` | `{_default(f)}` | {_range(f)} |" for n, f in BuildConfig.model_fields.items() if n not in sections
+    ]
     text = [INTRODUCTION, "## General\n", "| setting | default | range |", "|---|---|---|", *plain, ""]
     for name, section in sections.items():
         model = cast(type[BaseModel], section)
@@ -71,5 +82,9 @@ def page() -> str:
 
 if __name__ == "__main__":
     if "--check" in sys.argv[1:]:
-        sys.exit(0 if PAGE.is_file() and PAGE.read_text() == page() else "docs/configuration.md is out of date: python docs/make_configuration.py")
+        sys.exit(
+            0
+            if PAGE.is_file() and PAGE.read_text() == page()
+            else "docs/configuration.md is out of date: python docs/make_configuration.py"
+        )
     PAGE.write_text(page())

@@ -48,7 +48,11 @@ def as_root(command: list[str]) -> list[str] | None:
 def distribution() -> tuple[str, str]:
     """Return the id and code name of the distribution ('debian', 'bookworm')."""
     release = Path("/etc/os-release")
-    fields = dict(line.split("=", 1) for line in release.read_text().splitlines() if "=" in line) if release.is_file() else {}
+    fields = (
+        dict(line.split("=", 1) for line in release.read_text().splitlines() if "=" in line)
+        if release.is_file()
+        else {}
+    )
     return fields.get("ID", "").strip('"'), fields.get("VERSION_CODENAME", "").strip('"')
 
 
@@ -65,14 +69,17 @@ def apt_install(packages: list[str], why: str, extra: list[str] | None = None, b
     for step in (update, command):
         done = subprocess.run(step or [], capture_output=True, text=True, env=environment)
         if done.returncode != 0 and step is command:
-            say(f"{why}; apt-get failed: {done.stderr.strip().splitlines()[-1] if done.stderr.strip() else 'no message'}. By hand: {by_hand}")
+            reason = (done.stderr.strip().splitlines() or ["no message"])[-1]
+            say(f"{why}; apt-get failed: {reason}. By hand: {by_hand}")
             return False
     return True
 
 
 def make_environment() -> None:
     """Create the virtual environment, with pip in it."""
-    if (VENV / "bin" / "python").exists() and subprocess.run([VENV / "bin" / "python", "-m", "pip", "--version"], capture_output=True).returncode == 0:
+    if (VENV / "bin" / "python").exists() and subprocess.run(
+        [VENV / "bin" / "python", "-m", "pip", "--version"], capture_output=True
+    ).returncode == 0:
         return
     shutil.rmtree(VENV, ignore_errors=True)
     try:
@@ -98,7 +105,10 @@ def install_packages() -> None:
         return
     pip = [str(VENV / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     say("installing the locked packages (a few minutes, once)")
-    for what in (["--require-hashes", "-r", str(ROOT / "requirements.lock")], ["--no-deps", "--no-build-isolation", "-e", str(ROOT)]):
+    for what in (
+        ["--require-hashes", "-r", str(ROOT / "requirements.lock")],
+        ["--no-deps", "--no-build-isolation", "-e", str(ROOT)],
+    ):
         if subprocess.run([*pip, *what]).returncode != 0:
             stop("pip could not install the packages, for the reason above; mend it, then run the same command again")
     STAMP.write_text(digest)
@@ -157,8 +167,10 @@ def install_renderer() -> None:
 
 
 def main() -> None:
-    if sys.version_info < (3, 11):
-        stop(f"Python 3.11 or newer is needed, this is {sys.version.split()[0]}; name one with: make PYTHON=python3.12 setup")
+    if sys.version_info < (3, 11):  # noqa: UP036  this file runs before pip can refuse an older Python
+        stop(
+            f"Python 3.11 or newer is needed, this is {sys.version.split()[0]}; name one with: make PYTHON=python3.12 setup"
+        )
     make_environment()
     install_packages()
     install_libraries()

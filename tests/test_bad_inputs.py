@@ -50,7 +50,10 @@ def results(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict
         files = [row["file"] for row in csv.DictReader(stream)]
     assert set(files) == set(REJECTED) | set(NAMES)
     rows = [(shared_data / "bad" / file, NAMES.get(file, "")) for file in files]
-    rows += [(shared_data / "photos" / "claw_hammer.jpg", "hammer"), (shared_data / "photos" / "steel_fork.jpg", "fork")]
+    rows += [
+        (shared_data / "photos" / "claw_hammer.jpg", "hammer"),
+        (shared_data / "photos" / "steel_fork.jpg", "fork"),
+    ]
     rows += [(shared_data / "meshes" / "toy_dinosaur" / "dinosaur_figure.obj", "toy")]
     manifest = folder / "manifest.csv"
     manifest.write_text("file,name\n" + "".join(f"{file},{name}\n" for file, name in rows))

@@ -95,10 +95,13 @@ def test_mass_properties_agree_with_mujoco(samples: dict[str, Twin]) -> None:
     mesh = trimesh.util.concatenate([trimesh.Trimesh(part.vertices, part.faces) for part in twin.visual])
     vertices = " ".join(f"{x:.9f}" for x in np.asarray(mesh.vertices).ravel())
     faces = " ".join(str(i) for i in np.asarray(mesh.faces).ravel())
-    xml = f"""<mujoco><compiler balanceinertia="false"/><asset><mesh name="m" vertex="{vertices}" face="{faces}" inertia="exact"/></asset>
+    xml = f"""<mujoco><compiler balanceinertia="false"/>
+    <asset><mesh name="m" vertex="{vertices}" face="{faces}" inertia="exact"/></asset>
     <worldbody><body><freejoint/><geom type="mesh" mesh="m" mass="{physical.mass_kg.value}"/></body></worldbody></mujoco>"""
     model = mujoco.MjModel.from_xml_string(xml)
-    assert np.sort(model.body_inertia[1]) == pytest.approx(np.linalg.eigvalsh(np.array(physical.inertia_kg_m2)), rel=0.01)
+    assert np.sort(model.body_inertia[1]) == pytest.approx(
+        np.linalg.eigvalsh(np.array(physical.inertia_kg_m2)), rel=0.01
+    )
     assert model.body_ipos[1] == pytest.approx(physical.center_of_mass_m, abs=5e-4)
 
 
@@ -137,7 +140,19 @@ def test_numbers_and_their_sources_are_in_the_record(samples: dict[str, Twin]) -
 
 def test_killed_build_leaves_no_half_twin_and_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "manitwin.cli", "build", str(SAMPLES / "mug.glb"), "-o", str(out), "--name", "mug", "-j", "1"]
+    command = [
+        sys.executable,
+        "-m",
+        "manitwin.cli",
+        "build",
+        str(SAMPLES / "mug.glb"),
+        "-o",
+        str(out),
+        "--name",
+        "mug",
+        "-j",
+        "1",
+    ]
     settings = tmp_path / "quick.toml"
     settings.write_text("[grasps]\nsimulated = 16\nunfiltered = 4\n")
     command += ["--config", str(settings)]
@@ -158,7 +173,17 @@ def test_killed_build_leaves_no_half_twin_and_goes_on(tmp_path: Path) -> None:
 
 
 def test_interrupted_build_says_so_and_exits_with_4(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "manitwin.cli", "build", str(SAMPLES / "mug.glb"), "-o", str(tmp_path / "out"), "-j", "1"]
+    command = [
+        sys.executable,
+        "-m",
+        "manitwin.cli",
+        "build",
+        str(SAMPLES / "mug.glb"),
+        "-o",
+        str(tmp_path / "out"),
+        "-j",
+        "1",
+    ]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     deadline = time.monotonic() + 240
     while not list((tmp_path / "out").glob(".work/*/mesh/*/result.json")) and time.monotonic() < deadline:

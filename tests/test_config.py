@@ -13,7 +13,7 @@ def load(tmp_path: Path, text: str) -> BuildConfig:
 
 
 def test_settings_of_a_file_replace_defaults(tmp_path: Path) -> None:
-    config = load(tmp_path, 'seed = 7\n[candidates]\ncount = 21\n')
+    config = load(tmp_path, "seed = 7\n[candidates]\ncount = 21\n")
     assert config.seed == 7 and config.candidates.count == 21
 
 

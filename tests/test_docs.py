@@ -21,7 +21,9 @@ def test_links_and_pictures_lead_somewhere(page: Path) -> None:
 
 
 def test_settings_page_is_that_of_the_code() -> None:
-    done = subprocess.run([sys.executable, ROOT / "docs" / "make_configuration.py", "--check"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, ROOT / "docs" / "make_configuration.py", "--check"], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -35,7 +37,9 @@ def test_readme_commands_are_those_that_ci_and_tests_run() -> None:
     for command in commands:
         if "manitwin" in command.split()[0]:
             words = command.split()
-            done = subprocess.run([sys.executable, "-m", "manitwin.cli", words[1], "--help"], capture_output=True, text=True)
+            done = subprocess.run(
+                [sys.executable, "-m", "manitwin.cli", words[1], "--help"], capture_output=True, text=True
+            )
             assert done.returncode == 0, command
             assert all(option in done.stdout for option in words if option.startswith("--")), command
 

@@ -12,7 +12,10 @@ def test_identity_depends_on_bytes_name_units_and_up_only(tmp_path: Path) -> Non
     other.write_bytes(b"other")
     item = Item(file=str(file))
     assert twin_id(item) == twin_id(Item(file=str(copy), license="CC0-1.0", attribution="somebody"))
-    changed = [Item(file=str(other)), *(dataclasses.replace(item, **c) for c in ({"name": "mug"}, {"units": "mm"}, {"up": "y"}))]
+    changed = [
+        Item(file=str(other)),
+        *(dataclasses.replace(item, **c) for c in ({"name": "mug"}, {"units": "mm"}, {"up": "y"})),
+    ]
     assert len({twin_id(item), *map(twin_id, changed)}) == 5
 
 

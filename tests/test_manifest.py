@@ -9,7 +9,14 @@ from manitwin.manifest import collect_items
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    for name in ("cup.glb", "photo.jpg", "with_texture/model.obj", "with_texture/texture.png", "photos/a.png", ".hidden/b.png"):
+    for name in (
+        "cup.glb",
+        "photo.jpg",
+        "with_texture/model.obj",
+        "with_texture/texture.png",
+        "photos/a.png",
+        ".hidden/b.png",
+    ):
         path = tmp_path / name
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(b"x")
@@ -33,7 +40,9 @@ def test_csv_rows_override_what_holds_for_all(folder: Path) -> None:
 
 def test_jsonl_holds_texts_and_absolute_paths(folder: Path) -> None:
     manifest = folder / "list.jsonl"
-    manifest.write_text(json.dumps({"text": "a red mug", "name": "mug"}) + "\n\n" + json.dumps({"file": str(folder / "cup.glb")}))
+    manifest.write_text(
+        json.dumps({"text": "a red mug", "name": "mug"}) + "\n\n" + json.dumps({"file": str(folder / "cup.glb")})
+    )
     items, _ = collect_items([manifest])
     assert items[0].text == "a red mug" and items[0].file is None
     assert items[1].file == str(folder / "cup.glb")

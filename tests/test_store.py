@@ -50,7 +50,7 @@ def test_altered_twin_is_refused(sealed: Path, alter: str) -> None:
     else:
         path = sealed / "twin.json"
         path.write_text(path.read_text().replace("nothing in it", "something in it"))
-    with pytest.raises(TwinError, match="altered|missing"):
+    with pytest.raises(TwinError, match=r"altered|missing"):
         read_record(sealed, verify=True)
 
 

@@ -29,7 +29,9 @@ err_console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 @app.command()
 def build(
-    inputs: Annotated[list[Path], typer.Argument(help="Images, meshes, folders, or .csv/.jsonl manifests.", metavar="INPUT...")],
+    inputs: Annotated[
+        list[Path], typer.Argument(help="Images, meshes, folders, or .csv/.jsonl manifests.", metavar="INPUT...")
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write twins into.")],
     name: Annotated[str | None, typer.Option(help="What the object is ('mug'): the key to the priors.")] = None,
     units: Annotated[str, typer.Option(help="Units of meshes: m, cm, mm or auto.")] = "auto",

@@ -141,6 +141,23 @@ class FinishConfig(Section):
     """Nothing to choose: the card shows what is there."""
 
 
+class MattingConfig(Section):
+    """Reading a photo and cutting its object out. ``frame`` chooses a picture of an animation, counted from 0."""
+
+    frame: int | None = Field(default=None, ge=0)
+    photo_side_px: int = Field(default=2048, ge=256)
+    working_side_px: int = Field(default=512, ge=128)
+    min_confidence: float = Field(default=0.5, ge=0, le=1)
+    min_area_share: float = Field(default=0.002, gt=0, lt=1)
+    second_object_share: float = Field(default=0.12, gt=0, le=1)
+
+
+class GenerateConfig(Section):
+    """Waiting for a generator."""
+
+    max_wait_s: float = Field(default=1800.0, gt=0)
+
+
 class BuildConfig(Section):
     """Everything that decides what a build makes of its inputs."""
 
@@ -151,6 +168,8 @@ class BuildConfig(Section):
     simulator: str = "sapien"
     gripper: str = "panda"
     item_timeout_s: float = Field(default=1800.0, gt=0)
+    matting: MattingConfig = MattingConfig()
+    generate: GenerateConfig = GenerateConfig()
     mesh: MeshConfig = MeshConfig()
     views: ViewsConfig = ViewsConfig()
     gate: GateConfig = GateConfig()

@@ -11,7 +11,18 @@ from pathlib import Path
 
 from manitwin.errors import ManiTwinError
 
-PACKAGES = ("sapien", "trimesh", "embreex", "manifold3d", "numpy", "scipy", "opencv-python", "pyarrow", "usd-core", "pycollada")
+PACKAGES = (
+    "sapien",
+    "trimesh",
+    "embreex",
+    "manifold3d",
+    "numpy",
+    "scipy",
+    "opencv-python",
+    "pyarrow",
+    "usd-core",
+    "pycollada",
+)
 MIN_FREE_GB = 2
 
 

@@ -17,8 +17,8 @@ A message names the file or the thing, the cause and the remedy, and lists what 
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import Iterable
 
 
 class ManiTwinError(Exception):

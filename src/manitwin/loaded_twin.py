@@ -80,7 +80,9 @@ class Twin:
         wanted = gripper or (self.record.grasps.gripper if self.record.grasps else "")
         keep = [
             i
-            for i, (name, proposer, held) in enumerate(zip(table["gripper"], table["proposer"], table["verified"], strict=True))
+            for i, (name, proposer, held) in enumerate(
+                zip(table["gripper"], table["proposer"], table["verified"], strict=True)
+            )
             if name == wanted and not proposer.endswith((":unfiltered", ":jittered")) and (held or not verified_only)
         ]
         columns = {name: [values[i] for i in keep] for name, values in table.items()}
@@ -105,4 +107,6 @@ class Twin:
         from manitwin.simulate.sapien_body import add_body
 
         file = self.folder / "visual.glb" if visual else None
-        return add_body(scene, [h.vertices for h in self.hulls], self.physical, pose=pose, visual_glb=file, name=self.record.twin_id)
+        return add_body(
+            scene, [h.vertices for h in self.hulls], self.physical, pose=pose, visual_glb=file, name=self.record.twin_id
+        )

@@ -44,7 +44,9 @@ def collect_items(
         if path.is_dir():
             found = [_item({"file": str(p)}, Path.cwd(), defaults, str(path)) for p in files_in_folder(path)]
             if not found:
-                raise UsageError(f"{given}: no image or mesh in this folder; known: {', '.join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))}")
+                raise UsageError(
+                    f"{given}: no image or mesh in this folder; known: {', '.join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))}"
+                )
         elif path.suffix.lower() in MANIFEST_SUFFIXES:
             found = list(_manifest_items(path, defaults, remarks))
         else:
@@ -69,12 +71,16 @@ def files_in_folder(folder: Path) -> list[Path]:
 def _manifest_items(path: Path, defaults: dict[str, Any], remarks: list[str]) -> Iterator[Item]:
     rows = list(_rows(path))
     if not rows:
-        raise UsageError(f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}")
+        raise UsageError(
+            f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"
+        )
     ignored = sorted({str(key) for _, row in rows for key in row} - set(COLUMNS))
     for column in ignored:
         near = get_close_matches(column.lower(), COLUMNS, n=1, cutoff=0.75)
         if near:
-            raise UsageError(f"{path}: unknown column {column!r}; did you mean {near[0]!r}? Valid: {', '.join(COLUMNS)}")
+            raise UsageError(
+                f"{path}: unknown column {column!r}; did you mean {near[0]!r}? Valid: {', '.join(COLUMNS)}"
+            )
     if ignored:
         remarks.append(f"{path}: columns not used: {', '.join(ignored)}")
     for line, row in rows:
@@ -85,7 +91,9 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
-        raise UsageError(f"{path}: not UTF-8 text ({error.reason} at byte {error.start}); save the manifest as UTF-8") from error
+        raise UsageError(
+            f"{path}: not UTF-8 text ({error.reason} at byte {error.start}); save the manifest as UTF-8"
+        ) from error
     if path.suffix.lower() == ".csv":
         reader = csv.DictReader(text.splitlines())
         for row in reader:
@@ -101,12 +109,17 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
         except json.JSONDecodeError as error:
             raise UsageError(f"{path}:{number}: not JSON ({error.msg}); each line is one object") from error
         if not isinstance(row, dict):
-            raise UsageError(f"{path}:{number}: a line is one JSON object with 'file' or 'text', not {type(row).__name__}")
+            raise UsageError(
+                f"{path}:{number}: a line is one JSON object with 'file' or 'text', not {type(row).__name__}"
+            )
         yield number, row
 
 
 def _item(row: dict[str, Any], folder: Path, defaults: dict[str, Any], where: str) -> Item:
-    values = {**defaults, **{key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")}}
+    values = {
+        **defaults,
+        **{key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")},
+    }
     file, text = values.get("file"), values.get("text")
     if (file is None) == (text is None):
         raise UsageError(f"{where}: a row has either 'file' or 'text'")

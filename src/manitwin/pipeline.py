@@ -100,7 +100,9 @@ def finished_record(folder: Path, config: BuildConfig) -> TwinRecord | None:
     return record if same else None
 
 
-def build_item(item: Item, out: Path, config: BuildConfig, on_stage: Callable[[str], None] = lambda name: None) -> ItemResult:
+def build_item(
+    item: Item, out: Path, config: BuildConfig, on_stage: Callable[[str], None] = lambda name: None
+) -> ItemResult:
     """Take one item through all stages; never raises for what the item or a backend does.
 
     A rejection is a result. A backend that fails, or a defect, leaves the item unfinished: what its stages have done stays in

@@ -24,7 +24,12 @@ class BuildProgress:
     """A bar on stderr where that is a terminal; a line for every finished item on stdout."""
 
     def __init__(self, out: Console, err: Console):
-        columns = (BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TextColumn("{task.fields[working]}", markup=False))
+        columns = (
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("{task.fields[working]}", markup=False),
+        )
         self._progress = Progress(*columns, console=err, disable=not err.is_terminal)
         # on one terminal, a line must go through the bar's console, or the two overwrite each other
         self._lines = self._progress.console if out.is_terminal and err.is_terminal else out
@@ -36,7 +41,9 @@ class BuildProgress:
         self._progress.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._progress.stop()
 
     def start(self, total: int) -> None:

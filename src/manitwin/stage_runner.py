@@ -29,7 +29,10 @@ class StageCost:
 
 def stage_key(stage: Stage, draft: Draft) -> str:
     """Return the hash of everything that decides a stage's result: same key, same bytes."""
-    reads = {n: sha256_of_json(draft.field(n)) if is_field(n) else sha256_of_artifact(draft.path(n)) for n in _present(stage, draft)}
+    reads = {
+        n: sha256_of_json(draft.field(n)) if is_field(n) else sha256_of_artifact(draft.path(n))
+        for n in _present(stage, draft)
+    }
     decides = {
         "twin": draft.twin_id,
         "name": stage.name,

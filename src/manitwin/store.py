@@ -120,7 +120,9 @@ def read_record(folder: Path, verify: bool = False) -> TwinRecord:
 
 def _verify(folder: Path, record: TwinRecord, data: dict[str, Any]) -> None:
     if revision_of(data) != record.revision:
-        raise TwinError(f"{folder / RECORD}: altered since it was written (its revision does not match); build the twin again")
+        raise TwinError(
+            f"{folder / RECORD}: altered since it was written (its revision does not match); build the twin again"
+        )
     for name, digest in record.files.items():
         path = folder / name
         if not path.is_file():

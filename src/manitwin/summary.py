@@ -49,7 +49,12 @@ def _rows(record: TwinRecord) -> list[tuple[str, str]]:
         ]
     if record.mesh is not None:
         hulls = record.mesh.hulls
-        rows.append(("mesh", f"{record.mesh.faces} faces, {hulls.count} hulls, error p95 {1000 * hulls.surface_error_p95_m:.1f} mm"))
+        rows.append(
+            (
+                "mesh",
+                f"{record.mesh.faces} faces, {hulls.count} hulls, error p95 {1000 * hulls.surface_error_p95_m:.1f} mm",
+            )
+        )
         rows += [("repair", repair) for repair in record.mesh.repairs]
     if record.points is not None:
         rows += [(f"point {p.id}", f"{p.label}: {p.description}") for p in record.points.functional]
@@ -58,13 +63,20 @@ def _rows(record: TwinRecord) -> list[tuple[str, str]]:
         rows += _grasp_rows(record.grasps)
     for placement in record.placements or []:
         way = "upright" if placement.upright else "lying"
-        rows.append(("rests", f"{way}, probability {placement.probability:.2f}, radius {100 * placement.collision_radius_m:.1f} cm"))
+        rows.append(
+            (
+                "rests",
+                f"{way}, probability {placement.probability:.2f}, radius {100 * placement.collision_radius_m:.1f} cm",
+            )
+        )
     return rows
 
 
 def _grasp_rows(grasps: GraspSummary) -> list[tuple[str, str]]:
     failures = ", ".join(f"{number} {outcome}" for outcome, number in sorted(grasps.failures.items())) or "none"
-    unfiltered = "not tried" if grasps.unfiltered_success_rate is None else f"{100 * grasps.unfiltered_success_rate:.0f} %"
+    unfiltered = (
+        "not tried" if grasps.unfiltered_success_rate is None else f"{100 * grasps.unfiltered_success_rate:.0f} %"
+    )
     return [
         ("grasps", f"{grasps.verified} of {grasps.simulated} verified with {grasps.gripper} (unfiltered {unfiltered})"),
         ("failures", failures),

@@ -301,7 +301,9 @@ class TwinRecord(Record):
     def _whole(self) -> TwinRecord:
         if (self.status == "rejected") != (self.rejection is not None):
             raise ValueError("a rejected twin has a rejection, an accepted one has none")
-        missing = [n for n in ("mesh", "physical", "language", "points", "grasps", "placements") if getattr(self, n) is None]
+        missing = [
+            n for n in ("mesh", "physical", "language", "points", "grasps", "placements") if getattr(self, n) is None
+        ]
         if self.status == "accepted" and missing:
             raise ValueError(f"an accepted twin lacks {', '.join(missing)}")
         return self

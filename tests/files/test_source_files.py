@@ -13,7 +13,10 @@ def test_side_files_never_leave_the_folder(tmp_path: Path) -> None:
     folder.mkdir()
     (folder / "link.png").symlink_to(secret)
     (folder / "inside.png").write_bytes(b"fine")
-    images = [{"uri": u} for u in ("../secret.png", str(secret), "link.png", "inside.png", "http://x/y.png", "data:image/png;base64,")]
+    images = [
+        {"uri": u}
+        for u in ("../secret.png", str(secret), "link.png", "inside.png", "http://x/y.png", "data:image/png;base64,")
+    ]
     (folder / "a.gltf").write_text(json.dumps({"images": images, "buffers": "nonsense"}))
     assert side_files(folder / "a.gltf") == [folder / "inside.png"]
 

@@ -27,7 +27,9 @@ def side_files(path: Path) -> list[Path]:
     names = {".obj": _named_by_obj, ".gltf": _named_by_gltf, ".dae": _named_by_dae}.get(path.suffix.lower())
     if names is None:
         return []
-    return sorted({inside for name in names(path) if (inside := _inside(path.parent, name)) is not None} - {path.resolve()})
+    return sorted(
+        {inside for name in names(path) if (inside := _inside(path.parent, name)) is not None} - {path.resolve()}
+    )
 
 
 def _inside(folder: Path, name: str) -> Path | None:

@@ -6,7 +6,9 @@ import numpy as np
 import trimesh
 
 
-def sample_surface(mesh: trimesh.Trimesh, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def sample_surface(
+    mesh: trimesh.Trimesh, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Sample points uniformly by area.
 
     Returns points ``(count, 3)`` m, the outward unit normals of their faces ``(count, 3)`` and face indices ``(count,)``.

@@ -25,7 +25,9 @@ def backends() -> dict[str, dict[str, str]]:
             names = found.setdefault(kind, {})
             for name, target in targets.items():
                 if names.get(name, target) != target:
-                    raise ConfigError(f"two packages register the {kind} {name!r}: {names[name]} and {target}; uninstall one")
+                    raise ConfigError(
+                        f"two packages register the {kind} {name!r}: {names[name]} and {target}; uninstall one"
+                    )
                 names[name] = target
     return found
 
@@ -39,5 +41,7 @@ def create(kind: str, name: str) -> Any:
     try:
         factory = getattr(import_module(module), attribute)
     except ImportError as error:
-        raise Unavailable(f"{kind} {name!r} cannot be loaded: {error}; install what it names, or choose another") from error
+        raise Unavailable(
+            f"{kind} {name!r} cannot be loaded: {error}; install what it names, or choose another"
+        ) from error
     return factory()

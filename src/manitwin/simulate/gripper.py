@@ -75,7 +75,9 @@ def load_gripper(name_or_path: str) -> Gripper:
     if name_or_path.endswith(".toml"):
         path = Path(name_or_path)
         if not path.is_file():
-            raise UsageError(f"gripper file {name_or_path} is not there; give a .toml file or one of {', '.join(shipped_grippers())}")
+            raise UsageError(
+                f"gripper file {name_or_path} is not there; give a .toml file or one of {', '.join(shipped_grippers())}"
+            )
         text = path.read_text()
     else:
         if name_or_path not in shipped_grippers():
@@ -85,7 +87,8 @@ def load_gripper(name_or_path: str) -> Gripper:
 
     def boxes(key: str) -> tuple[Box, ...]:
         return tuple(
-            Box(tuple(b["center_m"]), tuple(b["half_extents_m"]), float(b.get("rotation_y_rad", 0.0))) for b in data[key]
+            Box(tuple(b["center_m"]), tuple(b["half_extents_m"]), float(b.get("rotation_y_rad", 0.0)))
+            for b in data[key]
         )
 
     return Gripper(

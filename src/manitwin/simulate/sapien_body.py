@@ -35,7 +35,9 @@ def add_body(
     ``hulls`` are convex vertices ``(V, 3)`` in the object frame; mass, centre of mass and the full inertia come from
     ``physical``, not from the hulls. ``pose`` (sapien.Pose) is that of the object frame. ``visual_glb`` is a Y-up glTF file.
     """
-    material = physx.PhysxMaterial(physical.friction_static.value, physical.friction_dynamic.value, physical.restitution.value)
+    material = physx.PhysxMaterial(
+        physical.friction_static.value, physical.friction_dynamic.value, physical.restitution.value
+    )
     body = physx.PhysxRigidDynamicComponent()
     for vertices in hulls:
         body.attach(physx.PhysxCollisionShapeConvexMesh(vertices.astype(np.float32), np.ones(3, np.float32), material))

@@ -71,7 +71,9 @@ class FinishStage:
         """Return the verified grasps, the most different first: the card draws the first of them."""
         table = pyarrow.parquet.read_table(path).to_pydict()
         rows = [i for i, held in enumerate(table["verified"]) if held and ":" not in table["proposer"][i]]
-        rotations = rotation_from_quaternion_wxyz(np.array([table["quaternion_wxyz"][i] for i in rows], float).reshape(-1, 4))
+        rotations = rotation_from_quaternion_wxyz(
+            np.array([table["quaternion_wxyz"][i] for i in rows], float).reshape(-1, 4)
+        )
         positions = np.array([table["position_m"][i] for i in rows], float).reshape(-1, 3)
         poses = np.array([transform(r, t) for r, t in zip(rotations, positions, strict=True)]).reshape(-1, 4, 4)
         order = farthest_grasps(poses, np.array([table["depth_m"][i] for i in rows]), len(poses))
@@ -79,9 +81,12 @@ class FinishStage:
 
 
 def _card_points(points: dict[str, Any]) -> list[CardPoint]:
-    functional = [CardPoint(np.array(p["position_m"]), np.array(p["normal"]), p["label"], True) for p in points["functional"]]
+    functional = [
+        CardPoint(np.array(p["position_m"]), np.array(p["normal"]), p["label"], True) for p in points["functional"]
+    ]
     grasp = [
-        CardPoint(np.array(p["position_m"]), np.array(p["normal"]), p["type"].replace("_", " "), False) for p in points["grasp"]
+        CardPoint(np.array(p["position_m"]), np.array(p["normal"]), p["type"].replace("_", " "), False)
+        for p in points["grasp"]
     ]
     return functional + grasp
 

@@ -24,9 +24,24 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
     checks = [Check(**check) for check in draft.field("gate")["checks"]]
     if "matte" in draft.fields:
         matte = draft.field("matte")
-        checks.append(Check(name="matte", passed=not matte["findings"], value=matte["confidence"], message="; ".join(matte["findings"])))
+        checks.append(
+            Check(
+                name="matte",
+                passed=not matte["findings"],
+                value=matte["confidence"],
+                message="; ".join(matte["findings"]),
+            )
+        )
     findings = draft.field("geometry")["findings"]
-    checks.append(Check(name="input_as_declared", passed=not findings, value=float(len(findings)), limit=0.0, message="; ".join(findings)))
+    checks.append(
+        Check(
+            name="input_as_declared",
+            passed=not findings,
+            value=float(len(findings)),
+            limit=0.0,
+            message="; ".join(findings),
+        )
+    )
     checks += _physical_checks(draft) + _collision_checks(draft) + _grasp_checks(draft) + _placement_checks(draft)
     return [check.model_dump() for check in checks]
 
@@ -48,7 +63,9 @@ def _physical_checks(draft: Draft) -> list[Check]:
             name="category_known",
             passed=not unknown,
             value=draft.field("language")["category"],
-            message="no name given that the priors know: intervals are wide; give --name or a name in the manifest" if unknown else "",
+            message="no name given that the priors know: intervals are wide; give --name or a name in the manifest"
+            if unknown
+            else "",
         ),
         Check(
             name="center_of_mass_known",
@@ -93,9 +110,16 @@ def _grasp_checks(draft: Draft) -> list[Check]:
             passed=not grasps["association_radius_widened"],
             value=grasps["association_radius_m"],
             limit=0.03,
-            message="grasps were taken from farther than 3 cm around the points" if grasps["association_radius_widened"] else "",
+            message="grasps were taken from farther than 3 cm around the points"
+            if grasps["association_radius_widened"]
+            else "",
         ),
-        Check(name="approach_directions", passed=grasps["approach_octants"] >= 4, value=float(grasps["approach_octants"]), limit=4.0),
+        Check(
+            name="approach_directions",
+            passed=grasps["approach_octants"] >= 4,
+            value=float(grasps["approach_octants"]),
+            limit=4.0,
+        ),
     ]
 
 

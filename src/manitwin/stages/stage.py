@@ -7,7 +7,8 @@ ends in ``/`` (``views/``) a folder. Each is written by exactly one stage and re
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field as dataclass_field
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
 
@@ -52,7 +53,9 @@ class Draft:
     def field(self, name: str) -> Any:
         """Return the JSON value of a field artifact; raises ManiTwinError where no stage has written it."""
         if name not in self.fields:
-            raise ManiTwinError(f"no stage has written field {name!r}; there are: {', '.join(sorted(self.fields)) or 'none'}")
+            raise ManiTwinError(
+                f"no stage has written field {name!r}; there are: {', '.join(sorted(self.fields)) or 'none'}"
+            )
         return self.fields[name]
 
     def path(self, name: str) -> Path:

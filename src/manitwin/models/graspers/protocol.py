@@ -48,7 +48,9 @@ class GraspProposals:
 
     def take(self, index: np.ndarray) -> GraspProposals:
         """Return the proposals at ``index``."""
-        return GraspProposals(self.gripper_to_object[index], self.width_m[index], self.depth_m[index], self.score[index])
+        return GraspProposals(
+            self.gripper_to_object[index], self.width_m[index], self.depth_m[index], self.score[index]
+        )
 
 
 class Grasper(Protocol):
