@@ -1,17 +1,19 @@
-"""Make the pictures of the documentation: ``python docs/make_pictures.py`` writes docs/frames.png.
+"""Make the pictures of the documentation: ``python docs/make_pictures.py`` writes docs/frames.png and docs/cards.png.
 
 frames.png shows every frame of a twin on one mug: the object frame, the grasp frame, the plane of a placement, and the
-axes that a GLB file has.
+axes that a GLB file has. cards.png shows the cards of the two samples.
 """
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from PIL import Image, ImageDraw, ImageFont
 
+import manitwin
 from manitwin.files.glb import read_glb
 from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.poses import OBJECT_TO_GLTF, rotation_between, transform, transform_points
@@ -171,5 +173,19 @@ def _gltf_inset(draw: ImageDraw.ImageDraw, camera: Camera) -> None:
     draw.text((1180, 298), "is glTF (x, z, -y)", fill=GREY, font=_font(18))
 
 
+def cards_picture() -> Image.Image:
+    """Build the project's own samples and put their cards under one another."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = manitwin.build(DOCS.parent / "samples" / "samples.csv", folder)
+        cards = [Image.open(r.folder / "card.png").convert("RGB") for r in report.results if r.folder is not None]
+        cards.sort(key=lambda card: card.tobytes())
+    width, height = cards[0].size
+    picture = Image.new("RGB", (width, height * len(cards)), "white")
+    for index, card in enumerate(cards):
+        picture.paste(card, (0, index * height))
+    return picture
+
+
 if __name__ == "__main__":
     frames_picture().save(DOCS / "frames.png", optimize=True)
+    cards_picture().save(DOCS / "cards.png", optimize=True)

@@ -16,8 +16,9 @@ from trimesh.visual.material import PBRMaterial
 
 from manitwin.files.mesh_gltf import read_gltf
 from manitwin.files.mesh_source import MeshLimits, MeshSource
-from manitwin.files.mesh_textures import bake_transform, material_of, uv_of
+from manitwin.files.mesh_textures import bake_transform, make_part, material_of, normals_of, uv_of
 from manitwin.geometry.poses import GLTF_TO_OBJECT, OBJECT_TO_GLTF
+from manitwin.geometry.seams import close_seams, has_three_places
 
 _FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125  # glTF 2.0, section 3.6.2.2
 _ARRAY_BUFFER, _ELEMENT_BUFFER = 34962, 34963
@@ -30,6 +31,8 @@ def write_glb(parts: list[trimesh.Trimesh], *, max_texture_size: int = 2048) -> 
 
     Keeps names, normals, texture coordinates and the PBR material of each part. Textures are scaled down to
     ``max_texture_size`` pixels on the longer side; opaque ones become JPEG, those with an alpha that counts PNG.
+    Seams of texture and creases are closed by triangles without area (``geometry.seams``): a part that is a closed solid
+    stays one for tools that look at indices.
     Source: glTF 2.0 specification, Khronos Group 2021.
     """
     document = _Document(max_texture_size)
@@ -39,9 +42,26 @@ def write_glb(parts: list[trimesh.Trimesh], *, max_texture_size: int = 2048) -> 
 
 
 def read_glb(path: Path, *, limits: MeshLimits | None = None) -> list[trimesh.Trimesh]:
-    """Read the parts of a GLB into the object frame (Z-up, metres); raises InputError as ``read_mesh`` does."""
+    """Read the parts of a GLB into the object frame (Z-up, metres); raises InputError as ``read_mesh`` does.
+
+    Triangles without area that close seams are left out again.
+    """
     parts = read_gltf(MeshSource(path, limits or MeshLimits()), binary=True)
-    return [bake_transform(part, GLTF_TO_OBJECT) for part in parts]
+    return [bake_transform(_without_seam_faces(part), GLTF_TO_OBJECT) for part in parts]
+
+
+def _without_seam_faces(part: trimesh.Trimesh) -> trimesh.Trimesh:
+    keep = has_three_places(np.asarray(part.vertices), np.asarray(part.faces))
+    if keep.all():
+        return part
+    return make_part(
+        part.vertices,
+        part.faces[keep],
+        material=material_of(part),
+        name=str(part.metadata["name"]),
+        uv=uv_of(part),
+        normals=normals_of(part),
+    )
 
 
 class _Document:
@@ -57,16 +77,18 @@ class _Document:
     def add(self, part: trimesh.Trimesh, name: str) -> None:
         """Append a part as a mesh of one primitive under a node of its own."""
         turned = bake_transform(part, OBJECT_TO_GLTF)
+        positions = np.asarray(turned.vertices, dtype="<f4")  # what is one place is decided as it will be read
+        source, faces = close_seams(positions, np.asarray(turned.faces))
         attributes = {
-            "POSITION": self._vectors(turned.vertices, bounds=True),
-            "NORMAL": self._vectors(_unit_normals(turned)),
+            "POSITION": self._vectors(positions[source], bounds=True),
+            "NORMAL": self._vectors(_unit_normals(turned)[source]),
         }
         uv = uv_of(part)
         if uv is not None:
-            attributes["TEXCOORD_0"] = self._vectors(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]]))
+            attributes["TEXCOORD_0"] = self._vectors(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])[source])
         primitive = {
             "attributes": attributes,
-            "indices": self._indices(turned.faces, len(turned.vertices)),
+            "indices": self._indices(faces, len(source)),
             "material": self._material(material_of(part)),
             "mode": 4,
         }
