@@ -38,7 +38,9 @@ def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None 
     """
     found = sniff(path)
     if found.kind != "image":
-        raise InputError("wrong_type", f"{path.name}: is a mesh ({found.format}), not an image; give it as a mesh input")
+        raise InputError(
+            "wrong_type", f"{path.name}: is a mesh ({found.format}), not an image; give it as a mesh input"
+        )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit is checked below
         image = _open(path)
@@ -63,7 +65,7 @@ def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None 
 def _open(path: Path) -> Image.Image:
     try:
         return Image.open(path)
-    except Image.DecompressionBombError as error:
+    except Image.DecompressionBombError as error:  # raised at twice Pillow's own limit, before this module can look
         raise _too_large(path) from error
     except Exception as error:  # a decoder may raise anything on damaged bytes; the message names the cause
         raise _damaged(path, error) from error

@@ -42,5 +42,7 @@ def run_generator(
         raise Rejected("generator_failed", f"{generator.name}: {job.message or 'gave no reason'}", "generate")
     generated = generator.fetch(job_id, folder)
     if not generated.path.is_file() or generated.path.stat().st_size == 0:
-        raise BadReply(f"{generator.name}: job {job_id} is done but left no mesh at {generated.path.name}; run it again")
+        raise BadReply(
+            f"{generator.name}: job {job_id} is done but left no mesh at {generated.path.name}; run it again"
+        )
     return generated

@@ -1,0 +1,84 @@
+"""The built-in generator ``lift``: one matted photo to a closed textured mesh, without weights."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.errors import Unavailable
+from manitwin.files.glb import write_glb
+from manitwin.geometry.poses import GLTF_TO_OBJECT
+from manitwin.models.generators.lift.hint import hint_from_name
+from manitwin.models.generators.lift.lifting import Lifted, lift
+from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+
+ROUGHNESS = 0.6
+
+
+@dataclass(frozen=True)
+class _Job:
+    glb: bytes
+    notes: dict[str, Any]
+
+
+class LiftGenerator:
+    """Lift a silhouette to a solid: revolution, box or inflation.
+
+    It sees one side only and no depth: a stand-in for tests, demonstrations and machines without a GPU, not to be compared
+    with learned generators. ``submit`` does all the work; jobs live as long as this object.
+    """
+
+    name = "lift"
+    model: str | None = None
+
+    def __init__(self) -> None:
+        self._jobs: dict[str, _Job] = {}
+
+    def submit(self, request: GenerationRequest) -> str:
+        """Make the mesh; raises Unavailable for a text."""
+        if request.rgba is None:
+            raise Unavailable(
+                f"lift cannot make a mesh from text ({request.text!r}); give a photo, or choose another generator"
+            )
+        digest = hashlib.sha256(np.ascontiguousarray(request.rgba).tobytes() + (request.name or "").encode())
+        job_id = digest.hexdigest()[:16]
+        lifted = lift(request.rgba, hint_from_name(request.name))
+        self._jobs[job_id] = _Job(write_glb([textured_part(lifted)], max_texture_size=1024), lifted.notes)
+        return job_id
+
+    def poll(self, job_id: str) -> JobState:
+        """Return ``done``, or ``failed`` where this object does not know the job."""
+        if job_id in self._jobs:
+            return JobState("done")
+        return JobState("failed", f"lift has no job {job_id}: its jobs end with the process; submit it again")
+
+    def fetch(self, job_id: str, folder: Path) -> Generated:
+        """Write ``lift.glb`` below ``folder``; raises Unavailable for a job that is not known."""
+        if job_id not in self._jobs:
+            raise Unavailable(self.poll(job_id).message)
+        job = self._jobs.pop(job_id)
+        path = folder / "lift.glb"
+        path.write_bytes(job.glb)
+        return Generated(path=path, model=None, notes=job.notes, metric=False)
+
+
+def textured_part(lifted: Lifted) -> trimesh.Trimesh:
+    """Return the mesh in the object frame (Z up) with its texture."""
+    material = PBRMaterial(
+        name="photo",
+        baseColorFactor=[255, 255, 255, 255],
+        baseColorTexture=Image.fromarray(lifted.texture),
+        metallicFactor=0.0,
+        roughnessFactor=ROUGHNESS,
+    )
+    vertices = lifted.surface.vertices @ GLTF_TO_OBJECT[:3, :3].T
+    visual = TextureVisuals(uv=lifted.surface.uv, material=material)
+    return trimesh.Trimesh(vertices, lifted.surface.faces, visual=visual, process=False, metadata={"name": "lift"})

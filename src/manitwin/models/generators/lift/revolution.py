@@ -1,0 +1,109 @@
+"""A solid of revolution from a silhouette that is symmetric about an axis."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from manitwin.models.generators.lift.silhouette import Silhouette, turned_upright, turning
+from manitwin.models.generators.lift.surface import Surface
+
+SIDES = 64
+_RINGS = 56
+_BROAD_BASE = 0.85  # a base nearly as wide as the body is cut where a cut of 6 % of the length reaches it
+_EDGE = 0.97  # texture is taken no nearer to the outline than this share of the radius
+
+
+def profile(silhouette: Silhouette) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows (K,) of the upright mask and the radius (K,) at each, top to bottom, in pixels."""
+    turned = turned_upright(silhouette.mask, silhouette.axis_tilt_deg)
+    rows = np.nonzero(turned.any(axis=1))[0]
+    body = turned[rows[0] : rows[-1] + 1]
+    column = round(silhouette.axis_column_px)
+    left, right = body[:, :column].sum(axis=1), body[:, column:].sum(axis=1)
+    # where the halves disagree the narrower one is believed: what sticks out on one side only is no part of the solid
+    radii = np.where(np.abs(left - right) > 0.15 * (left + right), np.minimum(left, right), (left + right) / 2.0)
+    return np.arange(rows[0], rows[-1] + 1, dtype=float), gaussian_filter1d(radii, 1.2, mode="nearest")
+
+
+def trim_caps(
+    rows: np.ndarray, radii: np.ndarray, *, base_at_top: bool = False, base_share: float = 0.35
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cut the rounded ends off a profile so that its base is a flat disc.
+
+    A camera above or below the disc at an end sees it as an ellipse: the last rows narrow although the solid does not.
+    Both ends are cut where they narrow like a half-ellipse less than a quarter as deep as its radius; the base also where
+    it has less than ``base_share`` of the radius nearby, so that round things stand.
+    """
+    top = _end_of(radii, base_share if base_at_top else 0.0, len(rows))
+    bottom = _end_of(radii[::-1], 0.0 if base_at_top else base_share, len(rows))
+    return rows[top : len(rows) - bottom], radii[top : len(rows) - bottom]
+
+
+def _end_of(radii: np.ndarray, least_share: float, length: int) -> int:
+    """Return how many rows to cut at the start of ``radii``."""
+    nearby = float(radii[: max(8, length // 4)].max())
+    widest = int(np.argmax(radii[: max(8, length // 4)] >= 0.97 * nearby))
+    if 2 <= widest < 0.25 * nearby:
+        rows = np.arange(widest + 1)
+        ellipse = nearby * np.sqrt(np.maximum(0, 1 - ((widest - rows) / (widest + 0.5)) ** 2))
+        if np.abs(ellipse - radii[: widest + 1]).mean() < 0.12 * nearby:
+            return min(widest, length // 6)
+    if least_share == 0:
+        return 0
+    broad = int(np.argmax(radii >= _BROAD_BASE * nearby))
+    return broad if broad <= 0.06 * length else min(int(np.argmax(radii >= least_share * nearby)), length // 6)
+
+
+def revolve(silhouette: Silhouette, rows: np.ndarray, radii: np.ndarray, *, wall_px: float | None) -> Surface:
+    """Revolve a profile about the silhouette's axis; ``wall_px`` hollows it from the top with a wall that thick.
+
+    The surface has the axis along y and z = 0 through it, rows of the upright mask being -y. The photo is projected on
+    the front and mirrored on the back.
+    """
+    rings = np.linspace(rows[0], rows[-1], _RINGS)
+    outline = [(row, radius) for row, radius in zip(rings, np.interp(rings, rows, radii), strict=True)]
+    least = 0.02 * radii.max()
+    outline = [(row, max(radius, least)) for row, radius in outline]
+    if wall_px is None:
+        loop = [(rings[0], 0.0), *outline, (rings[-1], 0.0)]
+    else:
+        inner = [(row, radius - wall_px) for row, radius in outline if row < rings[-1] - 1.5 * wall_px]
+        inner = [(row, max(radius, least)) for row, radius in inner]
+        loop = [(inner[-1][0], 0.0), *inner[::-1], *outline, (rings[-1], 0.0)]
+    return _lathe(silhouette, np.array(loop))
+
+
+def _lathe(silhouette: Silhouette, loop: np.ndarray) -> Surface:
+    """Turn a loop of (row, radius) from axis to axis into a closed surface, outside to the left of its direction."""
+    turns = 2 * np.pi * np.arange(SIDES) / SIDES
+    middle = loop[1:-1]
+    x = middle[:, 1:] * np.sin(turns)
+    z = middle[:, 1:] * np.cos(turns)
+    y = np.repeat(-middle[:, :1], SIDES, axis=1)
+    ring_points = np.stack([x, y, z], -1).reshape(-1, 3)
+    poles = np.array([[0, -loop[0, 0], 0], [0, -loop[-1, 0], 0]])
+    vertices = np.concatenate([ring_points, poles])
+    ring, side = np.meshgrid(np.arange(len(middle) - 1), np.arange(SIDES), indexing="ij")
+    here, there = ring * SIDES + side, ring * SIDES + (side + 1) % SIDES
+    quads = np.concatenate(
+        [
+            np.stack([here, here + SIDES, there], -1).reshape(-1, 3),
+            np.stack([there, here + SIDES, there + SIDES], -1).reshape(-1, 3),
+        ]
+    )
+    sides = np.arange(SIDES)
+    first, last = len(ring_points), len(ring_points) + 1
+    top = np.column_stack([np.full(SIDES, first), sides, (sides + 1) % SIDES])
+    low = (len(middle) - 1) * SIDES
+    bottom = np.column_stack([np.full(SIDES, last), low + (sides + 1) % SIDES, low + sides])
+    return Surface(vertices, np.concatenate([quads, top, bottom]), _projected(silhouette, vertices))
+
+
+def _projected(silhouette: Silhouette, vertices: np.ndarray) -> np.ndarray:
+    """Return the texture coordinates of the photo seen along z."""
+    height, width = silhouette.mask.shape
+    upright = np.column_stack([silhouette.axis_column_px + _EDGE * vertices[:, 0], -vertices[:, 1]])
+    matrix = np.vstack([turning(height, width, silhouette.axis_tilt_deg), [0, 0, 1]])
+    pixels = np.column_stack([upright, np.ones(len(upright))]) @ np.linalg.inv(matrix).T
+    return np.column_stack([(pixels[:, 0] + 0.5) / width, 1 - (pixels[:, 1] + 0.5) / height])

@@ -1,0 +1,167 @@
+"""The background of a photo as a few smooth colour surfaces seen along its border, and each pixel's distance from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+FIT_SIDE_PX = 128
+MAX_SURFACES = 3
+BORDER_SHARE = 0.04
+NOISE_FLOOR_LAB = 0.5  # a quantised 8-bit channel: a perfectly flat border still has this much doubt
+
+
+@dataclass(frozen=True)
+class Background:
+    """A background model and what it says of the photo's pixels.
+
+    ``lab (H, W, 3)`` CIE L*a*b*; ``expected (H, W, 3)`` the background's colour at each pixel; ``residual`` their
+    difference; ``distance (H, W)`` Mahalanobis distance from the background, fine (about one pixel wide);
+    ``coarse_distance`` the same of the blurred photo; ``noise_lab`` the background's spread; ``unexplained`` the share of
+    the border that no surface explains; ``border`` the mask of the border ring; ``seam`` where two surfaces meet.
+    """
+
+    lab: np.ndarray
+    expected: np.ndarray
+    residual: np.ndarray
+    distance: np.ndarray
+    coarse_distance: np.ndarray
+    noise_lab: float
+    unexplained: float
+    surfaces: int
+    border: np.ndarray
+    seam: np.ndarray
+
+
+def border_ring(height: int, width: int) -> np.ndarray:
+    """Return the mask (H, W) of the outer 4 % of an image, at least three pixels."""
+    ring = np.zeros((height, width), bool)
+    thickness = max(3, round(BORDER_SHARE * max(height, width)))
+    ring[:thickness] = ring[-thickness:] = True
+    ring[:, :thickness] = ring[:, -thickness:] = True
+    return ring
+
+
+def connected_to(mask: np.ndarray, seed: np.ndarray) -> np.ndarray:
+    """Return the 4-connected parts of ``mask`` that hold a pixel of ``seed``."""
+    _, labels = cv2.connectedComponents(mask.astype(np.uint8), connectivity=4)
+    reached = np.unique(labels[seed & mask])
+    return np.isin(labels, reached[reached > 0])
+
+
+def model_background(rgb: np.ndarray) -> Background:
+    """Fit the background of ``rgb`` (H, W, 3) uint8 sRGB.
+
+    Up to three cubic colour surfaces in L*a*b*, each grown from the densest colour left on the border: light that falls
+    off, a vignette and a wall that meets a table are background, not object.
+    """
+    lab = cv2.cvtColor(rgb.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
+    height, width = lab.shape[:2]
+    fits, unexplained = _fit_surfaces(lab)
+    border = border_ring(height, width)
+    surfaces = [(_basis(height, width, degree) @ coefficients).astype(np.float32) for coefficients, degree in fits]
+    fine, residual, expected, noise = _distance(lab, 0.8, surfaces, border)
+    coarse, _, _, _ = _distance(lab, 2.5, surfaces, border)
+    seam = np.zeros((height, width), bool)
+    if len(surfaces) > 1:
+        fine, coarse, seam = _explain_seams(lab, surfaces, fine, coarse, noise, border)
+    return Background(lab, expected, residual, fine, coarse, noise, unexplained, len(surfaces), border, seam)
+
+
+def _basis(height: int, width: int, degree: int) -> np.ndarray:
+    y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
+    return np.stack([x**i * y**j for i in range(degree + 1) for j in range(degree + 1 - i)], -1)
+
+
+def _fit_surfaces(lab: np.ndarray) -> tuple[list[tuple[np.ndarray, int]], float]:
+    scale = FIT_SIDE_PX / max(lab.shape[:2])
+    small = cv2.resize(lab, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else lab
+    height, width = small.shape[:2]
+    colours = small.reshape(-1, 3).astype(float)
+    ring = border_ring(height, width).ravel()
+    left = ring.copy()
+    fits: list[tuple[np.ndarray, int]] = []
+    while len(fits) < MAX_SURFACES and (not fits or left.sum() > 0.05 * ring.sum()):
+        coefficients, degree, distance = _grow_surface(colours, left, height, width)
+        explained = left & (distance < 6)
+        if fits and explained.sum() < 0.04 * ring.sum():
+            break
+        fits.append((coefficients, degree))
+        left &= ~explained
+    return fits, float(left.sum() / ring.sum())
+
+
+def _grow_surface(colours: np.ndarray, left: np.ndarray, height: int, width: int) -> tuple[np.ndarray, int, np.ndarray]:
+    """Grow one surface from the densest border colour: fit, take in what is connected and explained, raise the degree."""
+    ring_colours = colours[left]
+    modes = ring_colours[:: max(1, len(ring_colours) // 200)]
+    weights = np.array([0.5, 1.0, 1.0])  # lightness varies along a background more than colour does
+    near = ((ring_colours[:, None] - modes[None]) ** 2 * weights).sum(2) < 49
+    start = modes[near.sum(0).argmax()]
+    used = left & (((colours - start) ** 2 * weights).sum(1) < 100)
+    for step in range(20):
+        degree = 1 if step < 5 else 2 if step < 12 else 3
+        basis = _basis(height, width, degree).reshape(height * width, -1)
+        a = basis[used]
+        coefficients = np.linalg.solve(a.T @ a + 1e-4 * len(a) * np.eye(a.shape[1]), a.T @ colours[used])
+        residual = colours - basis @ coefficients
+        spread = 1.4826 * np.median(np.abs(residual[used] - np.median(residual[used], 0)), axis=0) + 0.3
+        distance = np.sqrt((residual**2 / spread**2).sum(1))
+        inlier = distance < max(4.5, 9 - 0.5 * step)
+        grown = connected_to(inlier.reshape(height, width), left.reshape(height, width)).ravel()
+        if grown.sum() < 0.02 * len(colours):
+            break
+        used = grown
+    return coefficients, degree, distance
+
+
+def _distance(
+    lab: np.ndarray, blur_px: float, surfaces: list[np.ndarray], border: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    smooth = cv2.GaussianBlur(lab, (0, 0), blur_px)
+    floor = NOISE_FLOOR_LAB**2 * np.eye(3)
+    found: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    noises = []
+    for surface in surfaces:
+        residual = smooth - surface
+        used = border & (np.linalg.norm(residual, axis=2) < 12)
+        covariance = np.eye(3)
+        for _ in range(4):
+            if used.sum() < 50:
+                break
+            covariance = np.cov(residual[used].T)
+            distance = _mahalanobis(residual, covariance + floor)
+            used = border & (distance < 4)
+        found.append((_mahalanobis(residual, covariance + floor), residual, surface))
+        noises.append(float(np.sqrt(np.trace(covariance) / 3)))
+    nearest = np.argmin([f[0] for f in found], axis=0)
+
+    def pick(index: int) -> np.ndarray:
+        stack = np.stack([f[index] for f in found])
+        return np.take_along_axis(stack, nearest[None] if stack.ndim == 3 else nearest[None, ..., None], 0)[0]
+
+    return pick(0), pick(1), pick(2), max(noises)
+
+
+def _mahalanobis(residual: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    return np.sqrt(np.einsum("...i,ij,...j->...", residual, np.linalg.inv(covariance), residual)).astype(np.float32)
+
+
+def _explain_seams(
+    lab: np.ndarray, surfaces: list[np.ndarray], fine: np.ndarray, coarse: np.ndarray, noise: float, border: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Take the mixed colours of a line where two surfaces meet for background."""
+    smooth = cv2.GaussianBlur(lab, (0, 0), 0.8)
+    plain = connected_to(fine < 3.5, border)
+    seam = np.zeros(plain.shape, bool)
+    near = np.ones((13, 13), np.uint8)
+    for i in range(len(surfaces)):
+        for j in range(i):
+            step = surfaces[i] - surfaces[j]
+            share = ((smooth - surfaces[j]) * step).sum(2) / np.maximum((step**2).sum(2), 1e-6)
+            mixed = np.linalg.norm(smooth - surfaces[j] - np.clip(share, 0, 1)[..., None] * step, axis=2)
+            both = [cv2.dilate((plain & (side < 0.5)).astype(np.uint8), near) > 0 for side in (share, 1 - share)]
+            seam |= both[0] & both[1] & (mixed < 4 * max(noise, NOISE_FLOOR_LAB))
+    return np.where(seam, np.minimum(fine, 3), fine), np.where(seam, np.minimum(coarse, 3), coarse), seam

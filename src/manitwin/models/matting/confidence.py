@@ -1,0 +1,104 @@
+"""How far a mask can be believed, measured on the photo that it was cut from."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import cv2
+import numpy as np
+
+from manitwin.models.matting.background import connected_to
+from manitwin.models.matting.outline import dilated, disk, eroded, opened
+from manitwin.models.matting.segmentation import Segmentation
+from manitwin.models.matting.shadow import could_be_shade
+
+
+@dataclass(frozen=True)
+class MatteScores:
+    """Each in [0, 1]; 1 is best.
+
+    ``on_edges`` share of the outline that lies on an edge of the photo; ``crisp`` how
+    sharp it is against the object's own strong edges; ``separable`` how well the colours just inside and
+    just outside the outline differ from the background's (Youden's J); ``complete`` nothing else stands out of the
+    background; ``uncut`` share of the outline that the image border does not cut (4 times counted); ``stable``
+    overlap of two graph cuts with other seeds; ``whole`` little lies outside the largest connected part;
+    ``plain`` how uniform the background is.
+    """
+
+    on_edges: float
+    crisp: float
+    separable: float
+    complete: float
+    uncut: float
+    stable: float
+    whole: float
+    plain: float
+
+    @property
+    def confidence(self) -> float:
+        """The product: one bad score is enough to doubt."""
+        return float(np.prod(list(asdict(self).values())))
+
+    @property
+    def confidence_of_pieces(self) -> float:
+        """The confidence that what was found is no background, be it one piece or several."""
+        return float(np.prod([value for name, value in asdict(self).items() if name != "whole"]))
+
+    @property
+    def worst(self) -> str:
+        """The name of the lowest score."""
+        values = asdict(self)
+        return min(values, key=lambda name: values[name])
+
+
+def score(segmentation: Segmentation) -> MatteScores:
+    """Score a mask that is not empty."""
+    mask, background = segmentation.mask, segmentation.background
+    outline = mask & ~eroded(mask, 1)
+    border = np.zeros(mask.shape, bool)
+    border[:2] = border[-2:] = True
+    border[:, :2] = border[:, -2:] = True
+    sharpest = cv2.dilate(segmentation.gradient, disk(3))
+    free = outline & ~border
+    typical = float(np.percentile(sharpest[mask], 75))
+    on_edges = float((sharpest[free] > 1.6 * segmentation.edge_threshold).mean()) if free.any() else 0.0
+    reach = max(4, round(0.015 * max(mask.shape)))
+    inside = mask & ~eroded(mask, reach)
+    gap = max(
+        4, round(0.03 * max(mask.shape))
+    )  # light bounced off the object, and a coarse JPEG, tint what is next to it
+    outside = dilated(mask, reach + gap) & ~dilated(mask, gap) & ~segmentation.shadow & ~could_be_shade(background)
+    hit = float((background.distance[inside] > 4).mean())
+    false = float((background.distance[outside] > 4).mean()) if outside.sum() > 0.5 * outline.sum() else 0.0
+    _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
+    areas = stats[1:, cv2.CC_STAT_AREA]
+    return MatteScores(
+        on_edges=_ramp(on_edges, 0.4, 0.9),
+        crisp=_ramp(float(np.median(sharpest[free])) / typical if free.any() else 0.0, 0.15, 0.5),
+        separable=_ramp(hit - false, 0.1, 0.7),
+        complete=_ramp(1 - _left_over(segmentation) / mask.sum(), 0.3, 0.9),
+        uncut=float(np.clip(1 - 4 * (outline & border).sum() / outline.sum(), 0, 1)),
+        stable=_ramp(segmentation.stability, 0.6, 0.95),
+        whole=_ramp(float(areas.max() / areas.sum()), 0.8, 1.0),
+        plain=_ramp(-background.noise_lab - 20 * background.unexplained, -12, -3),
+    )
+
+
+def _left_over(segmentation: Segmentation) -> float:
+    """Return the area of coherent things outside the mask: no background and no shadow, or a shadow with drawing in it."""
+    background = segmentation.background
+    away = ~dilated(segmentation.mask, 5) & ~background.seam
+    limit = max(5.0, 1.5 * float(np.percentile(background.coarse_distance[background.border], 98)))
+    shade = dilated(segmentation.shadow, 3) | could_be_shade(background)
+    things = opened(away & ~shade & (background.coarse_distance > limit), 3)
+    away &= ~dilated(segmentation.mask, round(0.03 * max(away.shape)))
+    sharp = max(
+        1.6 * segmentation.edge_threshold, 0.25 * float(np.percentile(segmentation.gradient[segmentation.mask], 90))
+    )
+    drawn = away & eroded(segmentation.shadow, 4) & (segmentation.gradient > sharp)
+    things &= ~connected_to(things, background.border)  # light that the model missed comes in from the border
+    return float(things.sum() + 3 * drawn.sum())
+
+
+def _ramp(value: float, worst: float, best: float) -> float:
+    return float(np.clip((value - worst) / (best - worst), 0, 1))

@@ -1,0 +1,82 @@
+"""Edges of a photo, the flood of its background up to them, and the soft outline at full resolution."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from manitwin.models.matting.background import Background, connected_to
+
+
+def disk(radius: int) -> np.ndarray:
+    """Return a round structuring element."""
+    return cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * radius + 1, 2 * radius + 1))
+
+
+def dilated(mask: np.ndarray, radius: int) -> np.ndarray:
+    """Dilate a mask by a disk."""
+    return cv2.dilate(mask.astype(np.uint8), disk(radius)) > 0
+
+
+def eroded(mask: np.ndarray, radius: int) -> np.ndarray:
+    """Erode a mask by a disk."""
+    return cv2.erode(mask.astype(np.uint8), disk(radius)) > 0
+
+
+def opened(mask: np.ndarray, radius: int) -> np.ndarray:
+    """Open a mask by a disk: drop what is thinner than it."""
+    return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disk(radius)) > 0
+
+
+def gradient_magnitude(lab: np.ndarray, blur_px: float = 1.0) -> np.ndarray:
+    """Return the colour gradient (H, W) in L*a*b* units per pixel."""
+    smooth = cv2.GaussianBlur(lab, (0, 0), blur_px)
+    total = np.zeros(lab.shape[:2], np.float32)
+    for axis in ((1, 0), (0, 1)):
+        total += (cv2.Sobel(smooth, cv2.CV_32F, *axis, scale=0.125) ** 2).sum(2)
+    return np.sqrt(total)
+
+
+def edge_threshold(background: Background, gradient: np.ndarray) -> float:
+    """Return the gradient that the background's own texture hardly ever reaches (97th percentile of the border)."""
+    return max(0.35, float(np.percentile(gradient[background.border], 97)))
+
+
+def edges(background: Background, gradient: np.ndarray, threshold: float) -> np.ndarray:
+    """Return edges with hysteresis (Canny 1986): weak ones count where they hang on a strong one."""
+    weak = gradient > threshold
+    count, labels = cv2.connectedComponents(weak.astype(np.uint8), connectivity=8)
+    strong = np.zeros(count, bool)
+    strong[np.unique(labels[weak & (gradient > 1.6 * threshold)])] = True
+    strong[0] = False
+    return strong[labels]
+
+
+def flood(free: np.ndarray, seed: np.ndarray, ball_px: int, regrow_px: int) -> np.ndarray:
+    """Flood ``free`` from ``seed`` with a ball that cannot pass gaps narrower than itself, then fill up to the walls."""
+    roomy = ~dilated(~free, ball_px)
+    reached = connected_to(roomy, seed & roomy)
+    for _ in range(regrow_px):
+        reached = (dilated(reached, 1) & free) | reached
+    return reached
+
+
+def soft_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.ndarray:
+    """Refine a mask (any size) to alpha (H, W) uint8 at the photo's resolution.
+
+    Guided filter (He, Sun, Tang 2010, eq. 5 and 6, grey guide) in a band around the outline: the alpha's edge follows
+    the photo's edge.
+    """
+    height, width = rgb.shape[:2]
+    coarse = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
+    guide = cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY).astype(np.float32) / 255
+    size = (2 * band_px + 1, 2 * band_px + 1)
+    mean_guide, mean_mask = cv2.blur(guide, size), cv2.blur(coarse, size)
+    slope = (cv2.blur(guide * coarse, size) - mean_guide * mean_mask) / (
+        cv2.blur(guide**2, size) - mean_guide**2 + 1e-3
+    )
+    offset = mean_mask - slope * mean_guide
+    alpha = cv2.blur(slope, size) * guide + cv2.blur(offset, size)
+    inside, outside = eroded(coarse > 0.5, band_px), ~dilated(coarse > 0.5, band_px)
+    alpha = np.where(inside, 1, np.where(outside, 0, np.clip((alpha - 0.15) / 0.7, 0, 1)))
+    return (alpha * 255 + 0.5).astype(np.uint8)

@@ -1,0 +1,223 @@
+"""Solids lifted from drawn silhouettes, against their closed forms; and real photos."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from manitwin.errors import Unavailable
+from manitwin.files.glb import read_glb
+from manitwin.files.image_file import read_image
+from manitwin.models.generators.lift import LiftGenerator
+from manitwin.models.generators.lift.hint import ShapeHint
+from manitwin.models.generators.lift.inflation import inflate
+from manitwin.models.generators.lift.lifting import Lifted, lift
+from manitwin.models.generators.lift.posture import tip_angle_deg
+from manitwin.models.generators.lift.surface import to_manifold
+from manitwin.models.generators.protocol import GenerationRequest
+from manitwin.models.matting import matte_photo
+
+NO_HINT = ShapeHint()
+
+
+def _drawn(
+    *polygons: list[tuple[float, float]], size: int = 600, colour: tuple[int, int, int] = (60, 120, 200)
+) -> np.ndarray:
+    """An RGBA picture of filled polygons on transparent magenta."""
+    rgba = np.zeros((size, size, 4), np.uint8)
+    rgba[...] = (255, 0, 255, 0)
+    for polygon in polygons:
+        mask = np.zeros((size, size), np.uint8)
+        cv2.fillPoly(mask, [np.round(polygon).astype(np.int32)], 1)
+        rgba[mask > 0] = (*colour, 255)
+    return rgba
+
+
+def _turned(points: list[tuple[float, float]], degrees: float) -> list[tuple[float, float]]:
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    return [(300 + c * (x - 300) - s * (y - 300), 300 + s * (x - 300) + c * (y - 300)) for x, y in points]
+
+
+def _check_contract(lifted: Lifted) -> None:
+    surface = lifted.surface
+    solid = to_manifold(surface)
+    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+    assert solid.volume() > 0 and len(solid.decompose()) == 1
+    assert 2000 <= len(surface.faces) <= 20000
+    assert (high - low).max() == pytest.approx(1.0) and low[1] == pytest.approx(0.0, abs=1e-9)
+    assert np.allclose((low + high)[[0, 2]], 0, atol=1e-9)
+    assert tip_angle_deg(surface) > 5  # it stands on its flat base
+    feet = surface.vertices[:, 1] < 1e-4
+    assert feet.sum() >= 3
+    assert not (np.abs(lifted.texture.astype(int) - [255, 0, 255]).sum(2) < 120).any()
+
+
+def test_rectangle_with_round_hint_is_a_cylinder() -> None:
+    lifted = lift(_drawn([(220, 100), (380, 100), (380, 500), (220, 500)]), ShapeHint(round=True))
+    _check_contract(lifted)
+    assert lifted.notes["primitive"] == "revolution" and lifted.notes["rests"] == "standing"
+    assert to_manifold(lifted.surface).volume() == pytest.approx(math.pi * 0.2**2, rel=0.03)
+
+
+def test_rectangle_is_a_box_of_said_depth() -> None:
+    lifted = lift(_drawn([(200, 100), (400, 100), (400, 500), (200, 500)]), NO_HINT)
+    _check_contract(lifted)
+    assert lifted.notes["primitive"] == "box"
+    assert np.ptp(lifted.surface.vertices, axis=0) == pytest.approx(
+        [0.5, 1.0, 0.5 * lifted.notes["depth_share"]], abs=0.02
+    )
+
+
+def test_disc_is_a_sphere_with_a_flat_base() -> None:
+    circle = [(300 + 200 * math.cos(a), 300 + 200 * math.sin(a)) for a in np.linspace(0, 2 * math.pi, 200)]
+    lifted = lift(_drawn(circle), NO_HINT)
+    _check_contract(lifted)
+    assert lifted.notes["primitive"] == "revolution"
+    assert to_manifold(lifted.surface).volume() == pytest.approx(math.pi / 6, rel=0.04)
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 80])
+def test_tilted_bottle_is_turned_round_and_set_upright(degrees: float) -> None:
+    half = [(0, 90), (25, 90), (25, 180), (80, 240), (80, 510), (0, 510)]
+    outline = [(300 + x, y) for x, y in half] + [(300 - x, y) for x, y in reversed(half)]
+    lifted = lift(_drawn(_turned(outline, degrees)), NO_HINT)
+    _check_contract(lifted)
+    assert lifted.notes["primitive"] == "revolution" and lifted.notes["rests"] == "standing"
+    assert lifted.notes["axis_tilt_deg"] == pytest.approx(degrees, abs=1.5)
+    vertices = lifted.surface.vertices
+    assert np.ptp(vertices, axis=0) == pytest.approx([160 / 420, 1.0, 160 / 420], abs=0.03)
+    assert np.abs(vertices[vertices[:, 1] > 0.9][:, 0]).max() < 0.09  # the neck is on top
+
+
+def test_container_is_hollow_and_open_at_the_top() -> None:
+    rgba = _drawn([(180, 150), (420, 150), (400, 450), (200, 450)])
+    full = lift(rgba, ShapeHint(round=True))
+    cup = lift(rgba, ShapeHint(round=True, container=True, stands=True))
+    _check_contract(cup)
+    assert cup.notes["hollow"] and not full.notes["hollow"]
+    assert to_manifold(cup.surface).volume() < 0.3 * to_manifold(full.surface).volume()
+    assert to_manifold(cup.surface).genus() == 0
+
+
+def test_ring_keeps_its_hole() -> None:
+    rgba = _drawn([(300 + 200 * math.cos(a), 300 + 150 * math.sin(a)) for a in np.linspace(0, 6.283, 120)])
+    inner = np.zeros((600, 600), np.uint8)
+    cv2.ellipse(inner, (300, 300), (150, 100), 0, 0, 360, 1, -1)
+    rgba[inner > 0] = (255, 0, 255, 0)
+    lifted = lift(rgba, NO_HINT)
+    _check_contract(lifted)
+    assert lifted.notes["primitive"] == "inflation" and lifted.notes["rests"] == "lying"
+    assert to_manifold(lifted.surface).genus() == 1
+
+
+def test_flat_head_on_a_handle_is_not_revolved_and_lies() -> None:
+    turner = [(280, 60), (320, 60), (320, 330), (380, 360), (380, 540), (220, 540), (220, 360), (280, 330)]
+    lifted = lift(_drawn(turner), NO_HINT)
+    _check_contract(lifted)
+    assert lifted.notes["primitive"] == "inflation" and lifted.notes["rests"] == "lying"
+    assert np.ptp(lifted.surface.vertices[:, 1]) < 0.15
+
+
+def test_inflated_strip_is_a_round_bar() -> None:
+    mask = np.zeros((80, 400), bool)
+    mask[20:60, 10:390] = True
+    surface = inflate(mask, depth_limit_px=None, rise=1.0, flat_back=False)
+    middle = np.abs(surface.vertices[:, 0] - 200) < 60
+    assert surface.vertices[middle, 2].max() == pytest.approx(20, rel=0.08)
+    assert surface.vertices[middle, 2].min() == pytest.approx(-20, rel=0.08)
+
+
+def test_texture_shows_the_front_and_its_mirror_image_on_the_back() -> None:
+    rgba = _drawn([(220, 100), (380, 100), (380, 500), (220, 500)], colour=(200, 40, 40))
+    rgba[100:500, 300:380][rgba[100:500, 300:380, 3] > 0] = (40, 40, 200, 255)
+    lifted = lift(rgba, ShapeHint(round=True))
+    surface, texture = lifted.surface, lifted.texture
+    at = np.column_stack([(1 - surface.uv[:, 1]) * texture.shape[0], surface.uv[:, 0] * texture.shape[1]]).astype(int)
+    colours = texture[at[:, 0], at[:, 1]].astype(int)
+    right = surface.vertices[:, 0] > 0.05
+    left = surface.vertices[:, 0] < -0.05
+    assert (colours[right, 2] > colours[right, 0]).all() and (colours[left, 0] > colours[left, 2]).all()
+
+
+def test_generator_answers_the_protocol_with_the_same_bytes(tmp_path: Path) -> None:
+    request = GenerationRequest(_drawn([(200, 100), (400, 100), (430, 500), (170, 500)]), None, "cup", seed=0)
+    files = []
+    for run in range(2):
+        generator = LiftGenerator()
+        job = generator.submit(request)
+        assert generator.poll(job).state == "done"
+        (tmp_path / str(run)).mkdir()
+        made = generator.fetch(job, tmp_path / str(run))
+        assert made.notes["primitive"] == "revolution" and not made.metric
+        files.append(made.path.read_bytes())
+    assert files[0] == files[1]
+    (part,) = read_glb(tmp_path / "0" / "lift.glb")
+    assert part.is_watertight and part.volume > 0 and part.extents.max() == pytest.approx(1.0, abs=1e-6)
+    assert part.bounds[0][2] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_text_is_refused_with_a_remedy() -> None:
+    with pytest.raises(Unavailable, match="another generator"):
+        LiftGenerator().submit(GenerationRequest(None, "a red mug", None, seed=0))
+
+
+def _lifted_photo(path: Path) -> Lifted:
+    return lift(matte_photo(read_image(path, max_side_px=2048).pixels, path.name).rgba, NO_HINT)
+
+
+@pytest.mark.shared_data
+@pytest.mark.parametrize(
+    ("bad", "good"), [("bad/exif_rotated.jpg", "photos/claw_hammer.jpg"), ("bad/cmyk.jpg", "photos/steel_fork.jpg")]
+)
+def test_converted_photo_gives_the_geometry_of_its_original(shared_data: Path, bad: str, good: str) -> None:
+    first, second = (_lifted_photo(shared_data / name) for name in (bad, good))
+    assert first.notes["primitive"] == second.notes["primitive"]
+    extents = [np.ptp(lifted.surface.vertices, axis=0) for lifted in (first, second)]
+    assert extents[0] == pytest.approx(extents[1], abs=0.01)
+    volumes = [to_manifold(lifted.surface).volume() for lifted in (first, second)]
+    assert volumes[0] == pytest.approx(volumes[1], rel=0.15)
+
+
+@pytest.mark.shared_data
+def test_grey_flashlight_lying_is_the_one_standing(shared_data: Path) -> None:
+    grey = _lifted_photo(shared_data / "bad" / "gray16.png")
+    colour = _lifted_photo(shared_data / "photos" / "flashlight.jpg")
+    _check_contract(grey)
+    extents = [np.sort(np.ptp(lifted.surface.vertices, axis=0)) for lifted in (grey, colour)]
+    assert extents[0][1:] == pytest.approx(extents[1][1:], abs=0.02)
+    assert extents[0][0] == pytest.approx(extents[1][0], abs=0.05)  # a facet along its underside, if it lies
+
+
+@pytest.mark.shared_data
+def test_orange_with_garbage_under_its_alpha_is_orange_all_over(shared_data: Path) -> None:
+    lifted = _lifted_photo(shared_data / "bad" / "rgba_garbage_under_alpha.png")
+    _check_contract(lifted)
+    r, g, b = (lifted.texture[..., k].astype(int) for k in range(3))
+    assert not ((b > g + 10) & (r > 120)).any()
+
+
+@pytest.mark.slow
+@pytest.mark.shared_data
+def test_every_accepted_photo_becomes_a_solid_that_rests(shared_data: Path) -> None:
+    from manitwin.errors import Rejected
+
+    lifted = {}
+    for path in sorted((shared_data / "photos").glob("*.jpg")):
+        try:
+            lifted[path.stem] = _lifted_photo(path)
+        except Rejected:
+            continue
+    assert len(lifted) >= 18
+    for result in lifted.values():
+        _check_contract(result)
+    expected = {
+        "apple": "revolution",
+        "energy_drink_can": "revolution",
+        "claw_hammer": "inflation",
+        "bangle": "inflation",
+    }
+    assert {name: lifted[name].notes["primitive"] for name in expected} == expected
