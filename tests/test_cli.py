@@ -62,7 +62,7 @@ def test_missing_vulkan_device_is_one_clear_line(tmp_path: Path) -> None:
     nothing = {"VK_DRIVER_FILES": "/dev/null", "VK_ICD_FILENAMES": "/dev/null", "MANITWIN_RENDER_DEVICE_FOUND": "null"}
     done = manitwin("build", tmp_path / "cup.stl", "-o", tmp_path / "out", **nothing)
     assert done.returncode == 4
-    assert "Vulkan" in one_line(done.stderr) and "apt-get install" in done.stderr
+    assert "Vulkan" in one_line(done.stderr) and "VK_DRIVER_FILES" in done.stderr
 
 
 def test_doctor_looks_at_everything_that_a_build_needs() -> None:

@@ -13,7 +13,7 @@ from manitwin.errors import UsageError
 from manitwin.executors.local import StageStarted, build_all
 from manitwin.loaded_twin import Twin
 from manitwin.manifest import collect_items
-from manitwin.pipeline import ItemResult
+from manitwin.pipeline import ItemResult, check_names
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,7 @@ def build(
         raise UsageError(f"jobs is {jobs}; give 1 or more")
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
     items, remarks = collect_items(given, name=name, units=units, up=up, license=license, attribution=attribution)
+    check_names(settings)
     place = Path(out)
     if place.exists() and not place.is_dir():
         raise UsageError(f"{out}: a file; give a folder to write twins into")

@@ -11,11 +11,13 @@ import sys
 from pathlib import Path
 from typing import Annotated, NoReturn
 
-import click
 import typer
 from rich.console import Console
 
 from manitwin.errors import BackendError, ManiTwinError, UsageError
+
+# the base of what typer raises for a wrong command line; it has no public name of its own
+CommandLineError: type[Exception] = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
 
 app = typer.Typer(
     add_completion=False,
@@ -117,9 +119,9 @@ def main() -> None:
     signal.signal(signal.SIGTERM, _interrupt)
     try:
         sys.exit(app(standalone_mode=False))
-    except click.ClickException as error:
-        _fail(f"{error.format_message()} See manitwin --help", 2)
-    except (KeyboardInterrupt, click.Abort):
+    except CommandLineError as error:
+        _fail(f"{getattr(error, 'format_message', error.__str__)()} See manitwin --help", 2)
+    except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted; run the same command again to go on where it stopped", 4)
     except UsageError as error:
         _fail(str(error), 2)

@@ -17,7 +17,7 @@ from manitwin.errors import BackendError, ManiTwinError, Rejected, TwinError
 from manitwin.files.sniff import sniff
 from manitwin.files.source_files import MESH_SUFFIXES
 from manitwin.identity import twin_id
-from manitwin.models.registry import create
+from manitwin.models.registry import create, target
 from manitwin.simulate.gripper import load_gripper
 from manitwin.stage_runner import StageCost, run_stage
 from manitwin.stages.candidates import CandidatesStage
@@ -53,6 +53,13 @@ class ItemResult:
     detail: str
     folder: Path | None
     reused: bool = False
+
+
+def check_names(config: BuildConfig) -> None:
+    """Raise UsageError for a backend or gripper that is not there, before any work is begun."""
+    for kind in ("generator", "annotator", "grasper", "simulator"):
+        target(kind, getattr(config, kind))
+    load_gripper(config.gripper)
 
 
 def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:

@@ -25,7 +25,7 @@ def test_missing_driver_is_one_line_with_cause_and_remedy(tmp_path: Path) -> Non
     done = ask(VK_DRIVER_FILES=nowhere)
     assert done.returncode != 0
     last = done.stderr.strip().splitlines()[-1]
-    assert last.startswith("manitwin.errors.RendererMissing: nothing to render with")
+    assert last.startswith("manitwin.errors.RendererMissing: no Vulkan device can render")
     assert nowhere in last
     assert "unset VK_DRIVER_FILES" in last
 

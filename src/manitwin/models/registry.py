@@ -23,21 +23,26 @@ def backends() -> dict[str, dict[str, str]]:
     for entry in sorted(entry_points(group=GROUP), key=lambda e: e.name):
         for kind, targets in entry.load().BACKENDS.items():
             names = found.setdefault(kind, {})
-            for name, target in targets.items():
-                if names.get(name, target) != target:
+            for name, place in targets.items():
+                if names.get(name, place) != place:
                     raise ConfigError(
-                        f"two packages register the {kind} {name!r}: {names[name]} and {target}; uninstall one"
+                        f"two packages register the {kind} {name!r}: {names[name]} and {place}; uninstall one"
                     )
-                names[name] = target
+                names[name] = place
     return found
+
+
+def target(kind: str, name: str) -> str:
+    """Return where a backend is defined; raises ConfigError listing the valid names."""
+    names = backends().get(kind, {})
+    if name not in names:
+        raise ConfigError(choose_from(kind, name, names))
+    return names[name]
 
 
 def create(kind: str, name: str) -> Any:
     """Create a backend; raises ConfigError listing the valid names, Unavailable where it cannot be imported."""
-    names = backends().get(kind, {})
-    if name not in names:
-        raise ConfigError(choose_from(kind, name, names))
-    module, _, attribute = names[name].partition(":")
+    module, _, attribute = target(kind, name).partition(":")
     try:
         factory = getattr(import_module(module), attribute)
     except ImportError as error:

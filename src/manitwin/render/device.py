@@ -117,7 +117,7 @@ def _first_working(cpu_only: bool) -> RenderDevice:
             return RenderDevice(name, driver_file)
         causes.append(f"{driver_file or named or 'the GPU driver'}: {cause}")
     cause = "; ".join(causes) or "no Vulkan driver of Mesa's lavapipe is installed"
-    raise RendererMissing(f"nothing to render with ({cause}); {_remedy(named)}")
+    raise RendererMissing(f"no Vulkan device can render ({cause}); {_remedy(named)}")
 
 
 def _probe(driver_file: str | None, *, picture: bool) -> tuple[str | None, str]:
