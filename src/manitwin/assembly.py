@@ -50,7 +50,7 @@ def assemble(
             "manitwin_version": version("manitwin"),
             "config_sha256": config_sha256,
             "seed": draft.seed,
-            "stages": {s.name: {"version": s.version, "backend": s.backend, "model": s.model} for s in stages},
+            "stages": {s.name: {"version": s.version, "backend": s.backend, "model": _model(s, draft)} for s in stages},
         },
         "quality": {"checks": draft.fields.get("gate", {}).get("checks", [])},
     }
@@ -65,6 +65,13 @@ def assemble(
     sealed = seal(fresh, record)
     replace_folder(fresh, place)
     return sealed
+
+
+def _model(stage: Stage, draft: Draft) -> str | None:
+    """Return which model did a stage; a generator may know it only afterwards (lift: the primitive that fits)."""
+    if stage.name == "generate" and "generation" in draft.fields:
+        return draft.field("generation")["model"] or stage.model
+    return stage.model
 
 
 def _write_source(draft: Draft, kind: str, folder: Path) -> dict[str, Any]:

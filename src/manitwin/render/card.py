@@ -70,7 +70,7 @@ def make_card(
     mesh = merged(list(parts))
     hero = hero_camera(np.asarray(mesh.vertices), fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL)
     if photo is not None:
-        first, caption = input_panel(photo, PANEL), "input photo"
+        first, caption = input_panel(photo, PANEL), "input photo, cut out"
     elif prompt is not None:
         first, caption = _prompt_panel(prompt), "input text"
     else:

@@ -40,6 +40,7 @@ class GenerateStage:
                 "generator": self.generator.name,
                 "model": made.model,
                 "metric": made.metric,
+                "rests": made.rests,
                 "notes": made.notes,
             }
         }

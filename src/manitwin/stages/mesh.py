@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import trimesh
@@ -54,7 +54,7 @@ class MeshStage:
         result = repair(_soup(parts), **self.settings.repair.model_dump())
         chosen = choose_up(
             result.mesh,
-            user="auto" if generated else draft.item.up,
+            user=_said_up(draft, generated),
             file_up=file.up,
             stands=None if prior is None else prior.stands,
         )
@@ -77,6 +77,13 @@ def _input_path(draft: Draft, generated: bool) -> Path:
     if draft.item.file is None:
         raise InputError("empty", "no mesh file and nothing generated; give a file")
     return Path(draft.item.file)
+
+
+def _said_up(draft: Draft, generated: bool) -> Literal["y", "z", "auto"]:
+    """Return the up axis as the user said it, or as a generator did that sets its meshes down by itself."""
+    if not generated:
+        return draft.item.up
+    return "y" if draft.field("generation").get("rests", False) else "auto"
 
 
 def _unit(file: MeshFile, draft: Draft, generated: bool, prior: Prior | None) -> LengthUnit:

@@ -33,12 +33,16 @@ class JobState:
 
 @dataclass(frozen=True)
 class Generated:
-    """A mesh file (GLB, glTF Y-up, any scale) and what the generator says about how it was made."""
+    """A mesh file (GLB, glTF Y-up, any scale) and what the generator says about how it was made.
+
+    ``metric``: its units are true metres. ``rests``: it stands or lies on y = 0 as such a thing does, so that its pose is kept.
+    """
 
     path: Path
     model: str | None
     notes: dict[str, Any] = field(default_factory=dict)
     metric: bool = False
+    rests: bool = False
 
 
 class Generator(Protocol):

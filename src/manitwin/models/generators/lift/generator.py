@@ -67,7 +67,7 @@ class LiftGenerator:
         job = self._jobs.pop(job_id)
         path = folder / "lift.glb"
         path.write_bytes(job.glb)
-        return Generated(path=path, model=None, notes=job.notes, metric=False)
+        return Generated(path=path, model=str(job.notes["primitive"]), notes=job.notes, rests=True)
 
 
 def textured_part(lifted: Lifted) -> trimesh.Trimesh:
