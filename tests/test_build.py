@@ -192,3 +192,11 @@ def test_interrupted_build_says_so_and_exits_with_4(tmp_path: Path) -> None:
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 4
     assert "interrupted" in errors and "Traceback" not in errors
+
+
+def test_a_script_without_a_main_guard_builds_once(tmp_path: Path) -> None:
+    (tmp_path / "empty.png").write_bytes(b"")
+    script = tmp_path / "script.py"
+    script.write_text("import manitwin\nprint(manitwin.build('empty.png', 'out', jobs=1).results[0].status)\n")
+    done = subprocess.run([sys.executable, script], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.stdout.strip(), done.returncode) == ("rejected", 0), done.stderr

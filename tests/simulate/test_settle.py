@@ -47,6 +47,20 @@ def test_copies_in_one_scene_do_not_disturb_each_other() -> None:
         assert settled.object_to_plane == pytest.approx(alone.object_to_plane, abs=1e-4)
 
 
+def test_small_prism_keeps_its_facets_and_falls_back_onto_the_one_it_was_tilted_off() -> None:
+    sides, radius, tilt = 20, 0.0095, np.radians(4)  # every second corner lies 0.46 mm beyond its neighbours' chord
+    angle = (np.arange(sides) + 0.5) * 2 * np.pi / sides
+    ring = radius * np.stack([np.sin(angle), -np.cos(angle)], 1)
+    prism = trimesh.convex.convex_hull(np.vstack([np.insert(ring, 0, x, axis=1) for x in (-0.06, 0.06)]))
+    for turned in (0.0, tilt, -tilt):
+        turn = trimesh.transformations.rotation_matrix(turned, [1, 0, 0])[:3, :3]
+        start = transform(turn, np.array([0, 0, -float((prism.vertices @ turn[2]).min())]))
+        (settled,) = settle_on_plane(_body(prism, 0.016), [start], drop_m=0.001, seconds=2.0)
+        assert settled.at_rest
+        assert settled.object_to_plane[2, 2] > np.cos(np.radians(0.5))
+        assert settled.object_to_plane[2, 3] == pytest.approx(radius * np.cos(np.pi / sides), abs=1e-4)
+
+
 def test_no_poses_settle_nowhere() -> None:
     assert settle_on_plane(_body(trimesh.creation.box((0.1, 0.1, 0.1))), [], drop_m=0.001, seconds=1.0) == []
 

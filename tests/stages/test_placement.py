@@ -120,6 +120,52 @@ def test_can_on_its_side_rolls_and_does_not_come_first(tmp_path: Path) -> None:
     assert on_its_side and not any(p["settled"] for p in on_its_side)
 
 
+def _lying_prism(sides: int) -> trimesh.Trimesh:
+    """Return a marker: a regular prism along x, 19 mm across its corners and 12 cm long, on one of its facets."""
+    angle = (np.arange(sides) + 0.5) * 2 * np.pi / sides
+    ring = 0.0095 * np.stack([np.sin(angle), -np.cos(angle)], 1)
+    mesh = trimesh.convex.convex_hull(np.vstack([np.insert(ring, 0, x, axis=1) for x in (-0.06, 0.06)]))
+    return mesh.apply_translation((0, 0, -mesh.bounds[0, 2]))
+
+
+def _up(placement: dict[str, Any]) -> np.ndarray:
+    return rotation_from_quaternion_wxyz(np.array(placement["quaternion_wxyz"]))[2]
+
+
+def _center_height(draft: Draft, placement: dict[str, Any]) -> float:
+    return float(np.array(draft.field("physical")["center_of_mass_m"]) @ _up(placement) + placement["position_m"][2])
+
+
+def _lies(placement: dict[str, Any]) -> bool:
+    return bool(abs(_up(placement)[0]) < 0.1)
+
+
+@pytest.mark.parametrize("sides", [12, 18, 24])
+def test_marker_of_wide_facets_lies_on_one(tmp_path: Path, sides: int) -> None:
+    draft = _draft(tmp_path, _lying_prism(sides), 0.016, [_lying_prism(sides).vertices])
+    found = _placements(draft, tmp_path)
+    stay = [p for p in found if p["settled"]]
+    assert len(stay) == 6 and all(map(_lies, stay))  # an end takes 1.2 % of the solid angle, both together
+    inradius = 0.0095 * np.cos(np.pi / sides)
+    for placement in stay:
+        assert -(_lying_prism(sides).vertices @ _up(placement)).min() == pytest.approx(placement["position_m"][2])
+        assert _center_height(draft, placement) == pytest.approx(inradius, abs=2e-6)  # flat on a facet
+    moved_m, turned_deg = _set_down_in_mujoco(draft, found[0])
+    assert moved_m < 0.01 and turned_deg < 5
+
+
+@pytest.mark.parametrize("sides", [48, 64, 120])
+def test_marker_of_narrow_facets_rolls_and_only_stays_on_its_end(tmp_path: Path, sides: int) -> None:
+    draft = _draft(tmp_path, _lying_prism(sides), 0.016, [_lying_prism(sides).vertices])
+    found = _placements(draft, tmp_path)
+    assert [p["settled"] for p in found if _lies(p)] == [False]
+    assert found[0]["settled"] and not _lies(found[0])
+    end_solid_angle = 2 * np.pi * (1 - 0.06 / np.hypot(0.06, 0.0095))
+    assert found[0]["probability"] == pytest.approx(end_solid_angle / (4 * np.pi), rel=0.02)
+    moved_m, turned_deg = _set_down_in_mujoco(draft, found[0])
+    assert moved_m < 0.01 and turned_deg < 5
+
+
 def test_cup_stands_on_either_end_in_a_second_engine(tmp_path: Path) -> None:
     draft = _draft(tmp_path, cup(), 0.2)
     found = _placements(draft, tmp_path)

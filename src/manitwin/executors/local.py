@@ -5,9 +5,11 @@ from __future__ import annotations
 import multiprocessing
 import os
 import queue
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, TimeoutError
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -57,6 +59,26 @@ def build_all(
     A worker that crashes or exceeds ``config.item_timeout_s`` leaves its item unfinished. Closing the iterator early stops
     the workers; finished twins and stages stay.
     """
+    with _hidden_main_module():
+        yield from _build_all(items, out, config, jobs, on_stage)
+
+
+@contextmanager
+def _hidden_main_module() -> Iterator[None]:
+    """Keep spawned workers from importing the script that started this build: without a guard it would start it again."""
+    main = sys.modules["__main__"].__dict__
+    hidden: dict[str, Any] = {name: main[name] for name in ("__file__", "__spec__") if name in main}
+    main.pop("__file__", None)
+    main["__spec__"] = None
+    try:
+        yield
+    finally:
+        main.update(hidden)
+
+
+def _build_all(
+    items: list[Item], out: Path, config: BuildConfig, jobs: int, on_stage: Callable[[StageStarted], None]
+) -> Iterator[ItemResult]:
     context = multiprocessing.get_context("spawn")
     events = context.Queue()
     done: queue.Queue[ItemResult] = queue.Queue()
