@@ -54,7 +54,7 @@ def test_generated_twin_says_who_made_it(samples: dict[str, Twin]) -> None:
 def test_same_input_and_seed_give_the_same_twin(samples: dict[str, Twin], kind: str, tmp_path: Path) -> None:
     twin = samples[kind]
     source = twin.folder / twin.record.source.file
-    report = manitwin.build(source, tmp_path, name=twin.record.name, config=QUICK, units="auto", **_said(kind))
+    report = manitwin.build(source, tmp_path, name=twin.record.name, config=QUICK, **_said(kind))
     again = manitwin.load(report.results[0].folder or "", verify=True)
     assert again.record.files == twin.record.files
     assert again.record.revision == twin.record.revision
@@ -64,7 +64,7 @@ def _said(kind: str) -> dict[str, str]:
     with (SAMPLES / "samples.csv").open() as stream:
         header, *rows = (line.strip().split(",") for line in stream)
     row = next(dict(zip(header, r, strict=True)) for r in rows if r[0].endswith((".glb",)) == (kind == "mesh"))
-    return {key: row[key] for key in ("license", "attribution") if row.get(key)}
+    return {key: row[key] for key in ("license", "attribution", "units") if row.get(key)}
 
 
 def test_finished_twins_are_not_built_again(samples: dict[str, Twin]) -> None:

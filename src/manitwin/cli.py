@@ -16,6 +16,9 @@ from rich.console import Console
 
 from manitwin.errors import BackendError, ManiTwinError, UsageError
 
+TYPER_INTERRUPTED = 130
+"""What typer returns where it caught a KeyboardInterrupt by itself."""
+
 # the base of what typer raises for a wrong command line; it has no public name of its own
 CommandLineError: type[Exception] = next(base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException")
 
@@ -118,7 +121,10 @@ def main() -> None:
     """Run the command line; every error is one line."""
     signal.signal(signal.SIGTERM, _interrupt)
     try:
-        sys.exit(app(standalone_mode=False))
+        status = app(standalone_mode=False)
+        if status == TYPER_INTERRUPTED:
+            raise KeyboardInterrupt
+        sys.exit(status)
     except CommandLineError as error:
         _fail(f"{getattr(error, 'format_message', error.__str__)()} See manitwin --help", 2)
     except (KeyboardInterrupt, typer.Abort):
