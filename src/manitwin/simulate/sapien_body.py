@@ -10,6 +10,7 @@ import sapien
 from sapien import physx
 
 from manitwin.geometry.poses import GLTF_TO_OBJECT, quaternion_wxyz
+from manitwin.simulate.convex_shape import convex_shape
 from manitwin.twin import Physical
 
 
@@ -40,7 +41,7 @@ def add_body(
     )
     body = physx.PhysxRigidDynamicComponent()
     for vertices in hulls:
-        body.attach(physx.PhysxCollisionShapeConvexMesh(vertices.astype(np.float32), np.ones(3, np.float32), material))
+        body.attach(convex_shape(vertices, material))
     moments, axes = principal_frame(np.array(physical.inertia_kg_m2))
     body.set_mass(physical.mass_kg.value)
     body.set_cmass_local_pose(sapien.Pose(physical.center_of_mass_m, quaternion_wxyz(axes)))

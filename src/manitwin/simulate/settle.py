@@ -11,14 +11,12 @@ from sapien import physx
 
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform_points
+from manitwin.simulate.convex_shape import convex_shape
 from manitwin.simulate.sapien_body import principal_frame
 
 _TIMESTEP_S = 1 / 240
 _SOLVER_ITERATIONS = 20  # at PhysX's own 4 to 10, stacks of hulls creep
 _CONTACT_OFFSET_M = 0.002  # 10 mm costs 1.6 times as much for the same answer
-# PhysX drops corners within 0.7 mm of the hull of the others (PxCookingParams::planeTolerance): a marker would roll on
-# a coarser polygon than its own. Cooked this much larger and scaled back, it keeps all beyond 7 um.
-_COOKING_SCALE = 100.0
 _CHECK_EVERY = 12  # steps between looks at whether all is still
 _STILL_M_S = 1e-3
 _STILL_RAD_S = 1e-2
@@ -154,8 +152,7 @@ def _attach_hulls(
     component: physx.PhysxRigidBaseComponent, hulls: Sequence[np.ndarray], material: physx.PhysxMaterial
 ) -> None:
     for hull in hulls:
-        corners = np.asarray(hull * _COOKING_SCALE, dtype=np.float32)
-        shape = physx.PhysxCollisionShapeConvexMesh(corners, np.full(3, 1 / _COOKING_SCALE, np.float32), material)
+        shape = convex_shape(hull, material)
         shape.contact_offset = _CONTACT_OFFSET_M
         component.attach(shape)
 

@@ -26,7 +26,7 @@ class VerifyStage:
     """Try every chosen grasp, and the unfiltered sample beside it."""
 
     name: ClassVar[str] = "verify"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = (PROPOSALS, "proposals", "hulls.npz", "physical")
     writes: ClassVar[tuple[str, ...]] = (TABLE, "grasps")
     needs: ClassVar[Resource] = "cpu"
