@@ -93,7 +93,7 @@ class GateConfig(Section):
 
 
 class CollisionConfig(Section):
-    """The convex hulls that stand for the object in physics (design/twin.md: at most 32 of at most 64 vertices)."""
+    """The convex hulls that stand for the object in physics (at most 32 of at most 64 vertices: what PhysX takes)."""
 
     max_hulls: int = Field(default=32, ge=1, le=32)
     max_vertices: int = Field(default=64, ge=8, le=64)
