@@ -117,6 +117,7 @@ def _grasp_checks(draft: Draft) -> list[Check]:
         Check(
             name="approach_directions",
             passed=grasps["approach_octants"] >= 4,
+            message="octants of the approach direction among the verified grasps",
             value=float(grasps["approach_octants"]),
             limit=4.0,
         ),

@@ -29,7 +29,7 @@ class RulesAnnotator:
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:
         """Judge nothing: rules cannot see."""
-        return QualityVerdict(None, None, "not judged: rules do not look at pictures")
+        return QualityVerdict(None, None, "rules do not look at pictures")
 
     def estimate_physical(self, subject: Subject) -> PhysicalEstimates:
         """Estimate size, mass and friction from the prior, the bulk density and the volume."""
