@@ -75,8 +75,12 @@ def print_summary(figures: list[dict]) -> None:
     accepted = sum(f["accepted"] for f in figures)
     many, wide = int(np.sum(verified >= 20)), sum(f["octants"] >= 4 for f in figures)
     rate = 100 * verified.sum() / max(simulated.sum(), 1)
-    print(f"\naccepted {accepted}/{len(figures)}, {many} with 20 verified or more, {wide} with 4 approach octants or more")
-    print(f"verified {verified.sum()}/{simulated.sum()} = {rate:.1f} % of the simulated (none held counts 0 of {GRASPS_WANTED})")
+    print(
+        f"\naccepted {accepted}/{len(figures)}, {many} with 20 verified or more, {wide} with 4 approach octants or more"
+    )
+    print(
+        f"verified {verified.sum()}/{simulated.sum()} = {rate:.1f} % of the simulated (none held counts 0 of {GRASPS_WANTED})"
+    )
     print(f"verified per object: median {np.median(verified):.0f}, 10th percentile {np.percentile(verified, 10):.0f}")
     for stage in dict.fromkeys(stage for f in figures for stage in f["cpu"]):
         print_seconds(stage, [f["cpu"][stage] for f in figures if stage in f["cpu"]])

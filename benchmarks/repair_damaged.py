@@ -21,10 +21,10 @@ import numpy as np
 import trimesh
 
 from manitwin.geometry.distance import distance_to_surface
-from manitwin.geometry.open_sheets import fibonacci_sphere
-from manitwin.geometry.repair import RepairResult, repair
+from manitwin.geometry.repair.cascade import RepairResult, repair
+from manitwin.geometry.repair.open_sheets import fibonacci_sphere
+from manitwin.geometry.repair.welding import weld_equal
 from manitwin.geometry.sampling import sample_surface
-from manitwin.geometry.welding import weld_equal
 
 SAMPLES = 12_000
 VIEWS = 48

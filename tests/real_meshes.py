@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from manitwin.geometry.repair import repair
+from manitwin.geometry.repair.cascade import repair
 
 Y_UP = ("bowl_evo", "plate_8in", "tomato_soup_can", "salt_shaker", "gelatin_box")
 VESSELS = {"mug_ycb": 0.85, "bowl_evo": 0.85, "frypan_8in": 0.85, "utensil_holder": 0.85, "sneaker": 0.80}

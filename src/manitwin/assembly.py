@@ -13,7 +13,7 @@ import numpy as np
 
 from manitwin.errors import Rejected
 from manitwin.files.source_files import pack_source
-from manitwin.geometry.hull_reduction import hull_to_obj
+from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.stage_runner import StageCost
 from manitwin.stages.stage import Draft, Stage
 from manitwin.store import RUN, canonical_json, replace_folder, seal, write_bytes_atomically

@@ -11,7 +11,7 @@ import trimesh
 from PIL import Image
 
 from manitwin.files.glb import read_glb, write_glb
-from manitwin.files.mesh_textures import make_part, pbr_material
+from manitwin.files.meshes.textures import make_part, pbr_material
 
 
 def _texture(size: tuple[int, int] = (64, 32), mode: str = "RGB") -> Image.Image:

@@ -37,9 +37,7 @@ def test_overlap_agrees_with_the_intersection_volume_over_random_poses() -> None
     rng = np.random.default_rng(3)
     vertices = trimesh.creation.icosphere(subdivisions=2, radius=0.03).vertices * [1.2, 0.7, 1.0]
     rotations = Rotation.random(300, rng).as_matrix()
-    poses = np.stack(
-        [transform(r, rng.uniform(-0.03, 0.03, 3) - r[:, 2] * rng.uniform(0.06, 0.16)) for r in rotations]
-    )
+    poses = np.stack([transform(r, rng.uniform(-0.03, 0.03, 3) - r[:, 2] * rng.uniform(0.06, 0.16)) for r in rotations])
     ours = overlaps((vertices,), poses)
     truly = np.array([shared_volume(vertices, pose) > 1e-12 for pose in poses])
     assert 60 < truly.sum() < 240

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from manitwin.geometry.cavity import find_opening
-from manitwin.geometry.convex_decomposition import convex_decomposition
+from manitwin.geometry.hulls.decomposition import convex_decomposition
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.poses import transform
 from manitwin.simulate.settle import RigidBody, ball_stays_inside, settle_on_plane

@@ -8,7 +8,7 @@ import trimesh
 from manitwin.config import GateConfig
 from manitwin.errors import Rejected
 from manitwin.files.glb import write_glb
-from manitwin.files.mesh_textures import make_part, pbr_material
+from manitwin.files.meshes.textures import make_part, pbr_material
 from manitwin.models.annotators.protocol import QualityVerdict, Subject
 from manitwin.stages.gate import GateStage
 from manitwin.stages.stage import Draft, Item

@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 
 from manitwin.config import CollisionConfig, PlacementConfig
 from manitwin.errors import Rejected
-from manitwin.geometry.hull_reduction import hull_to_obj
+from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.stages.collision import CollisionStage

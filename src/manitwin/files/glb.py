@@ -14,9 +14,9 @@ import trimesh
 from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
-from manitwin.files.mesh_gltf import read_gltf
-from manitwin.files.mesh_source import MeshLimits, MeshSource
-from manitwin.files.mesh_textures import bake_transform, make_part, material_of, normals_of, uv_of
+from manitwin.files.meshes.gltf import read_gltf
+from manitwin.files.meshes.source import MeshLimits, MeshSource
+from manitwin.files.meshes.textures import bake_transform, make_part, material_of, normals_of, uv_of
 from manitwin.geometry.poses import GLTF_TO_OBJECT, OBJECT_TO_GLTF
 from manitwin.geometry.seams import close_seams, has_three_places
 

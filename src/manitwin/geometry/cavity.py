@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from manitwin.geometry.hull_reduction import hull_volume
+from manitwin.geometry.hulls.reduction import hull_volume
 from manitwin.geometry.poses import rotation_between
 
 # Measured on 25 real meshes: the shallowest vessel (a plate) has depth 4.4 % of the longest side and the smallest (a

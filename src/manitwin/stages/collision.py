@@ -11,8 +11,8 @@ from scipy.spatial import QhullError
 from manitwin.config import CollisionConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.cavity import find_opening
-from manitwin.geometry.convex_decomposition import convex_decomposition
-from manitwin.geometry.hull_error import hull_error
+from manitwin.geometry.hulls.decomposition import convex_decomposition
+from manitwin.geometry.hulls.error import hull_error
 from manitwin.simulate.settle import ball_stays_inside
 from manitwin.stages.object_arrays import load_solid
 from manitwin.stages.stage import Draft, Resource

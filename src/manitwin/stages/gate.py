@@ -11,7 +11,7 @@ import trimesh
 from manitwin.config import GateConfig
 from manitwin.errors import Rejected
 from manitwin.files.glb import read_glb
-from manitwin.geometry.components import separate_objects
+from manitwin.geometry.repair.components import separate_objects
 from manitwin.models.annotators.protocol import Annotator, QualityVerdict, Subject
 from manitwin.stages.stage import Draft, Resource
 from manitwin.twin import Check

@@ -45,9 +45,7 @@ FROM_PROPOSALS = (
 )
 
 
-def write_grasp_table(
-    path: Path, gripper: str, proposals: dict[str, np.ndarray], results: list[TrialResult]
-) -> None:
+def write_grasp_table(path: Path, gripper: str, proposals: dict[str, np.ndarray], results: list[TrialResult]) -> None:
     """Write the grasps and their verdicts; equal arguments give equal bytes.
 
     ``proposals`` holds the arrays of ``proposals.npz``, in the order of ``results``. Second engine and robustness are

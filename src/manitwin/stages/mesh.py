@@ -11,15 +11,15 @@ import trimesh
 from manitwin.config import MeshConfig
 from manitwin.errors import InputError
 from manitwin.files.glb import write_glb
-from manitwin.files.mesh_read import MeshFile, read_mesh
-from manitwin.files.mesh_repaired import repaired_parts
-from manitwin.files.mesh_source import MeshLimits
-from manitwin.files.mesh_textures import bake_transform
-from manitwin.geometry.canonical import object_frame
-from manitwin.geometry.canonical_units import LengthUnit, decide_unit
-from manitwin.geometry.canonical_up import UpChoice, choose_up
-from manitwin.geometry.components import connected_parts
-from manitwin.geometry.repair import RepairResult, repair
+from manitwin.files.meshes.read import MeshFile, read_mesh
+from manitwin.files.meshes.repaired import repaired_parts
+from manitwin.files.meshes.source import MeshLimits
+from manitwin.files.meshes.textures import bake_transform
+from manitwin.geometry.canonical.frame import object_frame
+from manitwin.geometry.canonical.units import LengthUnit, decide_unit
+from manitwin.geometry.canonical.up import UpChoice, choose_up
+from manitwin.geometry.repair.cascade import RepairResult, repair
+from manitwin.geometry.repair.components import connected_parts
 from manitwin.models.annotators.priors import Prior, lookup
 from manitwin.stages.stage import Draft, Resource
 

@@ -11,7 +11,7 @@ import trimesh
 from manitwin.config import PhysicalConfig
 from manitwin.errors import BadReply, Rejected
 from manitwin.files.glb import write_glb
-from manitwin.files.mesh_textures import bake_transform
+from manitwin.files.meshes.textures import bake_transform
 from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
 from manitwin.models.annotators.priors import Interval, lookup

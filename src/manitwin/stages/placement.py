@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from manitwin.config import PlacementConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.boxes import smallest_enclosing_circle
-from manitwin.geometry.hull_reduction import convex_corners
+from manitwin.geometry.hulls.reduction import convex_corners
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform
 from manitwin.geometry.stable_poses import easiest_tilt, stable_poses
 from manitwin.simulate.settle import RigidBody, Settled, settle_on_plane

@@ -10,8 +10,8 @@ import pytest
 import trimesh
 
 from handmade import cup, cylinder, subject
-from manitwin.files.mesh_read import read_mesh
-from manitwin.geometry.repair import repair
+from manitwin.files.meshes.read import read_mesh
+from manitwin.geometry.repair.cascade import repair
 from manitwin.models.annotators.physical_rules import estimate_physical
 from manitwin.models.annotators.priors import load_priors, lookup
 from manitwin.models.annotators.rules import RulesAnnotator

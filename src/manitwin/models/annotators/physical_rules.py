@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.geometry.boxes import oriented_bounding_box
-from manitwin.geometry.local_thickness import local_thickness
+from manitwin.geometry.parts.local_thickness import local_thickness
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.annotators.priors import Interval, Prior, unknown_prior
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject

@@ -11,8 +11,8 @@ from functools import cached_property
 
 import numpy as np
 
-from manitwin.geometry.features import Feature, feature_scores
-from manitwin.geometry.shape import Shape, SurfacePoints, measure_shape, surface_points
+from manitwin.geometry.parts.features import Feature, feature_scores
+from manitwin.geometry.parts.shape import Shape, SurfacePoints, measure_shape, surface_points
 from manitwin.models.annotators.priors import FunctionalPart, GraspPart, Prior, unknown_prior
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
 from manitwin.twin import FunctionalPoint, GraspPoint

@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from manitwin.errors import ManiTwinError, choose_from
-from manitwin.geometry.elongation import HeadEnd
-from manitwin.geometry.features import Feature
+from manitwin.geometry.parts.elongation import HeadEnd
+from manitwin.geometry.parts.features import Feature
 from manitwin.twin import Estimate, Finite, GraspType, Record
 
 VOCABULARY_FILES = ("materials", "forms")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.geometry.cavity import find_opening
-from manitwin.geometry.overall_shape import overall_shape
+from manitwin.geometry.parts.overall_shape import overall_shape
 from manitwin.models.annotators.priors import Prior, normalised
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.surface_color import UNTEXTURED, ColorShare, measure_colors
@@ -89,9 +89,7 @@ def _shape(subject: Subject, prior: Prior | None, rng: np.random.Generator) -> s
     return f"{measured.word} and hollow, open at one side" if opening is not None else measured.word
 
 
-def write_captions(
-    category: str, prior: Prior | None, material: str, color: str, shape: str, size: str
-) -> list[str]:
+def write_captions(category: str, prior: Prior | None, material: str, color: str, shape: str, size: str) -> list[str]:
     """Return captions of differing length and style, the full sentence first; ``color`` may be empty: unknown."""
     noun = "object" if category == "unknown" else category
     if prior is not None and prior.counter:

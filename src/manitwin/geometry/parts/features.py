@@ -1,0 +1,220 @@
+"""Where the parts of a thing are, told from its shape: scores of surface points for places such as rim, handle or tip.
+
+Every score is in [0, 1]; a place that the shape does not have has no score (None). Object frame: +Z up, metres.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+
+from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoints
+
+Feature = Literal[
+    "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
+    "top", "base", "side", "center", "front", "back", "end", "ring",
+]  # fmt: skip
+"""A place on an object that geometry can point out."""
+
+
+def feature_scores(feature: Feature, shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    """Return how well each point stands for a feature, ``(N,)`` in [0, 1]; None where the shape has no such place."""
+    scores = _SCORERS[feature](shape, points)
+    return None if scores is None else np.clip(scores, 0.0, 1.0)
+
+
+def _near(distance: np.ndarray, width: float) -> np.ndarray:
+    """Return 1 at distance 0, falling to 0.6 at ``width`` and to nothing at three of them."""
+    return np.exp(-0.5 * (distance / max(width, 1e-9)) ** 2)
+
+
+def _share_of_height(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    low, high = shape.bounds_m[:, 2]
+    return (points.positions_m[:, 2] - low) / max(high - low, 1e-9)
+
+
+def _rim(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    opening = shape.opening
+    if opening is None:
+        return None
+    offset = points.positions_m - opening.center_m
+    above = offset @ opening.axis
+    radial = np.linalg.norm(offset - above[:, None] * opening.axis, axis=1)
+    height = _near(above, 0.05 * shape.size_m + 0.02 * opening.depth_m)
+    within = np.where(radial < 1.5 * opening.rim_radius_m + 0.01, 1.0, 0.1)
+    scores = height * within * (0.4 + 0.6 * _near(np.maximum(points.thickness_m - 0.012, 0), 0.012))
+    if shape.side_handle is not None:
+        scores = np.where(shape.body.belongs(points.positions_m, shape.side_handle), 0.1 * scores, scores)
+    return scores * np.where(radial > 0.6 * opening.rim_radius_m, 1.0, 0.2)
+
+
+def _opening(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    """The rim where one pours: away from the handle."""
+    rim = _rim(shape, points)
+    return None if rim is None else rim * _away_from_handle(shape, points)
+
+
+def _away_from_handle(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    if shape.side_handle is None:
+        return np.ones(len(points.positions_m))
+    return 0.75 - 0.25 * np.cos(shape.body.azimuth(points.positions_m) - shape.side_handle.azimuth_rad)
+
+
+def _inside(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    up = points.normals[:, 2]
+    if shape.opening is None:
+        radial = np.linalg.norm(points.positions_m[:, :2] - shape.bounds_m[:, :2].mean(0), axis=1)
+        return np.maximum(up, 0) * _near(radial, 0.3 * shape.size_m)
+    opening = shape.opening
+    offset = points.positions_m - opening.center_m
+    above = offset @ opening.axis
+    radial = np.linalg.norm(offset - above[:, None] * opening.axis, axis=1)
+    facing = 0.3 + 0.7 * np.maximum(points.normals @ opening.axis, 0)
+    deep = np.clip(-above / opening.depth_m, 0, 1)
+    inward = np.einsum("ij,ij->i", points.normals, opening.center_m - points.positions_m) > 0
+    return facing * (0.2 + 0.8 * deep) * (radial < 1.05 * opening.rim_radius_m) * inward
+
+
+def _handle(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    if shape.side_handle is not None:
+        mine = shape.body.belongs(points.positions_m, shape.side_handle)
+        outside = shape.body.outside_m(points.positions_m) / shape.side_handle.reach_m
+        # A ring handle is held in its outer half, a long one (a pan's) well before its end.
+        best = 0.7 if shape.side_handle.reach_m < shape.body.radius_m.max() else 0.35
+        return mine * (0.3 + 0.7 * _near(outside - best, 0.35))
+    if not shape.has_ends:
+        return None
+    along = shape.axis.along(points.positions_m)
+    held = (1 + 2 * max(shape.axis.head_share, 0.3)) / 3
+    return _near(along - held, 0.14) * (along > shape.axis.head_share)
+
+
+def _handle_end(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    if shape.side_handle is not None:
+        outside = shape.body.outside_m(points.positions_m) / shape.side_handle.reach_m
+        return shape.body.belongs(points.positions_m, shape.side_handle) * _near(outside - 0.9, 0.15)
+    if not shape.has_ends:
+        return None
+    return _near(shape.axis.along(points.positions_m) - 0.95, 0.08)
+
+
+def _head(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    along = shape.axis.along(points.positions_m)
+    share = max(shape.axis.head_share, 0.1)
+    broad = 1 - np.abs(points.normals @ shape.axis.direction)
+    centered = 0.6 + 0.4 * _near(shape.axis.off_axis_m(points.positions_m), 0.25 * float(shape.axis.width_m.max()))
+    return _near(along - 0.55 * share, 0.35 * share) * (0.5 + 0.5 * broad) * centered
+
+
+def _face(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    """The outermost point of the head, across the handle: where a hammer strikes."""
+    along = shape.axis.along(points.positions_m)
+    off = shape.axis.off_axis_m(points.positions_m)
+    of_head = shape.axis.along(shape.surface_m) < shape.axis.head_share + 0.1
+    furthest = float(shape.axis.off_axis_m(shape.surface_m[of_head]).max())
+    return (off / max(furthest, 1e-9)) ** 2 * (along < shape.axis.head_share + 0.12)
+
+
+def _tip(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    return _near(shape.axis.along(points.positions_m), 0.06)
+
+
+def _edge(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    """Thin matter; on a long thing, in its working half."""
+    thin = _near(np.maximum(points.thickness_m - 0.002, 0), 0.25 * float(np.median(points.thickness_m)) + 0.002)
+    if not shape.has_ends:
+        return thin
+    along = shape.axis.along(points.positions_m)
+    return (0.3 + 0.7 * thin) * _near(along - 0.25, 0.15)
+
+
+def _middle(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    along = shape.axis.along(points.positions_m)
+    return _near(along - shape.axis.center_of_mass_share, 0.1)
+
+
+def _neck(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    heights = np.linspace(0, 1, len(shape.body.radius_m))
+    upper = (heights > 0.25) & (heights < 0.92)
+    narrow = int(np.where(upper, shape.body.radius_m, np.inf).argmin())
+    if shape.body.radius_m[narrow] > 0.8 * shape.body.radius_m.max():
+        return None
+    sideways = 1 - np.abs(points.normals[:, 2])
+    return _near(_share_of_height(shape, points) - heights[narrow], 0.08) * (0.4 + 0.6 * sideways)
+
+
+def _spout(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    others = [p for p in shape.body.protrusions if p is not shape.side_handle]
+    high = 0.3 + 0.7 * _share_of_height(shape, points)
+    if others and others[0].reach_m > 0.3 * LEAST_HANDLE_REACH * shape.body.radius_m.max():
+        return shape.body.belongs(points.positions_m, others[0]) * high
+    rim = _rim(shape, points)
+    if rim is None:
+        rim = _top(shape, points)
+    return np.sqrt(np.maximum(rim, 0)) * _away_from_handle(shape, points) ** 3  # the side counts more than the height
+
+
+def _top(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    return _near(1 - _share_of_height(shape, points), 0.12) * (0.6 + 0.4 * points.normals[:, 2])
+
+
+def _base(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    return _near(_share_of_height(shape, points), 0.08) * (0.4 - 0.6 * points.normals[:, 2])
+
+
+def _side(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    sideways = 1 - np.abs(points.normals[:, 2])
+    low, high = shape.bounds_m[:, 2]
+    at = (shape.center_of_mass_m[2] - low) / max(high - low, 1e-9)
+    radial = points.positions_m[:, :2] - shape.body.axis_xy_m
+    outward = np.einsum("ij,ij->i", points.normals[:, :2], radial) > 0
+    scores = _near(_share_of_height(shape, points) - at, 0.15) * sideways * np.where(outward, 1.0, 0.2)
+    if shape.side_handle is not None:
+        scores = np.where(shape.body.belongs(points.positions_m, shape.side_handle), 0.1 * scores, scores)
+    return scores
+
+
+def _center(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    distance = np.linalg.norm(points.positions_m - shape.center_of_mass_m, axis=1)
+    return _near(distance, 0.3 * shape.size_m)
+
+
+def _front(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    return _large_face(shape, points, 1)
+
+
+def _back(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    return _large_face(shape, points, -1)
+
+
+def _large_face(shape: Shape, points: SurfacePoints, side: int) -> np.ndarray:
+    """The face across the box's shortest axis: the upper one first, or the one towards -y of a thing that stands."""
+    axis = shape.obb_to_object[:3, int(shape.obb_extents_m.argmin())]
+    leading = axis[2] if abs(axis[2]) > 0.3 else -axis[1] - 0.1 * axis[0]
+    axis = axis * (side if leading > 0 else -side)
+    offset = points.positions_m - shape.obb_to_object[:3, 3]
+    in_plane = np.linalg.norm(offset - (offset @ axis)[:, None] * axis, axis=1)
+    return np.maximum(points.normals @ axis, 0) * _near(in_plane, 0.3 * shape.size_m)
+
+
+def _end(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    """Either end of the long axis; of a thing that stands, the upper one first."""
+    along = shape.axis.along(points.positions_m)
+    return _near(0.5 - np.abs(along - 0.5), 0.08) * (0.8 + 0.2 * _share_of_height(shape, points))
+
+
+def _ring(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    """The inner side of a ring: surface that looks at the centre of the box from nearby."""
+    toward = shape.obb_to_object[:3, 3] - points.positions_m
+    distance = np.linalg.norm(toward, axis=1)
+    facing = np.einsum("ij,ij->i", points.normals, toward) / np.maximum(distance, 1e-9)
+    return None if facing.max() < 0.5 else np.maximum(facing, 0)
+
+
+_SCORERS: dict[str, Callable[[Shape, SurfacePoints], np.ndarray | None]] = {
+    "opening": _opening, "rim": _rim, "inside": _inside, "handle": _handle, "handle_end": _handle_end, "head": _head,
+    "face": _face, "tip": _tip, "edge": _edge, "middle": _middle, "neck": _neck, "spout": _spout, "top": _top,
+    "base": _base, "side": _side, "center": _center, "front": _front, "back": _back, "end": _end, "ring": _ring,
+}  # fmt: skip

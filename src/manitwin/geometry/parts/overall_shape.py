@@ -1,0 +1,76 @@
+"""What a thing looks like as a whole, in one word, from its proportions and how round or box-like it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from manitwin.geometry.parts.protrusions import round_body
+from manitwin.geometry.sampling import sample_surface
+
+_SAMPLES = 4000
+_LONG, _FLAT = 2.2, 3.0  # longest by second, and second by shortest side of the box
+_BOX_FILL = 0.85  # of the box: a box is 1, a cylinder along it 0.785, a ball 0.524
+_ROUND_RESIDUAL = 0.05  # of the radius, from a body of revolution
+
+
+@dataclass(frozen=True)
+class OverallShape:
+    """Proportions of a tight box (longest / second, second / shortest), share of it that is filled, and roundness.
+
+    ``revolution_residual`` is the median distance of the surface from the best body of revolution about an axis of
+    the box, as a share of its radius: 0 for a perfect one.
+    """
+
+    elongation: float
+    flatness: float
+    box_fill: float
+    revolution_residual: float
+
+    @property
+    def proportion(self) -> str:
+        """'long', 'flat' or 'compact'."""
+        if self.elongation >= _LONG:
+            return "long"
+        return "flat" if self.flatness >= _FLAT else "compact"
+
+    @property
+    def word(self) -> str:
+        """A word for a thing that nobody has named."""
+        if self.box_fill > _BOX_FILL:
+            return {"long": "bar-shaped", "flat": "slab-shaped", "compact": "box-shaped"}[self.proportion]
+        if self.revolution_residual < _ROUND_RESIDUAL:
+            if self.flatness >= _FLAT:
+                return "disc-shaped"
+            near_ball = self.elongation < 1.15 and self.flatness < 1.15
+            return "round" if near_ball and self.box_fill < 0.62 else "cylindrical"
+        return {"long": "elongated", "flat": "flat", "compact": "irregular"}[self.proportion]
+
+
+def overall_shape(mesh: trimesh.Trimesh, rng: np.random.Generator) -> OverallShape:
+    """Measure proportions, fill and roundness of a watertight mesh in a box along its own or its principal axes."""
+    surface, _, _ = sample_surface(mesh, _SAMPLES, rng)
+    boxes = [surface @ axes.T for axes in (np.eye(3), np.asarray(mesh.principal_inertia_vectors))]
+    local = min(boxes, key=lambda points: float(np.prod(np.ptp(points, axis=0))))
+    longest, second, shortest = sorted((float(e) for e in np.ptp(local, axis=0)), reverse=True)
+    return OverallShape(
+        elongation=longest / max(second, 1e-9),
+        flatness=second / max(shortest, 1e-9),
+        box_fill=float(mesh.volume) / max(longest * second * shortest, 1e-12),
+        revolution_residual=min(_residual(np.roll(local - local.mean(0), turn, axis=1)) for turn in range(3)),
+    )
+
+
+def _residual(local_m: np.ndarray) -> float:
+    """Return the median distance from the outline about the third axis; samples near the end faces do not count."""
+    width, depth, height = np.ptp(local_m, axis=0)
+    if min(width, depth) < 0.85 * max(width, depth):
+        return 1.0
+    body = round_body(local_m, local_m[:, :2].min(0) + np.array([width, depth]) / 2)
+    middle = np.abs(local_m[:, 2] - local_m[:, 2].min() - height / 2) < 0.45 * height
+    radius = np.hypot(*(local_m[middle, :2] - body.axis_xy_m).T)
+    outline = body.radius_at(local_m[middle])
+    outer = radius > 0.7 * outline
+    return float(np.median(np.abs(radius[outer] / outline[outer] - 1))) if outer.any() else 1.0

@@ -1,0 +1,152 @@
+"""Edges with more than two faces: fins are dropped, the sheets that cross there are glued in pairs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.geometry.repair.halfedges import (
+    EdgeGroups,
+    group_edges,
+    halfedge_vertices,
+    next_halfedge,
+    previous_halfedge,
+    twins_of_manifold_edges,
+)
+from manitwin.geometry.repair.surface import Surface
+
+_FOLD_COSINE = -0.5  # an ear folded by more than 60 degrees out of its neighbour's plane is a fin
+_SAME_WAY_PENALTY = 0.3  # prefers partners that run in opposite directions over slightly flatter ones that do not
+
+
+def fins(vertices: np.ndarray, faces: np.ndarray, groups: EdgeGroups) -> np.ndarray:
+    """Tell which faces ``(F,)`` dangle: they hang on by edges with other faces, and elsewhere by nothing.
+
+    A face on an edge with three or more faces and no edge with exactly two is a fin. So is an ear (two open edges)
+    that folds sharply off its only neighbour: a fin on the rim of a hole.
+    """
+    uses = groups.uses.reshape(-1, 3)
+    crowded, open_edges = (uses > 2).any(1), (uses == 1).sum(1)
+    result = crowded & (open_edges > 0) & ~(uses == 2).any(1)
+    if not crowded.any():
+        return result
+    ears = np.flatnonzero((open_edges == 2) & ~crowded)
+    hinge = 3 * ears + (uses[ears] == 2).argmax(1)
+    pair = groups.starts[groups.group_of[hinge]]
+    partner = np.where(groups.order[pair] == hinge, groups.order[pair + 1], groups.order[pair])
+    inward = _apex_directions(vertices, faces, hinge), _apex_directions(vertices, faces, partner)
+    result[ears] = np.einsum("ij,ij->i", *inward) > _FOLD_COSINE
+    return result
+
+
+def glue_faces(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Glue faces along their edges; returns ``twin (3F,)`` and which half-edges ``(3F,)`` lie on a crowded edge.
+
+    Where as many faces run one way along an edge as the other, partners bound one wedge of matter between them (the
+    solids that touch there come apart). Else the flattest pairs are glued and an odd face stays open.
+    """
+    groups = group_edges(faces, len(vertices))
+    twin = twins_of_manifold_edges(groups)
+    start, end = halfedge_vertices(faces)
+    for group in np.flatnonzero(groups.counts > 2):
+        members = groups.members(int(group))
+        forward = start[members] < end[members]
+        toward_apex = _apex_directions(vertices, faces, members)
+        if 2 * forward.sum() == len(members):
+            low, high = sorted((start[members[0]], end[members[0]]))
+            pairs = _wedges_of_matter(toward_apex, forward, vertices[high] - vertices[low])
+        else:
+            pairs = _flattest_pairs(toward_apex, forward)
+        for i, j in pairs:
+            twin[members[i]], twin[members[j]] = members[j], members[i]
+    return twin, groups.uses > 2
+
+
+def separate_coincident_edges(surface: Surface) -> tuple[Surface, int]:
+    """Put a vertex in the middle of glued edges that end at the same two vertices as another; returns how many.
+
+    Splitting vertices cannot part two sheets that meet along one edge and are joined around both of its ends.
+    """
+    groups = group_edges(surface.faces, len(surface.vertices))
+    done = 0
+    for group in np.flatnonzero(groups.counts > 2):
+        waiting = groups.members(int(group)).tolist()
+        waiting = [h for h in waiting if h < surface.twin[h]]
+        for halfedge in waiting[1:]:
+            surface = _split_glued_edge(surface, halfedge)
+            done += 1
+    return surface, done
+
+
+def _split_glued_edge(surface: Surface, halfedge: int) -> Surface:
+    """Cut the two faces at a glued half-edge in two each; half-edges keep their numbers and starts."""
+    faces, twin = surface.faces.copy(), surface.twin.copy()
+    middle, count = len(surface.vertices), len(faces)
+    pair = (halfedge, int(twin[halfedge]))
+    parents = np.array([h // 3 for h in pair])
+    start, end = halfedge_vertices(faces)
+    position = 0.5 * (surface.vertices[start[halfedge]] + surface.vertices[end[halfedge]])
+    added = np.array([(middle, end[h], start[previous_halfedge(np.array(h))]) for h in pair])
+    twin = np.append(twin, np.full(6, -1))
+    for at, h in enumerate(pair):
+        behind, new = int(next_halfedge(np.array(h))), 3 * (count + at)
+        faces[behind // 3, behind % 3] = middle
+        far = int(twin[behind])
+        twin[new + 1] = far
+        if far >= 0:
+            twin[far] = new + 1
+        twin[new + 2], twin[behind] = behind, new + 2
+    for h, new in ((pair[0], 3 * count + 3), (pair[1], 3 * count)):
+        twin[h], twin[new] = new, h
+    return Surface(
+        np.append(surface.vertices, position[None], axis=0),
+        np.concatenate((faces, added)),
+        np.append(surface.source, surface.source[parents]),
+        np.append(surface.flipped, surface.flipped[parents]),
+        twin,
+    )
+
+
+def _apex_directions(vertices: np.ndarray, faces: np.ndarray, halfedges: np.ndarray) -> np.ndarray:
+    """Return unit vectors from each half-edge towards its face's third corner, perpendicular to the edge."""
+    start, end = halfedge_vertices(faces)
+    origin = vertices[start[halfedges]]
+    along = vertices[end[halfedges]] - origin
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny)
+    across = vertices[start[previous_halfedge(halfedges)]] - origin
+    across -= np.einsum("ij,ij->i", across, along)[:, None] * along
+    return across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), np.finfo(float).tiny)
+
+
+def _wedges_of_matter(toward_apex: np.ndarray, forward: np.ndarray, along: np.ndarray) -> list[tuple[int, int]]:
+    """Pair balanced faces around an edge like brackets.
+
+    Turning counter-clockwise about ``along``, matter begins at a face that runs backward and ends at one that runs
+    forward (its normal, along x apex direction, points on in the direction of turning).
+    """
+    x = toward_apex[0]
+    y = np.cross(along / np.linalg.norm(along), x)
+    angle = np.round(np.arctan2(toward_apex @ y, toward_apex @ x), 9) % (2 * np.pi)
+    order = np.lexsort((np.arange(len(angle)), forward, angle))
+    balance = np.cumsum(np.where(forward[order], -1, 1))
+    order = np.roll(order, -(int(balance.argmin()) + 1))
+    pairs: list[tuple[int, int]] = []
+    begun: list[int] = []
+    for i in order:
+        if forward[i]:
+            pairs.append((begun.pop(), int(i)))
+        else:
+            begun.append(int(i))
+    return pairs
+
+
+def _flattest_pairs(toward_apex: np.ndarray, forward: np.ndarray) -> list[tuple[int, int]]:
+    """Pair faces around an edge greedily, the flattest first; one of an odd number is left over."""
+    fold = toward_apex @ toward_apex.T + _SAME_WAY_PENALTY * (forward[:, None] == forward[None])
+    left = list(range(len(forward)))
+    pairs = []
+    while len(left) > 1:
+        candidates = [(fold[i, j], i, j) for at, i in enumerate(left) for j in left[at + 1 :]]
+        _, i, j = min(candidates)
+        pairs.append((i, j))
+        left = [k for k in left if k not in (i, j)]
+    return pairs

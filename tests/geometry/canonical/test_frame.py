@@ -1,0 +1,138 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from manitwin.geometry.canonical.frame import object_frame
+from manitwin.geometry.canonical.units import decide_unit
+from manitwin.geometry.canonical.up import UpChoice, choose_up
+from manitwin.geometry.poses import transform_points
+
+
+def _stood(mesh: trimesh.Trimesh, choice: UpChoice) -> trimesh.Trimesh:
+    vertices = transform_points(object_frame(mesh.vertices, choice.rotation), mesh.vertices)
+    return trimesh.Trimesh(vertices, mesh.faces, process=False)
+
+
+def _bottle() -> trimesh.Trimesh:
+    """A turned bottle along z, 60 mm wide, 200 mm tall."""
+    profile = np.array([(0, 0), (30, 0), (30, 130), (12, 160), (12, 200), (0, 200)]) / 1000.0
+    return trimesh.creation.revolve(profile, sections=48)
+
+
+def _cup() -> trimesh.Trimesh:
+    """A cup along z, 80 mm wide, 100 mm tall, wall 3 mm."""
+    profile = np.array([(0, 0), (40, 0), (40, 100), (37, 100), (37, 3), (0, 3)]) / 1000.0
+    return trimesh.creation.revolve(profile, sections=64)
+
+
+def _turned(mesh: trimesh.Trimesh, euler_deg: tuple[float, float, float]) -> trimesh.Trimesh:
+    rotation = Rotation.from_euler("xyz", euler_deg, degrees=True).as_matrix()
+    return trimesh.Trimesh(mesh.vertices @ rotation.T, mesh.faces, process=False)
+
+
+def test_object_frame_has_its_origin_at_the_bottom_centre() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.normal(loc=(5, -7, 3), size=(200, 3))
+    placed = transform_points(object_frame(points, Rotation.random(rng=1).as_matrix()), points)
+    np.testing.assert_allclose(placed.min(0)[:2], -placed.max(0)[:2], atol=1e-12)
+    assert placed[:, 2].min() == pytest.approx(0, abs=1e-12)
+
+
+def test_cup_that_lies_in_its_file_is_stood_up_with_its_opening_up() -> None:
+    for euler in ((90, 0, 0), (-90, 0, 0), (180, 0, 0), (0, 90, 20)):
+        cup = _turned(_cup(), euler)
+        stood = _stood(cup, choose_up(cup, file_up="z", stands=True))
+        assert stood.extents[2] == pytest.approx(0.1, abs=1e-6)
+        assert stood.center_mass[2] < 0.05, "the bottom is the heavy end"
+
+
+def test_bottle_tilted_by_a_generator_is_set_straight() -> None:
+    bottle = _turned(_bottle(), (15, 0, 0))
+    stood = _stood(bottle, choose_up(bottle, file_up="z", stands=True))
+    np.testing.assert_allclose(stood.extents, [0.06, 0.06, 0.2], atol=2e-4)
+
+
+def test_bottle_in_a_y_up_file_without_a_rule_stands_up() -> None:
+    bottle = _turned(_bottle(), (-90, 0, 0))
+    assert bottle.extents[1] == pytest.approx(0.2)
+    choice = choose_up(bottle, stands=True)
+    assert choice.up == "y"
+    stood = _stood(bottle, choice)
+    assert stood.extents[2] == pytest.approx(0.2, abs=1e-6) and stood.center_mass[2] < 0.1
+
+
+def test_thing_that_lies_is_laid_down() -> None:
+    pen = trimesh.creation.cylinder(radius=0.005, height=0.14, sections=24)
+    stood = _stood(pen, choose_up(pen, file_up="z", stands=False))
+    assert stood.extents[2] < 0.011
+
+
+def test_unnamed_thing_keeps_the_formats_axis_where_it_rests_so() -> None:
+    block = trimesh.creation.box(extents=(0.05, 0.08, 0.12))
+    choice = choose_up(block, file_up="z")
+    np.testing.assert_allclose(choice.rotation, np.eye(3), atol=1e-9)
+    assert choice.turned_deg == pytest.approx(0, abs=1e-5)
+
+
+def test_user_decides_even_against_balance() -> None:
+    cone = trimesh.creation.cone(radius=0.02, height=0.1, sections=32)
+    upside_down = _turned(cone, (180, 0, 0))
+    choice = choose_up(upside_down, user="z")
+    np.testing.assert_allclose(choice.rotation, np.eye(3), atol=1e-12)
+    assert choice.probability == 0.0
+
+
+def test_pose_is_snapped_onto_its_facet_and_keeps_its_yaw() -> None:
+    block = _turned(trimesh.creation.box(extents=(0.1, 0.06, 0.04)), (0, 0, 30))
+    tilted = _turned(block, (3, -2, 0))
+    stood = _stood(tilted, choose_up(tilted, user="z"))
+    low = stood.vertices[:, 2] < 1e-9
+    assert low.sum() == 4
+    edge = stood.vertices[np.argmax(stood.vertices[:, 0])][:2] - stood.vertices[np.argmin(stood.vertices[:, 1])][:2]
+    heading = np.degrees(np.arctan2(edge[1], edge[0])) % 90
+    assert min(abs(heading - 30), abs(heading - 60)) < 0.2
+
+
+def test_y_up_maps_to_z_up_without_spinning() -> None:
+    block = trimesh.creation.box(extents=(0.05, 0.12, 0.08))
+    choice = choose_up(block, file_up="y")
+    np.testing.assert_allclose(choice.rotation, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("longest", "given", "factor", "metric", "source"),
+    [
+        (0.24, {}, 1.0, True, "assumed"),
+        (240.0, {}, 0.001, True, "guessed"),
+        (0.24, {"file_unit_m": 1.0}, 1.0, True, "declared"),
+        (24.0, {"file_unit_m": 0.01}, 0.01, True, "declared"),
+        (240.0, {"user": "mm"}, 0.001, True, "user"),
+        (5.0, {"user": "m"}, 1.0, True, "user"),
+        (12.0, {}, 0.001, False, "guessed"),  # 12 mm, 12 cm or 12 inches
+        (12.0, {"expected_m": (0.1, 0.14)}, 0.01, True, "guessed"),
+        (1.0, {"expected_m": (0.08, 0.13)}, 1.0, False, "unknown"),  # a mug scaled to the unit cube
+        (1.0, {}, 1.0, False, "unknown"),
+        (1.0, {"expected_m": (0.9, 1.5)}, 1.0, True, "assumed"),  # a walking stick
+        (2.0, {"file_unit_m": 1.0}, 1.0, False, "unknown"),  # -1..1, as generators write it
+        (0.7, {"file_unit_m": 1.0, "expected_m": (0.08, 0.13)}, 1.0, True, "declared"),
+        (0.7, {"expected_m": (0.08, 0.13)}, 1.0, False, "unknown"),
+    ],
+)
+def test_units(longest: float, given: dict, factor: float, metric: bool, source: str) -> None:
+    unit = decide_unit(longest, **given)
+    assert (unit.factor, unit.metric, unit.source) == (factor, metric, source)
+    assert (unit.finding is None) == (source in ("user", "declared", "assumed"))
+
+
+def test_size_that_no_unit_makes_plausible_is_kept_for_the_gate_to_refuse() -> None:
+    unit = decide_unit(1e6)
+    assert (unit.factor, unit.metric) == (1.0, True)
+    assert unit.finding is not None and "no usual unit" in unit.finding
+
+
+def test_finding_names_the_unit_that_was_taken() -> None:
+    finding = decide_unit(240.121).finding
+    assert finding is not None and "millimetres" in finding and "0.24 m" in finding

@@ -1,0 +1,110 @@
+import io
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import QhullError
+
+from manitwin.geometry.cavity import find_opening
+from manitwin.geometry.hulls.decomposition import Decomposition, convex_decomposition
+from manitwin.geometry.hulls.error import hull_error
+from manitwin.geometry.hulls.reduction import hull_to_obj
+from real_meshes import VESSELS, cup, load_real_mesh, mesh_rows
+
+
+def _decompose(mesh: trimesh.Trimesh) -> Decomposition:
+    return convex_decomposition(mesh, max_hulls=32, max_vertices=64, oversplit=1.5, opening=find_opening(mesh))
+
+
+def _assert_loadable(hulls: tuple[np.ndarray, ...], mesh: trimesh.Trimesh) -> None:
+    """What a checker of finished twins asks of collision meshes."""
+    assert 1 <= len(hulls) <= 32
+    for hull in hulls:
+        loaded = trimesh.load(io.BytesIO(hull_to_obj(hull)), file_type="obj", force="mesh")
+        assert loaded.is_convex and len(loaded.vertices) <= 64
+    corners = np.vstack(hulls)
+    assert np.abs(np.array([corners.min(0), corners.max(0)]) - mesh.bounds).max() < 1e-3
+
+
+def test_box_is_one_hull() -> None:
+    box = trimesh.creation.box((0.1, 0.2, 0.05))
+    found = _decompose(box)
+    assert len(found.hulls) == 1 and found.method == "plane_cuts"
+    _assert_loadable(found.hulls, box)
+
+
+def test_two_boxes_in_an_l_are_two_hulls() -> None:
+    corner = trimesh.boolean.union(
+        [
+            trimesh.creation.box(bounds=[(0, 0, 0), (0.1, 0.02, 0.02)]),
+            trimesh.creation.box(bounds=[(0, 0, 0), (0.02, 0.02, 0.1)]),
+        ]
+    )
+    found = _decompose(corner)
+    error = hull_error(corner, found.hulls, None, np.random.default_rng(0))
+    assert len(found.hulls) <= 3
+    assert error.surface_error_max_m < 1e-3
+
+
+def test_cup_stays_open() -> None:
+    mesh = cup()
+    found = _decompose(mesh)
+    error = hull_error(mesh, found.hulls, find_opening(mesh), np.random.default_rng(0))
+    assert error.cavity_kept is not None and error.cavity_kept > 0.9
+    assert error.surface_uncovered_max_m < 1e-3
+    _assert_loadable(found.hulls, mesh)
+
+
+def test_same_mesh_gives_the_same_hulls() -> None:
+    mesh = cup()
+    first, second = _decompose(mesh), _decompose(mesh.copy())
+    assert [hull.tobytes() for hull in first.hulls] == [hull.tobytes() for hull in second.hulls]
+
+
+def test_mesh_that_is_no_manifold_gets_a_hull_a_component_and_says_so() -> None:
+    left = trimesh.creation.box((0.1, 0.1, 0.1))
+    right = trimesh.creation.icosphere(radius=0.05).apply_translation((0.3, 0, 0))
+    broken = trimesh.util.concatenate([left, right])
+    broken = trimesh.Trimesh(broken.vertices, broken.faces[1:], process=False)
+    found = _decompose(broken)
+    assert found.method == "component_hulls" and "manifold3d refused" in found.notes[0]
+    assert len(found.hulls) == 2
+    _assert_loadable(found.hulls, broken)
+
+
+def test_more_components_than_hulls_are_merged() -> None:
+    crowd = [
+        trimesh.creation.box((0.01,) * 3).apply_translation((0.03 * (i % 7), 0.03 * (i // 7), 0)) for i in range(40)
+    ]
+    found = _decompose(trimesh.util.concatenate(crowd))
+    assert len(found.hulls) == 32
+
+
+def test_flat_mesh_is_refused() -> None:
+    with pytest.raises(QhullError):
+        _decompose(trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]))
+
+
+@pytest.mark.shared_data
+@pytest.mark.parametrize("name", ["mug_ycb", "bowl_evo", "cracker_box"])
+def test_real_objects_are_covered_and_open(shared_data, name: str) -> None:
+    _check_real(shared_data, name)
+
+
+@pytest.mark.slow
+@pytest.mark.shared_data
+def test_all_real_objects_are_covered_and_open(shared_data) -> None:
+    for name in mesh_rows(shared_data):
+        _check_real(shared_data, name)
+
+
+def _check_real(data, name: str) -> None:
+    mesh = load_real_mesh(data, name)
+    opening = find_opening(mesh)
+    found = _decompose(mesh)
+    assert found.method == "plane_cuts", name
+    _assert_loadable(found.hulls, mesh)
+    error = hull_error(mesh, found.hulls, opening, np.random.default_rng(0))
+    assert error.surface_uncovered_max_m < 0.002, name
+    if name in VESSELS:
+        assert error.cavity_kept is not None and error.cavity_kept >= VESSELS[name], name

@@ -1,0 +1,73 @@
+"""Scores of surface points for named places, against shapes whose places are known."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import numpy as np
+import pytest
+import trimesh
+
+from handmade import candidates, cup, cylinder, hammer, mug
+from manitwin.geometry.parts.features import Feature, feature_scores
+from manitwin.geometry.parts.shape import Shape, SurfacePoints, measure_shape, surface_points
+
+
+def measured(mesh: trimesh.Trimesh, stands: bool | None = None) -> tuple[Shape, SurfacePoints]:
+    shape = measure_shape(mesh, mesh.center_mass, "wide", stands, np.random.default_rng(0))
+    return shape, surface_points(mesh, *candidates(mesh))
+
+
+def best(feature: Feature, mesh: trimesh.Trimesh, stands: bool | None = None) -> np.ndarray:
+    shape, points = measured(mesh, stands)
+    return points.positions_m[int(feature_scores(feature, shape, points).argmax())]
+
+
+@pytest.mark.parametrize("mesh", [mug(), hammer()])
+def test_every_feature_scores_between_none_and_one(mesh: trimesh.Trimesh) -> None:
+    shape, points = measured(mesh)
+    for feature in get_args(Feature):
+        scores = feature_scores(feature, shape, points)
+        assert scores is None or (scores.shape == (42,) and scores.min() >= 0 and scores.max() <= 1), feature
+
+
+def test_a_cups_places_are_where_they_are() -> None:
+    mesh = cup()
+    assert best("rim", mesh)[2] == pytest.approx(0.1, abs=0.003)
+    assert best("base", mesh)[2] == pytest.approx(0.0, abs=0.002)
+    inside = best("inside", mesh)
+    assert np.hypot(*inside[:2]) < 0.0375 and inside[2] < 0.05
+    side = best("side", mesh)
+    assert np.hypot(*side[:2]) == pytest.approx(0.04, abs=0.001)
+    assert side[2] == pytest.approx(mesh.center_mass[2], abs=0.02)
+
+
+def test_what_a_shape_does_not_have_has_no_score() -> None:
+    shape, points = measured(cylinder(0.04, 0.05))
+    assert shape.opening is None
+    for feature in ("rim", "opening", "handle", "neck"):
+        assert feature_scores(feature, shape, points) is None
+
+
+def test_a_mug_is_poured_opposite_its_handle() -> None:
+    assert best("handle", mug())[0] > 0.055
+    assert best("spout", mug())[0] < -0.02
+
+
+def test_a_bottles_neck_is_its_narrow_part() -> None:
+    bottle = trimesh.boolean.union([cylinder(0.035, 0.15), cylinder(0.013, 0.05, 0.15), cylinder(0.017, 0.015, 0.2)])
+    assert 0.15 <= best("neck", bottle, stands=True)[2] <= 0.205
+    assert best("top", bottle, stands=True)[2] > 0.205
+
+
+def test_a_lying_thing_is_held_along_its_axis_and_a_standing_one_at_its_side() -> None:
+    assert best("handle", hammer(), stands=False)[0] > 0.1
+    assert measured(mug(), stands=True)[0].side_handle is not None
+    assert measured(mug(), stands=False)[0].side_handle is None
+
+
+def test_the_front_of_a_slab_is_its_large_upper_face() -> None:
+    slab = trimesh.creation.box([0.2, 0.14, 0.02])
+    front, back = best("front", slab, stands=False), best("back", slab, stands=False)
+    assert front[2] == pytest.approx(0.01) and back[2] == pytest.approx(-0.01)
+    assert abs(front[0]) < 0.05 and abs(front[1]) < 0.05
