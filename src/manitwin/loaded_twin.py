@@ -14,6 +14,7 @@ import trimesh
 from manitwin.errors import TwinError
 from manitwin.files.glb import read_glb
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.simulate.rigid_body import RigidBody
 from manitwin.store import read_record
 from manitwin.twin import Physical, TwinRecord
 
@@ -70,6 +71,18 @@ class Twin:
         files = sorted((self.folder / "collision").glob("hull_*.obj"))
         return [trimesh.load_mesh(path, process=False) for path in files]
 
+    def rigid_body(self) -> RigidBody:
+        """Return the hulls with the twin's mass properties and friction, as simulations take them."""
+        physical = self.physical
+        return RigidBody(
+            hulls=tuple(np.asarray(hull.vertices) for hull in self.hulls),
+            mass_kg=physical.mass_kg.value,
+            center_of_mass_m=np.array(physical.center_of_mass_m),
+            inertia_kg_m2=np.array(physical.inertia_kg_m2),
+            friction_static=physical.friction_static.value,
+            friction_dynamic=physical.friction_dynamic.value,
+        )
+
     def grasps(self, verified_only: bool = True, gripper: str | None = None) -> Grasps:
         """Return the grasps of a gripper (by default the one that the twin was verified with).
 
@@ -106,7 +119,11 @@ class Twin:
         """
         from manitwin.simulate.sapien_body import add_body
 
-        file = self.folder / "visual.glb" if visual else None
         return add_body(
-            scene, [h.vertices for h in self.hulls], self.physical, pose=pose, visual_glb=file, name=self.record.twin_id
+            scene,
+            self.rigid_body(),
+            restitution=self.physical.restitution.value,
+            pose=pose,
+            visual_glb=self.folder / "visual.glb" if visual else None,
+            name=self.record.twin_id,
         )

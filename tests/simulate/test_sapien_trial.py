@@ -11,8 +11,9 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.poses import transform
 from manitwin.simulate.gripper import load_gripper
+from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.sapien_trial import SapienTrial
-from manitwin.simulate.trial import TrialBody, TrialResult, TrialSettings
+from manitwin.simulate.trial import TrialResult, TrialSettings
 
 PANDA = load_gripper("panda")
 SETTINGS = TrialSettings(force_n=50.0, finger_friction=1.0)
@@ -24,14 +25,14 @@ def above(tip_m: list[float], rotation: np.ndarray = FROM_ABOVE) -> np.ndarray:
     return transform(rotation, np.array(tip_m) - rotation[:, 2] * PANDA.tip_depth_m)
 
 
-def box(extents_m: list[float], mass_kg: float, friction: float = 0.5, center_m: tuple = (0, 0, 0)) -> TrialBody:
+def box(extents_m: list[float], mass_kg: float, friction: float = 0.5, center_m: tuple = (0, 0, 0)) -> RigidBody:
     x, y, z = np.square(extents_m)
     inertia = mass_kg / 12 * np.diag([y + z, x + z, x + y])
     hull = np.array(trimesh.creation.box(extents_m).vertices)
-    return TrialBody((hull,), mass_kg, np.array(center_m, float), inertia, friction, friction)
+    return RigidBody((hull,), mass_kg, np.array(center_m, float), inertia, friction, friction)
 
 
-def try_one(body: TrialBody, pose: np.ndarray, settings: TrialSettings = SETTINGS) -> TrialResult:
+def try_one(body: RigidBody, pose: np.ndarray, settings: TrialSettings = SETTINGS) -> TrialResult:
     return SapienTrial().run(body, PANDA, pose[None], settings)[0]
 
 
@@ -60,7 +61,7 @@ def test_fingers_press_with_the_closing_force() -> None:
 def test_sphere_between_the_pads_holds() -> None:
     sphere = trimesh.creation.icosphere(subdivisions=1, radius=0.02)
     inertia = 0.4 * 0.1 * 0.02**2 * np.eye(3)
-    body = TrialBody((np.array(sphere.vertices),), 0.1, np.zeros(3), inertia, 0.5, 0.5)
+    body = RigidBody((np.array(sphere.vertices),), 0.1, np.zeros(3), inertia, 0.5, 0.5)
     assert try_one(body, above([0, 0, 0])).outcome == "held"
 
 

@@ -6,7 +6,8 @@ from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.hulls.decomposition import convex_decomposition
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.poses import transform
-from manitwin.simulate.settle import RigidBody, ball_stays_inside, settle_on_plane
+from manitwin.simulate.rigid_body import RigidBody
+from manitwin.simulate.settle import ball_stays_inside, settle_on_plane
 from real_meshes import VESSELS, cup, load_real_mesh
 
 

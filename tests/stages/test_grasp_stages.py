@@ -16,8 +16,9 @@ from manitwin.errors import Rejected
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.models.graspers.antipodal import AntipodalGrasper
 from manitwin.simulate.gripper import Gripper, load_gripper
+from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.sapien_trial import SapienTrial
-from manitwin.simulate.trial import TrialBody, TrialResult, TrialSettings
+from manitwin.simulate.trial import TrialResult, TrialSettings
 from manitwin.stages.grasps import GraspsStage
 from manitwin.stages.stage import Draft, Item, Stage
 from manitwin.stages.verify import VerifyStage
@@ -170,7 +171,7 @@ class _NothingHolds:
     name: str = "nothing-holds"
 
     def run(
-        self, body: TrialBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
+        self, body: RigidBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
     ) -> list[TrialResult]:
         return [TrialResult("drops", 0.03, 0.0, 0.0, (50.0, 50.0), 200)] * len(gripper_to_object)
 

@@ -1,42 +1,40 @@
-"""The grasp trial in SAPIEN 3 (PhysX 5 on the CPU): close, lift, stable frames, slides along six directions.
+"""The grasp trial in SAPIEN 3 (PhysX 5 on the CPU): one object and one still hand in a scene of their own.
 
-Source: paper, "Verification" (three stable frames, 1 cm, 2,000 steps); what it leaves open is as measured: one shared
-finger target, 20 solver iterations at 1/240 s, gravity from the lift on.
+Settings as measured: one shared finger target, 20 solver iterations at 1/240 s, gravity from the lift on.
 
-The scene's frame is the gripper's, and moves with it without turning: the object is placed relative to it, and what
-acts on the object there is its weight and the inertial force of the path, -m a (Galilean relativity). PhysX would give
-both to the object at once when a step begins, while the closing force reaches the contacts in equal parts over the
-solver's substeps: the first of them would lack the normal force to resist, and a heavy object would creep (measured:
-6 mm at 4 kg where friction carries 5.6 kg, 0.8 mm as below). So the load enters as a drive, which the solver applies in
-every substep as well.
+PhysX would give weight and inertial force to the object at once when a step begins, while the closing force reaches the
+contacts in equal parts over the solver's substeps: the first of them would lack the normal force to resist, and a heavy
+object would creep (measured: 6 mm at 4 kg where friction carries 5.6 kg, 0.8 mm as below). So the load enters as a
+drive, which the solver applies in every substep as well.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import sapien
 from sapien import physx
-from scipy.spatial.transform import Rotation
 
-from manitwin.geometry.poses import inverse, transform
-from manitwin.simulate.convex_shape import convex_shape
+from manitwin.geometry.poses import inverse
 from manitwin.simulate.gripper import Gripper
-from manitwin.simulate.sapien_body import principal_frame
+from manitwin.simulate.hand_reach import reachable_hulls
+from manitwin.simulate.rigid_body import RigidBody
+from manitwin.simulate.sapien_body import dynamic_component
 from manitwin.simulate.sapien_hand import MIN_PATCH_RADIUS_M, PATCH_RADIUS_M, FixedHand
-from manitwin.simulate.trial import GRAVITY_M_S2, TrialBody, TrialResult, TrialSettings
-from manitwin.twin import Outcome
+from manitwin.simulate.shared_target import SharedTarget
+from manitwin.simulate.trial import TrialResult, TrialSettings
+from manitwin.simulate.trial_phases import HandContacts, run_phases
 
-DIRECTIONS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
-CHECK_EVERY_STEPS = 16
 NO_SPIN = np.zeros(3, np.float32)
 LOAD_RATE_PER_S = 0.01  # drag of the load's drive per mass: 1e-4 of the weight at 0.1 m/s in the hand
 # At 1 m/s the solver cannot push a thing of 10 g off fingers that close with 50 N: 7 of 20 grasps of a sponge sank in or
 # were lost, of which none is at 5 or 100 m/s; of four that were tried at 1/960 s and 40 iterations, all four hold.
 MAX_DEPENETRATION_M_S = 5.0
 MAX_DRIVE_FORCE = 4.0  # the drive's limit, as a multiple of the closing force: it never cuts the closing force itself
+REACH_MARGIN_M = 0.015  # hulls farther than this from the closing hand are left out, until the object moves so far
 
 
 class SapienTrial:
@@ -45,40 +43,43 @@ class SapienTrial:
     name = "sapien"
 
     def run(
-        self, body: TrialBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
+        self, body: RigidBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
     ) -> list[TrialResult]:
         """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order."""
-        return [_Trial(body, gripper, pose, settings).run() for pose in gripper_to_object]
+        return [_try_one(body, gripper, pose, settings) for pose in gripper_to_object]
 
 
-class _Failed(Exception):
-    """The grasp failed: ends the trial with its outcome."""
+def _try_one(body: RigidBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings) -> TrialResult:
+    """Try a grasp on the hulls that the hand can reach; where the object strayed so far that others count, on all."""
+    reached = reachable_hulls(body.hulls, gripper, gripper_to_object, REACH_MARGIN_M)
+    near = tuple(hull for hull, is_near in zip(body.hulls, reached, strict=True) if is_near)
+    object_to_hand = inverse(gripper_to_object)
+    if near:
+        scene = _Scene(replace(body, hulls=near), gripper, object_to_hand, settings)
+        result = run_phases(scene, object_to_hand[:3, :3], settings)
+        if len(near) == len(body.hulls) or scene.strayed_m(body.hulls) < REACH_MARGIN_M - settings.contact_offset_m:
+            return result
+    return run_phases(_Scene(body, gripper, object_to_hand, settings), object_to_hand[:3, :3], settings)
 
-    def __init__(self, outcome: Outcome):
-        super().__init__(outcome)
-        self.outcome: Outcome = outcome
 
+class _Scene:
+    """One grasp in one scene; its frame is the hand's."""
 
-class _Trial:
-    """One grasp in one scene."""
-
-    def __init__(self, body: TrialBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings):
-        self.settings = settings
-        self.object_to_scene = inverse(gripper_to_object)
-        self.center_of_mass_m = body.center_of_mass_m
+    def __init__(self, body: RigidBody, gripper: Gripper, object_to_hand: np.ndarray, settings: TrialSettings):
+        self.settings, self.start_rotation = settings, object_to_hand[:3, :3]
         with _scene_config(gravity=[0, 0, 0], bounce_threshold=2.0, enable_enhanced_determinism=False):
             self.system = physx.PhysxCpuSystem()
-        self.scene = sapien.Scene([self.system])
+        self.scene = scene = sapien.Scene([self.system])  # kept: bodies go with their scene
         self.system.timestep = settings.timestep_s
         self.object = _object(body, settings)
-        entity = sapien.Entity()
-        entity.add_component(self.object)
-        entity.pose = sapien.Pose(self.object_to_scene)
+        self.entity = sapien.Entity()
+        self.entity.add_component(self.object)
+        self.entity.pose = sapien.Pose(object_to_hand)
         self.load = _load(self.object)
-        entity.add_component(self.load)
-        self.scene.add_entity(entity)
+        self.entity.add_component(self.load)
+        scene.add_entity(self.entity)
         self.hand = FixedHand(
-            self.scene,
+            scene,
             gripper,
             friction=settings.finger_friction,
             stiffness_n_m=settings.finger_stiffness_n_m,
@@ -87,118 +88,27 @@ class _Trial:
             contact_offset_m=settings.contact_offset_m,
             solver_iterations=settings.solver_iterations,
         )
-        self.opening_m = gripper.opening_m
-        self.steps = 0
-        self.displacement_m = self.rotation_rad = self.penetration_m = 0.0
-        self.forces_n = (0.0, 0.0)
-        self.closed_rotation: np.ndarray | None = None
+        self.target = SharedTarget(gripper.opening_m, settings)
+        self.center_of_mass = sapien.Pose(body.center_of_mass_m)
+        self.start_center_m = self.start_rotation @ body.center_of_mass_m + object_to_hand[:3, 3]
+        self.moved_m = self.turned_rad = 0.0
 
-    def run(self) -> TrialResult:
-        """Run the phases until one fails."""
-        outcome: Outcome = "held"
-        try:
-            self._start_free()
-            self._close()
-            self._lift()
-            self._wait_for_stable_frames()
-            self._slide()
-        except _Failed as failure:
-            outcome = failure.outcome
-        if self.closed_rotation is not None:
-            turned = self._object_to_hand()[:3, :3] @ self.closed_rotation.T
-            self.rotation_rad = float(Rotation.from_matrix(turned).magnitude())
-        return TrialResult(
-            outcome, self.displacement_m, self.rotation_rad, self.penetration_m, self.forces_n, self.steps
-        )
+    def advance(self, loads_m_s2: np.ndarray) -> None:
+        """Take one step for each row of accelerations ``(N, 3)``."""
+        set_target, step = self.load.set_drive_velocity_target, self.system.step
+        for target in (loads_m_s2 / LOAD_RATE_PER_S).astype(np.float32):
+            set_target(target, NO_SPIN)
+            step()
 
-    def _start_free(self) -> None:
-        self._step()
-        if self._contacts()[1] > self.settings.max_overlap_m:
-            raise _Failed("collides")
+    def squeeze(self) -> None:
+        """Move the fingers' shared target on."""
+        self.hand.close_to(self.target.move_on(float(self.hand.finger_positions_m().mean())))
 
-    def _close(self) -> None:
-        """Ramp the shared target inwards, never further ahead of the fingers than presses with the closing force."""
-        settings = self.settings
-        press_m = settings.force_n / settings.finger_stiffness_n_m
-        ramp_m = settings.close_speed_m_s * settings.timestep_s * settings.steps_per_frame
-        target_m = self.opening_m / 2
-        for step in range(round(settings.close_time_s / settings.timestep_s)):
-            if step % settings.steps_per_frame == 0:
-                target_m = max(target_m - ramp_m, float(self.hand.finger_positions_m().mean()) - press_m)
-                self.hand.close_to(target_m)
-            self._step()
-        self._check_hold("misses")
-        self.closed_rotation = self._object_to_hand()[:3, :3]
-
-    def _lift(self) -> None:
-        settings = self.settings
-        reference = self._center_in_hand()
-        self._move([0, 0, settings.lift_m], settings.lift_time_s, reference, settings.max_lift_displacement_m, "drops")
-
-    def _wait_for_stable_frames(self) -> None:
-        settings = self.settings
-        frame_s = settings.steps_per_frame * settings.timestep_s
-        stable, before = 0, self._center_in_hand()
-        self.load.set_drive_velocity_target(self._load_targets(np.zeros((1, 3)))[0], NO_SPIN)
-        for _ in range(round(settings.stable_time_s / frame_s)):
-            for _ in range(settings.steps_per_frame):
-                self._step()
-            now = self._center_in_hand()
-            moved = float(np.linalg.norm(now - before))
-            stable, before = (stable + 1 if moved < settings.stable_speed_m_s * frame_s else 0), now
-            if stable >= settings.stable_frames:
-                self._check_hold("drops")
-                return
-        raise _Failed("unstable")
-
-    def _slide(self) -> None:
-        settings = self.settings
-        reference = self._center_in_hand()
-        self.displacement_m = 0.0
-        for direction in DIRECTIONS:
-            for sign in (1, -1):
-                path = sign * settings.slide_m * direction
-                self._move(path, settings.slide_time_s, reference, settings.max_displacement_m, "slips")
-        self._check_hold("slips")
-
-    def _move(
-        self, path_m: np.ndarray | list[float], time_s: float, reference: np.ndarray, limit_m: float, outcome: Outcome
-    ) -> None:
-        """Move the hand along an object-frame path with a quintic profile; fail where the object lags behind it."""
-        count = round(time_s / self.settings.timestep_s)
-        u = (np.arange(count) + 0.5) / count
-        profile = (60 * u - 180 * u**2 + 120 * u**3) / time_s**2
-        targets = self._load_targets(profile[:, None] * np.asarray(path_m))
-        for step, target in enumerate(targets, 1):
-            self.load.set_drive_velocity_target(target, NO_SPIN)
-            self._step()
-            if step % CHECK_EVERY_STEPS == 0 or step == count:
-                moved = float(np.linalg.norm(self._center_in_hand() - reference))
-                self.displacement_m = max(self.displacement_m, moved)
-                if not moved <= limit_m:
-                    raise _Failed(outcome)
-
-    def _load_targets(self, acceleration_m_s2: np.ndarray) -> np.ndarray:
-        """Return the drive's targets ``(N, 3)`` that give weight and inertial force of the hand's accelerations."""
-        load = [0, 0, -GRAVITY_M_S2] - acceleration_m_s2
-        return (load @ self.object_to_scene[:3, :3].T / LOAD_RATE_PER_S).astype(np.float32)
-
-    def _check_hold(self, outcome: Outcome) -> None:
-        """Fail unless both fingers press the object towards each other without sinking into it."""
-        forces, depth = self._contacts()
-        self.penetration_m = max(self.penetration_m, depth)
-        if self.closed_rotation is None:
-            self.forces_n = (float(forces[0]), float(forces[1]))
-        if not min(forces) > self.settings.min_finger_force_n:
-            raise _Failed(outcome)
-        if depth > self.settings.max_penetration_m:
-            raise _Failed("penetrates")
-
-    def _contacts(self) -> tuple[np.ndarray, float]:
-        """Return how hard the fingers press inwards on the object (N), and its deepest overlap (m) with the hand."""
+    def contacts(self) -> HandContacts:
+        """Return how hard the +X and the -X finger press inwards, and the deepest overlap with the hand."""
         forces, deepest = np.zeros(2), 0.0
         fingers = [finger.entity.per_scene_id for finger in self.hand.fingers]
-        target = self.object.entity.per_scene_id
+        target = self.entity.per_scene_id
         for contact in self.system.get_contacts():
             first, second = (body.entity.per_scene_id for body in contact.bodies)
             if target not in (first, second):
@@ -210,20 +120,25 @@ class _Trial:
                     side = fingers.index(other)
                     push_x = point.impulse[0] * (1 if first == target else -1)
                     forces[side] += push_x * (-1, 1)[side] / self.settings.timestep_s
-        return forces, deepest
+        return HandContacts((float(forces[0]), float(forces[1])), deepest)
 
-    def _object_to_hand(self) -> np.ndarray:
-        return self.object.entity_pose.to_transformation_matrix()
+    def object_rotation(self) -> np.ndarray:
+        """Return the object's rotation in the hand's frame."""
+        rotation = self.object.entity_pose.to_transformation_matrix()[:3, :3]
+        turned = float(np.arccos(np.clip((np.trace(rotation @ self.start_rotation.T) - 1) / 2, -1, 1)))
+        self.turned_rad = max(self.turned_rad, turned)
+        return rotation
 
-    def _center_in_hand(self) -> np.ndarray:
-        pose = self._object_to_hand()
-        return pose[:3, :3] @ self.center_of_mass_m + pose[:3, 3]
+    def center_of_mass_m(self) -> np.ndarray:
+        """Return the object's centre of mass in the hand's frame."""
+        center = (self.object.entity_pose * self.center_of_mass).p.astype(float)
+        self.moved_m = max(self.moved_m, float(np.linalg.norm(center - self.start_center_m)))
+        return center
 
-    def _step(self) -> None:
-        if self.steps >= self.settings.max_steps:
-            raise _Failed("unstable")
-        self.system.step()
-        self.steps += 1
+    def strayed_m(self, hulls: tuple[np.ndarray, ...]) -> float:
+        """Return how far any point of the hulls can have moved from where it was, as far as was looked."""
+        radius_m = max(float(np.linalg.norm(hull - self.center_of_mass.p, axis=1).max()) for hull in hulls)
+        return self.moved_m + self.turned_rad * radius_m
 
 
 @contextmanager
@@ -243,19 +158,10 @@ def _scene_config(**values: object) -> Iterator[None]:
         physx.set_scene_config(config)
 
 
-def _object(body: TrialBody, settings: TrialSettings) -> physx.PhysxRigidDynamicComponent:
-    """Build the object with its own mass properties: SAPIEN would take them from the hulls."""
-    material = physx.PhysxMaterial(body.friction_static, body.friction_dynamic, 0.0)
-    component = physx.PhysxRigidDynamicComponent()
-    for hull in body.hulls:
-        shape = convex_shape(hull, material)
-        shape.contact_offset = settings.contact_offset_m
+def _object(body: RigidBody, settings: TrialSettings) -> physx.PhysxRigidDynamicComponent:
+    component = dynamic_component(body, contact_offset_m=settings.contact_offset_m)
+    for shape in component.collision_shapes:
         shape.patch_radius, shape.min_patch_radius = PATCH_RADIUS_M, MIN_PATCH_RADIUS_M
-        component.attach(shape)
-    moments, axes = principal_frame(body.inertia_kg_m2)
-    component.set_mass(body.mass_kg)
-    component.set_cmass_local_pose(sapien.Pose(transform(axes, body.center_of_mass_m)))
-    component.set_inertia(moments.astype(np.float32))
     component.set_sleep_threshold(0.0)  # at rest in the hand is not at rest
     component.solver_position_iterations = settings.solver_iterations
     component.solver_velocity_iterations = 1

@@ -12,7 +12,8 @@ from sapien import physx
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform_points
 from manitwin.simulate.convex_shape import convex_shape
-from manitwin.simulate.sapien_body import principal_frame
+from manitwin.simulate.rigid_body import RigidBody
+from manitwin.simulate.sapien_body import dynamic_component
 
 _TIMESTEP_S = 1 / 240
 _SOLVER_ITERATIONS = 20  # at PhysX's own 4 to 10, stacks of hulls creep
@@ -22,18 +23,6 @@ _STILL_M_S = 1e-3
 _STILL_RAD_S = 1e-2
 _BALL_TIMESTEP_S = 1 / 480
 _GRAVITY_M_S2 = (0.0, 0.0, -9.81)
-
-
-@dataclass(frozen=True)
-class RigidBody:
-    """What moves: hulls (each ``(V, 3)`` m), mass, inertia about the centre of mass (object frame), friction."""
-
-    hulls: tuple[np.ndarray, ...]
-    mass_kg: float
-    center_of_mass_m: np.ndarray
-    inertia_kg_m2: np.ndarray
-    friction_static: float
-    friction_dynamic: float
 
 
 @dataclass(frozen=True)
@@ -67,7 +56,9 @@ def settle_on_plane(
     offsets = [np.array([spacing * i, 0.0, drop_m]) for i in range(len(object_to_plane))]
     bodies = []
     for pose, offset in zip(object_to_plane, offsets, strict=True):
-        component = _dynamic_body(body, material)
+        component = dynamic_component(body, contact_offset_m=_CONTACT_OFFSET_M)
+        component.set_solver_position_iterations(_SOLVER_ITERATIONS)
+        component.set_angular_damping(0.0)
         _add(scene, component, sapien.Pose(pose[:3, 3] + offset, quaternion_wxyz(pose[:3, :3])))
         bodies.append(component)
     still = [0] * len(bodies)
@@ -100,7 +91,10 @@ def ball_stays_inside(hulls: Sequence[np.ndarray], opening: Opening, *, seconds:
     turn = rotation_between(axis, up)
     material = physx.PhysxMaterial(0.5, 0.5, 0.0)
     vessel = physx.PhysxRigidStaticComponent()
-    _attach_hulls(vessel, hulls, material)
+    for hull in hulls:
+        wall = convex_shape(hull, material)
+        wall.contact_offset = _CONTACT_OFFSET_M
+        vessel.attach(wall)
     _add(scene, vessel, sapien.Pose([0, 0, 0], quaternion_wxyz(turn)))
     ball = physx.PhysxRigidDynamicComponent()
     shape = physx.PhysxCollisionShapeSphere(radius, material)
@@ -146,27 +140,6 @@ def _add_ground(scene: sapien.Scene, material: physx.PhysxMaterial) -> None:
     ground.attach(physx.PhysxCollisionShapePlane(material))
     half = float(np.sqrt(0.5))
     _add(scene, ground, sapien.Pose([0, 0, 0], [half, 0, -half, 0]))  # PhysX planes face +X
-
-
-def _attach_hulls(
-    component: physx.PhysxRigidBaseComponent, hulls: Sequence[np.ndarray], material: physx.PhysxMaterial
-) -> None:
-    for hull in hulls:
-        shape = convex_shape(hull, material)
-        shape.contact_offset = _CONTACT_OFFSET_M
-        component.attach(shape)
-
-
-def _dynamic_body(body: RigidBody, material: physx.PhysxMaterial) -> physx.PhysxRigidDynamicComponent:
-    component = physx.PhysxRigidDynamicComponent()
-    _attach_hulls(component, body.hulls, material)
-    moments, axes = principal_frame(body.inertia_kg_m2)
-    component.set_mass(body.mass_kg)
-    component.set_cmass_local_pose(sapien.Pose(body.center_of_mass_m, quaternion_wxyz(axes)))
-    component.set_inertia(moments.astype(np.float32))
-    component.set_solver_position_iterations(_SOLVER_ITERATIONS)
-    component.set_angular_damping(0.0)
-    return component
 
 
 def _is_still(component: physx.PhysxRigidDynamicComponent) -> bool:

@@ -12,35 +12,19 @@ from typing import Protocol
 import numpy as np
 
 from manitwin.simulate.gripper import Gripper
+from manitwin.simulate.rigid_body import RigidBody
 from manitwin.twin import Outcome
 
 GRAVITY_M_S2 = 9.81
 
 
 @dataclass(frozen=True)
-class TrialBody:
-    """The object of a trial: convex hulls (each ``(V, 3)`` m) and its real mass properties, in the object frame.
-
-    ``inertia_kg_m2 (3, 3)`` is about the centre of mass, along the axes of the object frame; it is not derived from the
-    hulls.
-    """
-
-    hulls: tuple[np.ndarray, ...]
-    mass_kg: float
-    center_of_mass_m: np.ndarray
-    inertia_kg_m2: np.ndarray
-    friction_static: float
-    friction_dynamic: float
-
-
-@dataclass(frozen=True)
 class TrialSettings:
     """The numbers of the trial; each default is the one that was measured to be converged, or the paper's.
 
-    The fingers share one position target, which is what the mechanical coupling of the real hand does: two
-    independently saturated fingers have no lateral stiffness and drift by centimetres. At 1/240 s, 20 iterations and
-    2 mm contact offset, nine of ten verdicts on hard grasps are those of a reference at 1/960 s and 40 iterations (two
-    such references agree with each other no better); SAPIEN's default of 10 iterations does not converge on several hulls.
+    At 1/240 s, 20 iterations and 2 mm contact offset, nine of ten verdicts on hard grasps are those of a reference at
+    1/960 s and 40 iterations (two such references agree with each other no better); SAPIEN's default of 10 iterations
+    does not converge on several hulls.
     """
 
     force_n: float
@@ -49,6 +33,7 @@ class TrialSettings:
     solver_iterations: int = 20
     contact_offset_m: float = 0.002
     max_steps: int = 2000
+    steps_per_frame: int = 4
     close_time_s: float = 0.8
     close_speed_m_s: float = 0.1
     finger_stiffness_n_m: float = 1e4
@@ -59,13 +44,17 @@ class TrialSettings:
     lift_m: float = 0.2
     lift_time_s: float = 0.8
     max_lift_displacement_m: float = 0.02
-    steps_per_frame: int = 4
     stable_frames: int = 3
     stable_speed_m_s: float = 0.01
     stable_time_s: float = 1.0
     slide_m: float = 0.1
     slide_time_s: float = 0.4
     max_displacement_m: float = 0.01
+
+    @property
+    def frame_s(self) -> float:
+        """The time between two looks at the hand: steps are the solver's matter, frames the protocol's."""
+        return self.steps_per_frame * self.timestep_s
 
 
 @dataclass(frozen=True)
@@ -75,14 +64,14 @@ class TrialResult:
     ``displacement_m`` is the largest distance that the centre of mass moved in the hand during the phase that decided:
     the slides of a held grasp, else the phase of its failure. ``rotation_rad`` is how far the object turned in the hand
     since it was closed. ``penetration_m`` is the deepest overlap of finger and object, ``finger_forces_n`` the normal
-    forces of the +X and the -X finger when closed, ``steps`` the simulated steps.
+    forces of the fingers when closed, ``steps`` the simulated steps.
     """
 
     outcome: Outcome
     displacement_m: float
     rotation_rad: float
     penetration_m: float
-    finger_forces_n: tuple[float, float]
+    finger_forces_n: tuple[float, ...]
     steps: int
 
 
@@ -92,7 +81,7 @@ class GraspTrial(Protocol):
     name: str
 
     def run(
-        self, body: TrialBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
+        self, body: RigidBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
     ) -> list[TrialResult]:
         """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order."""
         ...

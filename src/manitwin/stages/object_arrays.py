@@ -1,4 +1,4 @@
-"""The arrays of an object that later stages read: solid mesh and collision hulls, in the object frame in metres."""
+"""The object as later stages read it: solid mesh, collision hulls, rigid body; object frame, SI units."""
 
 from __future__ import annotations
 
@@ -6,6 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+
+from manitwin.simulate.rigid_body import RigidBody
+from manitwin.stages.stage import Draft
 
 
 def load_solid(path: Path) -> trimesh.Trimesh:
@@ -18,3 +21,16 @@ def load_hulls(path: Path) -> tuple[np.ndarray, ...]:
     """Load the convex vertices of ``hulls.npz``, each ``(V, 3)``, in the order of their names."""
     with np.load(path) as arrays:
         return tuple(arrays[name] for name in sorted(arrays.files))
+
+
+def load_body(draft: Draft) -> RigidBody:
+    """Load the hulls of ``hulls.npz`` with the mass properties and friction of the field ``physical``."""
+    physical = draft.field("physical")
+    return RigidBody(
+        hulls=load_hulls(draft.path("hulls.npz")),
+        mass_kg=physical["mass_kg"]["value"],
+        center_of_mass_m=np.array(physical["center_of_mass_m"]),
+        inertia_kg_m2=np.array(physical["inertia_kg_m2"]),
+        friction_static=physical["friction_static"]["value"],
+        friction_dynamic=physical["friction_dynamic"]["value"],
+    )

@@ -17,8 +17,9 @@ from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.hulls.reduction import convex_corners
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform
 from manitwin.geometry.stable_poses import easiest_tilt, stable_poses
-from manitwin.simulate.settle import RigidBody, Settled, settle_on_plane
-from manitwin.stages.object_arrays import load_hulls, load_solid
+from manitwin.simulate.rigid_body import RigidBody
+from manitwin.simulate.settle import Settled, settle_on_plane
+from manitwin.stages.object_arrays import load_body, load_solid
 from manitwin.stages.stage import Draft, Resource
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -67,19 +68,10 @@ class PlacementStage:
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return the field ``placements``; raises Rejected where the object stays in no pose."""
-        hulls = load_hulls(draft.path("hulls.npz"))
-        physical = draft.field("physical")
-        body = RigidBody(
-            hulls=hulls,
-            mass_kg=physical["mass_kg"]["value"],
-            center_of_mass_m=np.array(physical["center_of_mass_m"]),
-            inertia_kg_m2=np.array(physical["inertia_kg_m2"]),
-            friction_static=physical["friction_static"]["value"],
-            friction_dynamic=physical["friction_dynamic"]["value"],
-        )
+        body = load_body(draft)
         rests = find_rests(body, self.settings)
-        outline = convex_corners(np.vstack([load_solid(draft.path("solid.npz")).vertices, *hulls]))[0]
-        return {"placements": [_placement(rest, outline, np.vstack(hulls)) for rest in rests]}
+        outline = convex_corners(np.vstack([load_solid(draft.path("solid.npz")).vertices, *body.hulls]))[0]
+        return {"placements": [_placement(rest, outline, np.vstack(body.hulls)) for rest in rests]}
 
 
 def find_rests(body: RigidBody, settings: PlacementConfig) -> list[_Rest]:

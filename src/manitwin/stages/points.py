@@ -23,7 +23,7 @@ class PointsStage:
     """Ask the annotator for points, and see that each is one of the candidates."""
 
     name: ClassVar[str] = "points"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "language", "candidates", "visible_candidates",
     )  # fmt: skip

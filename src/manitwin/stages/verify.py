@@ -12,10 +12,11 @@ from manitwin.config import VerifyConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.grasp_diversity import approach_octants
 from manitwin.simulate.gripper import Gripper
-from manitwin.simulate.trial import GraspTrial, TrialBody, TrialResult, TrialSettings
+from manitwin.simulate.rigid_body import RigidBody
+from manitwin.simulate.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.stages.grasp_table import write_grasp_table
 from manitwin.stages.grasps import PROPOSALS, UNFILTERED
-from manitwin.stages.object_arrays import load_hulls
+from manitwin.stages.object_arrays import load_body
 from manitwin.stages.stage import Draft, Resource
 from manitwin.twin import GraspSummary, Trial
 
@@ -26,7 +27,7 @@ class VerifyStage:
     """Try every chosen grasp, and the unfiltered sample beside it."""
 
     name: ClassVar[str] = "verify"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = (PROPOSALS, "proposals", "hulls.npz", "physical")
     writes: ClassVar[tuple[str, ...]] = (TABLE, "grasps")
     needs: ClassVar[Resource] = "cpu"
@@ -41,7 +42,7 @@ class VerifyStage:
         """Write ``grasps.parquet`` and return the field ``grasps``; raises Rejected where no grasp held."""
         with np.load(draft.path(PROPOSALS)) as arrays:
             proposals = dict(arrays)
-        body, settings = self._body(draft), self._trial_settings()
+        body, settings = load_body(draft), self._trial_settings()
         results = self.trial.run(body, self.gripper, proposals["gripper_to_object"], settings)
         unfiltered = np.char.endswith(proposals["proposer"], UNFILTERED)
         summary = self._summary(draft.field("proposals"), proposals, results, unfiltered, body, settings)
@@ -50,17 +51,6 @@ class VerifyStage:
             raise Rejected("none_held", f"none of {summary.simulated} simulated grasps held: {failures}")
         write_grasp_table(folder / TABLE, self.gripper.name, proposals, results)
         return {"grasps": summary.model_dump(mode="json")}
-
-    def _body(self, draft: Draft) -> TrialBody:
-        physical = draft.field("physical")
-        return TrialBody(
-            hulls=load_hulls(draft.path("hulls.npz")),
-            mass_kg=physical["mass_kg"]["value"],
-            center_of_mass_m=np.array(physical["center_of_mass_m"]),
-            inertia_kg_m2=np.array(physical["inertia_kg_m2"]),
-            friction_static=physical["friction_static"]["value"],
-            friction_dynamic=physical["friction_dynamic"]["value"],
-        )
 
     def _trial_settings(self) -> TrialSettings:
         return TrialSettings(
@@ -80,7 +70,7 @@ class VerifyStage:
         proposals: dict[str, np.ndarray],
         results: list[TrialResult],
         unfiltered: np.ndarray,
-        body: TrialBody,
+        body: RigidBody,
         settings: TrialSettings,
     ) -> GraspSummary:
         held = np.array([result.outcome == "held" for result in results])

@@ -58,6 +58,14 @@ def test_an_empty_middle_is_held_by_the_rim() -> None:
         assert point.position_m[2] > 0.06
 
 
+def test_a_body_held_by_its_side_is_held_from_the_other_side_too() -> None:
+    points = select(trimesh.creation.box([0.05, 0.09, 0.2]).apply_translation([0, 0, 0.1]), "mustard bottle").grasp
+    sides = [np.array(point.normal) for point in points if abs(point.normal[2]) < 0.3]
+    assert len(points) == 3
+    assert min(float(a @ b) for a in sides for b in sides) < -0.7
+    assert "other side" in points[-1].scenario
+
+
 def test_a_grasp_avoids_what_is_wider_than_the_gripper_opens() -> None:
     box = trimesh.creation.box([0.2, 0.15, 0.05])
     box.apply_translation([0, 0, 0.025])

@@ -112,6 +112,7 @@ class PointSelection:
         weights = self._seen() * self._fit() * self._closeness()
         found: list[GraspPoint] = []
         taken: list[int] = []
+        sides: list[tuple[GraspPart, int]] = []
         for part in (*self.prior.grasp, *generic):
             if len(found) >= (LEAST if part in generic else MOST_GRASPS):
                 continue
@@ -119,6 +120,13 @@ class PointSelection:
             if choice is not None:
                 taken.append(choice.candidate)
                 found.append(self._grasp_point(len(found), part, choice))
+                sides += [(part, choice.candidate)] if part.feature == "side" else []
+        for part, index in sides[: MOST_GRASPS - len(found)]:
+            other = self._best("side", weights * self._facing_away(index), taken, 0.0)
+            if other is not None:  # a hand may have to come from there
+                taken.append(other.candidate)
+                part = part.model_copy(update={"scenario": f"{part.scenario}, from the other side"})
+                found.append(self._grasp_point(len(found), part, other))
         for index in self._leftover(taken, LEAST - len(found)):
             part = GraspPart(type="parallel_jaw", scenario="pick up near the centre of mass", feature="center")
             found.append(self._grasp_point(len(found), part, _Choice(index, _WEAK)))
@@ -128,6 +136,10 @@ class PointSelection:
         """Weight candidates by whether the gripper opens wide enough for the matter behind them."""
         room = self.request.max_opening_m - _FINGER_CLEARANCE_M
         return np.where(self.points.thickness_m <= room, 1.0, 0.2 * room / np.maximum(self.points.thickness_m, room))
+
+    def _facing_away(self, index: int) -> np.ndarray:
+        """Weight candidates by how much they face the opposite way, from 1 down to 0 at right angles."""
+        return np.clip(-self.request.normals @ self.request.normals[index], 0.0, 1.0)
 
     def _closeness(self) -> np.ndarray:
         return 0.4 + 0.6 / (1 + (self.lever_m / _LEVER_M) ** 2)

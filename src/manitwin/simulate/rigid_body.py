@@ -1,0 +1,31 @@
+"""The rigid body that simulations move: convex hulls with mass properties and friction of their own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """Convex hulls (each ``(V, 3)`` m) and the real mass properties, in the object frame.
+
+    ``inertia_kg_m2 (3, 3)`` is about the centre of mass, along the axes of the object frame; it is not derived from the
+    hulls.
+    """
+
+    hulls: tuple[np.ndarray, ...]
+    mass_kg: float
+    center_of_mass_m: np.ndarray
+    inertia_kg_m2: np.ndarray
+    friction_static: float
+    friction_dynamic: float
+
+
+def principal_frame(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the principal moments ``(3,)`` ascending and the right-handed rotation ``(3, 3)`` of their axes to the object's."""
+    moments, axes = np.linalg.eigh(inertia_kg_m2)
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] *= -1
+    return moments, axes
