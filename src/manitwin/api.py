@@ -45,6 +45,9 @@ def build(
     jobs: int | None = None,
     seed: int | None = None,
     config: BuildConfig | str | Path | None = None,
+    grippers: Iterable[str] | None = None,
+    require_agreement: bool = False,
+    quick: bool = False,
     on_start: Callable[[int], None] = lambda total: None,
     on_stage: Callable[[StageStarted], None] = lambda event: None,
     on_result: Callable[[ItemResult], None] = lambda result: None,
@@ -52,12 +55,13 @@ def build(
     """Build twins from images, meshes, folders and manifests into the folder ``out``.
 
     ``units`` m|cm|mm|auto and ``up`` y|z|auto hold for all inputs whose manifest row does not say otherwise. A finished twin
-    of the same configuration and seed is not built again. Raises UsageError for wrong arguments; what happens to one item is
+    of the same configuration and seed is not built again. ``grippers``: names or .toml files, the first one's grasps are the
+    twin's own. ``require_agreement`` verifies only what a second engine holds too; ``quick`` leaves out second engine and
+    robustness. Raises UsageError for wrong arguments; what happens to one item is
     in the report and never raised.
     """
     settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
-    if seed is not None:
-        settings = settings.model_copy(update={"seed": seed})
+    settings = _with_flags(settings, seed, grippers, require_agreement, quick)
     if jobs is not None and jobs < 1:
         raise UsageError(f"jobs is {jobs}; give 1 or more")
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
@@ -73,6 +77,24 @@ def build(
         results.append(result)
         on_result(result)
     return BuildReport(results, remarks)
+
+
+def _with_flags(
+    settings: BuildConfig, seed: int | None, grippers: Iterable[str] | None, require_agreement: bool, quick: bool
+) -> BuildConfig:
+    if quick and require_agreement:
+        raise UsageError("quick leaves the second engine out, and require-agreement asks for it; give one of them")
+    update: dict[str, Any] = {} if seed is None else {"seed": seed}
+    if grippers is not None:
+        update["grippers"] = tuple(grippers)
+    if require_agreement:
+        update["second_opinion"] = settings.second_opinion.model_copy(
+            update={"enabled": True, "require_agreement": True}
+        )
+    if quick:
+        update["second_opinion"] = settings.second_opinion.model_copy(update={"enabled": False})
+        update["robustness"] = settings.robustness.model_copy(update={"enabled": False})
+    return settings.model_copy(update=update)
 
 
 def load(folder: str | Path, verify: bool = False) -> Twin:

@@ -48,6 +48,15 @@ def build(
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one a core.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of everything random; default: the configuration's.")] = None,
     config: Annotated[Path | None, typer.Option(help="A TOML file of settings.")] = None,
+    gripper: Annotated[
+        list[str] | None, typer.Option(help="A gripper to verify for; may be repeated, the first is the twin's own.")
+    ] = None,
+    require_agreement: Annotated[
+        bool, typer.Option("--require-agreement", help="Verify only grasps that both engines hold.")
+    ] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="One engine, one trial a grasp: no second opinion, no robustness.")
+    ] = False,
 ) -> None:
     """Build a verified twin of every input."""
     from manitwin.api import build as build_twins
@@ -68,6 +77,9 @@ def build(
             jobs=jobs,
             seed=seed,
             config=config,
+            grippers=gripper or None,
+            require_agreement=require_agreement,
+            quick=quick,
             on_start=progress.start,
             on_stage=progress.stage,
             on_result=progress.result,

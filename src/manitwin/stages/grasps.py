@@ -25,23 +25,30 @@ from manitwin.stages.object_arrays import load_hulls, load_solid
 from manitwin.stages.proposal_rounds import Kept, contact_friction, propose_in_rounds, torque_ratios
 from manitwin.stages.stage import Draft, Resource
 
-PROPOSALS = "proposals.npz"
+PROPOSALS = "proposals{}.npz"
+PROPOSED = "proposals{}"
 UNFILTERED = ":unfiltered"
 MIN_WIDTH_M = 0.0005  # thinner than this, a wall is not told from the surface's noise
 WIDTH_SAMPLES = 2000
 
 
 class GraspsStage:
-    """Propose, filter, associate and choose grasps."""
+    """Propose, filter, associate and choose grasps.
 
-    name: ClassVar[str] = "grasps"
-    version: ClassVar[str] = "1"
+    ``suffix`` is part of the artifacts' names: empty for the twin's first gripper. Where nothing fits, the first gripper
+    rejects the object; another one is left with no proposals and the reason.
+    """
+
+    version = "2"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz", "hulls.npz", "points", "physical")
-    writes: ClassVar[tuple[str, ...]] = (PROPOSALS, "proposals")
     needs: ClassVar[Resource] = "cpu"
 
-    def __init__(self, settings: GraspConfig, grasper: Grasper, gripper: Gripper):
+    def __init__(self, settings: GraspConfig, grasper: Grasper, gripper: Gripper, suffix: str = ""):
         """Take the settings, who proposes, and for which gripper."""
+        self.name = f"grasps{suffix}"
+        self.file, self.proposed = PROPOSALS.format(suffix), PROPOSED.format(suffix)
+        self.writes: tuple[str, ...] = (self.file, self.proposed)
+        self.may_reject = not suffix
         self.settings, self.grasper, self.gripper = settings, grasper, gripper
         self.backend = grasper.name
         self.model: str | None = f"{grasper.model or grasper.name} for {gripper.name} {gripper.sha256[:12]}"
@@ -52,7 +59,11 @@ class GraspsStage:
         request = self._request(draft)
         kept = propose_in_rounds(request, self.grasper, settings)
         if not len(kept.proposals):
-            raise _no_proposal(request, kept.counts)
+            answer = _no_proposal(request, kept.counts)
+            if self.may_reject:
+                raise answer
+            self._write(folder / self.file, request, kept, np.empty(0, int), points)
+            return {self.proposed: {"none_because": {"reason": answer.reason, "detail": answer.detail}}}
         nearest_m = kept.distance_m.min(1)
         association = associate(
             nearest_m,
@@ -62,10 +73,10 @@ class GraspsStage:
         )
         near = association.index
         chosen = near[self._choose(request, kept, near)]
-        self._write(folder / PROPOSALS, request, kept, chosen, points)
+        self._write(folder / self.file, request, kept, chosen, points)
         octants = approach_octants(kept.proposals.gripper_to_object)
         return {
-            "proposals": {
+            self.proposed: {
                 "proposed": len(kept.proposals),
                 "proposed_by_filter": {**kept.counts, "after_association": len(near), "after_diversity": len(chosen)},
                 "association_radius_m": association.radius_m,
