@@ -15,6 +15,6 @@ def __getattr__(name: str) -> Any:
     """Import the public names when they are first used, so that `manitwin --help` answers at once."""
     if name not in __all__:
         raise AttributeError(f"module 'manitwin' has no attribute {name!r}; it has {', '.join(__all__)}")
-    from manitwin import api
+    from importlib import import_module
 
-    return getattr(api, name)
+    return getattr(import_module("manitwin.loaded_twin" if name == "Twin" else "manitwin.api"), name)

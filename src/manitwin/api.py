@@ -6,14 +6,15 @@ import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from manitwin.config import BuildConfig, load_config
 from manitwin.errors import UsageError
-from manitwin.executors.local import StageStarted, build_all
-from manitwin.loaded_twin import Twin
-from manitwin.manifest import collect_items
-from manitwin.pipeline import ItemResult, check_names
+
+if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
+    from manitwin.config import BuildConfig
+    from manitwin.executors.local import StageStarted
+    from manitwin.loaded_twin import Twin
+    from manitwin.pipeline import ItemResult
 
 
 @dataclass(frozen=True)
@@ -60,6 +61,11 @@ def build(
     robustness. Raises UsageError for wrong arguments; what happens to one item is
     in the report and never raised.
     """
+    from manitwin.config import BuildConfig, load_config
+    from manitwin.executors.local import build_all
+    from manitwin.manifest import collect_items
+    from manitwin.pipeline import check_names
+
     settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
     settings = _with_flags(settings, seed, grippers, require_agreement, quick)
     if jobs is not None and jobs < 1:
@@ -99,6 +105,8 @@ def _with_flags(
 
 def load(folder: str | Path, verify: bool = False) -> Twin:
     """Load a finished twin; with ``verify``, check the digest of every file. Raises TwinError."""
+    from manitwin.loaded_twin import Twin
+
     return Twin(folder, verify=verify)
 
 

@@ -15,6 +15,7 @@ import numpy as np
 import trimesh
 from PIL import Image, ImageDraw, ImageFont
 
+from manitwin.geometry.hulls.reduction import convex_corners
 from manitwin.render.cameras import hero_camera
 from manitwin.render.card_panels import (
     DRAWN_GRASPS,
@@ -68,7 +69,8 @@ def make_card(
     the input was a mesh it shows the bare shape. Raises RendererMissing where nothing renders.
     """
     mesh = merged(list(parts))
-    hero = hero_camera(np.asarray(mesh.vertices), fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL)
+    outline = convex_corners(np.asarray(mesh.vertices))[0]  # all that a camera's choice depends on
+    hero = hero_camera(outline, fov_y_deg=FOV_Y_DEG, width_px=PANEL, height_px=PANEL)
     if photo is not None:
         first, caption = input_panel(photo, PANEL), "input photo, cut out"
     elif prompt is not None:
@@ -92,7 +94,7 @@ def make_card(
     _legend(draw)
     draw.text((MARGIN + 2, HEIGHT - 16), _shortened(text.footer, 1400, 12), fill=GREY, font=_font(12), anchor="lm")
     stream = io.BytesIO()
-    card.save(stream, "PNG", compress_level=6)
+    card.save(stream, "PNG", compress_level=5)
     return stream.getvalue()
 
 

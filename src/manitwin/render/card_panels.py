@@ -9,13 +9,14 @@ import cv2
 import numpy as np
 import trimesh
 
+from manitwin.geometry.hulls.reduction import convex_corners, hull_mesh
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.render.cameras import Camera, framing_camera, project, silhouette_area_px
 from manitwin.render.gripper_fork import Boxes, gripper_fork
 from manitwin.render.ground_shadow import ground_shadow
 from manitwin.render.markers import draw_markers
-from manitwin.render.raycast import cast_camera, visible_points
+from manitwin.render.raycast import cast_camera, merged, visible_points
 from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.render.surfaces import plain_part
 from manitwin.render.wireframe import visible_edges
@@ -63,8 +64,7 @@ def clay_panel(mesh: trimesh.Trimesh, hero: Camera) -> np.ndarray:
 def mesh_panel(solid: trimesh.Trimesh, hulls: Sequence[np.ndarray], hero: Camera) -> np.ndarray:
     """Draw the convex collision hulls, each in its colour, under the edges of the solid mesh."""
     camera = _turned(hero, np.concatenate([np.asarray(solid.vertices), *hulls]), 0.0)
-    shapes = [trimesh.Trimesh(hull, process=False).convex_hull for hull in hulls]
-    parts = [plain_part(shape, HULL_COLORS[i % len(HULL_COLORS)], roughness=0.9) for i, shape in enumerate(shapes)]
+    parts = _colored([hull_mesh(hull) for hull in hulls], HULL_COLORS, roughness=0.9)
     picture = shared_renderer().render(parts, [camera])[0].rgb.astype(np.float32)
     depth, _, _ = cast_camera(RayCaster(solid), camera)
     cover = visible_edges(solid, camera, depth)
@@ -89,8 +89,7 @@ def grasp_panel(
     forks = [gripper_fork(grasp.boxes, rod_m).apply_transform(grasp.gripper_to_object) for grasp in drawn]
     everything = np.concatenate([mesh.vertices, *(fork.vertices for fork in forks)])
     camera, seen = _telling_camera(mesh, everything, points, hero)
-    colored = [plain_part(fork, GRASP_COLORS[i % len(GRASP_COLORS)], roughness=0.5) for i, fork in enumerate(forks)]
-    picture = _grounded([*parts, *colored], mesh, camera)
+    picture = _grounded([*parts, *_colored(forks, GRASP_COLORS, roughness=0.5)], mesh, camera)
     shown = [point for point, visible in zip(points, seen, strict=True) if visible]
     pixels, _ = project(np.array([point.position_m for point in shown]).reshape(-1, 3), camera)
     colors = [FUNCTIONAL if point.functional else GRASP for point in shown]
@@ -123,6 +122,14 @@ def diverse(gripper_to_object: np.ndarray, count: int) -> np.ndarray:
     return farthest_point_sampling(np.hstack([tips, 0.35 * spread * gripper_to_object[:, :3, 2]]), count)
 
 
+def _colored(
+    shapes: Sequence[trimesh.Trimesh], colors: Sequence[tuple[int, int, int]], *, roughness: float
+) -> list[trimesh.Trimesh]:
+    """Return a part for each of the colours, which the shapes take in turn."""
+    turns = [list(shapes[index :: len(colors)]) for index in range(min(len(colors), len(shapes)))]
+    return [plain_part(merged(turn), color, roughness=roughness) for turn, color in zip(turns, colors, strict=False)]
+
+
 def _turned(hero: Camera, points: np.ndarray, turn_deg: float) -> Camera:
     """Return the camera that frames ``points`` from the hero's elevation, turned about the vertical."""
     x, y, z = hero.camera_to_object[:3, 2]
@@ -144,12 +151,13 @@ def _telling_camera(
     positions = np.array([point.position_m for point in points]).reshape(-1, 3)
     normals = np.array([point.normal for point in points]).reshape(-1, 3)
     tolerance_m = 0.01 * float(mesh.extents.max())
+    outline, everything = (convex_corners(np.asarray(cloud))[0] for cloud in (mesh.vertices, everything))
     best: tuple[float, Camera, np.ndarray] | None = None
     for turn in (0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5, 6):
         camera = _turned(hero, everything, 30.0 * turn)
         seen = visible_points(positions, normals, camera, caster, tolerance_m)
         # A point more is worth as much as a third of the panel.
-        share = silhouette_area_px(np.asarray(mesh.vertices), camera) / (hero.width_px * hero.height_px)
+        share = silhouette_area_px(outline, camera) / (hero.width_px * hero.height_px)
         score = float(seen.sum()) + 3 * share
         if best is None or score > best[0] + 1e-6:
             best = score, camera, seen

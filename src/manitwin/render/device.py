@@ -34,8 +34,8 @@ ICD_FOLDERS = (
 PROBE_SECONDS = 120.0  # a device that takes longer to make one small picture hangs, or is of no use
 
 # Creating a RenderSystem is where an unfit driver is refused. A GPU must also make a picture: without the right
-# libraries in a container it fails or hangs only there. Lavapipe is spared the picture: compiling its pipelines takes 6
-# CPU-seconds.
+# libraries in a container it fails or hangs only there. Lavapipe is spared the picture: SAPIEN's own shaders, which this
+# takes, compile for 6 CPU-seconds.
 _PROBE = """
 import sys
 import sapien.render as render

@@ -1,4 +1,4 @@
-"""A picture with depth and part ids, and how it is made from one with more pixels."""
+"""A picture with depth, and how it is made from one with more pixels."""
 
 from __future__ import annotations
 
@@ -17,48 +17,46 @@ class Frame:
     """A picture of size (H, W).
 
     ``rgb (H, W, 3) uint8`` over the background; ``coverage (H, W) float32``, the share of each pixel that the object
-    covers; ``ids (H, W) int32``, the index of the part at the pixel's centre, -1 for none; ``depth (H, W) float32``
-    there along the viewing axis in the object's unit, 0 where ids is -1.
+    covers; ``depth (H, W) float32``, that of the surface along the viewing axis in the object's unit, 0 where the object
+    covers less than half a pixel.
     """
 
     rgb: np.ndarray
     coverage: np.ndarray
-    ids: np.ndarray
     depth: np.ndarray
 
 
 def reduced_frame(
     color: np.ndarray,
-    part: np.ndarray,
-    depth: np.ndarray,
+    buffer: np.ndarray,
     *,
+    nearest: float,
+    farthest: float,
     background: tuple[int, int, int],
     supersample: int,
     radius: float,
 ) -> Frame:
     """Reduce a picture ``supersample`` times each way.
 
-    ``color (H, W, 3) float32`` in [0, 1], ``part (H, W)`` with -1 for none, ``depth (H, W)``; ``radius`` is that of the
-    object. Colours are averaged over the background; 1/depth is linear over the picture of a plane, so the harmonic
-    mean of the subpixels of one part is its depth at the pixel's centre.
+    ``color (H, W, 4) uint8`` is black and transparent where nothing is; ``buffer (H, W) float32`` is the depth buffer,
+    linear in 1/depth from 0 at ``nearest`` to 1 at ``farthest``, and 1 where nothing is; ``radius`` is that of the
+    object. Colours are averaged over the background; 1/depth is linear over the picture of a plane, so its mean over
+    what is covered is the inverse depth at the pixel's centre.
     """
-    k = supersample
-    height, width = part.shape[0] // k, part.shape[1] // k
-    seen = part >= 0
-    ids = part[k // 2 :: k, k // 2 :: k].copy()
-    count, inverse_sum = np.zeros(ids.shape), np.zeros(ids.shape)
-    for row in range(k):
-        for column in range(k):
-            same = (part[row::k, column::k] == ids) & (ids >= 0)
-            count += same
-            inverse_sum += same / depth[row::k, column::k]
-    at_center = (count / np.where(ids >= 0, inverse_sum, 1.0)).astype(np.float32)
-    coverage = cv2.resize(seen.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
-    lit = np.where(seen[..., None], color, np.float32(0.0))
-    lit = cv2.resize(lit, (width, height), interpolation=cv2.INTER_AREA)
-    lit *= depth_shade(at_center, ids >= 0, radius)[..., None]
-    rgb = lit + (1 - coverage)[..., None] * (np.array(background, dtype=np.float32) / 255)
-    return Frame(np.rint(np.clip(rgb, 0, 1) * 255).astype(np.uint8), coverage, ids, at_center)
+    size = (color.shape[1] // supersample, color.shape[0] // supersample)
+    coverage = _averaged(cv2.extractChannel(color, 3).astype(np.float32), size) / np.float32(255)
+    empty = np.float32(1) - coverage
+    seen = coverage >= 0.5
+    nearness = np.float32(1 / nearest) + _averaged(buffer, size) * np.float32(1 / farthest - 1 / nearest)
+    at_center = np.zeros_like(coverage)
+    np.divide(coverage, nearness - empty * np.float32(1 / farthest), out=at_center, where=seen)
+    lit = _averaged(color, size)[..., :3] * depth_shade(at_center, seen, radius)[..., None]
+    rgb = lit + empty[..., None] * np.array(background, dtype=np.float32)
+    return Frame(np.rint(np.minimum(rgb, 255)).astype(np.uint8), coverage, at_center)
+
+
+def _averaged(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
 
 
 def depth_shade(depth: np.ndarray, seen: np.ndarray, radius: float) -> np.ndarray:

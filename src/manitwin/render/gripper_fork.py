@@ -13,6 +13,9 @@ Boxes = Sequence[tuple[np.ndarray, np.ndarray]]
 """``(box_to_gripper (4, 4), half_extents_m (3,))`` of each box of palm and fingers, grasp frame: +Z approach, X
 closing."""
 
+_unit_box = trimesh.creation.box(bounds=[[0, 0, 0], [1, 1, 1]])
+_UNIT_BOX = np.asarray(_unit_box.vertices), np.asarray(_unit_box.faces)  # made once: trimesh takes a millisecond for it
+
 STEM_SHARE = 0.5  # the stem's length, in that of the fingers
 
 
@@ -50,7 +53,7 @@ def gripper_body(boxes: Boxes) -> trimesh.Trimesh:
 def _rod(start: Sequence[float], end: Sequence[float], thickness: float) -> trimesh.Trimesh:
     """Return a square rod along an axis of the frame, closed around both ends."""
     low, high = np.minimum(start, end) - thickness / 2, np.maximum(start, end) + thickness / 2
-    return trimesh.creation.box(bounds=[low, high])
+    return trimesh.Trimesh(low + _UNIT_BOX[0] * (high - low), _UNIT_BOX[1], process=False)
 
 
 def _corners(box_to_gripper: np.ndarray, half: np.ndarray) -> np.ndarray:

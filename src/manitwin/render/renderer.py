@@ -1,20 +1,20 @@
-"""Pictures of meshes with SAPIEN: colour, depth and part ids, lit like an object on a turntable in a studio.
+"""Pictures of meshes with SAPIEN: colour and depth, lit like an object on a turntable in a studio.
 
-The object turns, the lights do not: they hang on the camera, so every view is exposed alike. SAPIEN's ``minimal``
-shaders are used: forward shading costs 0.13 CPU-s a megapixel on lavapipe where the deferred ``default`` ones cost 0.3
-(measured). Normals are not drawn: ``manitwin.render.raycast`` gives exact ones.
+The object turns, the lights do not: they hang on the camera, so every view is exposed alike. The studio is a shader of
+our own, ``shaders/gbuffer.frag``: a picture of a megapixel costs 0.02 CPU-s on lavapipe and the first one 0.2, where
+SAPIEN's ``minimal`` shaders cost 0.13 and 11 (measured). Normals and faces are not drawn: ``manitwin.render.raycast``
+gives exact ones.
 """
 
 from __future__ import annotations
 
 import atexit
 import os
-import tempfile
 import warnings
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import trimesh
 
@@ -26,13 +26,7 @@ from manitwin.render.surfaces import Surface, surface
 
 BACKDROP = (233, 235, 238)  # light enough to be no colour, dark enough that white things stand out
 SUPERSAMPLE = 2  # SAPIEN's edges are not antialiased; twice the size each way removes the steps that are seen
-
-# Direction of light and its irradiance, in the camera's axes (x right, y up, -z forward): key and fill. White paper
-# that faces the camera gets 0.9 of what the picture can show, paper that faces the key light all of it.
-LIGHTS = (((0.55, -0.75, -0.75), 1.8), ((-0.9, -0.1, -0.75), 0.8))
-AMBIENT = 0.18
-SKY, HORIZON, GROUND = 0.30, 0.18, 0.10  # the studio's own glow, from above, around and below (linear radiance)
-
+SHADERS = Path(__file__).parent / "shaders"
 
 _shared: tuple[int, Renderer] | None = None
 
@@ -40,7 +34,7 @@ _shared: tuple[int, Renderer] | None = None
 def shared_renderer() -> Renderer:
     """Return this process's renderer, made at the first call; raises RendererMissing where nothing renders.
 
-    Making one costs some 10 CPU-seconds, a picture with it a tenth of one.
+    Making one costs half a CPU-second, most of it for importing SAPIEN.
     """
     global _shared
     if _shared is None or _shared[0] != os.getpid():
@@ -68,24 +62,9 @@ class Renderer:
             import sapien.render
         self._sapien: Any = sapien
         sapien.render.set_log_level("error")
-        sapien.render.set_camera_shader_dir("minimal")
+        sapien.render.set_picture_format("Color", "R8G8B8A8Unorm")
         self._scene: Any = sapien.Scene([sapien.render.RenderSystem()])
-        self._scene.set_ambient_light([AMBIENT] * 3)
-        self._rig: Any = sapien.Entity()
-        for direction, irradiance in LIGHTS:
-            light = sapien.render.RenderDirectionalLightComponent()
-            light.color = [irradiance] * 3
-            light.shadow = False
-            light.local_pose = sapien.Pose(
-                q=sapien.math.shortest_rotation([1, 0, 0], _sapien_axes(np.array(direction)))
-            )
-            self._rig.add_component(light)
-        self._scene.add_entity(self._rig)
         self._cameras: dict[tuple[int, int], tuple[Any, Any]] = {}
-        with tempfile.TemporaryDirectory() as folder:
-            self._scene.render_system.cubemap = sapien.render.RenderCubemap(*_studio_cubemap(folder))
-            self._scene.update_render()
-            self._camera(16, 16)[0].take_picture()  # the files are read only now; so are the pipelines compiled
 
     def render(
         self,
@@ -97,8 +76,8 @@ class Renderer:
     ) -> list[Frame]:
         """Draw ``parts``, meshes in the object frame, from each camera, over a background colour.
 
-        ``supersample`` smooths the edges of ``rgb``; with 1, ``depth`` and ``ids`` are those of the rays through the
-        pixels' centres (measured: 1e-7 m on an object of 0.1 m), with 2 they are a little off at creases and edges.
+        ``supersample`` smooths the edges of ``rgb``; with 1, ``depth`` is that of the rays through the pixels' centres
+        (measured: 1e-7 m on an object of 0.1 m), with 2 it is a little off at creases and edges.
         """
         surfaces = [surface(part) for part in parts]
         points = np.concatenate([s.vertices for s in surfaces])
@@ -108,9 +87,7 @@ class Renderer:
         for entity in entities:
             self._scene.add_entity(entity)
         try:
-            ids = np.full(max(entity.per_scene_id for entity in entities) + 1, -1, dtype=np.int32)
-            ids[[entity.per_scene_id for entity in entities]] = np.arange(len(entities))
-            return [self._shoot(camera, center, scale, ids, background, supersample) for camera in cameras]
+            return [self._shoot(camera, center, scale, background, supersample) for camera in cameras]
         finally:
             for entity in entities:
                 self._scene.remove_entity(entity)
@@ -119,7 +96,7 @@ class Renderer:
         """Give back what the driver holds."""
         self._cameras.clear()
         self._scene.clear()
-        del self._rig, self._scene
+        del self._scene
 
     def _entity(self, s: Surface, center: np.ndarray, scale: float) -> Any:
         render = self._sapien.render
@@ -145,20 +122,17 @@ class Renderer:
 
     def _camera(self, width: int, height: int) -> tuple[Any, Any]:
         if (width, height) not in self._cameras:
-            component, entity = self._sapien.render.RenderCameraComponent(width, height), self._sapien.Entity()
+            component, entity = (
+                self._sapien.render.RenderCameraComponent(width, height, str(SHADERS)),
+                self._sapien.Entity(),
+            )
             entity.add_component(component)
             self._scene.add_entity(entity)
             self._cameras[width, height] = component, entity
         return self._cameras[width, height]
 
     def _shoot(
-        self,
-        camera: Camera,
-        center: np.ndarray,
-        scale: float,
-        ids: np.ndarray,
-        background: tuple[int, int, int],
-        k: int,
+        self, camera: Camera, center: np.ndarray, scale: float, background: tuple[int, int, int], k: int
     ) -> Frame:
         component, entity = self._camera(camera.width_px * k, camera.height_px * k)
         position = (camera.position - center) * scale
@@ -166,38 +140,16 @@ class Renderer:
         near, far = max(0.02, distance - 1.05), distance + 1.05
         component.set_fovy(camera.fov_y_rad, True)
         component.near, component.far = near, far
-        backward, right, up = (
-            camera.camera_to_object[:3, 2],
-            camera.camera_to_object[:3, 0],
-            camera.camera_to_object[:3, 1],
-        )
-        pose = self._sapien.Pose(transform(np.stack([-backward, -right, up], 1), position))
-        entity.set_pose(pose)
-        self._rig.set_pose(pose)
+        right, up, backward = camera.camera_to_object[:3, :3].T
+        entity.set_pose(self._sapien.Pose(transform(np.stack([-backward, -right, up], 1), position)))
         self._scene.update_render()
         component.take_picture()
-        color = component.get_picture("Color")[..., :3]
-        part = ids[np.clip(component.get_picture("PositionSegmentation")[..., 3], 0, len(ids) - 1)]
-        buffer = component.get_picture("GbufferDepth").reshape(part.shape).astype(np.float64)
-        depth = near * far / (far - buffer * (far - near)) / scale
-        return reduced_frame(color, part, depth, background=background, supersample=k, radius=1 / scale)
-
-
-def _sapien_axes(direction: np.ndarray) -> np.ndarray:
-    """Turn a direction in OpenGL's camera axes into SAPIEN's (x forward, y left, z up)."""
-    return np.array([-direction[2], -direction[0], direction[1]]) / np.linalg.norm(direction)
-
-
-def _studio_cubemap(folder: str) -> list[str]:
-    """Write the soft surroundings that shiny things mirror: six faces, y up, which SAPIEN takes from files only."""
-    size = 64
-    across = np.linspace(-1, 1, size)
-    height = -across[:, None] / np.sqrt(1 + across[:, None] ** 2 + across[None] ** 2)
-    side = np.where(height > 0, HORIZON + (SKY - HORIZON) * height, HORIZON + (HORIZON - GROUND) * height)
-    top, bottom = np.full((size, size), SKY), np.full((size, size), GROUND)
-    paths = []
-    for name, level in (("px", side), ("nx", side), ("py", top), ("ny", bottom), ("pz", side), ("nz", side)):
-        paths.append(os.path.join(folder, f"{name}.png"))
-        srgb = np.rint(np.repeat(level[..., None], 3, 2) ** (1 / 2.2) * 255).astype(np.uint8)
-        cv2.imwrite(paths[-1], srgb)
-    return paths
+        return reduced_frame(
+            component.get_picture("Color"),
+            component.get_picture("GbufferDepth").reshape(camera.height_px * k, camera.width_px * k),
+            nearest=near / scale,
+            farthest=far / scale,
+            background=background,
+            supersample=k,
+            radius=1 / scale,
+        )

@@ -95,10 +95,7 @@ def _shrunk(image: np.ndarray) -> np.ndarray:
 
 def _tinted(image: np.ndarray, factor: np.ndarray) -> np.ndarray:
     """Multiply an sRGB image ``(H, W, 3) uint8`` by a linear factor; returns ``(H, W, 4) uint8`` sRGB, opaque."""
-    result = np.full((*image.shape[:2], 4), 255, dtype=np.uint8)
-    result[..., :3] = image
     if not np.allclose(factor, 1.0, rtol=0, atol=1 / 512):
         table = np.rint(linear_to_srgb(srgb_to_linear(np.linspace(0, 1, 256))[:, None] * factor) * 255).astype(np.uint8)
-        for channel in range(3):
-            result[..., channel] = table[image[..., channel], channel]
-    return result
+        image = np.asarray(cv2.LUT(image, table[None]))
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2RGBA))

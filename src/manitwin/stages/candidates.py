@@ -34,7 +34,7 @@ class CandidatesStage:
     """
 
     name: ClassVar[str] = "candidates"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz", "visual.glb", "views/", "cameras", "physical")
     writes: ClassVar[tuple[str, ...]] = ("marked/", "candidates", "visible_candidates")
     needs: ClassVar[Resource] = "cpu"

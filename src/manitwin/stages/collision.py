@@ -28,7 +28,7 @@ class CollisionStage:
     """
 
     name: ClassVar[str] = "collision"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz",)
     writes: ClassVar[tuple[str, ...]] = (HULLS, "collision")
     needs: ClassVar[Resource] = "cpu"

@@ -31,7 +31,7 @@ class PhysicalStage:
     """Ask for size, mass and friction, scale the object, and compute the mass properties of its real shape."""
 
     name: ClassVar[str] = "physical"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/")
     writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical")
     needs: ClassVar[Resource] = "cpu"

