@@ -18,7 +18,7 @@ class GenerateStage:
     """Write ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?",)
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
     needs: ClassVar[Resource] = "generator"

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from manitwin.errors import Unavailable
+from manitwin.errors import Rejected, Unavailable
 from manitwin.files.glb import read_glb
 from manitwin.files.image_file import read_image
 from manitwin.models.generators.lift import LiftGenerator
@@ -160,6 +160,14 @@ def test_generator_answers_the_protocol_with_the_same_bytes(tmp_path: Path) -> N
     assert part.bounds[0][2] == pytest.approx(0.0, abs=1e-6)
 
 
+def test_open_container_seen_from_above_is_rejected_not_filled() -> None:
+    tray = [(60, 250), (380, 120), (560, 260), (550, 320), (230, 520), (180, 500)]
+    with pytest.raises(Rejected, match="open container") as caught:
+        lift(_drawn(tray), ShapeHint(container=True, flat=True))
+    assert caught.value.reason == "generator_failed"
+    assert lift(_drawn(tray), NO_HINT).notes["primitive"] == "inflation"
+
+
 def test_text_is_refused_with_a_remedy() -> None:
     with pytest.raises(Unavailable, match="another generator"):
         LiftGenerator().submit(GenerationRequest(None, "a red mug", None, seed=0))
@@ -203,8 +211,6 @@ def test_orange_with_garbage_under_its_alpha_is_orange_all_over(shared_data: Pat
 @pytest.mark.slow
 @pytest.mark.shared_data
 def test_every_accepted_photo_becomes_a_solid_that_rests(shared_data: Path) -> None:
-    from manitwin.errors import Rejected
-
     lifted = {}
     for path in sorted((shared_data / "photos").glob("*.jpg")):
         try:

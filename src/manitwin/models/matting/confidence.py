@@ -6,11 +6,15 @@ from dataclasses import asdict, dataclass
 
 import cv2
 import numpy as np
+from scipy import ndimage
 
-from manitwin.models.matting.background import connected_to
+from manitwin.models.matting.background import Background, connected_to
+from manitwin.models.matting.hard_shadow import PENUMBRA_PX, edge_width_px
 from manitwin.models.matting.outline import dilated, disk, eroded, opened
 from manitwin.models.matting.segmentation import Segmentation
 from manitwin.models.matting.shadow import could_be_shade
+
+FRAME_EDGE = 5.0  # L*a*b* per pixel: an edge in focus of an object, not shading
 
 
 @dataclass(frozen=True)
@@ -22,7 +26,8 @@ class MatteScores:
     just outside the outline differ from the background's (Youden's J); ``complete`` nothing else stands out of the
     background; ``uncut`` share of the outline that the image border does not cut (4 times counted); ``stable``
     overlap of two graph cuts with other seeds; ``whole`` little lies outside the largest connected part;
-    ``plain`` how uniform the background is.
+    ``plain`` how uniform the background is; ``outermost`` share of the outline with no edge beyond it, in what passes for
+    shade, that is nearly as sharp; ``sharply_bounded`` how little of it is as soft as a shadow's edge with shade inside.
     """
 
     on_edges: float
@@ -33,6 +38,8 @@ class MatteScores:
     stable: float
     whole: float
     plain: float
+    outermost: float
+    sharply_bounded: float
 
     @property
     def confidence(self) -> float:
@@ -81,7 +88,62 @@ def score(segmentation: Segmentation) -> MatteScores:
         stable=_ramp(segmentation.stability, 0.6, 0.95),
         whole=_ramp(float(areas.max() / areas.sum()), 0.8, 1.0),
         plain=_ramp(-background.noise_lab - 20 * background.unexplained, -12, -3),
+        outermost=_ramp(-_overshadowed(segmentation, outline), -0.25, -0.05),
+        sharply_bounded=_ramp(-_softly_bounded(segmentation, outline), -0.4, -0.15),
     )
+
+
+def frame_cause(background: Background, gradient: np.ndarray) -> str | None:
+    """Return what sharp edges across the image's frame mean: ``uncut`` an object cut off, ``plain`` a cluttered scene.
+
+    None where the frame has no more of them than a wall that meets a table. A frame nearly half of which has one colour
+    shows a plain background, and what interrupts it is cut off.
+    """
+    lab = cv2.GaussianBlur(background.lab, (0, 0), 1.5)
+    colours, steepest = _along_frame(lab), _along_frame(gradient)
+    crossings = int((np.diff((steepest > FRAME_EDGE).astype(int)) == 1).sum())
+    if crossings < 4:
+        return None
+    weights = np.array([0.5, 1.0, 1.0])  # lightness varies along a background more than colour does
+    near = [np.linalg.norm((colours - colour) * weights, axis=1) < 8 for colour in colours[::8]]
+    return "uncut" if max(float(same.mean()) for same in near) > 0.4 else "plain"
+
+
+def _along_frame(picture: np.ndarray) -> np.ndarray:
+    inner = picture[2:-2, 2:-2]
+    return np.concatenate([inner[0], inner[1:, -1], inner[-1, -2::-1], inner[-2:0:-1, 0]])
+
+
+def _overshadowed(segmentation: Segmentation, outline: np.ndarray) -> float:
+    """Return the share of the outline that has an edge beyond it, in the shade beside it, at least 0.7 times as sharp.
+
+    A shadow's own edge is softer than the outline of what casts it, so a sharp one is the rim of a grey or clear part. A
+    shadow with a visible edge was judged by more than that, and does not count.
+    """
+    mask, gradient = segmentation.mask, segmentation.gradient
+    distance, nearest = ndimage.distance_transform_edt(~mask, return_indices=True)
+    shade = (segmentation.shadow | could_be_shade(segmentation.background)) & ~dilated(segmentation.hard, 6)
+    beside = shade & (distance > 5) & (distance < 0.1 * max(mask.shape))
+    beyond = np.zeros(mask.shape, np.float32)
+    np.maximum.at(beyond, (nearest[0][beside], nearest[1][beside]), gradient[beside])
+    sharper = cv2.dilate(beyond, disk(3)) > 0.7 * cv2.dilate(gradient, disk(3))
+    return float(sharper[outline].mean())
+
+
+def _softly_bounded(segmentation: Segmentation, outline: np.ndarray) -> float:
+    """Return the share of the outline where a penumbra, not an edge, leads to the background's colour, dimmed.
+
+    That is the outline of a shadow: seen on a grey object, where nothing else tells the shadow that hangs on it.
+    """
+    inner = eroded(segmentation.mask, 5)
+    if not inner.any():
+        return 0.0
+    distance, nearest = ndimage.distance_transform_edt(~inner, return_indices=True)
+    depth = cv2.blur(np.linalg.norm(segmentation.background.residual, axis=2), (3, 3))
+    width_px = edge_width_px(depth[nearest[0], nearest[1]], cv2.dilate(segmentation.gradient, disk(4)))
+    soft = (width_px > PENUMBRA_PX) & could_be_shade(segmentation.background)[nearest[0], nearest[1]]
+    at = outline & (distance < 9)
+    return float(soft[at].mean()) if at.any() else 0.0
 
 
 def _left_over(segmentation: Segmentation) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import ndimage
 
 from manitwin.errors import Rejected
-from manitwin.models.matting.confidence import MatteScores, score
+from manitwin.models.matting.confidence import MatteScores, frame_cause, score
 from manitwin.models.matting.outline import dilated, soft_outline
 from manitwin.models.matting.segmentation import Segmentation, segment
 
@@ -26,6 +26,8 @@ _CAUSES = {
     "stable": "the outline depends on where the search starts",
     "whole": "it falls apart into pieces",
     "plain": "the background is too cluttered",
+    "sharply_bounded": "it is as grey as a shadow, and part of its outline as soft as one: a shadow may hang on it",
+    "outermost": "what looks like its shadow has edges as sharp as its outline, so a clear or grey part of it may be lost",
 }
 _REMEDY = "photograph it whole on a plain surface of another colour, or give an image with an alpha channel"
 
@@ -61,9 +63,10 @@ def matte_photo(
     if image.shape[2] == 4 and (image[..., 3] < 250).mean() > TRANSPARENT_SHARE:
         return _given_matte(image, name, min_area_share, second_object_share)
     rgb = np.ascontiguousarray(image[..., :3])
-    scale = min(1.0, working_side_px / max(rgb.shape[:2]))
-    small = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else rgb
-    found = segment(small)
+    found = segment(_scaled(rgb, working_side_px))
+    if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
+        found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
+    scale = max(found.mask.shape) / max(rgb.shape[:2])
     plain = found.background.noise_lab < PLAIN_NOISE_LAB and found.background.unexplained < 0.05
     if found.mask.mean() < min_area_share:
         if not plain:
@@ -74,7 +77,7 @@ def matte_photo(
             "no_object", f"{name}: nothing stands out of the background; photograph the object larger", "generate"
         )
     scores = score(found)
-    _reject_doubtful(name, scores, found.mask, min_confidence, second_object_share)
+    _reject_doubtful(name, scores, found, min_confidence, second_object_share)
     band = max(2, round(2 / scale))
     alpha = soft_outline(rgb, _largest(found.mask), band)
     return Matte(
@@ -84,6 +87,16 @@ def matte_photo(
         findings=tuple(_findings(scores, found)),
         scores={key: round(value, 4) for key, value in asdict(scores).items()},
     )
+
+
+def _scaled(rgb: np.ndarray, side_px: int) -> np.ndarray:
+    scale = side_px / max(rgb.shape[:2])
+    return cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else rgb
+
+
+def _longest_side(mask: np.ndarray) -> int:
+    rows, columns = np.nonzero(mask)
+    return int(max(np.ptp(rows), np.ptp(columns))) + 1 if len(rows) else 0
 
 
 def _given_matte(image: np.ndarray, name: str, min_area_share: float, second_object_share: float) -> Matte:
@@ -102,15 +115,16 @@ def _given_matte(image: np.ndarray, name: str, min_area_share: float, second_obj
 
 
 def _reject_doubtful(
-    name: str, scores: MatteScores, mask: np.ndarray, min_confidence: float, second_object_share: float
+    name: str, scores: MatteScores, found: Segmentation, min_confidence: float, second_object_share: float
 ) -> None:
     if scores.confidence_of_pieces >= min_confidence:
-        _reject_several(name, mask, second_object_share)
+        _reject_several(name, found.mask, second_object_share)
     if scores.confidence < min_confidence:
+        cause = frame_cause(found.background, found.gradient) or scores.worst
         raise Rejected(
             "low_confidence_matte",
             f"{name}: the object cannot be told from the background (confidence {scores.confidence:.2f} <"
-            f" {min_confidence:g}): {_CAUSES[scores.worst]}; {_REMEDY}",
+            f" {min_confidence:g}): {_CAUSES[cause]}; {_REMEDY}",
             "generate",
         )
 

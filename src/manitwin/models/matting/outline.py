@@ -7,6 +7,8 @@ import numpy as np
 
 from manitwin.models.matting.background import Background, connected_to
 
+OBJECT_DISTANCE = 6.0  # of a border pixel's Mahalanobis distance: what the background's fit takes for explained
+
 
 def disk(radius: int) -> np.ndarray:
     """Return a round structuring element."""
@@ -38,8 +40,14 @@ def gradient_magnitude(lab: np.ndarray, blur_px: float = 1.0) -> np.ndarray:
 
 
 def edge_threshold(background: Background, gradient: np.ndarray) -> float:
-    """Return the gradient that the background's own texture hardly ever reaches (97th percentile of the border)."""
-    return max(0.35, float(np.percentile(gradient[background.border], 97)))
+    """Return the gradient that the background's own texture hardly ever reaches (97th percentile of the border).
+
+    What no surface explains there, and its rim, is an object near the frame, not texture.
+    """
+    texture = background.border & ~dilated(background.border & (background.coarse_distance > OBJECT_DISTANCE), 3)
+    if texture.sum() < 0.5 * background.border.sum():
+        texture = background.border
+    return max(0.35, float(np.percentile(gradient[texture], 97)))
 
 
 def edges(background: Background, gradient: np.ndarray, threshold: float) -> np.ndarray:
@@ -53,12 +61,17 @@ def edges(background: Background, gradient: np.ndarray, threshold: float) -> np.
 
 
 def flood(free: np.ndarray, seed: np.ndarray, ball_px: int, regrow_px: int) -> np.ndarray:
-    """Flood ``free`` from ``seed`` with a ball that cannot pass gaps narrower than itself, then fill up to the walls."""
+    """Flood ``free`` from ``seed`` with a ball that cannot pass gaps narrower than itself, then fill up to the walls.
+
+    The picture goes on beyond its frame as it ends there: the ball enters between an object and the frame beside it.
+    """
+    free, seed = (np.pad(mask, ball_px + 1, mode="edge") for mask in (free, seed))
     roomy = ~dilated(~free, ball_px)
     reached = connected_to(roomy, seed & roomy)
     for _ in range(regrow_px):
         reached = (dilated(reached, 1) & free) | reached
-    return reached
+    inner = slice(ball_px + 1, -ball_px - 1)
+    return reached[inner, inner]
 
 
 def soft_outline(rgb: np.ndarray, mask: np.ndarray, band_px: int) -> np.ndarray:

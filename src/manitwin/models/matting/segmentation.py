@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from manitwin.models.matting.background import Background, model_background
+from manitwin.models.matting.hard_shadow import hard_shadow
 from manitwin.models.matting.outline import dilated, edge_threshold, edges, flood, gradient_magnitude, opened
 from manitwin.models.matting.shadow import cast_shadow, gaps
 
@@ -17,13 +18,14 @@ BALL_SHARE = 0.010  # of the longer side: gaps in an outline narrower than twice
 
 @dataclass(frozen=True)
 class Segmentation:
-    """A mask (H, W) at working resolution, and what it was made from."""
+    """A mask (H, W) at working resolution, and what it was made from; ``hard`` is the part of ``shadow`` with an edge."""
 
     mask: np.ndarray
     background: Background
     gradient: np.ndarray
     edge_threshold: float
     shadow: np.ndarray
+    hard: np.ndarray
     stability: float
 
 
@@ -42,13 +44,15 @@ def segment(rgb: np.ndarray) -> Segmentation:
     candidate &= ~flood(~candidate | plain, ~candidate, ball_px=2, regrow_px=4)
     candidate &= ~background.seam | opened(candidate, 2 * ball)  # what is left of a seam is a thin line
     shadow = cast_shadow(background, candidate, gradient, threshold)
-    solid = candidate & ~shadow
-    solid &= ~gaps(background, solid, gradient, threshold)
+    seen_through = gaps(background, candidate & ~shadow, gradient, threshold)
+    hard = hard_shadow(background, candidate & ~shadow & ~seen_through, gradient)
+    shadow |= hard
+    solid = candidate & ~shadow & ~seen_through
     mask = _to_half_contrast(background, _graph_cut(background, solid, core_px=6, doubt=3.0, seed=0))
     other = _to_half_contrast(background, _graph_cut(background, solid, core_px=9, doubt=4.5, seed=1))
     union = (mask | other).sum()
     stability = float((mask & other).sum() / union) if union else 0.0
-    return Segmentation(mask, background, gradient, threshold, shadow, stability)
+    return Segmentation(mask, background, gradient, threshold, shadow, hard, stability)
 
 
 def _graph_cut(background: Background, solid: np.ndarray, *, core_px: int, doubt: float, seed: int) -> np.ndarray:

@@ -14,6 +14,7 @@ MIN_SHADE, MAX_SHADE = (
 )  # ratio of reflected light: darker is no cast shadow of a lit scene, lighter is none at all
 MAX_PENUMBRA = 3.5  # L*a*b* units per pixel at working size; cast shadows of the studied photos have 1.5 to 3.3
 NEUTRAL = 0.08  # spread of the channels' ratios in a shadow of one light
+RISE = 0.05  # of the background's light: what shading and noise add on a way into a shadow
 TINTED = 0.25  # the same where a second, coloured light fills the shadow
 
 
@@ -46,6 +47,7 @@ def cast_shadow(background: Background, candidate: np.ndarray, gradient: np.ndar
     tinted = np.linalg.norm(tint, axis=2) / np.sqrt(3)
     certain = opened(candidate & ~(shady & (tinted < TINTED)) & (background.distance > 4), 2)
     edge = _object_edge(certain, candidate, gradient)
+    shady &= falls_inward(darkening, ~candidate)
     plain = _without_bounce(tint, ratio[certain]) < NEUTRAL
     softest = gradient < max(threshold, 0.12 * edge)
     soft = (plain & (gradient < max(threshold, min(0.3 * edge, MAX_PENUMBRA)))) | ((tinted < TINTED) & softest)
@@ -56,6 +58,22 @@ def cast_shadow(background: Background, candidate: np.ndarray, gradient: np.ndar
     glow = faint & softest
     reached = flood(outside | ((shady | lit) & soft) | glow, outside, ball_px=2, regrow_px=4) & candidate
     return reached
+
+
+def falls_inward(light: np.ndarray, outside: np.ndarray) -> np.ndarray:
+    """Return where ``light`` (H, W) only falls on some way in from ``outside``, up to ``RISE``.
+
+    A cast shadow is darkest where it meets what casts it. What is lighter again behind a dark line is an object: its rim,
+    or the near wall of a transparent one. Grey reconstruction by dilation (Vincent 1993) gives the best way's darkest pixel.
+    """
+    smooth = cv2.GaussianBlur(light, (0, 0), 1.0).astype(np.float32)
+    darkest = np.where(outside, smooth, 0).astype(np.float32)
+    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    while True:
+        grown = np.where(outside, smooth, np.minimum(cv2.dilate(darkest, cross), smooth))
+        if np.array_equal(grown, darkest):
+            return np.asarray(smooth - darkest < RISE)
+        darkest = grown
 
 
 def _without_bounce(tint: np.ndarray, object_ratio: np.ndarray) -> np.ndarray:

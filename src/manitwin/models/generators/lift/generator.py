@@ -43,7 +43,7 @@ class LiftGenerator:
         self._jobs: dict[str, _Job] = {}
 
     def submit(self, request: GenerationRequest) -> str:
-        """Make the mesh; raises Unavailable for a text."""
+        """Make the mesh; raises Unavailable for a text, Rejected for what ``lift`` cannot make."""
         if request.rgba is None:
             raise Unavailable(
                 f"lift cannot make a mesh from text ({request.text!r}); give a photo, or choose another generator"

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from manitwin.errors import Rejected
 from manitwin.models.generators.lift.box import DEPTH_SHARE, make_box
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.inflation import inflate
@@ -45,10 +46,20 @@ class Lifted:
 
 
 def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
-    """Lift the object in ``rgba`` (H, W, 4) uint8, whose alpha is its mask, to a solid."""
+    """Lift the object in ``rgba`` (H, W, 4) uint8, whose alpha is its mask, to a solid.
+
+    Raises Rejected ``generator_failed`` for an open container that is not seen from the side: its hollow would be filled.
+    """
     crop = crop_object(rgba, CROP_SIDE_PX)
     silhouette = analyse_silhouette(crop.mask)
     primitive = choose_primitive(silhouette, hint)
+    if hint.container and primitive != "revolution":
+        raise Rejected(
+            "generator_failed",
+            "lift cannot make this open container: its outline is not that of a round one seen from the side, and one outline"
+            " says nothing of the hollow; choose another generator, or give a mesh",
+            "generate",
+        )
     make = {"revolution": _revolved, "box": _boxed, "inflation": _inflated}[primitive]
     surface, rest = make(silhouette, hint)
     surface = normalised(surface)
