@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.executors.local import StageStarted
     from manitwin.loaded_twin import Twin
     from manitwin.pipeline import ItemResult
+    from manitwin.twin import TwinRecord
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,12 @@ class BuildReport:
     def count(self, status: str) -> int:
         """Return how many items ended as 'accepted', 'rejected' or 'unfinished'."""
         return sum(result.status == status for result in self.results)
+
+    def records(self) -> Iterator[TwinRecord]:
+        """Read the records of the accepted twins, one after the other."""
+        from manitwin.store import read_record
+
+        return (read_record(r.folder) for r in self.results if r.status == "accepted" and r.folder is not None)
 
     @property
     def exit_code(self) -> int:

@@ -62,6 +62,7 @@ def build(
     from manitwin.api import build as build_twins
     from manitwin.progress import BuildProgress
     from manitwin.render.device import require_renderer
+    from manitwin.run_summary import grasp_lines, summarize_grasps
 
     require_renderer()
     progress = BuildProgress(out_console, err_console)
@@ -88,6 +89,8 @@ def build(
         err_console.print(remark, markup=False)
     accepted, rejected, unfinished = (report.count(s) for s in ("accepted", "rejected", "unfinished"))
     out_console.print(f"{accepted} accepted, {rejected} rejected, {unfinished} unfinished, in {out}", markup=False)
+    for line in grasp_lines(summarize_grasps(report.records())):
+        out_console.print(line, markup=False)
     if unfinished:
         err_console.print("run the same command again to go on where it stopped", markup=False)
     raise typer.Exit(report.exit_code)

@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import cast
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from manitwin.errors import ConfigError, choose_from
@@ -108,6 +108,15 @@ class RobustnessConfig(Section):
     fragile_share: float = Field(default=0.5, gt=0, lt=1)
     error: float = Field(default=0.1, gt=0, lt=0.5)
     max_trials: int = Field(default=10, ge=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> RobustnessConfig:
+        for name, (low, high) in (("friction", self.friction), ("force", self.force)):
+            if not 0 < low <= high:
+                raise ValueError(f"{name} is a factor's lowest and highest value, above 0; it is {low:g} to {high:g}")
+        if not self.fragile_share < self.robust_share:
+            raise ValueError(f"fragile_share {self.fragile_share:g} is not below robust_share {self.robust_share:g}")
+        return self
 
 
 class GateConfig(Section):

@@ -27,6 +27,7 @@ from manitwin.stages.finish import FinishStage
 from manitwin.stages.gate import GateStage
 from manitwin.stages.generate import GenerateStage
 from manitwin.stages.grasps import GraspsStage
+from manitwin.stages.gripper_kinds import KINDS
 from manitwin.stages.mesh import MeshStage
 from manitwin.stages.photo import PhotoStage
 from manitwin.stages.physical import PhysicalStage
@@ -99,14 +100,16 @@ def _grippers(config: BuildConfig) -> list[tuple[Gripper, str]]:
 
 def _trials(gripper: Gripper, suffix: str, config: BuildConfig) -> list[Stage]:
     """Return the stages that propose and try the grasps of one gripper."""
-    simulator = create("simulator", config.simulator)
+    kind = KINDS[gripper.kind]
+    simulator = create("simulator", kind.simulator(config))
     stages: list[Stage] = [
-        GraspsStage(config.grasps, create("grasper", config.grasper), gripper, suffix),
+        GraspsStage(config.grasps, create("grasper", kind.grasper(config)), gripper, suffix),
         VerifyStage(config.verify, simulator, gripper, suffix),
     ]
-    if config.second_opinion.enabled:
-        second = create("simulator", config.second_simulator)
-        stages.append(SecondOpinionStage(config.second_opinion, config.verify, simulator, second, gripper, suffix))
+    second = kind.second_simulator(config)
+    if config.second_opinion.enabled and second is not None:
+        other = create("simulator", second)
+        stages.append(SecondOpinionStage(config.second_opinion, config.verify, simulator, other, gripper, suffix))
     if config.robustness.enabled:
         stages.append(RobustnessStage(config.robustness, config.verify, simulator, gripper, suffix))
     return stages
@@ -120,8 +123,12 @@ def _generation(kind: Kind, config: BuildConfig) -> list[Stage]:
 
 
 def config_sha256(config: BuildConfig) -> str:
-    """Return the digest of everything in the configuration but the seed, which a twin states by itself."""
-    return sha256_of_json(config.model_dump(mode="json", exclude={"seed"}))
+    """Return the digest of everything in the configuration but the seed, which a twin states by itself.
+
+    Grippers count by their content: a changed file is another configuration.
+    """
+    grippers = [gripper.sha256 for gripper, _ in _grippers(config)]
+    return sha256_of_json({**config.model_dump(mode="json", exclude={"seed"}), "grippers": grippers})
 
 
 def finished_record(folder: Path, config: BuildConfig) -> TwinRecord | None:

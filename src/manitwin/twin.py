@@ -257,7 +257,11 @@ class SecondOpinion(Record):
 
 
 class RobustnessSummary(Record):
-    """What the held grasps were put through again, and how many survive: ``median`` and ``robust`` are over grasps."""
+    """What the held grasps were put through again, and how many survive.
+
+    ``median`` is that of the grasps' shares; ``robust`` counts those that rather hold in ``robust_share`` of the cases than
+    in ``fragile_share`` (the sequential test's verdict).
+    """
 
     pose_m: Finite
     pose_deg: Finite
@@ -270,6 +274,7 @@ class RobustnessSummary(Record):
     median: Unit
     robust: int
     robust_share: Unit
+    fragile_share: Unit
 
 
 class FailureTable(Record):

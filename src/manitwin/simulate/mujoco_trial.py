@@ -14,19 +14,20 @@ import mujoco
 import numpy as np
 
 from manitwin.geometry.poses import inverse, quaternion_wxyz
-from manitwin.simulate.gripper import Gripper
-from manitwin.simulate.rigid_body import RigidBody, principal_frame
+from manitwin.simulate.gripper import Gripper, of_kind
+from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.simulate.mujoco_body import OBJECT, STIFF_SOLREF, add_object, contact_parameters
+from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.shared_target import SharedTarget
 from manitwin.simulate.trial import TrialResult, TrialSettings
 from manitwin.simulate.trial_phases import HandContacts, run_phases
 
 TIMESTEP_S, STEPS_PER_FRAME = 0.002, 8
 IMPEDANCE_RATIO, NO_SLIP_ITERATIONS = 10.0, 5
-CONTACT_SOLREF = (0.005, 1.0)
-TORSIONAL_FRICTION_M, ROLLING_FRICTION_M = 0.005, 1e-4  # MuJoCo's own defaults
 FINGER_MASS_KG = 0.1
+MET_M = -0.001  # contacts and finger stops are soft: of 50 N they give half a millimetre on each side
 MAX_DRIVE_FORCE = 4.0  # as a multiple of the closing force: it never cuts the closing force itself
-OBJECT, FINGERS = "object", ("finger_plus", "finger_minus")
+FINGERS = ("finger_plus", "finger_minus")
 
 
 class MujocoTrial:
@@ -35,16 +36,21 @@ class MujocoTrial:
     name = "mujoco"
 
     def run(
-        self, body: RigidBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
+        self,
+        body: RigidBody,
+        gripper: Gripper,
+        gripper_to_object: np.ndarray,
+        settings: TrialSettings,
+        joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
         """Try the grasps ``gripper_to_object (N, 4, 4)``; of ``settings``, the engine's own numbers are the frozen ones."""
         if not len(gripper_to_object):
             return []
-        settings = frozen(settings)
-        model = _model(body, gripper, settings)
+        settings, hand = frozen(settings), of_kind(gripper, ParallelGripper)
+        model = _model(body, hand, settings)
         results = []
         for object_to_hand in (inverse(pose) for pose in gripper_to_object):
-            scene = _Scene(model, gripper, object_to_hand, settings)
+            scene = _Scene(model, hand, object_to_hand, settings)
             results.append(run_phases(scene, object_to_hand[:3, :3], settings))
         return results
 
@@ -63,9 +69,11 @@ def frozen(settings: TrialSettings) -> TrialSettings:
 class _Scene:
     """One grasp in one scene; its frame is the hand's. The load is the scene's gravity, which the fingers do not feel."""
 
-    def __init__(self, model: mujoco.MjModel, gripper: Gripper, object_to_hand: np.ndarray, settings: TrialSettings):
+    def __init__(
+        self, model: mujoco.MjModel, gripper: ParallelGripper, object_to_hand: np.ndarray, settings: TrialSettings
+    ):
         self.model, self.data = model, mujoco.MjData(model)
-        self.target = SharedTarget(gripper.opening_m, settings)
+        self.target = SharedTarget(gripper.opening_m, settings, MET_M)
         self.object = model.body(OBJECT).id
         self.fingers = [model.body(name).id for name in FINGERS]
         self.joints = [model.joint(name).qposadr[0] for name in FINGERS]
@@ -86,17 +94,19 @@ class _Scene:
         self.data.ctrl[:] = self.target.move_on(float(self.data.qpos[self.joints].mean()))
 
     def contacts(self) -> HandContacts:
-        """Return how hard the +X and the -X finger press, and the deepest overlap with the hand."""
+        """Return how hard the +X and the -X finger press inwards, and the deepest overlap with the hand."""
         forces, deepest, wrench = [0.0, 0.0], 0.0, np.zeros(6)
         for index, contact in enumerate(self.data.contact):
             bodies = self.model.geom_bodyid[list(contact.geom)]
             if self.object not in bodies:
                 continue
             deepest = max(deepest, -float(contact.dist))
+            towards_object = 1 if bodies[1] == self.object else -1  # the normal points from the first to the second
             for side, finger in enumerate(self.fingers):
                 if finger in bodies:
                     mujoco.mj_contactForce(self.model, self.data, index, wrench)
-                    forces[side] += abs(float(contact.frame[0]) * wrench[0])
+                    push_x = towards_object * float(contact.frame[0] * wrench[0])
+                    forces[side] += push_x * (-1, 1)[side]
         return HandContacts((forces[0], forces[1]), deepest)
 
     def object_rotation(self) -> np.ndarray:
@@ -108,21 +118,22 @@ class _Scene:
         return self.data.xipos[self.object].copy()
 
 
-def _model(body: RigidBody, gripper: Gripper, settings: TrialSettings) -> mujoco.MjModel:
+def _model(body: RigidBody, gripper: ParallelGripper, settings: TrialSettings) -> mujoco.MjModel:
     """Compile hand and object once; contacts take the mean friction, as in SAPIEN (MuJoCo's own rule is the maximum)."""
     spec = mujoco.MjSpec()
     option = spec.option
     option.timestep, option.integrator = settings.timestep_s, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPEDANCE_RATIO
     option.noslip_iterations = NO_SLIP_ITERATIONS
-    friction = [(settings.finger_friction + body.friction_static) / 2, TORSIONAL_FRICTION_M, ROLLING_FRICTION_M]
-    contact = {"friction": friction, "condim": 4, "solref": list(CONTACT_SOLREF)}
+    contact = contact_parameters((settings.finger_friction + body.friction_static) / 2, STIFF_SOLREF)
     _add_hand(spec, gripper, settings, contact)
-    _add_object(spec, body, contact)
+    add_object(spec, body, contact)
     return spec.compile()
 
 
-def _add_hand(spec: mujoco.MjSpec, gripper: Gripper, settings: TrialSettings, contact: dict[str, object]) -> None:
+def _add_hand(
+    spec: mujoco.MjSpec, gripper: ParallelGripper, settings: TrialSettings, contact: dict[str, object]
+) -> None:
     boxes, first, count = gripper.boxes(0.0), len(gripper.palm_boxes), len(gripper.finger_boxes)
     bodies = [(spec.worldbody, boxes[:first])]
     for side, name in enumerate(FINGERS):
@@ -149,15 +160,3 @@ def _add_hand(spec: mujoco.MjSpec, gripper: Gripper, settings: TrialSettings, co
                 conaffinity=2,
                 **contact,
             )
-
-
-def _add_object(spec: mujoco.MjSpec, body: RigidBody, contact: dict[str, object]) -> None:
-    moments, axes = principal_frame(body.inertia_kg_m2)
-    thing = spec.worldbody.add_body(name=OBJECT)
-    thing.add_freejoint(name=OBJECT)
-    thing.mass, thing.inertia, thing.explicitinertial = body.mass_kg, moments, True
-    thing.ipos, thing.iquat = body.center_of_mass_m, quaternion_wxyz(axes)
-    for number, hull in enumerate(body.hulls):
-        name = f"hull_{number:02d}"
-        spec.add_mesh(name=name, uservert=np.asarray(hull, np.float32).ravel())
-        thing.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, contype=2, conaffinity=1, **contact)

@@ -11,6 +11,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+ROUNDING = 1e-9  # of the sums of logarithms: a ratio that reaches the bound exactly is beyond it
+
 
 @dataclass(frozen=True)
 class SequentialTest:
@@ -20,6 +22,21 @@ class SequentialTest:
     fragile_share: float
     error: float
     max_trials: int
+
+    def log_ratio(self, held: int, trials: int) -> float:
+        """Return the logarithm of how much likelier ``held`` of ``trials`` is for a robust grasp than for a fragile one."""
+        gain = math.log(self.robust_share / self.fragile_share)
+        loss = math.log((1 - self.robust_share) / (1 - self.fragile_share))
+        return held * gain + (trials - held) * loss
+
+    def is_clear(self, held: int, trials: int) -> bool:
+        """Tell whether no further trial is needed."""
+        bound = math.log((1 - self.error) / self.error)
+        return trials >= self.max_trials or abs(self.log_ratio(held, trials)) >= bound - ROUNDING
+
+    def is_robust(self, held: int, trials: int) -> bool:
+        """Tell whether what was seen is likelier for a robust grasp; also where ``max_trials`` ended it undecided."""
+        return self.log_ratio(held, trials) > 0
 
 
 @dataclass(frozen=True)
@@ -42,14 +59,9 @@ class Robustness:
 
 def try_until_clear(holds: Callable[[int], bool], test: SequentialTest) -> Robustness:
     """Call ``holds(0)``, ``holds(1)``, ... until the test is settled or ``max_trials`` are done."""
-    gain = math.log(test.robust_share / test.fragile_share)
-    loss = math.log((1 - test.robust_share) / (1 - test.fragile_share))
-    bound = math.log((1 - test.error) / test.error)
-    ratio, held = 0.0, 0
+    held = 0
     for number in range(test.max_trials):
-        success = holds(number)
-        held += success
-        ratio += gain if success else loss
-        if abs(ratio) >= bound:
-            return Robustness(held, number + 1)
-    return Robustness(held, test.max_trials)
+        held += holds(number)
+        if test.is_clear(held, number + 1):
+            break
+    return Robustness(held, number + 1)

@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.stages.object_arrays import JOINTS
 
 JITTERED = ":jittered"
 SCHEMA = pa.schema(
@@ -34,6 +35,7 @@ SCHEMA = pa.schema(
         ("robustness", pa.float64()),
         ("robustness_trials", pa.int32()),
         ("retired", pa.bool_()),
+        *((name, pa.list_(pa.float64())) for name in JOINTS),
     ]
 )
 FROM_PROPOSALS = (
@@ -77,7 +79,12 @@ class GripperRows:
             "robustness": [self.robustness[i] for i in order],
             "robustness_trials": [self.robustness_trials[i] for i in order],
             "retired": [False] * len(order),
+            **{name: self._joints(name, order) for name in JOINTS},
         }
+
+    def _joints(self, name: str, order: np.ndarray) -> list[Any]:
+        """Return the joints of hands with more than one, null for the others."""
+        return self.proposals[name][order].tolist() if name in self.proposals else [None] * len(order)
 
 
 def write_grasp_table(path: Path, parts: list[dict[str, list[Any]]]) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from manitwin.config import SecondOpinionConfig
+from manitwin.errors import Rejected
 from manitwin.geometry.grasp_diversity import approach_octants
 from manitwin.simulate.gripper import Gripper
 from manitwin.stages.grasp_table import JITTERED, GripperRows, write_grasp_table
@@ -45,7 +46,7 @@ class RecordGraspsStage:
         )
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write the table and return the summary."""
+        """Write the table and return the summary; raises Rejected where engines must agree and do so on no grasp."""
         types = {point["id"]: point["type"] for point in draft.field("points")["grasp"]}
         labels = {point["id"]: point["label"] for point in draft.field("points")["functional"]}
         parts: list[dict[str, list[Any]]] = []
@@ -56,6 +57,8 @@ class RecordGraspsStage:
             parts += [rows.columns(_best_first(rows)), *controls]
             summaries.append(_summary(draft, gripper, suffix, rows, types, labels))
             chosen = (rows.outcome == "held") & ~_unfiltered(rows)
+            if self.settings.require_agreement and not suffix and not chosen.any():
+                raise _none_agreed(draft, rows)
             held_points.append(set(rows.proposals["grasp_point_id"][chosen].tolist()))
         write_grasp_table(folder / TABLE, parts)
         others = {
@@ -102,6 +105,14 @@ class RecordGraspsStage:
             ids,
         )
         return rows, controls
+
+
+def _none_agreed(draft: Draft, rows: GripperRows) -> Rejected:
+    """Say what became in the second engine of all that held in the first."""
+    held = (_arrays(draft, VERDICTS.format(""))["outcome"] == "held") & ~_unfiltered(rows)
+    counted = ", ".join(f"{n} {outcome}" for outcome, n in sorted(Counter(rows.outcome[held].tolist()).items()))
+    engine, second = (draft.field(name.format(""))["engine"] for name in (TRIAL, AGREEMENT))
+    return Rejected("none_held", f"of {held.sum()} grasps that held in {engine} none holds in {second}: {counted}")
 
 
 def _arrays(draft: Draft, name: str) -> dict[str, np.ndarray]:

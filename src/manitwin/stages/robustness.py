@@ -13,7 +13,7 @@ from manitwin.simulate.perturbation import Spread, draw_perturbations
 from manitwin.simulate.robustness import Robustness, SequentialTest, try_until_clear
 from manitwin.simulate.trial import GraspTrial
 from manitwin.stages.grasps import PROPOSALS, UNFILTERED
-from manitwin.stages.object_arrays import load_body
+from manitwin.stages.object_arrays import joints_of, load_body
 from manitwin.stages.stage import Draft, Resource
 from manitwin.stages.verify import VERDICTS, trial_settings
 from manitwin.twin import RobustnessSummary
@@ -38,7 +38,7 @@ class RobustnessStage:
         self.name = f"robustness{suffix}"
         self.proposals, self.verdicts = PROPOSALS.format(suffix), VERDICTS.format(suffix)
         self.file, self.field = ROBUSTNESS_FILE.format(suffix), ROBUSTNESS.format(suffix)
-        self.reads: tuple[str, ...] = (self.proposals, self.verdicts, "hulls.npz", "physical")
+        self.reads: tuple[str, ...] = (self.proposals, self.verdicts, "solid.npz", "hulls.npz", "physical")
         self.writes: tuple[str, ...] = (self.file, self.field)
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
@@ -47,6 +47,7 @@ class RobustnessStage:
             poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
             chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
             good = np.flatnonzero((verdicts["outcome"] == "held") & chosen)
+            joints = joints_of(proposals, np.arange(len(poses)))
         spread = self._spread(draft.field("physical"))
         draws = draw_perturbations(spread, self.settings.max_trials, draft.seed)
         body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
@@ -55,7 +56,9 @@ class RobustnessStage:
         def survives(index: int, number: int) -> bool:
             draw, other_body, other_settings = variants[number]
             pose = draw.grasp(poses[index], float(depth_m[index]))
-            return self.trial.run(other_body, self.gripper, pose[None], other_settings)[0].outcome == "held"
+            closing = {name: values[index : index + 1] for name, values in joints.items()}
+            result = self.trial.run(other_body, self.gripper, pose[None], other_settings, **closing)[0]
+            return result.outcome == "held"
 
         test = SequentialTest(
             self.settings.robust_share, self.settings.fragile_share, self.settings.error, self.settings.max_trials
@@ -65,7 +68,7 @@ class RobustnessStage:
             answer = try_until_clear(lambda number, index=index: survives(index, number), test)  # type: ignore[misc]
             held[index], trials[index] = answer.held, answer.trials
         np.savez(folder / self.file, held=held, trials=trials)
-        return {self.field: self._summary(spread, held[good], trials[good]).model_dump(mode="json")}
+        return {self.field: self._summary(spread, test, held[good], trials[good]).model_dump(mode="json")}
 
     def _spread(self, physical: dict[str, Any]) -> Spread:
         settings, mass = self.settings, physical["mass_kg"]
@@ -78,16 +81,16 @@ class RobustnessStage:
             center_of_mass_m=physical["center_of_mass_uncertainty_m"],
         )
 
-    def _summary(self, spread: Spread, held: np.ndarray, trials: np.ndarray) -> RobustnessSummary:
+    def _summary(self, spread: Spread, test: SequentialTest, held: np.ndarray, trials: np.ndarray) -> RobustnessSummary:
         share = held / np.maximum(trials, 1)
-        robust = int((share >= self.settings.robust_share).sum())
         return RobustnessSummary(
             **vars(spread),
             max_trials=self.settings.max_trials,
             trials=int(trials.sum()),
             median=float(np.median(share)) if len(share) else 0.0,
-            robust=robust,
+            robust=sum(test.is_robust(int(h), int(n)) for h, n in zip(held, trials, strict=True)),
             robust_share=self.settings.robust_share,
+            fragile_share=self.settings.fragile_share,
         )
 
 

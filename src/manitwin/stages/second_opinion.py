@@ -13,7 +13,7 @@ from manitwin.simulate.gripper import Gripper
 from manitwin.simulate.jitter import jittered
 from manitwin.simulate.trial import GraspTrial, TrialResult
 from manitwin.stages.grasps import PROPOSALS, UNFILTERED
-from manitwin.stages.object_arrays import load_body
+from manitwin.stages.object_arrays import joints_of, load_body
 from manitwin.stages.stage import Draft, Resource
 from manitwin.stages.verify import VERDICTS, trial_settings
 from manitwin.twin import SecondOpinion as SecondOpinionRecord
@@ -52,7 +52,7 @@ class SecondOpinionStage:
         self.name = f"second_opinion{suffix}"
         self.proposals, self.verdicts = PROPOSALS.format(suffix), VERDICTS.format(suffix)
         self.file, self.field = SECOND_OPINION.format(suffix), AGREEMENT.format(suffix)
-        self.reads: tuple[str, ...] = (self.proposals, self.verdicts, "hulls.npz", "physical")
+        self.reads: tuple[str, ...] = (self.proposals, self.verdicts, "solid.npz", "hulls.npz", "physical")
         self.writes: tuple[str, ...] = (self.file, self.field)
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
@@ -61,6 +61,7 @@ class SecondOpinionStage:
             poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
             chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
             held = verdicts["outcome"] == "held"
+            joints = joints_of(proposals, np.arange(len(poses)))
         rng = np.random.default_rng([draft.seed, JITTER_STREAM])
         good, bad = np.flatnonzero(held & chosen), np.flatnonzero(~held & chosen)
         some_bad = np.sort(rng.permutation(bad)[: round(self.settings.share_of_failed * len(bad))])
@@ -70,8 +71,16 @@ class SecondOpinionStage:
         )
         body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
         tried = np.concatenate([good, some_bad])
-        again = self.second.run(body, self.gripper, np.concatenate([poses[tried], moved]), settings)
-        first = self.first.run(body, self.gripper, moved, settings)
+        again = self.second.run(
+            body,
+            self.gripper,
+            np.concatenate([poses[tried], moved]),
+            settings,
+            **{name: values[np.concatenate([tried, of])] for name, values in joints.items()},
+        )
+        first = self.first.run(
+            body, self.gripper, moved, settings, **{name: values[of] for name, values in joints.items()}
+        )
         holds, outcome = np.full(len(poses), NOT_TRIED, np.int8), np.full(len(poses), "", "U16")
         holds[tried] = [result.outcome == "held" for result in again[: len(tried)]]
         outcome[tried] = [result.outcome for result in again[: len(tried)]]

@@ -12,9 +12,9 @@ from manitwin.errors import Rejected
 from manitwin.simulate.gripper import Gripper
 from manitwin.simulate.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.stages.grasps import PROPOSALS, UNFILTERED
-from manitwin.stages.object_arrays import load_body
+from manitwin.stages.gripper_kinds import KINDS
+from manitwin.stages.object_arrays import joints_of, load_body
 from manitwin.stages.stage import Draft, Resource
-from manitwin.stages.why_none import why_none_held
 from manitwin.twin import Trial
 
 VERDICTS = "verdicts{}.npz"
@@ -38,7 +38,7 @@ class VerifyStage:
         self.model: str | None = f"{gripper.name} {gripper.sha256[:12]}"
         self.name = f"verify{suffix}"
         self.proposals, self.verdicts, self.trial_field = (n.format(suffix) for n in (PROPOSALS, VERDICTS, TRIAL))
-        self.reads: tuple[str, ...] = (self.proposals, "hulls.npz", "physical")
+        self.reads: tuple[str, ...] = (self.proposals, "solid.npz", "hulls.npz", "physical")
         self.writes: tuple[str, ...] = (self.verdicts, self.trial_field)
         self.may_reject = not suffix
 
@@ -46,12 +46,14 @@ class VerifyStage:
         """Write the verdicts and return the field ``trial``; raises Rejected where no grasp held."""
         with np.load(draft.path(self.proposals)) as arrays:
             poses, depth_m, proposer = (arrays[n] for n in ("gripper_to_object", "depth_m", "proposer"))
+            joints = joints_of(arrays, np.arange(len(poses)))
         body, settings = load_body(draft), trial_settings(self.settings, self.gripper)
-        results = self.trial.run(body, self.gripper, poses, settings)
+        results = self.trial.run(body, self.gripper, poses, settings, **joints)
         chosen = np.flatnonzero(~np.char.endswith(proposer, UNFILTERED))
         if self.may_reject and not any(results[i].outcome == "held" for i in chosen):
             tried = [results[i] for i in chosen]
-            raise Rejected("none_held", why_none_held(tried, poses[chosen], depth_m[chosen], body, settings))
+            why = KINDS[self.gripper.kind].why_none_held
+            raise Rejected("none_held", why(tried, poses[chosen], depth_m[chosen], body, settings))
         save_results(folder / self.verdicts, results)
         return {self.trial_field: describe(self.trial, settings, body.friction_static).model_dump(mode="json")}
 

@@ -19,9 +19,7 @@ def why_none_held(
     body: RigidBody,
     settings: TrialSettings,
 ) -> str:
-    """Say how often which outcome came, then whether friction is too little or the centre of mass out of reach."""
-    failures = Counter(result.outcome for result in results)
-    counted = ", ".join(f"{count} {outcome}" for outcome, count in sorted(failures.items()))
+    """Say how often which outcome came, then whether jaws have too little friction or the centre of mass is out of reach."""
     friction = (settings.finger_friction + body.friction_static) / 2
     needed_n = body.mass_kg * (GRAVITY_M_S2 + PEAK_SLIDE_ACCELERATION_M_S2)
     carried_n = 2 * friction * settings.force_n
@@ -40,7 +38,14 @@ def why_none_held(
                 f"centre of mass out of reach: {1000 * lever_m:.0f} mm from the nearest grip, whose pads carry "
                 f"{1 / ratio:.2f} of the torque"
             )
-    return "; ".join([f"none of {len(results)} simulated grasps held: {counted}", *reasons])
+    return "; ".join([outcomes_of(results), *reasons])
+
+
+def outcomes_of(results: list[TrialResult]) -> str:
+    """Say how often which outcome came."""
+    failures = Counter(result.outcome for result in results)
+    counted = ", ".join(f"{count} {outcome}" for outcome, count in sorted(failures.items()))
+    return f"none of {len(results)} simulated grasps held: {counted}"
 
 
 def nearest_lever_m(gripper_to_object: np.ndarray, depth_m: np.ndarray, center_of_mass_m: np.ndarray) -> float:
