@@ -1,6 +1,6 @@
 """Build a twin of every mesh of a data folder and print what came of it, and what it cost.
 
-    python benchmarks/build_meshes.py DATA OUT [--jobs N] [--only NAME,NAME]
+    python benchmarks/build_meshes.py DATA OUT [--jobs N] [--only NAME,NAME] [--quick]
 
 DATA holds ``manifest.csv`` with the columns file, kind and category; meshes are taken as metric, named by their category.
 Objects without a twin or a grasp count as 0 of 100. CPU seconds are those of the worker, by stage, as run.json keeps them.
@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import manitwin
+from manitwin.run_summary import grasp_lines, summarize_grasps
 from manitwin.store import read_record
 
 GRASPS_WANTED = 100
@@ -92,7 +93,7 @@ def print_summary(figures: list[dict]) -> None:
 def print_seconds(name: str, seconds: list[float]) -> None:
     """Print how CPU seconds are spread."""
     ninetieth = np.percentile(seconds, 90)
-    print(f"  {name:12s} median {np.median(seconds):6.2f}  p90 {ninetieth:6.2f}  max {max(seconds):6.2f} CPU-s")
+    print(f"  {name:14s} median {np.median(seconds):6.2f}  p90 {ninetieth:6.2f}  max {max(seconds):6.2f} CPU-s")
 
 
 def main() -> None:
@@ -103,14 +104,20 @@ def main() -> None:
     parser.add_argument("--kind", choices=["mesh", "photo"], default="mesh")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--only", default="")
+    parser.add_argument("--quick", action="store_true", help="without second engine and robustness")
     arguments = parser.parse_args()
     only = set(filter(None, arguments.only.split(",")))
     manifest = write_manifest(arguments.data, arguments.out, arguments.kind, only)
     report = manitwin.build(
-        manifest, arguments.out / "twins", jobs=arguments.jobs, on_result=lambda r: print(".", end="", flush=True)
+        manifest,
+        arguments.out / "twins",
+        jobs=arguments.jobs,
+        quick=arguments.quick,
+        on_result=lambda r: print(".", end="", flush=True),
     )
     print()
     print_summary(print_table(report.results, arguments.kind))
+    print(*grasp_lines(summarize_grasps(report.records())), sep="\n")
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ python docs/make_configuration.py --check    exits 1 where the page differs
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 from typing import cast
@@ -46,6 +47,8 @@ def rows(model: type[BaseModel], prefix: str = "") -> list[str]:
 
 def _default(field: FieldInfo) -> str:
     value = field.default
+    if isinstance(value, tuple):
+        return json.dumps(value)
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 

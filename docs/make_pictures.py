@@ -1,7 +1,7 @@
-"""Make the pictures of the documentation: ``python docs/make_pictures.py`` writes docs/frames.png and docs/cards.png.
+"""Make the pictures of the documentation: ``python docs/make_pictures.py`` writes frames.png, cards.png, grippers.png.
 
 frames.png shows every frame of a twin on one mug: the object frame, the grasp frame, the plane of a placement, and the
-axes that a GLB file has. cards.png shows the cards of the two samples.
+axes that a GLB file has. cards.png shows the cards of the two samples, grippers.png every shipped gripper on the mug.
 """
 
 from __future__ import annotations
@@ -22,13 +22,18 @@ from manitwin.render.gripper_fork import gripper_body
 from manitwin.render.raycast import merged
 from manitwin.render.renderer import shared_renderer
 from manitwin.render.surfaces import plain_part
-from manitwin.simulate.gripper import Gripper, load_gripper
+from manitwin.simulate.gripper import Gripper, load_gripper, shipped_grippers
+from manitwin.simulate.hand_collision import HandCollision
+from manitwin.simulate.hands.multi_finger import MultiFingerGripper
+from manitwin.simulate.hands.suction import SuctionGripper
 
 DOCS = Path(__file__).resolve().parent
 MUG = DOCS.parent / "samples" / "mug.glb"
 AXIS_COLORS = ((214, 48, 49), (39, 150, 70), (32, 98, 210))
 AXIS_M = 0.07
 WIDTH, HEIGHT = 1500, 940
+TILE = 440
+FINGER_COLORS = ((120, 128, 144), (196, 92, 60), (84, 134, 200), (76, 160, 116), (196, 158, 66))
 INK, GREY = (24, 28, 36), (96, 104, 116)
 
 GRASP_TEXT = """Grasp frame
@@ -173,6 +178,76 @@ def _gltf_inset(draw: ImageDraw.ImageDraw, camera: Camera) -> None:
     draw.text((1180, 298), "is glTF (x, z, -y)", fill=GREY, font=_font(18))
 
 
+def grippers_picture() -> Image.Image:
+    """Draw every shipped gripper as it holds the mug, at one scale."""
+    parts = mug()
+    whole = merged(parts)
+    drawn = [(name, _held(load_gripper(name), whole)) for name in shipped_grippers()]
+    corners = [hand.vertices for _, hands in drawn for hand in hands]
+    camera = framing_camera(
+        np.concatenate([whole.vertices, *corners]),
+        azimuth_deg=-50.0,
+        elevation_deg=22.0,
+        fov_y_deg=22.0,
+        width_px=TILE,
+        height_px=TILE,
+    )
+    picture = Image.new("RGB", (TILE * len(drawn), TILE), "white")
+    draw = ImageDraw.Draw(picture)
+    for index, (name, hands) in enumerate(drawn):
+        scene = [*parts, *(plain_part(h, c) for h, c in zip(hands, FINGER_COLORS, strict=False))]
+        picture.paste(
+            Image.fromarray(shared_renderer().render(scene, [camera], background=(255, 255, 255))[0].rgb),
+            (TILE * index, 0),
+        )
+        draw.text((TILE * (index + 0.5), 30), name, fill=INK, font=_font(22), anchor="ms")
+    return picture
+
+
+def _held(gripper: Gripper, whole: trimesh.Trimesh) -> list[trimesh.Trimesh]:
+    """Return a gripper's parts where it holds the mug: jaws at the rim, a cup and a hand at the side without a handle."""
+    radius, height = float(whole.extents[1]) / 2, float(whole.extents[2])
+    if isinstance(gripper, SuctionGripper):
+        lip = trimesh.creation.cone(gripper.lip_radius_m, 0.02, sections=64)
+        lip.apply_transform(transform(np.diag([1.0, -1, -1]), np.array([0, 0, gripper.tip_depth_m])))
+        pose = _from_the_side(-radius - gripper.tip_depth_m, height / 2)
+        return [gripper_body(gripper.boxes(0.0)).apply_transform(pose), lip.apply_transform(pose)]
+    if isinstance(gripper, MultiFingerGripper):
+        return _held_in_hand(gripper, whole, radius, height)
+    pose, width_m = rim_grasp(gripper, whole.extents, whole)
+    return [gripper_body(gripper.boxes(width_m)).apply_transform(pose)]
+
+
+def _from_the_side(x: float, z: float) -> np.ndarray:
+    """Return a grasp's pose with its origin at (x, 0, z), that approaches along +X and closes along Y."""
+    return transform(np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), np.array([x, 0, z]))
+
+
+def _held_in_hand(
+    hand: MultiFingerGripper, whole: trimesh.Trimesh, radius: float, height: float
+) -> list[trimesh.Trimesh]:
+    """Close the first posture around the mug's body until it touches."""
+    body = HandCollision((np.array(trimesh.creation.cylinder(radius, height, sections=48).vertices),))
+    posture = hand.postures[0]
+    pose = _from_the_side(-radius - hand.palm_front_m - 0.006, 0.0)
+    opening_m = posture.openings_m[-1]
+    while not body.boxes_overlap(hand.boxes_at(posture.joints_at(np.array(opening_m))), pose[None], 0.0)[0]:
+        opening_m -= 0.001
+    links = hand.link_poses(posture.joints_at(np.array(opening_m)))
+    fingers: list[list[trimesh.Trimesh]] = [[] for _ in range(len(hand.fingers) + 1)]
+    for link, link_to_gripper, finger in zip(hand.links, links, hand.finger_of_link, strict=True):
+        for shape in link.shapes:
+            ball = shape.radius_m is not None
+            part = (
+                trimesh.creation.icosphere(3, shape.radius_m)
+                if ball
+                else trimesh.creation.box(2 * shape.half_extents_m)
+            )
+            lifted = transform(translation=np.array([0, 0, height / 2]))
+            fingers[finger + 1].append(part.apply_transform(lifted @ pose @ link_to_gripper @ shape.shape_to_link))
+    return [merged(some) for some in fingers]
+
+
 def cards_picture() -> Image.Image:
     """Build the project's own samples and put their cards under one another."""
     with tempfile.TemporaryDirectory() as folder:
@@ -188,4 +263,5 @@ def cards_picture() -> Image.Image:
 
 if __name__ == "__main__":
     frames_picture().save(DOCS / "frames.png", optimize=True)
+    grippers_picture().save(DOCS / "grippers.png", optimize=True)
     cards_picture().save(DOCS / "cards.png", optimize=True)

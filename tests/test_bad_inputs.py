@@ -32,6 +32,7 @@ REJECTED = {
     "zero_faces.obj": ("input", {"no_faces"}, "face"),
     "scene_four_objects.glb": ("gate", {"several_objects"}, "4"),
 }
+FEW_GRASPS = manitwin.config.BuildConfig(grasps={"simulated": 10, "unfiltered": 2})
 NAMES = {
     "cmyk.jpg": "fork",
     "gray16.png": "flashlight",
@@ -61,8 +62,7 @@ def results(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict
     rows += [(shared_data / "meshes" / "toy_dinosaur" / "dinosaur_figure.obj", "toy")]
     manifest = folder / "manifest.csv"
     manifest.write_text("file,name\n" + "".join(f"{file},{name}\n" for file, name in rows))
-    config = manitwin.config.BuildConfig(grasps={"simulated": 10, "unfiltered": 2})
-    report = manitwin.build(manifest, folder / "out", config=config)
+    report = manitwin.build(manifest, folder / "out", config=FEW_GRASPS, quick=True)
     assert report.count("unfinished") == 0, [r.detail for r in report.results if r.status == "unfinished"]
     left = {p.name for p in (folder / "out").iterdir()} - {".work"}
     assert left == {r.twin_id for r in report.results}, "every input ends in a folder, and nothing else is there"
@@ -169,7 +169,6 @@ def test_a_rejected_input_is_not_tried_again(results: dict[str, ItemResult], sha
     folder = results["one_pixel.png"].folder
     assert folder is not None
     shutil.copytree(folder, tmp_path / folder.name)
-    config = manitwin.config.BuildConfig(grasps={"simulated": 10, "unfiltered": 2})
-    report = manitwin.build(shared_data / "bad" / "one_pixel.png", tmp_path, config=config)
+    report = manitwin.build(shared_data / "bad" / "one_pixel.png", tmp_path, config=FEW_GRASPS, quick=True)
     assert [r.reused for r in report.results] == [True]
     assert json.loads((tmp_path / folder.name / "twin.json").read_text())["status"] == "rejected"

@@ -23,7 +23,12 @@ from manitwin.config import BuildConfig
 from manitwin.loaded_twin import Twin
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"
-QUICK = BuildConfig(grasps={"simulated": 16, "unfiltered": 4})
+QUICK = BuildConfig(
+    grasps={"simulated": 16, "unfiltered": 4}, second_opinion={"enabled": False}, robustness={"enabled": False}
+)
+THOROUGH = BuildConfig(
+    grasps={"simulated": 16, "unfiltered": 4}, second_opinion={"jittered": 6}, robustness={"max_trials": 3}
+)
 
 
 @pytest.fixture(scope="session")
@@ -128,6 +133,71 @@ def test_grasps_load_as_arrays(samples: dict[str, Twin]) -> None:
     assert set(verified.outcome) == {"held"}
 
 
+@pytest.fixture(scope="session")
+def thorough(samples: dict[str, Twin], tmp_path_factory: pytest.TempPathFactory) -> Twin:
+    """The sample mug with both engines, robustness and a second gripper, from the stages that the quick one has run."""
+    out = tmp_path_factory.mktemp("thorough")
+    work = Path(".work") / samples["mesh"].record.twin_id
+    shutil.copytree(samples["mesh"].folder.parent / work, out / work)
+    grippers = ("panda", "wsg50_110")
+    report = manitwin.build(SAMPLES / "mug.glb", out, name="mug", config=THOROUGH, grippers=grippers, **_said("mesh"))
+    assert report.exit_code == 0, [r.detail for r in report.results]
+    return manitwin.load(report.results[0].folder or "", verify=True)
+
+
+def test_thorough_build_asks_a_second_engine_and_tries_held_grasps_again(
+    thorough: Twin, samples: dict[str, Twin]
+) -> None:
+    summary, quick = thorough.record.grasps, samples["mesh"].record.grasps
+    assert summary is not None and quick is not None
+    assert (quick.second_opinion, quick.robustness, quick.other_grippers) == (None, None, {})
+    left_out = {"second_opinion": None, "robustness": None, "other_grippers": {}}
+    assert summary.model_copy(update=left_out) == quick, "nothing else changes"
+    second, robustness = summary.second_opinion, summary.robustness
+    assert second is not None and robustness is not None
+    assert second.engine == "mujoco" and second.held_tried == summary.verified
+    assert second.holds_share is not None and second.holds_share >= 0.9
+    assert second.jittered == 6
+    assert robustness.max_trials == 3
+    assert 2 * summary.verified <= robustness.trials <= 3 * summary.verified
+    mass = thorough.physical.mass_kg
+    assert robustness.mass_kg == (mass.low, mass.high)
+    stages = thorough.record.provenance.stages
+    assert {"second_opinion", "robustness", "verify-wsg50_110", "robustness-wsg50_110"} <= set(stages)
+    assert stages["second_opinion"].backend == "mujoco"
+    assert not {"second_opinion", "robustness"} & set(samples["mesh"].record.provenance.stages)
+
+
+def test_thorough_grasps_are_ranked_and_controls_are_left_out(thorough: Twin) -> None:
+    assert thorough.record.grasps is not None
+    grasps = thorough.grasps()
+    assert len(grasps) == thorough.record.grasps.verified
+    assert not any(":" in proposer for proposer in grasps.columns["proposer"])
+    held = np.round(np.array(grasps.columns["robustness"]) * np.array(grasps.columns["robustness_trials"]))
+    rank = (held + 1) / (np.array(grasps.columns["robustness_trials"]) + 2)
+    assert (np.diff(rank) <= 1e-12).all(), "best first"
+    other = thorough.record.grasps.other_grippers["wsg50_110"]
+    assert other.summary is not None and other.summary.trial.force_n == 80
+    assert len(thorough.grasps(gripper="wsg50_110")) == other.summary.verified >= 1
+    assert 0 <= other.transferred <= other.transferable
+
+
+def test_require_agreement_verifies_only_what_both_engines_hold(thorough: Twin, tmp_path: Path) -> None:
+    work = Path(".work") / thorough.record.twin_id
+    shutil.copytree(thorough.folder.parent / work, tmp_path / work)
+    report = manitwin.build(
+        SAMPLES / "mug.glb", tmp_path, name="mug", config=THOROUGH, require_agreement=True, **_said("mesh")
+    )
+    twin = manitwin.load(report.results[0].folder or "", verify=True)
+    before, after = thorough.record.grasps, twin.record.grasps
+    assert before is not None and after is not None and before.second_opinion is not None
+    assert before.second_opinion.holds_share is not None
+    assert after.verified == round(before.second_opinion.holds_share * before.verified)
+    assert after.verified + sum(after.failures.values()) == after.simulated == 16
+    assert all(twin.grasps().columns["holds_in_second_engine"])
+    assert set(twin.grasps().outcome) == {"held"}
+
+
 def test_numbers_and_their_sources_are_in_the_record(samples: dict[str, Twin]) -> None:
     for twin in samples.values():
         physical = twin.physical
@@ -155,7 +225,7 @@ def test_killed_build_leaves_no_half_twin_and_goes_on(tmp_path: Path) -> None:
     ]
     settings = tmp_path / "quick.toml"
     settings.write_text("[grasps]\nsimulated = 16\nunfiltered = 4\n")
-    command += ["--config", str(settings)]
+    command += ["--config", str(settings), "--quick"]
     process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE)
     deadline = time.monotonic() + 240
     while not list(out.glob(".work/*/collision/*/result.json")) and time.monotonic() < deadline:

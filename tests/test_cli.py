@@ -27,6 +27,8 @@ def one_line(text: str) -> str:
         (("build", "FILE", "-o", "FILE"), "give a folder"),
         (("build", "FILE", "-o", "OUT", "--config", "none.toml"), "none.toml: not there"),
         (("build", "FILE", "-o", "OUT", "--nonsense"), "--nonsense"),
+        (("build", "FILE", "-o", "OUT", "--quick", "--require-agreement"), "quick leaves the second engine out"),
+        (("build", "FILE", "-o", "OUT", "--gripper", "panda", "--gripper", "panda"), "each may be named once"),
         (("show", "OUT"), "no twin.json"),
         (("paint",), "paint"),
     ],
@@ -51,7 +53,7 @@ def test_unknown_setting_names_the_nearest(tmp_path: Path) -> None:
 
 def test_unknown_gripper_is_a_usage_error_before_any_work(tmp_path: Path) -> None:
     (tmp_path / "cup.stl").write_bytes(b"x")
-    (tmp_path / "run.toml").write_text('gripper = "pandas"\n')
+    (tmp_path / "run.toml").write_text('grippers = ["panda", "pandas"]\n')
     done = manitwin("build", tmp_path / "cup.stl", "-o", tmp_path / "out", "--config", tmp_path / "run.toml")
     assert done.returncode == 2
     assert "did you mean 'panda'" in one_line(done.stderr)

@@ -17,6 +17,19 @@ def test_settings_of_a_file_replace_defaults(tmp_path: Path) -> None:
     assert config.seed == 7 and config.candidates.count == 21
 
 
+def test_grippers_second_opinion_and_robustness_are_settings(tmp_path: Path) -> None:
+    text = """grippers = ["panda", "wsg50_110"]
+    [second_opinion]
+    jittered = 5
+    [robustness]
+    friction = [0.8, 1.2]
+    """
+    config = load(tmp_path, text)
+    assert config.grippers == ("panda", "wsg50_110")
+    assert config.second_opinion.jittered == 5 and config.second_opinion.enabled
+    assert config.robustness.friction == (0.8, 1.2)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -25,6 +38,13 @@ def test_settings_of_a_file_replace_defaults(tmp_path: Path) -> None:
         ("seed = 'x'", "seed: "),
         ("item_timeout_s = -1", "item_timeout_s: "),
         ("seed = ", "not TOML"),
+        ("gripper = 'panda'", "did you mean 'grippers'"),
+        ("grippers = []", "grippers: "),
+        ("[robustness]\nfriction = [1.4, 0.6]", "robustness: .*friction"),
+        ("[robustness]\nforce = [0.0, 1.0]", "robustness: .*force"),
+        ("[robustness]\nfragile_share = 0.9", "robustness: .*fragile_share 0.9 is not below robust_share 0.9"),
+        ("[robustness]\nerror = 0.5", "robustness.error: "),
+        ("[second_opinion]\nshare_of_failed = 1.5", "second_opinion.share_of_failed: "),
     ],
 )
 def test_bad_setting_names_key_and_remedy(tmp_path: Path, text: str, message: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.executors.local import StageStarted
     from manitwin.loaded_twin import Twin
     from manitwin.pipeline import ItemResult
+    from manitwin.twin import TwinRecord
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,12 @@ class BuildReport:
     def count(self, status: str) -> int:
         """Return how many items ended as 'accepted', 'rejected' or 'unfinished'."""
         return sum(result.status == status for result in self.results)
+
+    def records(self) -> Iterator[TwinRecord]:
+        """Read the records of the accepted twins, one after the other."""
+        from manitwin.store import read_record
+
+        return (read_record(r.folder) for r in self.results if r.status == "accepted" and r.folder is not None)
 
     @property
     def exit_code(self) -> int:
@@ -46,6 +53,9 @@ def build(
     jobs: int | None = None,
     seed: int | None = None,
     config: BuildConfig | str | Path | None = None,
+    grippers: Iterable[str] | None = None,
+    require_agreement: bool = False,
+    quick: bool = False,
     on_start: Callable[[int], None] = lambda total: None,
     on_stage: Callable[[StageStarted], None] = lambda event: None,
     on_result: Callable[[ItemResult], None] = lambda result: None,
@@ -53,7 +63,9 @@ def build(
     """Build twins from images, meshes, folders and manifests into the folder ``out``.
 
     ``units`` m|cm|mm|auto and ``up`` y|z|auto hold for all inputs whose manifest row does not say otherwise. A finished twin
-    of the same configuration and seed is not built again. Raises UsageError for wrong arguments; what happens to one item is
+    of the same configuration and seed is not built again. ``grippers``: names or .toml files, the first one's grasps are the
+    twin's own. ``require_agreement`` verifies only what a second engine holds too; ``quick`` leaves out second engine and
+    robustness. Raises UsageError for wrong arguments; what happens to one item is
     in the report and never raised.
     """
     from manitwin.config import BuildConfig, load_config
@@ -62,8 +74,7 @@ def build(
     from manitwin.pipeline import check_names
 
     settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
-    if seed is not None:
-        settings = settings.model_copy(update={"seed": seed})
+    settings = _with_flags(settings, seed, grippers, require_agreement, quick)
     if jobs is not None and jobs < 1:
         raise UsageError(f"jobs is {jobs}; give 1 or more")
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
@@ -79,6 +90,24 @@ def build(
         results.append(result)
         on_result(result)
     return BuildReport(results, remarks)
+
+
+def _with_flags(
+    settings: BuildConfig, seed: int | None, grippers: Iterable[str] | None, require_agreement: bool, quick: bool
+) -> BuildConfig:
+    if quick and require_agreement:
+        raise UsageError("quick leaves the second engine out, and require-agreement asks for it; give one of them")
+    update: dict[str, Any] = {} if seed is None else {"seed": seed}
+    if grippers is not None:
+        update["grippers"] = tuple(grippers)
+    if require_agreement:
+        update["second_opinion"] = settings.second_opinion.model_copy(
+            update={"enabled": True, "require_agreement": True}
+        )
+    if quick:
+        update["second_opinion"] = settings.second_opinion.model_copy(update={"enabled": False})
+        update["robustness"] = settings.robustness.model_copy(update={"enabled": False})
+    return settings.model_copy(update=update)
 
 
 def load(folder: str | Path, verify: bool = False) -> Twin:

@@ -48,11 +48,21 @@ def build(
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one a core.")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of everything random; default: the configuration's.")] = None,
     config: Annotated[Path | None, typer.Option(help="A TOML file of settings.")] = None,
+    gripper: Annotated[
+        list[str] | None, typer.Option(help="A gripper to verify for; may be repeated, the first is the twin's own.")
+    ] = None,
+    require_agreement: Annotated[
+        bool, typer.Option("--require-agreement", help="Verify only grasps that both engines hold.")
+    ] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="One engine, one trial a grasp: no second opinion, no robustness.")
+    ] = False,
 ) -> None:
     """Build a verified twin of every input."""
     from manitwin.api import build as build_twins
     from manitwin.progress import BuildProgress
     from manitwin.render.device import require_renderer
+    from manitwin.run_summary import grasp_lines, summarize_grasps
 
     require_renderer()
     progress = BuildProgress(out_console, err_console)
@@ -68,6 +78,9 @@ def build(
             jobs=jobs,
             seed=seed,
             config=config,
+            grippers=gripper or None,
+            require_agreement=require_agreement,
+            quick=quick,
             on_start=progress.start,
             on_stage=progress.stage,
             on_result=progress.result,
@@ -76,6 +89,8 @@ def build(
         err_console.print(remark, markup=False)
     accepted, rejected, unfinished = (report.count(s) for s in ("accepted", "rejected", "unfinished"))
     out_console.print(f"{accepted} accepted, {rejected} rejected, {unfinished} unfinished, in {out}", markup=False)
+    for line in grasp_lines(summarize_grasps(report.records())):
+        out_console.print(line, markup=False)
     if unfinished:
         err_console.print("run the same command again to go on where it stopped", markup=False)
     raise typer.Exit(report.exit_code)

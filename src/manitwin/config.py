@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 from typing import cast
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from manitwin.errors import ConfigError, choose_from
@@ -80,6 +80,43 @@ class VerifyConfig(Section):
     stable_frames: int = Field(default=3, ge=1)
     max_displacement_m: float = Field(default=0.01, gt=0)
     slide_distance_m: float = Field(default=0.1, gt=0)
+
+
+class SecondOpinionConfig(Section):
+    """The same grasps in a second engine: all that held, a share of those that failed, and jittered ones as controls."""
+
+    enabled: bool = True
+    share_of_failed: float = Field(default=0.5, ge=0, le=1)
+    jittered: int = Field(default=20, ge=0)
+    jitter_deg: float = Field(default=20.0, ge=0)
+    jitter_m: float = Field(default=0.012, ge=0)
+    require_agreement: bool = False
+
+
+class RobustnessConfig(Section):
+    """Held grasps tried again under perturbations (uniform), until a sequential test tells robust from fragile ones.
+
+    ``friction`` and ``force`` are factors; mass and centre of mass vary within the twin's own Estimates.
+    """
+
+    enabled: bool = True
+    pose_m: float = Field(default=0.005, ge=0)
+    pose_deg: float = Field(default=5.0, ge=0)
+    friction: tuple[float, float] = (0.6, 1.4)
+    force: tuple[float, float] = (0.5, 1.0)
+    robust_share: float = Field(default=0.9, gt=0, lt=1)
+    fragile_share: float = Field(default=0.5, gt=0, lt=1)
+    error: float = Field(default=0.1, gt=0, lt=0.5)
+    max_trials: int = Field(default=10, ge=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> RobustnessConfig:
+        for name, (low, high) in (("friction", self.friction), ("force", self.force)):
+            if not 0 < low <= high:
+                raise ValueError(f"{name} is a factor's lowest and highest value, above 0; it is {low:g} to {high:g}")
+        if not self.fragile_share < self.robust_share:
+            raise ValueError(f"fragile_share {self.fragile_share:g} is not below robust_share {self.robust_share:g}")
+        return self
 
 
 class GateConfig(Section):
@@ -166,7 +203,8 @@ class BuildConfig(Section):
     annotator: str = "rules"
     grasper: str = "antipodal"
     simulator: str = "sapien"
-    gripper: str = "panda"
+    second_simulator: str = "mujoco"
+    grippers: tuple[str, ...] = Field(default=("panda",), min_length=1)
     item_timeout_s: float = Field(default=1800.0, gt=0)
     matting: MattingConfig = MattingConfig()
     generate: GenerateConfig = GenerateConfig()
@@ -180,6 +218,8 @@ class BuildConfig(Section):
     points: PointsConfig = PointsConfig()
     grasps: GraspConfig = GraspConfig()
     verify: VerifyConfig = VerifyConfig()
+    second_opinion: SecondOpinionConfig = SecondOpinionConfig()
+    robustness: RobustnessConfig = RobustnessConfig()
     placement: PlacementConfig = PlacementConfig()
     finish: FinishConfig = FinishConfig()
 

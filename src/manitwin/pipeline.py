@@ -13,12 +13,12 @@ from typing import Literal
 
 from manitwin.assembly import assemble
 from manitwin.config import BuildConfig
-from manitwin.errors import BackendError, ManiTwinError, Rejected, TwinError
+from manitwin.errors import BackendError, ManiTwinError, Rejected, TwinError, UsageError
 from manitwin.files.sniff import sniff
 from manitwin.files.source_files import MESH_SUFFIXES
 from manitwin.identity import twin_id
 from manitwin.models.registry import create, target
-from manitwin.simulate.gripper import load_gripper
+from manitwin.simulate.gripper import Gripper, load_gripper
 from manitwin.stage_runner import StageCost, run_stage
 from manitwin.stages.candidates import CandidatesStage
 from manitwin.stages.caption import CaptionStage
@@ -27,11 +27,15 @@ from manitwin.stages.finish import FinishStage
 from manitwin.stages.gate import GateStage
 from manitwin.stages.generate import GenerateStage
 from manitwin.stages.grasps import GraspsStage
+from manitwin.stages.gripper_kinds import KINDS
 from manitwin.stages.mesh import MeshStage
 from manitwin.stages.photo import PhotoStage
 from manitwin.stages.physical import PhysicalStage
 from manitwin.stages.placement import PlacementStage
 from manitwin.stages.points import PointsStage
+from manitwin.stages.record_grasps import RecordGraspsStage
+from manitwin.stages.robustness import RobustnessStage
+from manitwin.stages.second_opinion import SecondOpinionStage
 from manitwin.stages.stage import Draft, Item, Stage
 from manitwin.stages.verify import VerifyStage
 from manitwin.stages.views import ViewsStage
@@ -59,13 +63,15 @@ def check_names(config: BuildConfig) -> None:
     """Raise UsageError for a backend or gripper that is not there, before any work is begun."""
     for kind in ("generator", "annotator", "grasper", "simulator"):
         target(kind, getattr(config, kind))
-    load_gripper(config.gripper)
+    target("simulator", config.second_simulator)
+    _grippers(config)
 
 
 def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
     """Return the stages of the paper's pipeline for a kind of input, in order."""
     annotator = create("annotator", config.annotator)
-    gripper = load_gripper(config.gripper)
+    grippers = _grippers(config)
+    first = grippers[0][0]
     return [
         *_generation(kind, config),
         MeshStage(config.mesh),
@@ -75,12 +81,38 @@ def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
         CollisionStage(config.collision),
         CaptionStage(config.caption, annotator),
         CandidatesStage(config.candidates),
-        PointsStage(config.points, annotator, gripper),
-        GraspsStage(config.grasps, create("grasper", config.grasper), gripper),
-        VerifyStage(config.verify, create("simulator", config.simulator), gripper),
+        PointsStage(config.points, annotator, first),
+        *(stage for gripper, suffix in grippers for stage in _trials(gripper, suffix, config)),
+        RecordGraspsStage(config.second_opinion, grippers),
         PlacementStage(config.placement),
-        FinishStage(config.finish, gripper),
+        FinishStage(config.finish, first),
     ]
+
+
+def _grippers(config: BuildConfig) -> list[tuple[Gripper, str]]:
+    """Return the grippers with the suffixes of their artifacts' names; raises UsageError where two have one name."""
+    grippers = [load_gripper(name) for name in config.grippers]
+    names = [gripper.name for gripper in grippers]
+    if len(set(names)) < len(names):
+        raise UsageError(f"grippers {', '.join(names)}: each may be named once")
+    return [(gripper, f"-{gripper.name}" if number else "") for number, gripper in enumerate(grippers)]
+
+
+def _trials(gripper: Gripper, suffix: str, config: BuildConfig) -> list[Stage]:
+    """Return the stages that propose and try the grasps of one gripper."""
+    kind = KINDS[gripper.kind]
+    simulator = create("simulator", kind.simulator(config))
+    stages: list[Stage] = [
+        GraspsStage(config.grasps, create("grasper", kind.grasper(config)), gripper, suffix),
+        VerifyStage(config.verify, simulator, gripper, suffix),
+    ]
+    second = kind.second_simulator(config)
+    if config.second_opinion.enabled and second is not None:
+        other = create("simulator", second)
+        stages.append(SecondOpinionStage(config.second_opinion, config.verify, simulator, other, gripper, suffix))
+    if config.robustness.enabled:
+        stages.append(RobustnessStage(config.robustness, config.verify, simulator, gripper, suffix))
+    return stages
 
 
 def _generation(kind: Kind, config: BuildConfig) -> list[Stage]:
@@ -91,8 +123,12 @@ def _generation(kind: Kind, config: BuildConfig) -> list[Stage]:
 
 
 def config_sha256(config: BuildConfig) -> str:
-    """Return the digest of everything in the configuration but the seed, which a twin states by itself."""
-    return sha256_of_json(config.model_dump(mode="json", exclude={"seed"}))
+    """Return the digest of everything in the configuration but the seed, which a twin states by itself.
+
+    Grippers count by their content: a changed file is another configuration.
+    """
+    grippers = [gripper.sha256 for gripper, _ in _grippers(config)]
+    return sha256_of_json({**config.model_dump(mode="json", exclude={"seed"}), "grippers": grippers})
 
 
 def finished_record(folder: Path, config: BuildConfig) -> TwinRecord | None:

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from manitwin.loaded_twin import Twin
-from manitwin.twin import Estimate, GraspSummary, TwinRecord
+from manitwin.twin import Estimate, GraspSummary, OtherGripper, SecondOpinion, TwinRecord
 
 
 def estimate_text(estimate: Estimate, unit: str = "") -> str:
@@ -77,7 +77,39 @@ def _grasp_rows(grasps: GraspSummary) -> list[tuple[str, str]]:
     unfiltered = (
         "not tried" if grasps.unfiltered_success_rate is None else f"{100 * grasps.unfiltered_success_rate:.0f} %"
     )
-    return [
+    rows = [
         ("grasps", f"{grasps.verified} of {grasps.simulated} verified with {grasps.gripper} (unfiltered {unfiltered})"),
         ("failures", failures),
     ]
+    table = grasps.failure_table
+    rows += [(f"held by {name}", _held(row)) for name, row in (*table.by_grasp_type.items(), *table.by_region.items())]
+    if grasps.robustness is not None:
+        again = grasps.robustness
+        share = f"{100 * again.robust_share:.0f} %"
+        rows.append(
+            ("robustness", f"{again.robust} hold in {share} of their perturbed trials, median {again.median:.2f}")
+        )
+    if grasps.second_opinion is not None:
+        rows.append(("second engine", _opinion(grasps.second_opinion)))
+    for name, other in grasps.other_grippers.items():
+        rows.append((f"with {name}", _other_gripper(other)))
+    return rows
+
+
+def _held(outcomes: dict[str, int]) -> str:
+    others = ", ".join(f"{number} {outcome}" for outcome, number in outcomes.items() if outcome != "held")
+    return f"{outcomes.get('held', 0)} of {sum(outcomes.values())}" + (f" ({others})" if others else "")
+
+
+def _opinion(opinion: SecondOpinion) -> str:
+    holds = "nothing held to try" if opinion.holds_share is None else f"holds {100 * opinion.holds_share:.0f} % of them"
+    kappa = "undefined" if opinion.kappa is None else f"{opinion.kappa:.2f}"
+    return f"{opinion.engine} {holds}; kappa {kappa} over {opinion.jittered} jittered"
+
+
+def _other_gripper(other: OtherGripper) -> str:
+    if other.summary is None:
+        return f"none: {other.detail}"
+    engines = other.summary.trial.engine + (" alone" if other.summary.second_opinion is None else "")
+    held = f"{other.summary.verified} of {other.summary.simulated} verified in {engines}"
+    return f"{held}; holds by {other.transferred} of {other.transferable} grasp points"

@@ -6,7 +6,7 @@ SI units, object frame (right-handed, +Z up, origin at the bottom centre), quate
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -238,6 +238,52 @@ class Trial(Record):
     slide_distance_m: Finite
 
 
+class SecondOpinion(Record):
+    """How far a second engine agrees: over grasps that held, some that failed, and jittered controls of those that held.
+
+    Kappa is Cohen's over the jittered alone: among grasps that nearly all hold, agreement says little.
+    """
+
+    engine: str
+    held_tried: int
+    holds_share: Unit | None
+    failed_tried: int
+    failed_pass_share: Unit | None
+    jittered: int
+    jittered_held: int
+    jittered_hold_in_second_engine: int
+    jittered_agree: int
+    kappa: Finite | None
+
+
+class RobustnessSummary(Record):
+    """What the held grasps were put through again, and how many survive.
+
+    ``median`` is that of the grasps' shares; ``robust`` counts those that rather hold in ``robust_share`` of the cases than
+    in ``fragile_share`` (the sequential test's verdict).
+    """
+
+    pose_m: Finite
+    pose_deg: Finite
+    friction: tuple[Finite, Finite]
+    force: tuple[Finite, Finite]
+    mass_kg: tuple[Finite, Finite]
+    center_of_mass_m: Finite
+    max_trials: int
+    trials: int
+    median: Unit
+    robust: int
+    robust_share: Unit
+    fragile_share: Unit
+
+
+class FailureTable(Record):
+    """Outcomes counted by what was grasped: by the type of the nearest grasp point and by the nearest functional point."""
+
+    by_grasp_type: dict[str, dict[str, int]]
+    by_region: dict[str, dict[str, int]]
+
+
 class GraspSummary(Record):
     """What became of the grasps of one gripper."""
 
@@ -257,7 +303,24 @@ class GraspSummary(Record):
     association_radius_widened: bool
     share_beyond_3cm: Unit
     trial: Trial
-    other_grippers: dict[str, Any] = Field(default_factory=dict)
+    failure_table: FailureTable
+    second_opinion: SecondOpinion | None
+    robustness: RobustnessSummary | None
+    other_grippers: dict[str, OtherGripper] = Field(default_factory=dict)
+
+
+class OtherGripper(Record):
+    """What became of the grasps of another gripper: a summary, or why there is none; and what it can hold of the first's.
+
+    ``transferred`` counts the grasp points by which the first gripper holds the object and this one does too, of
+    ``transferable``.
+    """
+
+    summary: GraspSummary | None
+    reason: str | None
+    detail: str | None
+    transferable: int
+    transferred: int
 
 
 class Placement(Record):

@@ -15,13 +15,13 @@ from manitwin.errors import BadReply
 from manitwin.files.glb import write_glb
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
 from manitwin.models.annotators.rules import RulesAnnotator
-from manitwin.simulate.gripper import Gripper
+from manitwin.simulate.hands.parallel import ParallelGripper
 from manitwin.stages.caption import CaptionStage
 from manitwin.stages.points import PointsStage
 from manitwin.stages.stage import Draft, Item
 from manitwin.twin import FunctionalPoint, GraspPoint, Language
 
-GRIPPER = Gripper("test", "0", 0.08, 0.1, 50.0, 1.0, (0.01, 0.01), (), (), "a test")
+GRIPPER = ParallelGripper("test", "0", 0.08, 0.1, 50.0, 1.0, (0.01, 0.01), (), (), "a test")
 
 
 @pytest.fixture

@@ -1,148 +1,172 @@
-"""The grasps and verify stages on a box whose grasps are known, and on things that cannot be gripped."""
+"""The stages of grasps on a box whose grasps are known, in real engines, and on things that cannot be gripped."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-import trimesh
 
-from manitwin.config import GraspConfig, VerifyConfig
+from grasp_drafts import PANDA, Scripted, box_draft, run_all
+from manitwin.config import GraspConfig, RobustnessConfig, SecondOpinionConfig, VerifyConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.models.graspers.antipodal import AntipodalGrasper
-from manitwin.simulate.gripper import Gripper, load_gripper
-from manitwin.simulate.rigid_body import RigidBody
+from manitwin.simulate.gripper import load_gripper
+from manitwin.simulate.mujoco_trial import MujocoTrial
 from manitwin.simulate.sapien_trial import SapienTrial
-from manitwin.simulate.trial import TrialResult, TrialSettings
 from manitwin.stages.grasps import GraspsStage
-from manitwin.stages.stage import Draft, Item, Stage
+from manitwin.stages.record_grasps import RecordGraspsStage
+from manitwin.stages.robustness import RobustnessStage
+from manitwin.stages.second_opinion import SecondOpinionStage
+from manitwin.stages.stage import Draft, Stage
 from manitwin.stages.verify import VerifyStage
 from manitwin.twin import GraspSummary
 
-PANDA = load_gripper("panda")
 FEW = GraspConfig(simulated=12, unfiltered=4, raw_per_round=2000, rounds=3, near_enough=200)
+SECOND = SecondOpinionConfig(jittered=6)
+ROBUST = RobustnessConfig(max_trials=4)
+SAPIEN, MUJOCO, VERIFY = SapienTrial(), MujocoTrial(), VerifyConfig()
 COLUMNS = [
     *("grasp_id", "gripper", "position_m", "quaternion_wxyz", "width_m", "depth_m", "score", "proposer"),
-    *("grasp_point_id", "functional_point_id", "distance_to_point_m", "outcome", "verified"),
-    *("displacement_m", "rotation_rad", "holds_in_second_engine", "robustness", "retired"),
+    *("grasp_point_id", "functional_point_id", "distance_to_point_m", "outcome", "verified", "displacement_m"),
+    *("rotation_rad", "holds_in_second_engine", "robustness", "robustness_trials", "retired"),
 ]
+BAR_POINTS = [[0.0, 0.0, 0.25], [0.0, 0.02, 0.04], [0.02, 0, 0.12]]
 
 
-def estimate(value: float) -> dict[str, Any]:
-    return {"value": value, "low": value, "high": value, "source": "user"}
+def grasps_stage(settings: GraspConfig = FEW, gripper: Any = PANDA, suffix: str = "") -> GraspsStage:
+    return GraspsStage(settings, AntipodalGrasper(), gripper, suffix)
 
 
-def draft_of(folder: Path, extents_m: list[float], points: list[list[float]], mass_kg: float = 0.3) -> Draft:
-    box = trimesh.creation.box(extents_m)
-    box.apply_translation([0, 0, extents_m[2] / 2])
-    np.savez(folder / "solid.npz", vertices=box.vertices, faces=box.faces)
-    np.savez(folder / "hulls.npz", hull_00=box.vertices)
-    x, y, z = np.square(extents_m)
-    physical = {
-        "mass_kg": estimate(mass_kg),
-        "friction_static": estimate(0.5),
-        "friction_dynamic": estimate(0.4),
-        "center_of_mass_m": [0, 0, extents_m[2] / 2],
-        "inertia_kg_m2": (mass_kg / 12 * np.diag([y + z, x + z, x + y])).tolist(),
-    }
-    functional = [{"id": "f0", "position_m": points[0]}]
-    grasp = [{"id": f"g{number}", "position_m": point} for number, point in enumerate(points[1:])]
-    draft = Draft("box", Item(None, "box"), seed=3)
-    draft.fields.update(physical=physical, points={"functional": functional, "grasp": grasp})
-    draft.paths.update({name: folder / name for name in ("solid.npz", "hulls.npz")})
-    return draft
+def trial_stages(gripper: Any = PANDA, suffix: str = "") -> list[Stage]:
+    return [
+        grasps_stage(FEW, gripper, suffix),
+        VerifyStage(VERIFY, SAPIEN, gripper, suffix),
+        SecondOpinionStage(SECOND, VERIFY, SAPIEN, MUJOCO, gripper, suffix),
+        RobustnessStage(ROBUST, VERIFY, SAPIEN, gripper, suffix),
+    ]
 
 
-def run_grasps(draft: Draft, folder: Path, settings: GraspConfig = FEW) -> dict[str, np.ndarray]:
-    draft.fields.update(GraspsStage(settings, AntipodalGrasper(), PANDA).run(draft, folder))
-    draft.paths["proposals.npz"] = folder / "proposals.npz"
-    return dict(np.load(folder / "proposals.npz"))
+def run_grasps(draft: Draft, folder: Path) -> dict[str, np.ndarray]:
+    run_all(draft, folder, grasps_stage())
+    return dict(np.load(draft.path("proposals.npz")))
+
+
+def table_of(draft: Draft) -> dict[str, list[Any]]:
+    return pq.read_table(draft.path("grasps.parquet")).to_pydict()
 
 
 @pytest.fixture(scope="module")
-def bar(tmp_path_factory: pytest.TempPathFactory) -> tuple[Draft, dict[str, np.ndarray], Path]:
+def bar(tmp_path_factory: pytest.TempPathFactory) -> Draft:
     folder = tmp_path_factory.mktemp("bar")
-    points = [[0.0, 0.0, 0.25], [0.0, 0.02, 0.04], [0.02, 0, 0.12]]
-    draft = draft_of(folder, [0.04, 0.04, 0.25], points)
-    proposals = run_grasps(draft, folder)
-    draft.fields.update(VerifyStage(VerifyConfig(), SapienTrial(), PANDA).run(draft, folder))
-    return draft, proposals, folder
+    draft = box_draft(folder, [0.04, 0.04, 0.25], BAR_POINTS)
+    return run_all(draft, folder, *trial_stages(), RecordGraspsStage(SECOND, [(PANDA, "")]))
 
 
 def test_stages_are_stages() -> None:
-    assert isinstance(GraspsStage(FEW, AntipodalGrasper(), PANDA), Stage)
-    assert isinstance(VerifyStage(VerifyConfig(), SapienTrial(), PANDA), Stage)
+    for stage in [*trial_stages(), *trial_stages(PANDA, "-panda"), RecordGraspsStage(SECOND, [(PANDA, "")])]:
+        assert isinstance(stage, Stage)
 
 
-def test_chosen_grasps_are_near_a_selected_point_and_named_after_the_nearest(bar: Any) -> None:
-    draft, proposals, _ = bar
+def test_chosen_grasps_are_near_a_selected_point_and_named_after_the_nearest(bar: Draft) -> None:
+    proposals = dict(np.load(bar.path("proposals.npz")))
     chosen = proposals["proposer"] == "antipodal"
     assert chosen.sum() == 12
     assert (proposals["distance_to_point_m"][chosen] <= 0.03).all()
-    assert not draft.field("proposals")["association_radius_widened"]
-    assert draft.field("proposals")["share_beyond_3cm"] == 0
-    tips = proposals["gripper_to_object"][:, :3, 3] + proposals["gripper_to_object"][:, :3, 2] * 0.1034
+    assert not bar.field("proposals")["association_radius_widened"]
+    assert bar.field("proposals")["share_beyond_3cm"] == 0
+    tips = proposals["gripper_to_object"][:, :3, 3] + proposals["gripper_to_object"][:, :3, 2] * PANDA.tip_depth_m
     low, high = chosen & (tips[:, 2] < 0.05), chosen & (tips[:, 2] > 0.1)
     assert set(proposals["grasp_point_id"][low]) <= {"g0"}
     assert set(proposals["grasp_point_id"][high]) <= {"g1"}
 
 
-def test_counts_by_filter_fall_and_octants_are_several(bar: Any) -> None:
-    field = bar[0].field("proposals")
-    counts = list(field["proposed_by_filter"].values())
+def test_counts_by_filter_fall_and_octants_are_several(bar: Draft) -> None:
+    field = bar.field("proposals")
+    filters = ("raw", "after_pad", "after_collision", "after_association", "after_diversity")
+    counts = [field["proposed_by_filter"][name] for name in filters]
     assert counts == sorted(counts, reverse=True)
     assert counts[-1] == 12
     assert field["proposed"] == field["proposed_by_filter"]["after_collision"]
     assert field["approach_octants"] >= 4
 
 
-def test_table_has_the_columns_of_the_contract_and_agrees_with_the_summary(bar: Any) -> None:
-    draft, _, folder = bar
-    table = pq.read_table(folder / "grasps.parquet")
-    assert table.column_names == COLUMNS
-    rows = table.to_pydict()
-    summary = GraspSummary(**draft.field("grasps"))
+def test_table_has_the_columns_of_the_contract_and_agrees_with_the_summary(bar: Draft) -> None:
+    rows, summary = table_of(bar), GraspSummary(**bar.field("grasps"))
+    assert set(COLUMNS) <= set(rows)
     raw = np.array([name.endswith(":unfiltered") for name in rows["proposer"]])
+    moved = np.array([name.endswith(":jittered") for name in rows["proposer"]])
     assert raw.sum() == summary.unfiltered_simulated == 4
-    assert sum(np.array(rows["verified"])[~raw]) == summary.verified
+    assert summary.second_opinion is not None and moved.sum() == summary.second_opinion.jittered == 6
+    assert len(raw) == 12 + 4 + 6
+    assert np.array(rows["verified"])[~raw & ~moved].sum() == summary.verified
     assert summary.simulated == 12
     assert summary.verified + sum(summary.failures.values()) == 12
     assert [outcome == "held" for outcome in rows["outcome"]] == rows["verified"]
-    assert rows["holds_in_second_engine"] == rows["robustness"] == [None] * 16
     assert summary.verified >= 11
+    assert len(set(rows["grasp_id"])) == len(raw)
 
 
-def test_table_poses_are_gripper_to_object_with_width_along_x(bar: Any) -> None:
-    rows = pq.read_table(bar[2] / "grasps.parquet").to_pydict()
+def test_second_engine_and_robustness_are_there_for_what_held(bar: Draft) -> None:
+    rows, summary = table_of(bar), GraspSummary(**bar.field("grasps"))
+    plain = [i for i, name in enumerate(rows["proposer"]) if ":" not in name]
+    held = [i for i in plain if rows["verified"][i]]
+    assert summary.second_opinion is not None and summary.robustness is not None
+    assert None not in [rows["holds_in_second_engine"][i] for i in held]
+    share = np.mean([rows["holds_in_second_engine"][i] for i in held])
+    assert share == summary.second_opinion.holds_share >= 0.9
+    for i in range(len(rows["proposer"])):
+        tried = i in held
+        assert (rows["robustness"][i] is not None) == (rows["robustness_trials"][i] is not None) == tried
+    trials = [rows["robustness_trials"][i] for i in held]
+    assert summary.robustness.trials == sum(trials)
+    assert min(trials) >= 2 and max(trials) <= 4
+    controls = [i for i, name in enumerate(rows["proposer"]) if name.endswith(":jittered")]
+    assert None not in [rows["holds_in_second_engine"][i] for i in controls]
+    both = [rows["holds_in_second_engine"][i] == rows["verified"][i] for i in controls]
+    assert sum(both) == summary.second_opinion.jittered_agree
+
+
+def test_table_poses_are_gripper_to_object_with_width_along_x(bar: Draft) -> None:
+    rows = table_of(bar)
     rotation = rotation_from_quaternion_wxyz(np.array(rows["quaternion_wxyz"]))
     tips = np.array(rows["position_m"]) + rotation[:, :, 2] * np.array(rows["depth_m"])[:, None]
-    assert (np.abs(tips[:, :2]) <= 0.03).all()
     closing = np.abs(rotation[:, :, 0])
-    held = np.array(rows["verified"])
+    held = np.array(rows["verified"]) & np.array([":" not in name for name in rows["proposer"]])
+    assert (np.abs(tips[held, :2]) <= 0.03).all()
     # the only sides that the stroke takes are the four long ones: closing is horizontal, and as wide as the bar
     assert closing[held, 2].max() < 0.5
     assert np.array(rows["width_m"])[held] == pytest.approx(0.04, abs=0.01)
 
 
-def test_same_seed_writes_the_same_bytes(bar: Any, tmp_path: Path) -> None:
-    draft, _, folder = bar
-    again = Draft("box", draft.item, draft.seed, dict(draft.fields), dict(draft.paths))
-    run_grasps(again, tmp_path)
-    again.fields.update(VerifyStage(VerifyConfig(), SapienTrial(), PANDA).run(again, tmp_path))
-    for name in ("proposals.npz", "grasps.parquet"):
-        assert (tmp_path / name).read_bytes() == (folder / name).read_bytes()
-    assert again.fields == draft.fields
+def test_same_seed_writes_the_same_bytes(bar: Draft, tmp_path: Path) -> None:
+    again = box_draft(tmp_path, [0.04, 0.04, 0.25], BAR_POINTS)
+    run_all(again, tmp_path, *trial_stages(), RecordGraspsStage(SECOND, [(PANDA, "")]))
+    for name in ("proposals.npz", "verdicts.npz", "second_opinion.npz", "robustness.npz", "grasps.parquet"):
+        assert again.path(name).read_bytes() == bar.path(name).read_bytes(), name
+    assert again.fields == bar.fields
+
+
+def test_without_second_engine_and_robustness_the_columns_are_empty_and_the_verdicts_the_same(
+    bar: Draft, tmp_path: Path
+) -> None:
+    quick = Draft("box", bar.item, bar.seed, dict(bar.fields), dict(bar.paths))
+    for name in ("second_opinion", "robustness"):
+        del quick.fields[name], quick.paths[f"{name}.npz"]
+    run_all(quick, tmp_path, RecordGraspsStage(SECOND, [(PANDA, "")]))
+    rows, summary = table_of(quick), GraspSummary(**quick.field("grasps"))
+    for name in ("holds_in_second_engine", "robustness", "robustness_trials"):
+        assert rows[name] == [None] * 16
+    full = GraspSummary(**bar.field("grasps"))
+    assert summary == full.model_copy(update={"second_opinion": None, "robustness": None})
 
 
 def test_radius_grows_where_the_points_cannot_be_gripped(tmp_path: Path) -> None:
     # the middle of the broad faces is out of the stroke's reach
-    draft = draft_of(tmp_path, [0.04, 0.2, 0.2], [[0.0, 0.1, 0.1], [0.02, 0.0, 0.1]])
-    draft.fields["points"]["functional"][0]["position_m"] = [0.02, 0.0, 0.1]
+    draft = box_draft(tmp_path, [0.04, 0.2, 0.2], [[0.02, 0.0, 0.1], [0.02, 0.0, 0.1]])
     run_grasps(draft, tmp_path)
     field = draft.field("proposals")
     assert field["association_radius_widened"]
@@ -151,32 +175,83 @@ def test_radius_grows_where_the_points_cannot_be_gripped(tmp_path: Path) -> None
 
 
 def test_too_wide_box_is_rejected_with_its_smallest_width(tmp_path: Path) -> None:
-    draft = draft_of(tmp_path, [0.1, 0.12, 0.14], [[0.05, 0, 0.07], [0, 0.06, 0.07]])
+    draft = box_draft(tmp_path, [0.1, 0.12, 0.14], [[0.05, 0, 0.07], [0, 0.06, 0.07]])
     with pytest.raises(Rejected, match=r"narrowest grip is 100\.0 mm, the panda opens 80 mm") as answer:
         run_grasps(draft, tmp_path)
     assert answer.value.reason == "too_wide"
 
 
 def test_foil_is_rejected_as_too_thin(tmp_path: Path) -> None:
-    draft = draft_of(tmp_path, [0.1, 0.12, 0.0003], [[0.05, 0, 0], [0, 0.06, 0]])
+    draft = box_draft(tmp_path, [0.1, 0.12, 0.0003], [[0.05, 0, 0], [0, 0.06, 0]])
     with pytest.raises(Rejected) as answer:
         run_grasps(draft, tmp_path)
     assert answer.value.reason == "too_thin"
 
 
-@dataclass
-class _NothingHolds:
-    """An engine in which every grasp drops: stands in for an object that no real trial fails so completely."""
+def test_another_gripper_without_proposals_does_not_reject_the_twin_and_says_why(tmp_path: Path) -> None:
+    # 100 mm: wide enough for the 110 mm of the first gripper, too wide for the second
+    wide = load_gripper("wsg50_110")
+    draft = box_draft(tmp_path, [0.1, 0.12, 0.14], [[0.05, 0, 0.07], [0.05, 0, 0.12], [-0.05, 0, 0.12]])
+    record = RecordGraspsStage(SECOND, [(wide, ""), (PANDA, "-panda")])
+    run_all(draft, tmp_path, *trial_stages(wide), *trial_stages(PANDA, "-panda"), record)
+    summary = GraspSummary(**draft.field("grasps"))
+    assert summary.gripper == "wsg50_110" and summary.verified >= 1
+    other = summary.other_grippers["panda"]
+    assert (other.summary, other.reason) == (None, "too_wide")
+    assert other.detail == "narrowest grip is 100.0 mm, the panda opens 80 mm"
+    assert (other.transferable, other.transferred) == (2, 0)
+    rows = table_of(draft)
+    panda = [i for i, name in enumerate(rows["gripper"]) if name == "panda"]
+    assert not any(rows["verified"][i] for i in panda)
+    assert all(rows["proposer"][i].endswith(":unfiltered") for i in panda)
 
-    name: str = "nothing-holds"
 
-    def run(
-        self, body: RigidBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
-    ) -> list[TrialResult]:
-        return [TrialResult("drops", 0.03, 0.0, 0.0, (50.0, 50.0), 200)] * len(gripper_to_object)
+def test_two_grippers_share_a_table_and_what_one_can_hold_of_the_others_points_is_counted(
+    bar: Draft, tmp_path: Path
+) -> None:
+    robotiq = load_gripper("robotiq_2f85")
+    draft = Draft("box", bar.item, bar.seed, dict(bar.fields), dict(bar.paths))
+    few = [
+        grasps_stage(FEW, robotiq, "-robotiq_2f85"),
+        VerifyStage(VERIFY, SAPIEN, robotiq, "-robotiq_2f85"),
+        RecordGraspsStage(SECOND, [(PANDA, ""), (robotiq, "-robotiq_2f85")]),
+    ]
+    run_all(draft, tmp_path, *few)
+    rows, summary = table_of(draft), GraspSummary(**draft.field("grasps"))
+    other = summary.other_grippers["robotiq_2f85"]
+    assert other.summary is not None and other.summary.trial.force_n == 100
+    assert (other.summary.second_opinion, other.summary.robustness) == (None, None)
+
+    def points(gripper: str) -> set[str]:
+        return {
+            rows["grasp_point_id"][i]
+            for i, name in enumerate(rows["gripper"])
+            if name == gripper and rows["verified"][i] and ":" not in rows["proposer"][i]
+        }
+
+    assert other.transferable == len(points("panda"))
+    assert other.transferred == len(points("panda") & points("robotiq_2f85")) >= 1
+    assert len(set(rows["grasp_id"])) == len(rows["grasp_id"])
+    first = summary.model_copy(update={"other_grippers": {}})
+    assert first == GraspSummary(**bar.field("grasps")), "another gripper changes nothing of the first one's"
 
 
-def test_object_of_which_nothing_holds_is_rejected_with_the_failures(bar: Any, tmp_path: Path) -> None:
+def test_object_of_which_nothing_holds_is_rejected_with_the_failures(bar: Draft, tmp_path: Path) -> None:
+    nothing = Scripted(lambda pose, settings: "drops")
     with pytest.raises(Rejected, match="none of 12 simulated grasps held: 12 drops") as answer:
-        VerifyStage(VerifyConfig(), _NothingHolds(), PANDA).run(bar[0], tmp_path)
+        VerifyStage(VerifyConfig(), nothing, PANDA).run(bar, tmp_path)
     assert answer.value.reason == "none_held"
+
+
+def test_another_gripper_of_which_nothing_holds_is_counted_and_not_rejected(bar: Draft, tmp_path: Path) -> None:
+    nothing = Scripted(lambda pose, settings: "drops")
+    draft = Draft("box", bar.item, bar.seed, dict(bar.fields), dict(bar.paths))
+    robotiq, suffix = load_gripper("robotiq_2f85"), "-robotiq_2f85"
+    stages = [grasps_stage(FEW, robotiq, suffix), VerifyStage(VERIFY, nothing, robotiq, suffix)]
+    stages += [SecondOpinionStage(SECOND, VERIFY, nothing, nothing, robotiq, suffix)]
+    stages += [RobustnessStage(ROBUST, VERIFY, nothing, robotiq, suffix)]
+    run_all(draft, tmp_path, *stages, RecordGraspsStage(SECOND, [(PANDA, ""), (robotiq, suffix)]))
+    other = GraspSummary(**draft.field("grasps")).other_grippers["robotiq_2f85"]
+    assert other.summary is not None
+    assert (other.summary.verified, other.summary.failures) == (0, {"drops": 12})
+    assert other.transferred == 0

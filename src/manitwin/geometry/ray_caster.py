@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import trimesh
 from embreex.mesh_construction import TriangleMesh
@@ -11,12 +13,20 @@ MILLIMETRES = 1000.0  # Embree works in float32 with absolute tolerances: object
 
 
 class RayCaster:
-    """A mesh prepared for rays."""
+    """A mesh prepared for rays, at the first of them."""
 
     def __init__(self, mesh: trimesh.Trimesh):
-        self._scene = EmbreeScene()
-        self._mesh = TriangleMesh(self._scene, (mesh.triangles * MILLIMETRES).astype(np.float32))
-        self.face_normals = mesh.face_normals
+        self._mesh = mesh
+
+    @cached_property
+    def face_normals(self) -> np.ndarray:
+        """The outward unit normals ``(F, 3)`` of the faces."""
+        return np.asarray(self._mesh.face_normals)
+
+    @cached_property
+    def _prepared(self) -> tuple[EmbreeScene, TriangleMesh]:
+        scene = EmbreeScene()  # knows of its mesh, but does not keep it
+        return scene, TriangleMesh(scene, (self._mesh.triangles * MILLIMETRES).astype(np.float32))
 
     def first_hits(self, origins_m: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the distance (m; inf: nothing) and the face (-1: nothing) of each ray's first hit.
@@ -25,7 +35,7 @@ class RayCaster:
         """
         if not len(origins_m):
             return np.zeros(0), np.zeros(0, dtype=np.int64)
-        hits = self._scene.run(
+        hits = self._prepared[0].run(
             np.ascontiguousarray(origins_m * MILLIMETRES, dtype=np.float32),
             np.ascontiguousarray(directions, dtype=np.float32),
             output=1,

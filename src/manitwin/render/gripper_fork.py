@@ -22,7 +22,8 @@ STEM_SHARE = 0.5  # the stem's length, in that of the fingers
 def gripper_fork(boxes: Boxes, rod_m: float) -> trimesh.Trimesh:
     """Return rods of ``rod_m`` thickness in the grasp frame: one along each finger's inner face, a crossbar, a stem.
 
-    Fingers are the boxes beside the middle plane x = 0; they reach from the palm's front to their tips.
+    Fingers are the boxes beside the middle plane x = 0; they reach from the palm's front to their tips. A gripper without
+    any, a suction cup, is its boxes.
     """
     sides: dict[int, list[np.ndarray]] = {1: [], -1: []}
     front = 0.0
@@ -32,6 +33,8 @@ def gripper_fork(boxes: Boxes, rod_m: float) -> trimesh.Trimesh:
             front = max(front, float(corners[:, 2].max()))
         else:
             sides[1 if box_to_gripper[0, 3] > 0 else -1].append(corners)
+    if not all(sides.values()):
+        return gripper_body(boxes)
     rods, tips = [], []
     for corners_of_side in sides.values():
         corners = np.concatenate(corners_of_side)

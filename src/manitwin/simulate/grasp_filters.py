@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 
-from manitwin.geometry.grasp_diversity import approach_octants, farthest_grasps
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.simulate.gripper import Gripper
+from manitwin.simulate.grasp_selection import Merits, select_likely
 from manitwin.simulate.hand_collision import HandCollision
+from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.simulate.hull_surface import union_surface
 from manitwin.simulate.pad_contact import PadContacts, pad_contacts
 
 # The pad filter: two cells of fifteen, contact centres at most 6 mm apart, normals inside the narrowed friction cone.
@@ -18,10 +18,9 @@ MIN_CELLS, MAX_OFFSET_M, CONE_SAFETY = 2, 0.006, 1.5
 CLEARANCE_M = 0.0005
 # What the simulation is likely to hold, measured on 1,799 trials of 18 objects: of grasps with levers under 50 mm 98 %
 # held, beyond 80 mm 47 %; of those on 2 cells 73 %, on 6 and more 92 %.
-GOOD_CELLS, GOOD_LEVER_M, GOOD_LEVER_SHARE, GOOD_TORQUE_RATIO = 3, 0.05, 0.3, 0.5
+GOOD_CELLS, GOOD_LEVER_M, GOOD_TORQUE_RATIO = 3, 0.05, 0.5
 PAD_ARM_M = 0.007  # the arm of the friction torque that a pad can hold: about two thirds of its half width
 PEAK_SLIDE_ACCELERATION_M_S2 = 3.6  # of a quintic path of 0.1 m in 0.4 s: 5.77 d / t^2
-MIN_OCTANTS = 4
 
 
 @dataclass(frozen=True)
@@ -36,10 +35,12 @@ class FilteredGrasps:
 class GraspFilter:
     """The filters of one gripper for one object."""
 
-    def __init__(self, gripper: Gripper, hulls: tuple[np.ndarray, ...], center_of_mass_m: np.ndarray, friction: float):
+    def __init__(
+        self, gripper: ParallelGripper, hulls: tuple[np.ndarray, ...], center_of_mass_m: np.ndarray, friction: float
+    ):
         """Prepare the convex hulls (each ``(V, 3)`` m); ``friction`` is that between finger and object."""
         self._gripper, self._center_of_mass_m = gripper, center_of_mass_m
-        self._caster = RayCaster(_union_surface(hulls))
+        self._caster = RayCaster(union_surface(hulls))
         self._collision = HandCollision(hulls)
         self._min_alignment = 1 / np.hypot(1, friction / CONE_SAFETY)
 
@@ -56,45 +57,20 @@ class GraspFilter:
         return FilteredGrasps(left, contacts.take(left), len(index))
 
 
-def _union_surface(hulls: tuple[np.ndarray, ...]) -> trimesh.Trimesh:
-    surfaces = [trimesh.convex.convex_hull(vertices) for vertices in hulls]
-    offsets = np.cumsum([0] + [len(surface.vertices) for surface in surfaces[:-1]])
-    faces = [surface.faces + offset for surface, offset in zip(surfaces, offsets, strict=True)]
-    vertices = np.concatenate([surface.vertices for surface in surfaces])
-    return trimesh.Trimesh(vertices, np.concatenate(faces), process=False)
-
-
 def torque_ratio(lever_m: np.ndarray, *, mass_kg: float, force_n: float, friction: float) -> np.ndarray:
     """Return the torque that weight and slides need about the pads, over what friction can hold."""
     needed = mass_kg * (9.81 + PEAK_SLIDE_ACCELERATION_M_S2) * lever_m
     return needed / (2 * friction * force_n * PAD_ARM_M)
 
 
-def likely_to_hold(contacts: PadContacts, torque_ratio: np.ndarray, max_lever_m: float = GOOD_LEVER_M) -> np.ndarray:
-    """Tell which grasps touch with three cells or more, by a short lever, and need half of the torque at most."""
-    good = (contacts.cells >= GOOD_CELLS) & (torque_ratio <= GOOD_TORQUE_RATIO)
-    return good & (contacts.lever_m <= max_lever_m)
+def pad_merits(contacts: PadContacts, torque_ratio: np.ndarray) -> Merits:
+    """Rate grasps: fit ones touch with three cells or more and need half of the friction torque at most; levers cost."""
+    weak = contacts.cells < GOOD_CELLS
+    return Merits(~weak & (torque_ratio <= GOOD_TORQUE_RATIO), weak, contacts.lever_m, GOOD_LEVER_M)
 
 
 def select_grasps(
     gripper_to_object: np.ndarray, depth_m: np.ndarray, contacts: PadContacts, torque_ratio: np.ndarray, count: int
 ) -> np.ndarray:
-    """Choose ``count`` diverse grasps among those that are likely to hold: indices into the N grasps.
-
-    The likely ones touch with three cells or more, need half of the friction torque at most, and have a lever under 50
-    mm or among the smallest 30 %. Where they are too few, the smallest levers join; where they point into less than
-    four octants, the smallest levers of the other octants join. Then the farthest grasps are chosen.
-    """
-    lever = contacts.lever_m
-    max_lever_m = max(GOOD_LEVER_M, float(np.quantile(lever, GOOD_LEVER_SHARE)))
-    likely = likely_to_hold(contacts, torque_ratio, max_lever_m)
-    rank = np.lexsort((lever, contacts.cells < GOOD_CELLS, ~likely))
-    chosen = rank[: max(count, int(likely.sum()))]
-    octants = approach_octants(gripper_to_object)
-    missing = [octant for octant in np.unique(octants) if octant not in octants[chosen]]
-    if len(np.unique(octants[chosen])) < MIN_OCTANTS and missing:
-        share = max(1, count // (2 * MIN_OCTANTS))
-        more = np.concatenate([rank[octants[rank] == octant][:share] for octant in missing])
-        chosen = np.concatenate([chosen, more])
-    picked = farthest_grasps(gripper_to_object[chosen], depth_m[chosen], count)
-    return np.sort(chosen[picked])
+    """Choose ``count`` diverse grasps among those that are likely to hold: indices into the N grasps."""
+    return select_likely(gripper_to_object, depth_m, pad_merits(contacts, torque_ratio), count)

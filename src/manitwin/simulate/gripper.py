@@ -1,4 +1,4 @@
-"""A parallel gripper as data: a TOML file of dimensions, not code.
+"""A gripper as data: a TOML file of dimensions, not code.
 
 Grasp frame (that of GraspGen, ACRONYM and Contact-GraspNet): origin at the gripper's base link, +Z the approach direction,
 X the closing direction. The finger on +X is the first one.
@@ -8,66 +8,107 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
-import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
 from manitwin.errors import UsageError, choose_from
+from manitwin.simulate.hands.box import PlacedBox
+from manitwin.simulate.hands.multi_finger import load_multi_finger
+from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.simulate.hands.suction import SuctionGripper
+
+Kind = TypeVar("Kind")
 
 
-@dataclass(frozen=True)
-class Box:
-    """A box of a gripper part: its centre (m), half extents (m) and rotation about Y (rad), in the grasp frame."""
+class Gripper(Protocol):
+    """What all kinds of grippers have in common.
 
-    center_m: tuple[float, float, float]
-    half_extents_m: tuple[float, float, float]
-    rotation_y_rad: float = 0.0
-
-
-@dataclass(frozen=True)
-class Gripper:
-    """A parallel-jaw gripper.
-
-    ``finger_boxes`` are those of the +X finger when closed (its inner face touches x = 0); the other finger is its half turn
-    about Z. ``opening_m`` is the full stroke; ``tip_depth_m`` is the fingertips' centre along +Z; ``pad_half_extents_m`` is
-    half of the pad's width (Y) and height (Z), centred on the tip depth.
+    ``tip_depth_m`` is the fingertips' centre along +Z, ``opening_m`` the widest thing that fits, ``force_n`` the force it
+    holds with.
     """
 
-    name: str
-    sha256: str
-    opening_m: float
-    tip_depth_m: float
-    force_n: float
-    finger_friction: float
-    pad_half_extents_m: tuple[float, float]
-    finger_boxes: tuple[Box, ...]
-    palm_boxes: tuple[Box, ...]
-    source: str
+    @property
+    def kind(self) -> str:
+        """Which of ``KINDS`` it is."""
+        ...
 
-    def boxes(self, opening_m: float) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Return ``(box_to_gripper 4x4, half_extents_m (3,))`` of palm and both fingers at a given opening between the pads."""
-        placed = [_placed(box, 0.0, 1) for box in self.palm_boxes]
-        for side in (1, -1):
-            placed += [_placed(box, opening_m / 2, side) for box in self.finger_boxes]
-        return placed
+    @property
+    def name(self) -> str:
+        """What a row of ``grasps.parquet`` calls it."""
+        ...
+
+    @property
+    def sha256(self) -> str:
+        """The digest of its definition."""
+        ...
+
+    @property
+    def opening_m(self) -> float:
+        """The widest thing that fits."""
+        ...
+
+    @property
+    def tip_depth_m(self) -> float:
+        """The fingertips' centre along +Z."""
+        ...
+
+    @property
+    def force_n(self) -> float:
+        """The force that it holds with."""
+        ...
+
+    @property
+    def finger_friction(self) -> float:
+        """The friction coefficient of what touches the object."""
+        ...
+
+    @property
+    def source(self) -> str:
+        """Where its numbers come from."""
+        ...
+
+    def boxes(self, opening_m: float) -> list[PlacedBox]:
+        """Return boxes around all of it, at a given opening."""
+        ...
+
+    def symbol(self, width_m: float) -> list[PlacedBox]:
+        """Return few boxes that stand for it in a drawing of many grasps."""
+        ...
 
 
-def _placed(box: Box, offset_m: float, side: int) -> tuple[np.ndarray, np.ndarray]:
-    angle = side * box.rotation_y_rad
-    cosine, sine = np.cos(angle), np.sin(angle)
-    box_to_gripper = np.eye(4)
-    box_to_gripper[:3, :3] = [[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]]
-    x, y, z = box.center_m
-    box_to_gripper[:3, 3] = [side * (x + offset_m), side * y, z]
-    return box_to_gripper, np.array(box.half_extents_m)
+def of_kind(gripper: Gripper, kind: type[Kind]) -> Kind:
+    """Return a gripper as one of the class that is wanted; raises UsageError where it is another."""
+    if not isinstance(gripper, kind):
+        raise UsageError(f"gripper {gripper.name} is of the kind {gripper.kind}, not a {kind.__name__}; choose another")
+    return gripper
+
+
+Loader = Callable[[dict[str, Any], Path], Gripper]
+
+
+def _parallel(data: dict[str, Any], folder: Path) -> Gripper:
+    return TypeAdapter(ParallelGripper).validate_python(data)
+
+
+def _suction(data: dict[str, Any], folder: Path) -> Gripper:
+    return TypeAdapter(SuctionGripper).validate_python(data)
+
+
+KINDS: dict[str, Loader] = {"parallel": _parallel, "suction": _suction, "multi_finger": load_multi_finger}
+"""How each kind is made of its file's content and folder."""
 
 
 def shipped_grippers() -> list[str]:
     """Return the names of the grippers that come with the package."""
-    folder = resources.files("manitwin.simulate") / "grippers"
-    return sorted(Path(str(p)).stem for p in folder.iterdir() if str(p).endswith(".toml"))
+    return sorted(path.stem for path in _shipped_folder().iterdir() if path.suffix == ".toml")
+
+
+def _shipped_folder() -> Path:
+    return Path(str(resources.files("manitwin.simulate") / "grippers"))
 
 
 def load_gripper(name_or_path: str) -> Gripper:
@@ -78,28 +119,22 @@ def load_gripper(name_or_path: str) -> Gripper:
             raise UsageError(
                 f"gripper file {name_or_path} is not there; give a .toml file or one of {', '.join(shipped_grippers())}"
             )
-        text = path.read_text()
     else:
         if name_or_path not in shipped_grippers():
             raise UsageError(choose_from("gripper", name_or_path, shipped_grippers()))
-        text = (resources.files("manitwin.simulate") / "grippers" / f"{name_or_path}.toml").read_text()
-    data = tomllib.loads(text)
-
-    def boxes(key: str) -> tuple[Box, ...]:
-        return tuple(
-            Box(tuple(b["center_m"]), tuple(b["half_extents_m"]), float(b.get("rotation_y_rad", 0.0)))
-            for b in data[key]
-        )
-
-    return Gripper(
-        name=data["name"],
-        sha256=hashlib.sha256(text.encode()).hexdigest(),
-        opening_m=data["opening_m"],
-        tip_depth_m=data["tip_depth_m"],
-        force_n=data["force_n"],
-        finger_friction=data["finger_friction"],
-        pad_half_extents_m=tuple(data["pad_half_extents_m"]),
-        finger_boxes=boxes("finger_boxes"),
-        palm_boxes=boxes("palm_boxes"),
-        source=data["source"],
-    )
+        path = _shipped_folder() / f"{name_or_path}.toml"
+    content = path.read_bytes()
+    try:
+        data = tomllib.loads(content.decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(f"gripper file {path}: not TOML: {error}") from error
+    kind = data.pop("kind", None)
+    if kind not in KINDS:
+        raise UsageError(f"gripper file {path}: {choose_from('kind', str(kind), KINDS)}")
+    data["sha256"] = hashlib.sha256(content).hexdigest()
+    try:
+        return KINDS[kind](data, path.parent)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise UsageError(f"gripper file {path}: {where}: {first['msg']}") from error

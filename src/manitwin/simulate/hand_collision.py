@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from manitwin.simulate.gripper import Gripper
+from manitwin.simulate.hands.box import PlacedBox
 
 PAIRS_AT_ONCE = 20_000
 
@@ -25,14 +26,18 @@ class HandCollision:
     def overlaps(
         self, gripper: Gripper, gripper_to_object: np.ndarray, *, opening_m: float, clearance_m: float
     ) -> np.ndarray:
-        """Tell for each grasp ``(N, 4, 4)`` whether a box of the hand comes closer than ``clearance_m`` to a hull.
+        """Tell for each grasp ``(N, 4, 4)`` whether the hand at an opening comes closer than ``clearance_m`` to a hull."""
+        return self.boxes_overlap(gripper.boxes(opening_m), gripper_to_object, clearance_m)
+
+    def boxes_overlap(self, boxes: list[PlacedBox], gripper_to_object: np.ndarray, clearance_m: float) -> np.ndarray:
+        """Tell for each grasp ``(N, 4, 4)`` whether one of the boxes comes closer than ``clearance_m`` to a hull.
 
         The separating axes tried are the normals of box and hull, not the products of their edges (Gottschalk et al.
         1996, section 5): no overlap is missed, and near misses of edge by edge, less than a hull's rounding, count as
         overlaps.
         """
         result = np.zeros(len(gripper_to_object), dtype=bool)
-        for box_to_gripper, half_extents_m in gripper.boxes(opening_m):
+        for box_to_gripper, half_extents_m in boxes:
             index = np.flatnonzero(~result)
             box_to_object = gripper_to_object[index] @ box_to_gripper
             result[index] = self._box_overlaps(box_to_object, half_extents_m + clearance_m)

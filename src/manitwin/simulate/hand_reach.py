@@ -2,29 +2,48 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
-from manitwin.geometry.poses import transform_points
-from manitwin.simulate.gripper import Gripper
+from manitwin.geometry.poses import inverse
+from manitwin.simulate.hands.parallel import ParallelGripper
 
 
 def reachable_hulls(
-    hulls: tuple[np.ndarray, ...], gripper: Gripper, gripper_to_object: np.ndarray, margin_m: float
+    hulls: tuple[np.ndarray, ...], gripper: ParallelGripper, gripper_to_object: np.ndarray, margin_m: float
 ) -> np.ndarray:
     """Tell for each hull ``(V, 3)`` whether palm or moving fingers can come within ``margin_m`` of it, ``(H,)`` bool.
 
     Never too few: boxes around the hulls, in the gripper's frame, against boxes around what the hand sweeps as it
     closes.
     """
-    object_to_gripper = np.linalg.inv(gripper_to_object)
-    corners = [transform_points(object_to_gripper, hull) for hull in hulls]
-    low, high = np.array([c.min(0) for c in corners]), np.array([c.max(0) for c in corners])
-    reached = np.zeros(len(hulls), bool)
+    return reached_at(hulls, gripper, inverse(gripper_to_object)[None], margin_m)[0]
+
+
+def reached_at(
+    hulls: tuple[np.ndarray, ...], gripper: ParallelGripper, object_to_gripper: np.ndarray, margin_m: float
+) -> np.ndarray:
+    """Tell the same of several poses of the object ``(P, 4, 4)`` in the gripper's frame, ``(P, H)`` bool."""
+    starts = np.cumsum([0] + [len(hull) for hull in hulls[:-1]])
+    corners = (
+        np.concatenate(hulls) @ object_to_gripper[:, :3, :3].transpose(0, 2, 1) + object_to_gripper[:, None, :3, 3]
+    )
+    low, high = np.minimum.reduceat(corners, starts, axis=1), np.maximum.reduceat(corners, starts, axis=1)
+    reached = np.zeros(low.shape[:2], bool)
+    for swept_low, swept_high in _swept_boxes(gripper):
+        reached |= ((low <= swept_high + margin_m) & (high >= swept_low - margin_m)).all(2)
+    return reached
+
+
+@lru_cache(maxsize=8)
+def _swept_boxes(gripper: ParallelGripper) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the corners of boxes around what each box of the hand sweeps between open and closed."""
+    boxes = []
     for start, end in zip(gripper.boxes(gripper.opening_m), gripper.boxes(0.0), strict=True):
         (first_low, first_high), (last_low, last_high) = _bounds(*start), _bounds(*end)
-        swept_low, swept_high = np.minimum(first_low, last_low), np.maximum(first_high, last_high)
-        reached |= ((low <= swept_high + margin_m) & (high >= swept_low - margin_m)).all(1)
-    return reached
+        boxes.append((np.minimum(first_low, last_low), np.maximum(first_high, last_high)))
+    return boxes
 
 
 def _bounds(box_to_gripper: np.ndarray, half_extents_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.simulate.gripper import Gripper
+from manitwin.simulate.hands.parallel import ParallelGripper
 
 ACROSS, ALONG = 3, 5  # cells of a pad
 INSET = 0.87  # the outermost rays lie inside the pad's edge
@@ -41,7 +41,7 @@ class PadContacts:
 
 
 def pad_contacts(
-    gripper: Gripper, gripper_to_object: np.ndarray, hulls: RayCaster, center_of_mass_m: np.ndarray
+    gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: RayCaster, center_of_mass_m: np.ndarray
 ) -> PadContacts:
     """Cast rays from both open pads of grasps ``(N, 4, 4)`` against the union of the hulls."""
     half_y, half_z = gripper.pad_half_extents_m

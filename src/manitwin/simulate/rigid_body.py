@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from manitwin.geometry.ray_caster import RayCaster
+
 
 @dataclass(frozen=True)
 class RigidBody:
     """Convex hulls (each ``(V, 3)`` m) and the real mass properties, in the object frame.
 
     ``inertia_kg_m2 (3, 3)`` is about the centre of mass, along the axes of the object frame; it is not derived from the
-    hulls.
+    hulls. ``surface`` is the true surface where it is known: a suction cup feels what hulls smooth over.
     """
 
     hulls: tuple[np.ndarray, ...]
@@ -21,6 +23,7 @@ class RigidBody:
     inertia_kg_m2: np.ndarray
     friction_static: float
     friction_dynamic: float
+    surface: RayCaster | None = None
 
 
 def principal_frame(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

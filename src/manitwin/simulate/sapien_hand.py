@@ -11,7 +11,9 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.simulate.gripper import Gripper
+from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.simulate.shared_target import SharedTarget
+from manitwin.simulate.trial import TrialSettings
 
 # PhysX stops a locked axis after every substep but solves contacts with the finger's mass along it too: friction of
 # fingers much lighter than the object needs more substeps than there are, and much heavier ones converge worse. Of 110
@@ -22,6 +24,7 @@ LOCKED_INERTIA_KG_M2 = 1e9  # as good as infinite: the fingers do not turn
 LOCKED_AXES = [False, True, True, True, True, True]  # translations x, y, z, then rotations
 LIMIT_SLACK_M = 1e-4  # keeps the open finger off its limit
 PATCH_RADIUS_M, MIN_PATCH_RADIUS_M = 0.01, 0.005  # of PhysX's torsional friction: that of a soft pad
+MAX_DRIVE_FORCE = 4.0  # the drive's limit, as a multiple of the closing force: it never cuts the closing force itself
 # SAPIEN's shapes with a common bit in the third word do not collide: so palm and fingers with one another.
 HAND_COLLISION_GROUPS = [1, 1, 2, 0]
 
@@ -35,21 +38,10 @@ class FixedHand:
     Finger coordinates are the distances (m) of the two pads from the plane x = 0.
     """
 
-    def __init__(
-        self,
-        scene: sapien.Scene,
-        gripper: Gripper,
-        *,
-        friction: float,
-        stiffness_n_m: float,
-        damping_n_s_m: float,
-        force_limit_n: float,
-        contact_offset_m: float,
-        solver_iterations: int,
-    ):
+    def __init__(self, scene: sapien.Scene, gripper: ParallelGripper, settings: TrialSettings):
         """Put the open hand into the scene."""
-        self._material = physx.PhysxMaterial(friction, friction, 0.0)
-        self._contact_offset_m = contact_offset_m
+        self._material = physx.PhysxMaterial(settings.finger_friction, settings.finger_friction, 0.0)
+        self._contact_offset_m = settings.contact_offset_m
         boxes, first = gripper.boxes(0.0), len(gripper.palm_boxes)
         count = len(gripper.finger_boxes)
         palm = physx.PhysxRigidStaticComponent()
@@ -63,15 +55,18 @@ class FixedHand:
             start = first + side * count
             self._attach(finger, boxes[start : start + count])
             _lock_to_x(finger, gripper.tip_depth_m)
-            finger.solver_position_iterations = solver_iterations
+            finger.solver_position_iterations = settings.solver_iterations
             finger.solver_velocity_iterations = 1
             drive = physx.PhysxDriveComponent(finger)
             drive.pose_in_parent = drive.pose_in_child = sapien.Pose([0, 0, gripper.tip_depth_m], axis)
-            drive.set_drive_property_x(stiffness_n_m, damping_n_s_m, force_limit_n)
+            drive.set_drive_property_x(
+                settings.finger_stiffness_n_m, settings.finger_damping_n_s_m, MAX_DRIVE_FORCE * settings.force_n
+            )
             drive.set_limit_x(0.0, half_opening_m + LIMIT_SLACK_M)
             _place(scene, finger, (1, -1)[side] * half_opening_m, drive)
             self.fingers.append(finger)
             self._drives.append(drive)
+        self._target = SharedTarget(gripper.opening_m, settings)
         self.close_to(half_opening_m)
 
     def _attach(
@@ -91,6 +86,20 @@ class FixedHand:
         """Return the coordinates ``(2,)`` of the +X and the -X finger."""
         plus, minus = self.fingers
         return np.array([plus.entity_pose.p[0], -minus.entity_pose.p[0]])
+
+    def squeeze(self) -> None:
+        """Move the fingers' shared target on by one frame."""
+        self.close_to(self._target.move_on(float(self.finger_positions_m().mean())))
+
+    def pressing_n(self, pushes: list[tuple[int, np.ndarray]]) -> tuple[float, ...]:
+        """Return how hard the +X and the -X finger press inwards on the object (N)."""
+        forces = [0.0, 0.0]
+        fingers = [finger.entity.per_scene_id for finger in self.fingers]
+        for other, push_n in pushes:
+            if other in fingers:
+                side = fingers.index(other)
+                forces[side] += float(push_n[0]) * (-1, 1)[side]
+        return tuple(forces)
 
     def close_to(self, target_m: float) -> None:
         """Give both fingers one target; a target inside the object presses on it."""

@@ -81,7 +81,15 @@ class GraspTrial(Protocol):
     name: str
 
     def run(
-        self, body: RigidBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
+        self,
+        body: RigidBody,
+        gripper: Gripper,
+        gripper_to_object: np.ndarray,
+        settings: TrialSettings,
+        joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
-        """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order."""
+        """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order.
+
+        ``joints_rad (N, 2, J)`` are given for hands with more joints: those before closing and those to close to.
+        """
         ...

@@ -25,7 +25,7 @@ class FinishStage:
     """Draw ``card.png`` and return the field ``quality``."""
 
     name: ClassVar[str] = "finish"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb",
         "solid.npz",
@@ -68,17 +68,19 @@ class FinishStage:
         return {"quality": {"checks": quality_checks(draft)}}
 
     def _card_grasps(self, path: Path) -> list[CardGrasp]:
-        """Return the verified grasps, the most different first: the card draws the first of them."""
+        """Return the first gripper's verified grasps, the most different first: the card draws the first of them."""
         # ParquetFile, as read_table imports all of pyarrow.dataset: 0.3 CPU-seconds
         table = pyarrow.parquet.ParquetFile(path).read().to_pydict()
-        rows = [i for i, held in enumerate(table["verified"]) if held and ":" not in table["proposer"][i]]
+        own = (gripper == self.gripper.name for gripper in table["gripper"])
+        chosen = zip(own, table["verified"], table["proposer"], strict=True)
+        rows = [i for i, (is_own, held, proposer) in enumerate(chosen) if is_own and held and ":" not in proposer]
         rotations = rotation_from_quaternion_wxyz(
             np.array([table["quaternion_wxyz"][i] for i in rows], float).reshape(-1, 4)
         )
         positions = np.array([table["position_m"][i] for i in rows], float).reshape(-1, 3)
         poses = np.array([transform(r, t) for r, t in zip(rotations, positions, strict=True)]).reshape(-1, 4, 4)
         order = farthest_grasps(poses, np.array([table["depth_m"][i] for i in rows]), len(poses))
-        return [CardGrasp(poses[i], self.gripper.boxes(table["width_m"][rows[i]])) for i in order]
+        return [CardGrasp(poses[i], self.gripper.symbol(table["width_m"][rows[i]])) for i in order]
 
 
 def _card_points(points: dict[str, Any]) -> list[CardPoint]:

@@ -12,36 +12,38 @@ from typing import Any, ClassVar
 import numpy as np
 
 from manitwin.config import GraspConfig
-from manitwin.errors import Rejected
-from manitwin.geometry.antipodal import antipodal_pairs
 from manitwin.geometry.grasp_diversity import approach_octants
-from manitwin.geometry.ray_caster import RayCaster
-from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest
-from manitwin.simulate.grasp_filters import select_grasps
+from manitwin.simulate.grasp_selection import select_likely
 from manitwin.simulate.gripper import Gripper
 from manitwin.stages.association import associate, distances_to_grasps
-from manitwin.stages.object_arrays import load_hulls, load_solid
-from manitwin.stages.proposal_rounds import Kept, contact_friction, propose_in_rounds, torque_ratios
+from manitwin.stages.gripper_kinds import KINDS
+from manitwin.stages.object_arrays import JOINTS, load_hulls, load_solid
+from manitwin.stages.proposal_rounds import Kept, propose_in_rounds
 from manitwin.stages.stage import Draft, Resource
 
-PROPOSALS = "proposals.npz"
+PROPOSALS = "proposals{}.npz"
+PROPOSED = "proposals{}"
 UNFILTERED = ":unfiltered"
-MIN_WIDTH_M = 0.0005  # thinner than this, a wall is not told from the surface's noise
-WIDTH_SAMPLES = 2000
 
 
 class GraspsStage:
-    """Propose, filter, associate and choose grasps."""
+    """Propose, filter, associate and choose grasps.
 
-    name: ClassVar[str] = "grasps"
-    version: ClassVar[str] = "1"
+    ``suffix`` is part of the artifacts' names: empty for the twin's first gripper. Where nothing fits, the first gripper
+    rejects the object; another one is left with no proposals and the reason.
+    """
+
+    version = "2"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz", "hulls.npz", "points", "physical")
-    writes: ClassVar[tuple[str, ...]] = (PROPOSALS, "proposals")
     needs: ClassVar[Resource] = "cpu"
 
-    def __init__(self, settings: GraspConfig, grasper: Grasper, gripper: Gripper):
+    def __init__(self, settings: GraspConfig, grasper: Grasper, gripper: Gripper, suffix: str = ""):
         """Take the settings, who proposes, and for which gripper."""
+        self.name = f"grasps{suffix}"
+        self.file, self.proposed = PROPOSALS.format(suffix), PROPOSED.format(suffix)
+        self.writes: tuple[str, ...] = (self.file, self.proposed)
+        self.may_reject = not suffix
         self.settings, self.grasper, self.gripper = settings, grasper, gripper
         self.backend = grasper.name
         self.model: str | None = f"{grasper.model or grasper.name} for {gripper.name} {gripper.sha256[:12]}"
@@ -50,9 +52,14 @@ class GraspsStage:
         """Write ``proposals.npz``, return the field ``proposals``; raises Rejected where nothing fits the gripper."""
         settings, points = self.settings, draft.field("points")
         request = self._request(draft)
-        kept = propose_in_rounds(request, self.grasper, settings)
+        screen = KINDS[self.gripper.kind].screen(request)
+        kept = propose_in_rounds(request, self.grasper, screen, settings)
         if not len(kept.proposals):
-            raise _no_proposal(request, kept.counts)
+            answer = screen.why_none(kept.counts)
+            if self.may_reject:
+                raise answer
+            self._write(folder / self.file, request, kept, np.empty(0, int), points)
+            return {self.proposed: {"none_because": {"reason": answer.reason, "detail": answer.detail}}}
         nearest_m = kept.distance_m.min(1)
         association = associate(
             nearest_m,
@@ -61,11 +68,12 @@ class GraspsStage:
             object_size_m=float(np.linalg.norm(request.solid.extents)),
         )
         near = association.index
-        chosen = near[self._choose(request, kept, near)]
-        self._write(folder / PROPOSALS, request, kept, chosen, points)
+        some = kept.proposals.take(near)
+        chosen = near[select_likely(some.gripper_to_object, some.depth_m, kept.merits.take(near), settings.simulated)]
+        self._write(folder / self.file, request, kept, chosen, points)
         octants = approach_octants(kept.proposals.gripper_to_object)
         return {
-            "proposals": {
+            self.proposed: {
                 "proposed": len(kept.proposals),
                 "proposed_by_filter": {**kept.counts, "after_association": len(near), "after_diversity": len(chosen)},
                 "association_radius_m": association.radius_m,
@@ -88,57 +96,40 @@ class GraspsStage:
             focus_points_m=np.array([p["position_m"] for p in points["functional"] + points["grasp"]]),
             max_proposals=self.settings.raw_per_round,
             seed=draft.seed,
+            grasp_points_m=np.array([p["position_m"] for p in points["grasp"]]),
+            grasp_types=tuple(p["type"] for p in points["grasp"]),
         )
-
-    def _choose(self, request: GraspRequest, kept: Kept, near: np.ndarray) -> np.ndarray:
-        proposals, contacts = kept.proposals.take(near), kept.contacts.take(near)
-        ratio = torque_ratios(request, contacts)
-        return select_grasps(proposals.gripper_to_object, proposals.depth_m, contacts, ratio, self.settings.simulated)
 
     def _write(self, path: Path, request: GraspRequest, kept: Kept, chosen: np.ndarray, points: dict[str, Any]) -> None:
         """Write the chosen grasps, then the unfiltered sample, with the ids of their nearest points."""
         raw, count = kept.raw, min(self.settings.unfiltered, len(kept.raw))
         drawn = np.sort(np.random.default_rng(request.seed).choice(len(raw), count, replace=False))
-        some, others = kept.proposals.take(chosen), raw.take(drawn)
+        others = raw.take(drawn)
+        both = GraspProposals.joined([kept.proposals.take(chosen), others])
         distance_m = np.concatenate([kept.distance_m[chosen], _distances(request.focus_points_m, others)])
         functional = [point["id"] for point in points["functional"]]
         grasp = [point["id"] for point in points["grasp"]]
         name = self.grasper.name
-        np.savez(
-            path,
-            gripper_to_object=np.concatenate([some.gripper_to_object, others.gripper_to_object]),
-            width_m=np.concatenate([some.width_m, others.width_m]),
-            depth_m=np.concatenate([some.depth_m, others.depth_m]),
-            score=np.concatenate([some.score, others.score]),
-            functional_point_id=np.array(functional)[distance_m[:, : len(functional)].argmin(1)],
-            grasp_point_id=np.array(grasp)[distance_m[:, len(functional) :].argmin(1)],
-            distance_to_point_m=distance_m.min(1),
-            proposer=np.array([name] * len(some) + [name + UNFILTERED] * len(others)),
-        )
+        arrays = {
+            "gripper_to_object": both.gripper_to_object,
+            "width_m": both.width_m,
+            "depth_m": both.depth_m,
+            "score": both.score,
+            "functional_point_id": np.array(functional)[distance_m[:, : len(functional)].argmin(1)],
+            "grasp_point_id": np.array(grasp)[distance_m[:, len(functional) :].argmin(1)],
+            "distance_to_point_m": distance_m.min(1),
+            "proposer": np.array([name] * len(chosen) + [name + UNFILTERED] * len(others), str),
+            **_hand_joints(both),
+        }
+        np.savez(path, allow_pickle=False, **arrays)
+
+
+def _hand_joints(proposals: GraspProposals) -> dict[str, np.ndarray]:
+    """Return the joints as the arrays that a table keeps, none for a gripper without."""
+    if proposals.joints_rad is None:
+        return {}
+    return dict(zip(JOINTS, proposals.joints_rad.transpose(1, 0, 2), strict=True))
 
 
 def _distances(points_m: np.ndarray, grasps: GraspProposals) -> np.ndarray:
     return distances_to_grasps(points_m, grasps.gripper_to_object, grasps.depth_m, grasps.width_m)
-
-
-def _no_proposal(request: GraspRequest, counts: dict[str, int]) -> Rejected:
-    """Say why nothing is left, with the widths that were measured."""
-    rng = np.random.default_rng(request.seed)
-    points, normals, _ = sample_surface(request.solid, WIDTH_SAMPLES, rng)
-    friction = contact_friction(request)
-    caster, anything = RayCaster(request.solid), float(np.linalg.norm(request.solid.extents))
-    pairs = antipodal_pairs(caster, points, normals, friction=friction, max_width_m=anything, rng=rng)
-    opening_mm = request.gripper.opening_m * 1000
-    if not len(pairs):
-        return Rejected("no_proposal", "no two opposite surface points can be pressed together")
-    least = pairs.width_m.min()
-    if least >= request.gripper.opening_m:
-        gripper = f"the {request.gripper.name} opens {opening_mm:.0f} mm"
-        return Rejected("too_wide", f"narrowest grip is {least * 1000:.1f} mm, {gripper}")
-    most = pairs.width_m[pairs.width_m < request.gripper.opening_m].max()
-    if most < MIN_WIDTH_M:
-        thick = f"thickest part that fits the stroke is {most * 1000:.2f} mm"
-        return Rejected("too_thin", f"{thick}, thinner than the {MIN_WIDTH_M * 1000:.1f} mm that a grip needs")
-    stages = ", ".join(f"{name} {count}" for name, count in counts.items())
-    grips = f"grips are {least * 1000:.1f} mm wide and more"
-    return Rejected("no_proposal", f"no grasp passes the filters ({stages}); {grips}")

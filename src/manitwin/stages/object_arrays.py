@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
+from manitwin.geometry.ray_caster import RayCaster
 from manitwin.simulate.rigid_body import RigidBody
 from manitwin.stages.stage import Draft
+
+JOINTS = ("pregrasp_joints_rad", "grasp_joints_rad")
+"""The arrays of ``proposals.npz`` that hands with more joints have: ``(N, J)`` each."""
 
 
 def load_solid(path: Path) -> trimesh.Trimesh:
@@ -24,7 +29,7 @@ def load_hulls(path: Path) -> tuple[np.ndarray, ...]:
 
 
 def load_body(draft: Draft) -> RigidBody:
-    """Load the hulls of ``hulls.npz`` with the mass properties and friction of the field ``physical``."""
+    """Load the hulls and the surface of ``solid.npz`` with the mass properties and friction of the field ``physical``."""
     physical = draft.field("physical")
     return RigidBody(
         hulls=load_hulls(draft.path("hulls.npz")),
@@ -33,4 +38,12 @@ def load_body(draft: Draft) -> RigidBody:
         inertia_kg_m2=np.array(physical["inertia_kg_m2"]),
         friction_static=physical["friction_static"]["value"],
         friction_dynamic=physical["friction_dynamic"]["value"],
+        surface=RayCaster(load_solid(draft.path("solid.npz"))),
     )
+
+
+def joints_of(proposals: Mapping[str, np.ndarray], index: np.ndarray) -> dict[str, np.ndarray]:
+    """Return what a trial wants to know of the grasps at ``index`` beside their poses: the joints of hands with more."""
+    if JOINTS[0] not in proposals:
+        return {}
+    return {"joints_rad": np.stack([proposals[name][index] for name in JOINTS], axis=1)}

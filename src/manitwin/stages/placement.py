@@ -17,6 +17,7 @@ from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.hulls.reduction import convex_corners
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform
 from manitwin.geometry.stable_poses import easiest_tilt, stable_poses
+from manitwin.simulate.mujoco_settle import settle_on_plane_in_mujoco
 from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.settle import Settled, settle_on_plane
 from manitwin.stages.object_arrays import load_body, load_solid
@@ -55,11 +56,11 @@ class PlacementStage:
     """
 
     name: ClassVar[str] = "placement"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = ("hulls.npz", "solid.npz", "physical")
     writes: ClassVar[tuple[str, ...]] = ("placements",)
     needs: ClassVar[Resource] = "cpu"
-    backend = "sapien"
+    backend = "sapien, mujoco"
     model: str | None = None
 
     def __init__(self, settings: PlacementConfig):
@@ -152,8 +153,9 @@ class _Shape:
     def settle(self, rests: list[_Rest], loosely: bool) -> list[tuple[Settled, bool]]:
         """Set the body down in simulation in each of the poses; tell where it went, and whether it stayed.
 
-        Staying is judged level, and nudged, tilted by ``NUDGE_DEG`` the way it tilts most easily: it must not go on. A
-        body that rests ``loosely`` is nudged the other way too, and must fall back to within ``SNAP_DEG`` from both.
+        Staying is judged level in two engines, and in the first one nudged, tilted by ``NUDGE_DEG`` the way it tilts most
+        easily: it must not go on. A body that rests ``loosely`` is nudged the other way too, and must fall back to within
+        ``SNAP_DEG`` from both.
         """
         if not rests:
             return []
@@ -173,8 +175,15 @@ class _Shape:
         for index, rotation in enumerate(level):
             first, *others = outcomes[index :: len(level)]
             back = all(self._stayed(other, rotation, back_rad) for other in others)
-            found.append((first, back and self._stayed(first, rotation, most_rad)))
+            stayed = back and self._stayed(first, rotation, most_rad)
+            found.append((first, stayed and self._stays_in_second_engine(poses[index], rotation, most_rad)))
         return found
+
+    def _stays_in_second_engine(self, pose: np.ndarray, level: np.ndarray, most_rad: float) -> bool:
+        """Tell whether the body stays in another solver too: on a narrow facet, the two need not agree."""
+        drop_m, seconds = self.settings.drop_m, self.settings.seconds
+        again = settle_on_plane_in_mujoco(self.plane_body, [pose], drop_m=drop_m, seconds=seconds)[0]
+        return self._stayed(again, level, most_rad)
 
     def _stayed(self, outcome: Settled, level: np.ndarray, most_rad: float) -> bool:
         turned_rad = Rotation.from_matrix(outcome.object_to_plane[:3, :3] @ level.T).magnitude()

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Protocol, runtime_checkable
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from pydantic import BaseModel
 
@@ -73,11 +73,30 @@ class Stage(Protocol):
     It is a pure function of what it ``reads``, ``settings``, ``backend``, ``model``, ``draft.item`` and ``draft.seed``.
     """
 
-    name: ClassVar[str]
-    version: ClassVar[str]
-    reads: ClassVar[tuple[str, ...]]
-    writes: ClassVar[tuple[str, ...]]
-    needs: ClassVar[Resource]
+    @property
+    def name(self) -> str:
+        """The stage's name, and that of its folder."""
+        ...
+
+    @property
+    def version(self) -> str:
+        """Raised whenever the same inputs give another result."""
+        ...
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The artifacts that decide its result."""
+        ...
+
+    @property
+    def writes(self) -> tuple[str, ...]:
+        """The artifacts that it makes."""
+        ...
+
+    @property
+    def needs(self) -> Resource:
+        """What it runs on."""
+        ...
 
     @property
     def settings(self) -> BaseModel:

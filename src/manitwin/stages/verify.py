@@ -2,111 +2,98 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from manitwin.config import VerifyConfig
 from manitwin.errors import Rejected
-from manitwin.geometry.grasp_diversity import approach_octants
 from manitwin.simulate.gripper import Gripper
-from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.trial import GraspTrial, TrialResult, TrialSettings
-from manitwin.stages.grasp_table import write_grasp_table
 from manitwin.stages.grasps import PROPOSALS, UNFILTERED
-from manitwin.stages.object_arrays import load_body
+from manitwin.stages.gripper_kinds import KINDS
+from manitwin.stages.object_arrays import joints_of, load_body
 from manitwin.stages.stage import Draft, Resource
-from manitwin.twin import GraspSummary, Trial
+from manitwin.twin import Trial
 
-TABLE = "grasps.parquet"
+VERDICTS = "verdicts{}.npz"
+TRIAL = "trial{}"
 
 
 class VerifyStage:
-    """Try every chosen grasp, and the unfiltered sample beside it."""
+    """Try every chosen grasp of a gripper, and the unfiltered sample beside it.
 
-    name: ClassVar[str] = "verify"
-    version: ClassVar[str] = "3"
-    reads: ClassVar[tuple[str, ...]] = (PROPOSALS, "proposals", "hulls.npz", "physical")
-    writes: ClassVar[tuple[str, ...]] = (TABLE, "grasps")
-    needs: ClassVar[Resource] = "cpu"
+    ``suffix`` is part of the artifacts' names: empty for the twin's first gripper. Without one that held, the first
+    gripper rejects the object; another gripper does not.
+    """
 
-    def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper):
+    version = "3"
+    needs: Resource = "cpu"
+
+    def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""):
         """Take the settings, the engine, and the gripper."""
         self.settings, self.trial, self.gripper = settings, trial, gripper
         self.backend = trial.name
         self.model: str | None = f"{gripper.name} {gripper.sha256[:12]}"
+        self.name = f"verify{suffix}"
+        self.proposals, self.verdicts, self.trial_field = (n.format(suffix) for n in (PROPOSALS, VERDICTS, TRIAL))
+        self.reads: tuple[str, ...] = (self.proposals, "solid.npz", "hulls.npz", "physical")
+        self.writes: tuple[str, ...] = (self.verdicts, self.trial_field)
+        self.may_reject = not suffix
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Write ``grasps.parquet`` and return the field ``grasps``; raises Rejected where no grasp held."""
-        with np.load(draft.path(PROPOSALS)) as arrays:
-            proposals = dict(arrays)
-        body, settings = load_body(draft), self._trial_settings()
-        results = self.trial.run(body, self.gripper, proposals["gripper_to_object"], settings)
-        unfiltered = np.char.endswith(proposals["proposer"], UNFILTERED)
-        summary = self._summary(draft.field("proposals"), proposals, results, unfiltered, body, settings)
-        if not summary.verified:
-            failures = ", ".join(f"{count} {outcome}" for outcome, count in summary.failures.items())
-            raise Rejected("none_held", f"none of {summary.simulated} simulated grasps held: {failures}")
-        write_grasp_table(folder / TABLE, self.gripper.name, proposals, results)
-        return {"grasps": summary.model_dump(mode="json")}
+        """Write the verdicts and return the field ``trial``; raises Rejected where no grasp held."""
+        with np.load(draft.path(self.proposals)) as arrays:
+            poses, depth_m, proposer = (arrays[n] for n in ("gripper_to_object", "depth_m", "proposer"))
+            joints = joints_of(arrays, np.arange(len(poses)))
+        body, settings = load_body(draft), trial_settings(self.settings, self.gripper)
+        results = self.trial.run(body, self.gripper, poses, settings, **joints)
+        chosen = np.flatnonzero(~np.char.endswith(proposer, UNFILTERED))
+        if self.may_reject and not any(results[i].outcome == "held" for i in chosen):
+            tried = [results[i] for i in chosen]
+            why = KINDS[self.gripper.kind].why_none_held
+            raise Rejected("none_held", why(tried, poses[chosen], depth_m[chosen], body, settings))
+        save_results(folder / self.verdicts, results)
+        return {self.trial_field: describe(self.trial, settings, body.friction_static).model_dump(mode="json")}
 
-    def _trial_settings(self) -> TrialSettings:
-        return TrialSettings(
-            force_n=self.gripper.force_n if self.settings.force_n is None else self.settings.force_n,
-            finger_friction=self.gripper.finger_friction,
-            timestep_s=self.settings.timestep_s,
-            solver_iterations=self.settings.solver_iterations,
-            max_steps=self.settings.max_steps,
-            stable_frames=self.settings.stable_frames,
-            max_displacement_m=self.settings.max_displacement_m,
-            slide_m=self.settings.slide_distance_m,
-        )
 
-    def _summary(
-        self,
-        proposed: dict[str, Any],
-        proposals: dict[str, np.ndarray],
-        results: list[TrialResult],
-        unfiltered: np.ndarray,
-        body: RigidBody,
-        settings: TrialSettings,
-    ) -> GraspSummary:
-        held = np.array([result.outcome == "held" for result in results])
-        verified = held & ~unfiltered
-        failures = Counter(
-            result.outcome
-            for result, raw in zip(results, unfiltered, strict=True)
-            if not raw and result.outcome != "held"
-        )
-        return GraspSummary(
-            gripper=self.gripper.name,
-            gripper_sha256=self.gripper.sha256,
-            proposed=proposed["proposed"],
-            proposed_by_filter=proposed["proposed_by_filter"],
-            simulated=int((~unfiltered).sum()),
-            verified=int(verified.sum()),
-            success_rate=float(held[~unfiltered].mean()),
-            unfiltered_simulated=int(unfiltered.sum()),
-            unfiltered_success_rate=float(held[unfiltered].mean()) if unfiltered.any() else None,
-            failures=dict(sorted(failures.items())),
-            approach_octants=len(np.unique(approach_octants(proposals["gripper_to_object"][verified]))),
-            file=TABLE,
-            association_radius_m=proposed["association_radius_m"],
-            association_radius_widened=proposed["association_radius_widened"],
-            share_beyond_3cm=proposed["share_beyond_3cm"],
-            trial=Trial(
-                engine=self.trial.name,
-                finger_friction=settings.finger_friction,
-                object_friction=body.friction_static,
-                combine="average",
-                force_n=settings.force_n,
-                timestep_s=settings.timestep_s,
-                solver_iterations=settings.solver_iterations,
-                max_steps=settings.max_steps,
-                stable_frames=settings.stable_frames,
-                max_displacement_m=settings.max_displacement_m,
-                slide_distance_m=settings.slide_m,
-            ),
-        )
+def trial_settings(settings: VerifyConfig, gripper: Gripper) -> TrialSettings:
+    """Return the trial's numbers: the configuration's, and the gripper's own force where that names none."""
+    return TrialSettings(
+        force_n=gripper.force_n if settings.force_n is None else settings.force_n,
+        finger_friction=gripper.finger_friction,
+        timestep_s=settings.timestep_s,
+        solver_iterations=settings.solver_iterations,
+        max_steps=settings.max_steps,
+        stable_frames=settings.stable_frames,
+        max_displacement_m=settings.max_displacement_m,
+        slide_m=settings.slide_distance_m,
+    )
+
+
+def describe(trial: GraspTrial, settings: TrialSettings, object_friction: float) -> Trial:
+    """Return what a twin says of the trial that its grasps went through."""
+    return Trial(
+        engine=trial.name,
+        finger_friction=settings.finger_friction,
+        object_friction=object_friction,
+        combine="average",
+        force_n=settings.force_n,
+        timestep_s=settings.timestep_s,
+        solver_iterations=settings.solver_iterations,
+        max_steps=settings.max_steps,
+        stable_frames=settings.stable_frames,
+        max_displacement_m=settings.max_displacement_m,
+        slide_distance_m=settings.slide_m,
+    )
+
+
+def save_results(path: Path, results: list[TrialResult]) -> None:
+    """Save outcome, displacement (m) and rotation (rad) of each trial as arrays."""
+    np.savez(
+        path,
+        outcome=np.array([result.outcome for result in results], dtype="U16"),
+        displacement_m=np.array([result.displacement_m for result in results], float),
+        rotation_rad=np.array([result.rotation_rad for result in results], float),
+    )

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from manitwin.geometry.antipodal import AntipodalPairs, antipodal_pairs, grasp_frames
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
+from manitwin.models.graspers.starting_points import starting_points
+from manitwin.simulate.gripper import of_kind
+from manitwin.simulate.hands.parallel import ParallelGripper
 
-POOL = 20_000  # surface samples to choose starting points from; as many as the paper takes for its candidates
 ROLLS = 8  # approach directions a pair
 CONE_SAFETY = 1.5  # the friction cone is narrowed by this: contacts are patches, and hulls are not the surface
 MIN_WIDTH_M = 0.0005
 CLEARANCE_M = 0.0005  # between open finger and object, on each side
 MAX_DEPTH_OFFSET_M = 0.007  # the middle of the pair stays on pads of 18.5 mm
-FOCUS_SPREAD_M, FOCUS_WEIGHT = 0.02, 8.0  # starting points lie denser around the selected points ...
-CENTER_SPREAD, CENTER_WEIGHT = 0.2, 2.0  # ... and around the centre of mass (as a share of the diagonal)
 # The score falls to one half at this lever: measured on 1,799 trials of 18 objects, where grasps beyond 80 mm held in
 # 47 %.
 HALF_LEVER_M, LEVER_SLOPE_M = 0.08, 0.02
@@ -36,15 +34,13 @@ class AntipodalGrasper:
         of mass.
         """
         rng = np.random.default_rng(request.seed)
-        gripper = request.gripper
+        gripper = of_kind(request.gripper, ParallelGripper)
         friction = (gripper.finger_friction + request.object_friction) / 2 / CONE_SAFETY
-        points, normals, _ = sample_surface(request.solid, POOL, rng)
-        count = min(POOL, max(1, request.max_proposals // ROLLS))
-        chosen = rng.choice(POOL, count, replace=False, p=_density(request, points))
+        points, normals = starting_points(request, max(1, request.max_proposals // ROLLS), rng)
         pairs = antipodal_pairs(
             RayCaster(request.solid),
-            points[chosen],
-            normals[chosen],
+            points,
+            normals,
             friction=friction,
             max_width_m=gripper.opening_m - 2 * CLEARANCE_M,
             rng=rng,
@@ -60,18 +56,6 @@ class AntipodalGrasper:
             np.repeat(_score(pairs, request.center_of_mass_m, friction), ROLLS),
         )
         return proposals.take(rng.permutation(len(poses))[: request.max_proposals])
-
-
-def _density(request: GraspRequest, points: np.ndarray) -> np.ndarray:
-    """Return the probability ``(N,)`` with which each surface point starts a pair."""
-    weight = np.ones(len(points))
-    if len(request.focus_points_m):
-        distance = cKDTree(request.focus_points_m).query(points)[0]
-        weight += FOCUS_WEIGHT * np.exp(-0.5 * (distance / FOCUS_SPREAD_M) ** 2)
-    spread_m = CENTER_SPREAD * float(np.linalg.norm(request.solid.extents))
-    distance = np.linalg.norm(points - request.center_of_mass_m, axis=1)
-    weight += CENTER_WEIGHT * np.exp(-0.5 * (distance / spread_m) ** 2)
-    return weight / weight.sum()
 
 
 def _score(pairs: AntipodalPairs, center_of_mass_m: np.ndarray, friction: float) -> np.ndarray:

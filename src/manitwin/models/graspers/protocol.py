@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 import trimesh
 
+from manitwin.errors import Rejected
+from manitwin.simulate.grasp_selection import Merits
 from manitwin.simulate.gripper import Gripper
 
 
@@ -17,6 +19,7 @@ class GraspRequest:
 
     ``solid`` is the watertight mesh, ``hulls`` the convex collision vertices (each ``(V, 3)``), both in the object frame in
     metres. ``focus_points_m`` ``(P, 3)`` are the selected points: proposals should be denser around them.
+    ``grasp_points_m (G, 3)`` are those of them that are for grasping, ``grasp_types`` how each wants to be grasped.
     """
 
     solid: trimesh.Trimesh
@@ -28,6 +31,8 @@ class GraspRequest:
     focus_points_m: np.ndarray
     max_proposals: int
     seed: int
+    grasp_points_m: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    grasp_types: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -35,13 +40,15 @@ class GraspProposals:
     """Grasps in the grasp frame (+Z approach, X closing, origin at the gripper's base).
 
     ``gripper_to_object (N, 4, 4)``, ``width_m (N,)`` distance of the two contacts along X, ``depth_m (N,)`` fingertip
-    centre along +Z, ``score (N,)`` in [0, 1].
+    centre along +Z, ``score (N,)`` in [0, 1]. For a hand with more joints than one, ``joints_rad (N, 2, J)`` are those
+    before it closes and those it closes to.
     """
 
     gripper_to_object: np.ndarray
     width_m: np.ndarray
     depth_m: np.ndarray
     score: np.ndarray
+    joints_rad: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.gripper_to_object)
@@ -49,7 +56,23 @@ class GraspProposals:
     def take(self, index: np.ndarray) -> GraspProposals:
         """Return the proposals at ``index``."""
         return GraspProposals(
-            self.gripper_to_object[index], self.width_m[index], self.depth_m[index], self.score[index]
+            self.gripper_to_object[index],
+            self.width_m[index],
+            self.depth_m[index],
+            self.score[index],
+            None if self.joints_rad is None else self.joints_rad[index],
+        )
+
+    @staticmethod
+    def joined(parts: list[GraspProposals]) -> GraspProposals:
+        """Return the proposals of all parts, one after the other; all of them have joints, or none."""
+        joints = [p.joints_rad for p in parts if p.joints_rad is not None]
+        return GraspProposals(
+            np.concatenate([p.gripper_to_object for p in parts]),
+            np.concatenate([p.width_m for p in parts]),
+            np.concatenate([p.depth_m for p in parts]),
+            np.concatenate([p.score for p in parts]),
+            np.concatenate(joints) if joints else None,
         )
 
 
@@ -61,4 +84,25 @@ class Grasper(Protocol):
 
     def propose(self, request: GraspRequest) -> GraspProposals:
         """Return up to ``max_proposals`` grasps, not yet filtered for collision or proven."""
+        ...
+
+
+@dataclass(frozen=True)
+class Screened:
+    """What is left of proposals: with the widths as measured, their merits, and how many were left after each filter."""
+
+    proposals: GraspProposals
+    merits: Merits
+    counts: dict[str, int]
+
+
+class Screen(Protocol):
+    """What one kind of gripper can tell of proposals for one object before any trial."""
+
+    def __call__(self, raw: GraspProposals) -> Screened:
+        """Keep the proposals that are worth a trial."""
+        ...
+
+    def why_none(self, counts: dict[str, int]) -> Rejected:
+        """Say why nothing was left."""
         ...

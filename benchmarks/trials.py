@@ -1,0 +1,177 @@
+"""Measure the grasp trials over finished twins: what they cost, where the time goes, and whether cheap verdicts are right.
+
+    python benchmarks/trials.py TWINS [--grasps N] [--reference N] [--processes N]
+
+``TWINS`` is a folder of finished twins. All ratios are of CPU seconds measured in this one run:
+- against one scene a grasp with all hulls, all slides and no early exit;
+- against the time inside the physics steps alone;
+- ``--reference N`` jittered and plain grasps a twin are also tried at 1/960 s and 40 iterations, and verdicts compared;
+- ``--processes`` runs the same trials in several processes and compares wall seconds with one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from manitwin.loaded_twin import Twin
+from manitwin.simulate import sapien_trial, trial_phases
+from manitwin.simulate.gripper import load_gripper
+from manitwin.simulate.jitter import jittered
+from manitwin.simulate.sapien_trial import SapienTrial
+from manitwin.simulate.trial import TrialSettings
+
+REFERENCE = {"timestep_s": 1 / 960, "solver_iterations": 40, "steps_per_frame": 16, "max_steps": 8000}
+NO_LIMITS = {
+    "max_overlap_m": np.inf,
+    "max_penetration_m": np.inf,
+    "min_finger_force_n": -1.0,
+    "max_lift_displacement_m": np.inf,
+    "max_displacement_m": np.inf,
+    "stable_speed_m_s": np.inf,
+}
+
+
+def main() -> None:
+    """Run all twins and print a line each, then the medians."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("twins", type=Path)
+    parser.add_argument("--grasps", type=int, default=100)
+    parser.add_argument("--reference", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=0)
+    arguments = parser.parse_args()
+    folders = sorted(path.parent for path in arguments.twins.glob("*/grasps.parquet"))
+    _warm_up(folders[0])
+    rows = [_measure(folder, arguments.grasps) for folder in folders]
+    for name in ("cpu_s", "around_s", "of_steps", "of_plain"):
+        values = [row[name] for row in rows]
+        print(f"{name}: median {np.median(values):.2f}, 90th percentile {np.percentile(values, 90):.2f}")
+    if arguments.reference:
+        _compare(folders, arguments.reference)
+    if arguments.processes:
+        _scale(folders, arguments.grasps, arguments.processes)
+
+
+def _measure(folder: Path, count: int) -> dict[str, float]:
+    """Return CPU seconds for 100 grasps, those around the steps, and the ratios to steps alone and to plain trials.
+
+    The machine's speed varies from second to second, so the three are measured in turns, grasp by grasp.
+    """
+    twin = Twin(folder)
+    poses = twin.grasps(verified_only=False).gripper_to_object[:count]
+    total = steps = plain = 0.0
+    for pose in poses:
+        with _timed_steps() as spent:
+            total += _cpu_of_trials(twin, pose[None], _settings())
+        steps += spent[0]
+        with _plain_trials():
+            plain += _cpu_of_trials(twin, pose[None], replace(_settings(), **NO_LIMITS))
+    scale = 100 / len(poses)
+    row = {
+        "cpu_s": total * scale,
+        "around_s": (total - steps) * scale,
+        "of_steps": total / steps,
+        "of_plain": total / plain,
+    }
+    print(f"{twin.record.name or folder.name:16s}", " ".join(f"{k} {v:.2f}" for k, v in row.items()), flush=True)
+    return row
+
+
+def _settings() -> TrialSettings:
+    gripper = load_gripper("panda")
+    return TrialSettings(force_n=gripper.force_n, finger_friction=gripper.finger_friction)
+
+
+def _cpu_of_trials(twin: Twin, poses: np.ndarray, settings: TrialSettings) -> float:
+    body, gripper = twin.rigid_body(), load_gripper("panda")
+    started = time.process_time()
+    SapienTrial().run(body, gripper, poses, settings)
+    return time.process_time() - started
+
+
+def _warm_up(folder: Path) -> None:
+    twin = Twin(folder)
+    _cpu_of_trials(twin, twin.grasps(verified_only=False).gripper_to_object[:2], _settings())
+
+
+@contextmanager
+def _timed_steps() -> Iterator[list[float]]:
+    """Count the CPU seconds inside the physics steps."""
+    spent, plain = [0.0], sapien_trial._Scene.advance
+
+    def advance(self: sapien_trial._Scene, loads_m_s2: np.ndarray) -> None:
+        targets = (loads_m_s2 / sapien_trial.LOAD_RATE_PER_S).astype(np.float32)
+        for target in targets:
+            self.load.set_drive_velocity_target(target, sapien_trial.NO_SPIN)
+            started = time.process_time()
+            self.system.step()
+            spent[0] += time.process_time() - started
+
+    sapien_trial._Scene.advance = advance  # type: ignore[method-assign]
+    try:
+        yield spent
+    finally:
+        sapien_trial._Scene.advance = plain  # type: ignore[method-assign]
+
+
+@contextmanager
+def _plain_trials() -> Iterator[None]:
+    """Keep all hulls and repeat all slides."""
+    margin, share = sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE
+    sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE = 10.0, 0.0
+    try:
+        yield
+    finally:
+        sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE = margin, share
+
+
+def _compare(folders: list[Path], count: int) -> None:
+    """Print how often the verdicts are those of the reference: of plain trials at today's step, and as they are run."""
+    verdicts: dict[str, list[bool]] = {"reference": [], "plain": [], "as run": []}
+    for folder in folders:
+        twin, rng = Twin(folder), np.random.default_rng(0)
+        grasps, gripper = twin.grasps(verified_only=False), load_gripper("panda")
+        index = rng.choice(len(grasps), min(count, len(grasps)), replace=False)
+        poses = grasps.gripper_to_object[index]
+        moved = jittered(poses, grasps.depth_m[index], rng, sigma_deg=10.0, sigma_m=0.006)
+        poses, body = np.concatenate([poses, moved]), twin.rigid_body()
+        with _plain_trials():
+            reference = SapienTrial().run(body, gripper, poses, replace(_settings(), **REFERENCE))  # type: ignore[arg-type]
+            plain = SapienTrial().run(body, gripper, poses, _settings())
+        as_run = SapienTrial().run(body, gripper, poses, _settings())
+        for name, results in zip(verdicts, (reference, plain, as_run), strict=True):
+            verdicts[name] += [result.outcome == "held" for result in results]
+    truth = np.array(verdicts["reference"])
+    for name in ("plain", "as run"):
+        agree = float((np.array(verdicts[name]) == truth).mean())
+        print(f"{name}: {100 * agree:.1f} % of {len(truth)} verdicts are the reference's (of which {truth.sum()} held)")
+
+
+def _one(job: tuple[Path, int]) -> float:
+    folder, count = job
+    twin = Twin(folder)
+    return _cpu_of_trials(twin, twin.grasps(verified_only=False).gripper_to_object[:count], _settings())
+
+
+def _scale(folders: list[Path], count: int, processes: int) -> None:
+    """Print how much faster several processes are: wall seconds of the same trials, one object a job."""
+    jobs, wall = [(folder, count) for folder in folders], {}
+    context = multiprocessing.get_context("spawn")
+    for number in (1, processes):
+        with context.Pool(number) as pool:
+            pool.map(_one, [(folders[0], 1)] * number, chunksize=1)  # imports are not what is measured
+            started = time.perf_counter()
+            pool.map(_one, jobs, chunksize=1)
+            wall[number] = time.perf_counter() - started
+    print(f"{processes} processes: {wall[1] / wall[processes]:.2f} times as fast as one ({wall[1]:.1f} s)")
+
+
+if __name__ == "__main__":
+    main()
