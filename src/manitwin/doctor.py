@@ -13,6 +13,7 @@ from manitwin.errors import ManiTwinError
 
 PACKAGES = (
     "sapien",
+    "mujoco",
     "trimesh",
     "embreex",
     "manifold3d",
@@ -41,6 +42,8 @@ def examine() -> list[Finding]:
         ("python", _python),
         ("packages", _packages),
         ("physics", _physics),
+        ("second engine", _second_engine),
+        ("grippers", _grippers),
         ("ray casting", _ray_casting),
         ("renderer", _renderer),
         ("backends", _backends),
@@ -79,6 +82,26 @@ def _physics() -> str:
     scene = sapien.Scene([sapien.physx.PhysxCpuSystem()])
     scene.step()
     return f"SAPIEN {sapien.__version__} steps a scene (PhysX on the CPU)"
+
+
+def _second_engine() -> str:
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    mujoco.mj_step(model, mujoco.MjData(model))
+    return f"MuJoCo {mujoco.__version__} steps a scene"
+
+
+def _grippers() -> str:
+    from manitwin.simulate.gripper import load_gripper, shipped_grippers
+
+    usable, left_out = [], []
+    for name in shipped_grippers():
+        try:
+            usable.append(load_gripper(name).name)
+        except ManiTwinError as error:  # a hand whose files come with an extra
+            left_out.append(str(error))
+    return "; ".join([", ".join(usable), *left_out])
 
 
 def _ray_casting() -> str:
