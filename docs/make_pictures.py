@@ -32,7 +32,7 @@ MUG = DOCS.parent / "samples" / "mug.glb"
 AXIS_COLORS = ((214, 48, 49), (39, 150, 70), (32, 98, 210))
 AXIS_M = 0.07
 WIDTH, HEIGHT = 1500, 940
-TILE = 440
+TILE, LABEL = 440, 40
 FINGER_COLORS = ((120, 128, 144), (196, 92, 60), (84, 134, 200), (76, 160, 116), (196, 158, 66))
 INK, GREY = (24, 28, 36), (96, 104, 116)
 
@@ -192,13 +192,13 @@ def grippers_picture() -> Image.Image:
         width_px=TILE,
         height_px=TILE,
     )
-    picture = Image.new("RGB", (TILE * len(drawn), TILE), "white")
+    picture = Image.new("RGB", (TILE * len(drawn), TILE + LABEL), "white")
     draw = ImageDraw.Draw(picture)
     for index, (name, hands) in enumerate(drawn):
         scene = [*parts, *(plain_part(h, c) for h, c in zip(hands, FINGER_COLORS, strict=False))]
         picture.paste(
             Image.fromarray(shared_renderer().render(scene, [camera], background=(255, 255, 255))[0].rgb),
-            (TILE * index, 0),
+            (TILE * index, LABEL),
         )
         draw.text((TILE * (index + 0.5), 30), name, fill=INK, font=_font(22), anchor="ms")
     return picture
