@@ -58,3 +58,9 @@ def rotation_between(source: np.ndarray, target: np.ndarray) -> np.ndarray:
         axis = np.cross(a, other)
         return Rotation.from_rotvec(np.pi * axis / np.linalg.norm(axis)).as_matrix()
     return Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_matrix()
+
+
+def rotation_angle_rad(rotation: np.ndarray) -> float:
+    """Return the angle of a rotation ``(3, 3)``; as exact near zero as elsewhere: |R - I| = 2 sqrt(2) sin(angle / 2)."""
+    half_sine = float(np.linalg.norm(rotation - np.eye(3))) / np.sqrt(8)
+    return float(2 * np.arcsin(min(1.0, half_sine)))

@@ -82,14 +82,11 @@ class FixedHand:
             shape.set_collision_groups(HAND_COLLISION_GROUPS)
             component.attach(shape)
 
-    def finger_positions_m(self) -> np.ndarray:
-        """Return the coordinates ``(2,)`` of the +X and the -X finger."""
-        plus, minus = self.fingers
-        return np.array([plus.entity_pose.p[0], -minus.entity_pose.p[0]])
-
     def squeeze(self) -> None:
         """Move the fingers' shared target on by one frame."""
-        self.close_to(self._target.move_on(float(self.finger_positions_m().mean())))
+        plus, minus = self.fingers
+        mean_m = (plus.entity_pose.p[0] - minus.entity_pose.p[0]) / 2
+        self.close_to(self._target.move_on(float(mean_m)))
 
     def pressing_n(self, pushes: list[tuple[int, np.ndarray]]) -> tuple[float, ...]:
         """Return how hard the +X and the -X finger press inwards on the object (N)."""

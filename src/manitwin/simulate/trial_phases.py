@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from manitwin.geometry.poses import rotation_angle_rad
 from manitwin.simulate.trial import GRAVITY_M_S2, TrialResult, TrialSettings
 from manitwin.twin import Outcome
 
@@ -91,7 +91,7 @@ class _Phases:
             outcome = failure.outcome
         if self.closed_rotation is not None:
             turned = self.scene.object_rotation() @ self.closed_rotation.T
-            self.rotation_rad = float(Rotation.from_matrix(turned).magnitude())
+            self.rotation_rad = rotation_angle_rad(turned)
         return TrialResult(
             outcome, self.displacement_m, self.rotation_rad, self.penetration_m, self.forces_n, self.steps
         )
