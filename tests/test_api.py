@@ -9,7 +9,7 @@ import pytest
 
 import manitwin
 from manitwin import simulate
-from manitwin.config import BuildConfig
+from manitwin.config import BuildConfig, SecondOpinionConfig
 from manitwin.errors import UsageError
 
 PANDA_FILE = Path(simulate.__file__).with_name("grippers") / "panda.toml"
@@ -22,6 +22,11 @@ PANDA_FILE = Path(simulate.__file__).with_name("grippers") / "panda.toml"
         ({"grippers": ["panda", "hook.toml"]}, "hook.toml is not there"),
         ({"grippers": ["panda", str(PANDA_FILE)]}, "grippers panda, panda: each may be named once"),
         ({"quick": True, "require_agreement": True}, "quick leaves the second engine out"),
+        ({"grippers": ["panda", "suction"], "require_agreement": True}, "no second engine can try the gripper suction"),
+        (
+            {"config": BuildConfig(second_opinion=SecondOpinionConfig(enabled=False, require_agreement=True))},
+            "requires agreement and is not enabled",
+        ),
         ({"config": BuildConfig(second_simulator="mujocco")}, "did you mean 'mujoco'"),
         ({"config": BuildConfig(simulator="sapient")}, "did you mean 'sapien'"),
         ({"jobs": 0}, "jobs is 0"),

@@ -45,6 +45,10 @@ def test_readme_commands_are_those_that_ci_and_tests_run() -> None:
 
 
 def test_python_examples_of_the_docs_compile() -> None:
-    for page in PAGES:
-        for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL):
-            compile(block, page.name, "exec")
+    examples = [
+        (page.name, block)
+        for page in PAGES
+        for block in re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
+    ]
+    assert len(examples) >= 3, "the pattern finds them"
+    assert all(compile(block, name, "exec") for name, block in examples)

@@ -64,7 +64,21 @@ def check_names(config: BuildConfig) -> None:
     for kind in ("generator", "annotator", "grasper", "simulator"):
         target(kind, getattr(config, kind))
     target("simulator", config.second_simulator)
-    _grippers(config)
+    grippers = [gripper for gripper, _ in _grippers(config)]
+    if config.second_opinion.require_agreement:
+        _check_agreement(grippers, config)
+
+
+def _check_agreement(grippers: list[Gripper], config: BuildConfig) -> None:
+    """Raise UsageError where agreement is asked for and nobody could give it: what is not judged is not accepted."""
+    if not config.second_opinion.enabled:
+        raise UsageError("second_opinion requires agreement and is not enabled; enable it, or require none")
+    alone = [gripper.name for gripper in grippers if KINDS[gripper.kind].second_simulator(config) is None]
+    if alone:
+        raise UsageError(
+            f"agreement is required, and no second engine can try the gripper {', '.join(alone)}; leave it out, or "
+            f"require none"
+        )
 
 
 def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:

@@ -86,9 +86,8 @@ def _grasp_rows(grasps: GraspSummary) -> list[tuple[str, str]]:
     if grasps.robustness is not None:
         again = grasps.robustness
         share = f"{100 * again.robust_share:.0f} %"
-        rows.append(
-            ("robustness", f"{again.robust} hold in {share} of their perturbed trials, median {again.median:.2f}")
-        )
+        median = "none tried" if again.median is None else f"median {again.median:.2f}"
+        rows.append(("robustness", f"{again.robust} hold in {share} of their perturbed trials, {median}"))
     if grasps.second_opinion is not None:
         rows.append(("second engine", _opinion(grasps.second_opinion)))
     for name, other in grasps.other_grippers.items():

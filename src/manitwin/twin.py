@@ -271,7 +271,7 @@ class RobustnessSummary(Record):
     center_of_mass_m: Finite
     max_trials: int
     trials: int
-    median: Unit
+    median: Unit | None
     robust: int
     robust_share: Unit
     fragile_share: Unit

@@ -14,13 +14,11 @@ from manitwin.errors import InputError
 from manitwin.files.image_file import read_image
 
 
-def _rejected(path: Path, reason: str, *words: str) -> None:
+def refusal(path: Path) -> InputError:
     with pytest.raises(InputError) as caught:
         read_image(path)
-    assert caught.value.reason == reason
     assert path.name in caught.value.detail and "\n" not in caught.value.detail
-    for word in words:
-        assert word in caught.value.detail
+    return caught.value
 
 
 @pytest.mark.shared_data
@@ -39,7 +37,9 @@ def _rejected(path: Path, reason: str, *words: str) -> None:
 def test_bad_file_is_refused_by_name_cause_and_remedy(
     shared_data: Path, name: str, reason: str, words: tuple[str]
 ) -> None:
-    _rejected(shared_data / "bad" / name, reason, *words)
+    error = refusal(shared_data / "bad" / name)
+    assert error.reason == reason
+    assert [word for word in words if word not in error.detail] == []
 
 
 @pytest.mark.shared_data
@@ -127,7 +127,8 @@ def test_scaling_down_does_not_mix_in_hidden_colours(tmp_path: Path) -> None:
 def test_side_limit(tmp_path: Path, side: int) -> None:
     Image.new("RGB", (100, side)).save(tmp_path / "thin.png")
     if side < 32:
-        _rejected(tmp_path / "thin.png", "too_small", f"100 x {side}")
+        error = refusal(tmp_path / "thin.png")
+        assert error.reason == "too_small" and f"100 x {side}" in error.detail
     else:
         assert read_image(tmp_path / "thin.png").pixels.shape == (side, 100, 3)
 
@@ -140,4 +141,5 @@ def test_decompression_bomb_is_refused_before_decoding(tmp_path: Path) -> None:
     (tmp_path / "bomb.png").write_bytes(
         b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
     )
-    _rejected(tmp_path / "bomb.png", "unreadable", "megapixels", "scale")
+    error = refusal(tmp_path / "bomb.png")
+    assert error.reason == "unreadable" and "megapixels" in error.detail and "scale" in error.detail

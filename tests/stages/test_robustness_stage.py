@@ -73,7 +73,7 @@ def test_nothing_held_is_nothing_tried(tmp_path: Path) -> None:
     engine = Scripted(lambda pose, settings: "held")
     run_all(draft, tmp_path, RobustnessStage(RobustnessConfig(), VerifyConfig(), engine, PANDA))
     summary = RobustnessSummary(**draft.field("robustness"))
-    assert (engine.asked, summary.trials, summary.robust, summary.median) == (0, 0, 0, 0.0)
+    assert (engine.asked, summary.trials, summary.robust, summary.median) == (0, 0, 0, None)
 
 
 def test_rank_values_order_by_evidence_and_the_untried_come_last() -> None:

@@ -53,9 +53,11 @@ def _try_one(
     def make_hand(scene: sapien.Scene) -> FixedHand:
         return FixedHand(scene, gripper, settings)
 
-    if near:
+    if not near:
+        return TrialResult("misses", 0.0, 0.0, 0.0, (0.0, 0.0), 0)  # nothing to simulate: nothing touches the object
+    if far:
         scene = HandScene(replace(body, hulls=near), object_to_hand, settings, make_hand)
         result = run_phases(scene, object_to_hand[:3, :3], settings)
-        if not far or not reached_at(far, gripper, np.array(scene.looks), LOOK_MARGIN_M).any():
+        if not reached_at(far, gripper, np.array(scene.looks), LOOK_MARGIN_M).any():
             return result
     return run_phases(HandScene(body, object_to_hand, settings, make_hand), object_to_hand[:3, :3], settings)

@@ -87,7 +87,7 @@ class RobustnessStage:
             **vars(spread),
             max_trials=self.settings.max_trials,
             trials=int(trials.sum()),
-            median=float(np.median(share)) if len(share) else 0.0,
+            median=float(np.median(share)) if len(share) else None,
             robust=sum(test.is_robust(int(h), int(n)) for h, n in zip(held, trials, strict=True)),
             robust_share=self.settings.robust_share,
             fragile_share=self.settings.fragile_share,
