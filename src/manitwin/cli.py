@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Annotated, NoReturn
 
 import typer
-from rich.console import Console
 
+from manitwin.commands.console import err_console, out_console
 from manitwin.errors import BackendError, ManiTwinError, UsageError
 
 TYPER_INTERRUPTED = 130
@@ -30,8 +30,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     help="Turn photos, texts and meshes into data-generation-ready digital twins.",
 )
-out_console = Console(highlight=False, soft_wrap=True)
-err_console = Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 @app.command()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from itertools import product
 
 import numpy as np
 
@@ -34,6 +35,18 @@ def reached_at(
     for swept_low, swept_high in _swept_boxes(gripper):
         reached |= ((low <= swept_high + margin_m) & (high >= swept_low - margin_m)).all(2)
     return reached
+
+
+def largest_motion_m(hulls: tuple[np.ndarray, ...], object_to_gripper: np.ndarray) -> float:
+    """Return a bound on how far any corner of the hulls strays from where it is in the first of the poses ``(P, 4, 4)``.
+
+    The motion is affine in the point, so that its norm is largest at a corner of the box around all hulls.
+    """
+    points = np.concatenate(hulls)
+    corners = np.array(list(product(*zip(points.min(0), points.max(0), strict=True))))
+    moved = object_to_gripper[1:] - object_to_gripper[0]
+    motion = corners @ moved[:, :3, :3].transpose(0, 2, 1) + moved[:, None, :3, 3]
+    return float(np.sqrt((motion**2).sum(2).max(initial=0.0)))
 
 
 @lru_cache(maxsize=8)
