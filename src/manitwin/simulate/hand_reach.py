@@ -3,60 +3,56 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from itertools import product
 
 import numpy as np
 
-from manitwin.geometry.poses import inverse
 from manitwin.simulate.hands.parallel import ParallelGripper
 
 
-def reachable_hulls(
-    hulls: tuple[np.ndarray, ...], gripper: ParallelGripper, gripper_to_object: np.ndarray, margin_m: float
-) -> np.ndarray:
-    """Tell for each hull ``(V, 3)`` whether palm or moving fingers can come within ``margin_m`` of it, ``(H,)`` bool.
+class HandReach:
+    """The hulls of an object, prepared to be told how far they are from many hands."""
 
-    Never too few: boxes around the hulls, in the gripper's frame, against boxes around what the hand sweeps as it
-    closes.
-    """
-    return reached_at(hulls, gripper, inverse(gripper_to_object)[None], margin_m)[0]
+    def __init__(self, hulls: tuple[np.ndarray, ...]):
+        """Take convex vertices, each ``(V, 3)`` m in the object frame."""
+        self._hulls, self._corners = hulls, np.concatenate(hulls)
+        self._starts = np.cumsum([0] + [len(hull) for hull in hulls[:-1]])
+        low, high = np.minimum.reduceat(self._corners, self._starts), np.maximum.reduceat(self._corners, self._starts)
+        self._centers, self._radii_m = (low + high) / 2, np.linalg.norm(high - low, axis=1) / 2
 
+    def of(self, some: np.ndarray) -> HandReach:
+        """Return that of some of the hulls, ``(H,)`` bool."""
+        return HandReach(tuple(self._hulls[index] for index in np.flatnonzero(some)))
 
-def reached_at(
-    hulls: tuple[np.ndarray, ...], gripper: ParallelGripper, object_to_gripper: np.ndarray, margin_m: float
-) -> np.ndarray:
-    """Tell the same of several poses of the object ``(P, 4, 4)`` in the gripper's frame, ``(P, H)`` bool."""
-    starts = np.cumsum([0] + [len(hull) for hull in hulls[:-1]])
-    corners = (
-        np.concatenate(hulls) @ object_to_gripper[:, :3, :3].transpose(0, 2, 1) + object_to_gripper[:, None, :3, 3]
-    )
-    low, high = np.minimum.reduceat(corners, starts, axis=1), np.maximum.reduceat(corners, starts, axis=1)
-    reached = np.zeros(low.shape[:2], bool)
-    for swept_low, swept_high in _swept_boxes(gripper):
-        reached |= ((low <= swept_high + margin_m) & (high >= swept_low - margin_m)).all(2)
-    return reached
+    def gaps_m(self, gripper: ParallelGripper, object_to_gripper: np.ndarray) -> np.ndarray:
+        """Return how far palm and moving fingers stay off each hull at poses ``(P, 4, 4)`` of the object: ``(P, H)``.
 
+        Never too much: along the gripper's axes, between boxes around the hulls and boxes around what the hand sweeps as
+        it closes. It is negative where these overlap.
+        """
+        rotations, origins = object_to_gripper[:, :3, :3].transpose(0, 2, 1), object_to_gripper[:, None, :3, 3]
+        corners = self._corners @ rotations + origins
+        low, high = (reduce.reduceat(corners, self._starts, axis=1)[:, :, None] for reduce in (np.minimum, np.maximum))
+        swept_low, swept_high = _swept_boxes(gripper)
+        return np.maximum(low - swept_high, swept_low - high).max(3).min(2)
 
-def largest_motion_m(hulls: tuple[np.ndarray, ...], object_to_gripper: np.ndarray) -> float:
-    """Return a bound on how far any corner of the hulls strays from where it is in the first of the poses ``(P, 4, 4)``.
+    def motions_m(self, object_to_gripper: np.ndarray) -> np.ndarray:
+        """Return bounds ``(H,)`` on how far a corner of each hull is in any of the poses ``(P, 4, 4)`` from where it is first.
 
-    The motion is affine in the point, so that its norm is largest at a corner of the box around all hulls.
-    """
-    points = np.concatenate(hulls)
-    corners = np.array(list(product(*zip(points.min(0), points.max(0), strict=True))))
-    moved = object_to_gripper[1:] - object_to_gripper[0]
-    motion = corners @ moved[:, :3, :3].transpose(0, 2, 1) + moved[:, None, :3, 3]
-    return float(np.sqrt((motion**2).sum(2).max(initial=0.0)))
+        A ball around the hull moves as its centre does, and by its radius times the norm of the change of rotation:
+        the largest singular value of a difference of rotations is its Frobenius norm over the root of two.
+        """
+        change = object_to_gripper - object_to_gripper[0]
+        moved = self._centers @ change[:, :3, :3].transpose(0, 2, 1) + change[:, None, :3, 3]
+        turned = np.linalg.norm(change[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
+        return np.asarray((np.linalg.norm(moved, axis=2) + turned[:, None] * self._radii_m).max(0))
 
 
 @lru_cache(maxsize=8)
-def _swept_boxes(gripper: ParallelGripper) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the corners of boxes around what each box of the hand sweeps between open and closed."""
-    boxes = []
-    for start, end in zip(gripper.boxes(gripper.opening_m), gripper.boxes(0.0), strict=True):
-        (first_low, first_high), (last_low, last_high) = _bounds(*start), _bounds(*end)
-        boxes.append((np.minimum(first_low, last_low), np.maximum(first_high, last_high)))
-    return boxes
+def _swept_boxes(gripper: ParallelGripper) -> tuple[np.ndarray, np.ndarray]:
+    """Return the corners ``(B, 3)`` of boxes around what each box of the hand sweeps between open and closed."""
+    ends = [[_bounds(*box) for box in gripper.boxes(opening_m)] for opening_m in (gripper.opening_m, 0.0)]
+    low, high = np.moveaxis(np.array(ends), 2, 0)
+    return low.min(0), high.max(0)
 
 
 def _bounds(box_to_gripper: np.ndarray, half_extents_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

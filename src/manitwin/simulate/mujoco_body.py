@@ -5,8 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from manitwin.geometry.poses import quaternion_wxyz
-from manitwin.simulate.rigid_body import RigidBody, principal_frame
+from manitwin.simulate.rigid_body import RigidBody
 
 OBJECT = "object"
 SOFT_SOLREF, STIFF_SOLREF = (
@@ -24,11 +23,11 @@ def contact_parameters(friction: float, solref: tuple[float, float]) -> dict[str
 
 def add_object(spec: mujoco.MjSpec, body: RigidBody, contact: dict[str, object]) -> None:
     """Add the body, free to move; it touches geoms of contact type 1."""
-    moments, axes = principal_frame(body.inertia_kg_m2)
     thing = spec.worldbody.add_body(name=OBJECT)
     thing.add_freejoint(name=OBJECT)
-    thing.mass, thing.inertia, thing.explicitinertial = body.mass_kg, moments, True
-    thing.ipos, thing.iquat = body.center_of_mass_m, quaternion_wxyz(axes)
+    thing.mass, thing.explicitinertial = body.mass_kg, True
+    thing.ipos = body.center_of_mass_m
+    thing.inertia, thing.iquat = body.principal_inertia
     for number, hull in enumerate(body.hulls):
         name = f"hull_{number:02d}"
         spec.add_mesh(name=name, uservert=np.asarray(hull, np.float32).ravel())

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.geometry.ray_caster import RayCaster
 
 
@@ -24,6 +26,12 @@ class RigidBody:
     friction_static: float
     friction_dynamic: float
     surface: RayCaster | None = None
+
+    @cached_property
+    def principal_inertia(self) -> tuple[np.ndarray, np.ndarray]:
+        """The principal moments ``(3,)`` ascending and the quaternion wxyz that turns their axes into the object's."""
+        moments, axes = principal_frame(self.inertia_kg_m2)
+        return moments, quaternion_wxyz(axes)
 
 
 def principal_frame(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,29 +9,43 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.geometry.poses import GLTF_TO_OBJECT, quaternion_wxyz
+from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.simulate.convex_shape import convex_shape
-from manitwin.simulate.rigid_body import RigidBody, principal_frame
+from manitwin.simulate.rigid_body import RigidBody
+
+
+def hull_shapes(hulls: tuple[np.ndarray, ...]) -> list[physx.PhysxCollisionShapeConvexMesh]:
+    """Cook hulls, each ``(V, 3)`` m, at 0.2 ms a hull; the component that takes them gives them its material.
+
+    A shape belongs to one component at a time, and is free again when that is gone.
+    """
+    return [convex_shape(hull, physx.get_default_material()) for hull in hulls]
 
 
 def dynamic_component(
-    body: RigidBody, *, contact_offset_m: float | None = None, restitution: float = 0.0
+    body: RigidBody,
+    shapes: list[physx.PhysxCollisionShapeConvexMesh],
+    *,
+    contact_offset_m: float | None = None,
+    restitution: float = 0.0,
 ) -> physx.PhysxRigidDynamicComponent:
-    """Return the body as a component; SAPIEN would take the mass properties from the hulls, so they are set.
+    """Return the body as a component; SAPIEN would take the mass properties from the shapes, so they are set first.
 
-    Without ``contact_offset_m`` the scene's own applies.
+    ``shapes`` are those of its hulls, or of the ones that matter. Without ``contact_offset_m`` the scene's own applies.
+    Raises RuntimeError where a shape belongs to another component.
     """
     material = physx.PhysxMaterial(body.friction_static, body.friction_dynamic, restitution)
     component = physx.PhysxRigidDynamicComponent()
-    for hull in body.hulls:
-        shape = convex_shape(hull, material)
+    moments, axes_wxyz = body.principal_inertia
+    component.set_mass(body.mass_kg)
+    component.set_cmass_local_pose(sapien.Pose(body.center_of_mass_m, axes_wxyz))
+    component.set_inertia(moments.astype(np.float32))
+    for shape in shapes:
+        shape.local_pose = sapien.Pose()  # refused while attached elsewhere; attaching would fail without a word
+        shape.physical_material = material
         if contact_offset_m is not None:
             shape.contact_offset = contact_offset_m
         component.attach(shape)
-    moments, axes = principal_frame(body.inertia_kg_m2)
-    component.set_mass(body.mass_kg)
-    component.set_cmass_local_pose(sapien.Pose(body.center_of_mass_m, quaternion_wxyz(axes)))
-    component.set_inertia(moments.astype(np.float32))
     return component
 
 
@@ -50,7 +64,7 @@ def add_body(
     """
     entity = sapien.Entity()
     entity.name = name
-    entity.add_component(dynamic_component(body, restitution=restitution))
+    entity.add_component(dynamic_component(body, hull_shapes(body.hulls), restitution=restitution))
     if visual_glb is not None:
         from sapien import render
 

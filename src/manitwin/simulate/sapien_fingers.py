@@ -16,7 +16,9 @@ from manitwin.simulate.convex_shape import convex_shape
 from manitwin.simulate.gripper import Gripper, of_kind
 from manitwin.simulate.hands.multi_finger import MultiFingerGripper
 from manitwin.simulate.hands.urdf import Link, LinkShape
+from manitwin.simulate.kept_for_hulls import KeptForHulls
 from manitwin.simulate.rigid_body import RigidBody
+from manitwin.simulate.sapien_body import hull_shapes
 from manitwin.simulate.sapien_hand import MIN_PATCH_RADIUS_M, PATCH_RADIUS_M
 from manitwin.simulate.sapien_scene import HandScene
 from manitwin.simulate.trial import TrialResult, TrialSettings
@@ -34,6 +36,9 @@ class ArticulatedTrial:
 
     name = "sapien"
 
+    def __init__(self) -> None:
+        self._shapes = KeptForHulls(hull_shapes)
+
     def run(
         self,
         body: RigidBody,
@@ -49,12 +54,26 @@ class ArticulatedTrial:
         hand = of_kind(gripper, MultiFingerGripper)
         if joints_rad is None:
             raise ValueError(f"a grasp of {hand.name} needs its joints before closing and those to close to")
-        results = []
-        for pose, joints in zip(gripper_to_object, joints_rad, strict=True):
-            object_to_hand = inverse(pose)
-            scene = HandScene(body, object_to_hand, settings, lambda s, j=joints: FingeredHand(s, hand, j, settings))  # type: ignore[misc]
-            results.append(run_phases(scene, object_to_hand[:3, :3], settings))
-        return results
+        shapes = self._shapes(body.hulls)
+        return [
+            _try_one(body, shapes, hand, pose, joints, settings)
+            for pose, joints in zip(gripper_to_object, joints_rad, strict=True)
+        ]
+
+
+def _try_one(
+    body: RigidBody,
+    shapes: list[physx.PhysxCollisionShapeConvexMesh],
+    hand: MultiFingerGripper,
+    gripper_to_object: np.ndarray,
+    joints_rad: np.ndarray,
+    settings: TrialSettings,
+) -> TrialResult:
+    object_to_hand = inverse(gripper_to_object)
+    scene = HandScene(
+        body, shapes, object_to_hand, settings, lambda scene: FingeredHand(scene, hand, joints_rad, settings)
+    )
+    return run_phases(scene, object_to_hand[:3, :3], settings)
 
 
 class FingeredHand:

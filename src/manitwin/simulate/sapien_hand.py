@@ -100,8 +100,9 @@ class FixedHand:
 
     def close_to(self, target_m: float) -> None:
         """Give both fingers one target; a target inside the object presses on it."""
+        target = sapien.Pose([target_m, 0, 0])
         for drive in self._drives:
-            drive.set_drive_target(sapien.Pose([target_m, 0, 0]))
+            drive.set_drive_target(target)
 
 
 def _lock_to_x(finger: physx.PhysxRigidDynamicComponent, tip_depth_m: float) -> None:

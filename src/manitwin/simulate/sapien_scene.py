@@ -49,16 +49,18 @@ class HandScene:
     def __init__(
         self,
         body: RigidBody,
+        shapes: list[physx.PhysxCollisionShapeConvexMesh],
         object_to_hand: np.ndarray,
         settings: TrialSettings,
         make_hand: Callable[[sapien.Scene], SapienHand],
     ):
+        """Put the body, of these ``shapes``, before the hand."""
         self.settings = settings
         with _scene_config(gravity=[0, 0, 0], bounce_threshold=2.0, enable_enhanced_determinism=False):
             self.system = physx.PhysxCpuSystem()
         self.scene = scene = sapien.Scene([self.system])  # kept: bodies go with their scene
         self.system.timestep = settings.timestep_s
-        self.object = _object(body, settings)
+        self.object = _object(body, shapes, settings)
         self.entity = sapien.Entity()
         self.entity.add_component(self.object)
         self.entity.pose = sapien.Pose(object_to_hand)
@@ -127,9 +129,11 @@ def _scene_config(**values: object) -> Iterator[None]:
         physx.set_scene_config(config)
 
 
-def _object(body: RigidBody, settings: TrialSettings) -> physx.PhysxRigidDynamicComponent:
-    component = dynamic_component(body, contact_offset_m=settings.contact_offset_m)
-    for shape in component.collision_shapes:
+def _object(
+    body: RigidBody, shapes: list[physx.PhysxCollisionShapeConvexMesh], settings: TrialSettings
+) -> physx.PhysxRigidDynamicComponent:
+    component = dynamic_component(body, shapes, contact_offset_m=settings.contact_offset_m)
+    for shape in shapes:
         shape.patch_radius, shape.min_patch_radius = PATCH_RADIUS_M, MIN_PATCH_RADIUS_M
     component.set_sleep_threshold(0.0)  # at rest in the hand is not at rest
     component.solver_position_iterations = settings.solver_iterations

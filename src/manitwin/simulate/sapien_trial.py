@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
-import sapien
+from sapien import physx
 
 from manitwin.geometry.poses import inverse
 from manitwin.simulate.gripper import Gripper, of_kind
-from manitwin.simulate.hand_reach import largest_motion_m, reachable_hulls, reached_at
+from manitwin.simulate.hand_reach import HandReach
 from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.simulate.kept_for_hulls import KeptForHulls
 from manitwin.simulate.rigid_body import RigidBody
+from manitwin.simulate.sapien_body import hull_shapes
 from manitwin.simulate.sapien_hand import FixedHand
 from manitwin.simulate.sapien_scene import HandScene
 from manitwin.simulate.trial import TrialResult, TrialSettings
@@ -28,6 +28,9 @@ class SapienTrial:
 
     name = "sapien"
 
+    def __init__(self) -> None:
+        self._shapes, self._reach = KeptForHulls(hull_shapes), KeptForHulls(HandReach)
+
     def run(
         self,
         body: RigidBody,
@@ -38,33 +41,37 @@ class SapienTrial:
     ) -> list[TrialResult]:
         """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order."""
         hand = of_kind(gripper, ParallelGripper)
-        return [_try_one(body, hand, pose, settings) for pose in gripper_to_object]
+        shapes, reach = self._shapes(body.hulls), self._reach(body.hulls)
+        return [_try_one(body, shapes, reach, hand, inverse(pose), settings) for pose in gripper_to_object]
 
 
 def _try_one(
-    body: RigidBody, gripper: ParallelGripper, gripper_to_object: np.ndarray, settings: TrialSettings
+    body: RigidBody,
+    shapes: list[physx.PhysxCollisionShapeConvexMesh],
+    reach: HandReach,
+    gripper: ParallelGripper,
+    object_to_hand: np.ndarray,
+    settings: TrialSettings,
 ) -> TrialResult:
     """Try a grasp on the hulls that the hand can reach; where the object turned others towards it, on all."""
-    reached = reachable_hulls(body.hulls, gripper, gripper_to_object, REACH_MARGIN_M)
-    near = tuple(hull for hull, is_near in zip(body.hulls, reached, strict=True) if is_near)
-    far = tuple(hull for hull, is_near in zip(body.hulls, reached, strict=True) if not is_near)
-    object_to_hand = inverse(gripper_to_object)
-
-    def make_hand(scene: sapien.Scene) -> FixedHand:
-        return FixedHand(scene, gripper, settings)
-
-    if not near:
+    gaps = reach.gaps_m(gripper, object_to_hand[None])[0]
+    near = gaps <= REACH_MARGIN_M
+    if not near.any():
         return TrialResult("misses", 0.0, 0.0, 0.0, (0.0, 0.0), 0)  # nothing to simulate: nothing touches the object
-    if far:
-        scene = HandScene(replace(body, hulls=near), object_to_hand, settings, make_hand)
-        result = run_phases(scene, object_to_hand[:3, :3], settings)
-        if _stayed_out(far, gripper, np.array(scene.looks)):
-            return result
-    return run_phases(HandScene(body, object_to_hand, settings, make_hand), object_to_hand[:3, :3], settings)
+
+    def simulate(some: np.ndarray) -> tuple[TrialResult, np.ndarray]:
+        """Return what became of the object with some of its shapes, and the poses at which it was looked at."""
+        chosen = [shape for shape, is_in in zip(shapes, some, strict=True) if is_in]
+        scene = HandScene(body, chosen, object_to_hand, settings, lambda scene: FixedHand(scene, gripper, settings))
+        return run_phases(scene, object_to_hand[:3, :3], settings), np.array(scene.looks)
+
+    result, looks = simulate(near)
+    if near.all() or _stayed_out(reach, gaps, gripper, looks):
+        return result
+    return simulate(np.ones_like(near))[0]
 
 
-def _stayed_out(far: tuple[np.ndarray, ...], gripper: ParallelGripper, looks: np.ndarray) -> bool:
+def _stayed_out(reach: HandReach, gaps: np.ndarray, gripper: ParallelGripper, looks: np.ndarray) -> bool:
     """Tell whether no hull that was left out came near the hand in any look ``(P, 4, 4)``; the cheap bound goes first."""
-    if largest_motion_m(far, looks) < REACH_MARGIN_M - LOOK_MARGIN_M:
-        return True
-    return not reached_at(far, gripper, looks, LOOK_MARGIN_M).any()
+    unsure = (gaps > REACH_MARGIN_M) & (gaps - reach.motions_m(looks) <= LOOK_MARGIN_M)
+    return not unsure.any() or not (reach.of(unsure).gaps_m(gripper, looks) <= LOOK_MARGIN_M).any()

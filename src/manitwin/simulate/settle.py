@@ -13,7 +13,7 @@ from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform_points
 from manitwin.simulate.convex_shape import convex_shape
 from manitwin.simulate.rigid_body import RigidBody
-from manitwin.simulate.sapien_body import dynamic_component
+from manitwin.simulate.sapien_body import dynamic_component, hull_shapes
 
 _TIMESTEP_S = 1 / 240
 _SOLVER_ITERATIONS = 20  # at PhysX's own 4 to 10, stacks of hulls creep
@@ -56,7 +56,7 @@ def settle_on_plane(
     offsets = [np.array([spacing * i, 0.0, drop_m]) for i in range(len(object_to_plane))]
     bodies = []
     for pose, offset in zip(object_to_plane, offsets, strict=True):
-        component = dynamic_component(body, contact_offset_m=_CONTACT_OFFSET_M)
+        component = dynamic_component(body, hull_shapes(body.hulls), contact_offset_m=_CONTACT_OFFSET_M)
         component.set_solver_position_iterations(_SOLVER_ITERATIONS)
         component.set_angular_damping(0.0)
         _add(scene, component, sapien.Pose(pose[:3, 3] + offset, quaternion_wxyz(pose[:3, :3])))

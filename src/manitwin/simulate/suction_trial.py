@@ -15,6 +15,7 @@ from manitwin.simulate.gripper import Gripper, of_kind
 from manitwin.simulate.hand_collision import HandCollision
 from manitwin.simulate.hands.suction import SuctionGripper
 from manitwin.simulate.hull_surface import union_surface
+from manitwin.simulate.kept_for_hulls import KeptForHulls
 from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.suction_load import lip_load
 from manitwin.simulate.suction_seal import seal
@@ -28,7 +29,7 @@ class SuctionTrial:
     name = "statics"
 
     def __init__(self) -> None:
-        self._prepared: tuple[tuple[np.ndarray, ...], HandCollision] | None = None
+        self._collision = KeptForHulls(HandCollision)
 
     def run(
         self,
@@ -47,7 +48,7 @@ class SuctionTrial:
         found = seal(cup, gripper_to_object, surface)
         pressed_on = gripper_to_object.copy()
         pressed_on[:, :3, 3] += found.advance_m[:, None] * pressed_on[:, :3, 2]
-        overlaps = self._collision(body).overlaps(cup, pressed_on, opening_m=cup.opening_m, clearance_m=0.0)
+        overlaps = self._collision(body.hulls).overlaps(cup, pressed_on, opening_m=cup.opening_m, clearance_m=0.0)
         results = []
         for number, pose in enumerate(gripper_to_object):
             object_to_hand = inverse(pose)
@@ -63,12 +64,6 @@ class SuctionTrial:
             )
             results.append(run_phases(scene, object_to_hand[:3, :3], settings))
         return results
-
-    def _collision(self, body: RigidBody) -> HandCollision:
-        """Return the hulls prepared; kept for the next call, which is often for the same ones."""
-        if self._prepared is None or self._prepared[0] is not body.hulls:
-            self._prepared = body.hulls, HandCollision(body.hulls)
-        return self._prepared[1]
 
 
 class _Scene:

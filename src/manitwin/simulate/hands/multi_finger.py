@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter
 
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
@@ -59,15 +59,8 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class MultiFingerGripper:
-    """A hand of a thumb and fingers, in the grasp frame: +Z out of the palm, the fingers on +X, the thumb on -X.
-
-    ``joints (J,)`` names the joints in the order of all postures and of a twin's table; ``fingers`` names the links of
-    each finger, the thumb first. ``palm_front_m`` is the palm's surface along +Z, ``clearance_m`` how much wider than the
-    object it opens on each side.
-    """
-
-    kind: ClassVar[str] = "multi_finger"
+class _Described:
+    """What the gripper's file says as it is."""
 
     name: str
     sha256: str
@@ -80,9 +73,22 @@ class MultiFingerGripper:
     fingers: tuple[tuple[str, ...], ...]
     drive: Drive
     postures: tuple[Posture, ...]
+    source: str
+
+
+@dataclass(frozen=True)
+class MultiFingerGripper(_Described):
+    """A hand of a thumb and fingers, in the grasp frame: +Z out of the palm, the fingers on +X, the thumb on -X.
+
+    ``joints (J,)`` names the joints in the order of all postures and of a twin's table; ``fingers`` names the links of
+    each finger, the thumb first. ``palm_front_m`` is the palm's surface along +Z, ``clearance_m`` how much wider than the
+    object it opens on each side.
+    """
+
+    kind: ClassVar[str] = "multi_finger"
+
     root_to_gripper: np.ndarray
     links: tuple[Link, ...]
-    source: str
 
     @property
     def opening_m(self) -> float:
@@ -139,50 +145,26 @@ class _RootField(BaseModel):
     quaternion_wxyz: tuple[float, float, float, float]
 
 
-class _File(BaseModel):
+@dataclass(frozen=True)
+class _File(_Described):
     """The keys of a gripper file of this kind."""
 
-    model_config = STRICT
-    name: str
-    sha256: str
-    source: str
-    tip_depth_m: float
-    force_n: float
-    finger_friction: float
-    palm_front_m: float
-    clearance_m: float
-    joints: tuple[str, ...]
-    fingers: tuple[tuple[str, ...], ...]
-    drive: Drive
-    postures: tuple[Posture, ...]
+    __pydantic_config__ = STRICT
     urdf: _UrdfField
     root_to_gripper: _RootField
 
 
 def load_multi_finger(data: dict[str, Any], folder: Path) -> MultiFingerGripper:
     """Make a hand of its file's content; raises UsageError where the URDF is missing, unreadable or has other joints."""
-    file = _File.model_validate(data)
+    file = TypeAdapter(_File).validate_python(data)
     path, root = _urdf_path(file.name, file.urdf, folder)
     links = read_urdf(path, root)
     _check(file, links)
     rotation = rotation_from_quaternion_wxyz(np.array(file.root_to_gripper.quaternion_wxyz))
-    digest = hashlib.sha256(file.sha256.encode() + path.read_bytes()).hexdigest()
-    return MultiFingerGripper(
-        name=file.name,
-        sha256=digest,
-        tip_depth_m=file.tip_depth_m,
-        force_n=file.force_n,
-        finger_friction=file.finger_friction,
-        palm_front_m=file.palm_front_m,
-        clearance_m=file.clearance_m,
-        joints=file.joints,
-        fingers=file.fingers,
-        drive=file.drive,
-        postures=file.postures,
-        root_to_gripper=transform(rotation, np.array(file.root_to_gripper.position_m)),
-        links=links,
-        source=file.source,
-    )
+    described = {field.name: getattr(file, field.name) for field in fields(_Described)}
+    described["sha256"] = hashlib.sha256(file.sha256.encode() + path.read_bytes()).hexdigest()
+    root_to_gripper = transform(rotation, np.array(file.root_to_gripper.position_m))
+    return MultiFingerGripper(**described, root_to_gripper=root_to_gripper, links=links)
 
 
 def _urdf_path(name: str, urdf: _UrdfField, folder: Path) -> tuple[Path, Path]:
