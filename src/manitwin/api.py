@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 from manitwin.errors import UsageError
 
 if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
+    from manitwin.build_item import ItemResult
     from manitwin.config import BuildConfig
-    from manitwin.executors.local import StageStarted
+    from manitwin.executors.whole_items import StageStarted
     from manitwin.loaded_twin import Twin
-    from manitwin.pipeline import ItemResult
     from manitwin.twin import TwinRecord
 
 
@@ -69,12 +69,12 @@ def build(
     in the report and never raised.
     """
     from manitwin.config import BuildConfig, load_config
-    from manitwin.executors.local import build_all
+    from manitwin.executors.whole_items import build_all
     from manitwin.manifest import collect_items
     from manitwin.pipeline import check_names
 
     settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
-    settings = _with_flags(settings, seed, grippers, require_agreement, quick)
+    settings = with_flags(settings, seed, grippers, require_agreement, quick)
     if jobs is not None and jobs < 1:
         raise UsageError(f"jobs is {jobs}; give 1 or more")
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
@@ -92,9 +92,10 @@ def build(
     return BuildReport(results, remarks)
 
 
-def _with_flags(
+def with_flags(
     settings: BuildConfig, seed: int | None, grippers: Iterable[str] | None, require_agreement: bool, quick: bool
 ) -> BuildConfig:
+    """Return the settings with what a command line says on top; raises UsageError where two of it contradict each other."""
     if quick and require_agreement:
         raise UsageError("quick leaves the second engine out, and require-agreement asks for it; give one of them")
     update: dict[str, Any] = {} if seed is None else {"seed": seed}

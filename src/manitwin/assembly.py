@@ -1,4 +1,4 @@
-"""Put a finished twin folder together, accepted or rejected, and rename it into place."""
+"""Put a finished twin folder together, accepted or rejected."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from manitwin.files.source_files import pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.stage_runner import StageCost
 from manitwin.stages.stage import Draft, Stage
-from manitwin.store import RUN, canonical_json, replace_folder, seal, write_bytes_atomically
+from manitwin.store import RUN, canonical_json, seal, write_bytes_atomically
 from manitwin.twin import REJECTION_REASONS, Rejection, TwinRecord
 
 
@@ -30,9 +30,8 @@ def assemble(
     rejected: Rejected | None,
     rejecting_stage: str | None,
     fresh: Path,
-    place: Path,
 ) -> TwinRecord:
-    """Write the twin's folder at ``fresh`` and rename it to ``place``; returns its record.
+    """Write the twin's folder at ``fresh``, to be renamed into place; returns its record.
 
     ``stages`` are those that ran, the rejecting one included. Where ``rejected`` is given, only the source and the reason
     are kept.
@@ -62,9 +61,7 @@ def assemble(
         "host": {"machine": platform.machine(), "system": platform.system(), "python": platform.python_version()},
     }
     write_bytes_atomically(fresh / RUN, canonical_json(run).encode())
-    sealed = seal(fresh, record)
-    replace_folder(fresh, place)
-    return sealed
+    return seal(fresh, record)
 
 
 def _model(stage: Stage, draft: Draft) -> str | None:

@@ -1,4 +1,4 @@
-"""The command line: build, show, doctor.
+"""The command line: one twin or many, a data set, and what is asked of both.
 
 Exit status: 0 all accepted, 3 some rejected, 4 some unfinished and resumable, 2 wrong use or configuration.
 """
@@ -13,7 +13,11 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from manitwin.commands.check import check
 from manitwin.commands.console import err_console, out_console
+from manitwin.commands.retry import retry
+from manitwin.commands.run import run
+from manitwin.commands.status import status
 from manitwin.errors import BackendError, ManiTwinError, UsageError
 
 TYPER_INTERRUPTED = 130
@@ -92,6 +96,12 @@ def build(
     if unfinished:
         err_console.print("run the same command again to go on where it stopped", markup=False)
     raise typer.Exit(report.exit_code)
+
+
+app.command()(run)
+app.command()(status)
+app.command()(retry)
+app.command()(check)
 
 
 @app.command()

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import cast
+from typing import Literal, cast
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from manitwin.errors import ConfigError, choose_from
+
+Resource = Literal["cpu", "gpu", "vlm", "generator"]
+"""What a stage runs on: each has slots of its own in a run."""
 
 
 class Section(BaseModel):
@@ -195,6 +198,28 @@ class GenerateConfig(Section):
     max_wait_s: float = Field(default=1800.0, gt=0)
 
 
+class RunConfig(Section):
+    """How a run works through its items; nothing here decides what a twin is.
+
+    ``cpu``, ``gpu``, ``vlm`` and ``generator`` are slots: so many stages of that kind at a time (cpu 0: one a core).
+    ``vlm_per_minute`` bounds how many stages that ask a VLM begin in a minute. A stage that kills its worker or fails is
+    tried ``attempts`` times. A service that is down is asked again for ``patience_s`` before its items are left for the
+    next run. ``in_flight`` bounds the items that are begun and not ended.
+    """
+
+    cpu: int = Field(default=0, ge=0)
+    gpu: int = Field(default=1, ge=1)
+    vlm: int = Field(default=8, ge=1)
+    generator: int = Field(default=4, ge=1)
+    vlm_per_minute: float = Field(default=600.0, gt=0)
+    attempts: int = Field(default=3, ge=1)
+    stage_timeout_s: float = Field(default=1800.0, gt=0)
+    patience_s: float = Field(default=1800.0, ge=0)
+    in_flight: int = Field(default=1000, ge=1)
+    index_every: int = Field(default=500, ge=1)
+    keep_work: bool = True
+
+
 class BuildConfig(Section):
     """Everything that decides what a build makes of its inputs."""
 
@@ -222,6 +247,7 @@ class BuildConfig(Section):
     robustness: RobustnessConfig = RobustnessConfig()
     placement: PlacementConfig = PlacementConfig()
     finish: FinishConfig = FinishConfig()
+    run: RunConfig = RunConfig()
 
 
 def load_config(path: Path) -> BuildConfig:

@@ -68,7 +68,14 @@ class Unavailable(BackendError):
 
 
 class RateLimited(BackendError):
-    """A backend that asks to be called later."""
+    """A backend that asks to be called later, after ``retry_after_s`` where it says so."""
+
+    def __init__(self, message: str, retry_after_s: float | None = None):
+        super().__init__(message)
+        self.retry_after_s = retry_after_s
+
+    def __reduce__(self) -> tuple[type, tuple[str, float | None]]:
+        return type(self), (str(self), self.retry_after_s)
 
 
 class BadReply(BackendError):

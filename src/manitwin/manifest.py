@@ -7,7 +7,7 @@ import json
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Literal, cast, get_args
+from typing import Any, Literal, TextIO, cast, get_args
 
 from manitwin.errors import UsageError, choose_from
 from manitwin.files.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
@@ -29,30 +29,36 @@ def collect_items(
     license: str | None = None,
     attribution: str | None = None,
 ) -> tuple[list[Item], list[str]]:
-    """Turn what a user typed into items, in order, without repeats.
+    """Turn what a user typed into items, in order, without repeats; returns them and remarks for the user.
 
-    The keyword arguments hold for every item whose manifest row does not say otherwise. Returns the items and remarks for
-    the user. Raises UsageError for a path that is not there, a manifest that cannot be read, or an unknown value.
+    The keyword arguments hold for every item whose manifest row does not say otherwise. Raises as ``iterate_items``.
     """
     defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
-    items: dict[Item, None] = {}
     remarks: list[str] = []
+    return list(dict.fromkeys(iterate_items(inputs, defaults, remarks))), remarks
+
+
+def iterate_items(inputs: Iterable[str | Path], defaults: dict[str, str | None], remarks: list[str]) -> Iterator[Item]:
+    """Yield the items one by one, so that a manifest may be of any length; remarks are added at the end of each.
+
+    Raises UsageError for a path that is not there, a manifest that cannot be read, or an unknown value.
+    """
+    defaults = {"units": "auto", "up": "auto", "name": None, "license": None, "attribution": None, **defaults}
     for given in inputs:
         path = Path(given)
         if not path.exists():
             raise UsageError(f"{given}: not there; give an image, a mesh, a folder, or a .csv or .jsonl manifest")
         if path.is_dir():
-            found = [_item({"file": str(p)}, Path.cwd(), defaults, str(path)) for p in files_in_folder(path)]
+            found = files_in_folder(path)
             if not found:
                 raise UsageError(
                     f"{given}: no image or mesh in this folder; known: {', '.join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))}"
                 )
+            yield from (_item({"file": str(p)}, Path.cwd(), defaults, str(path)) for p in found)
         elif path.suffix.lower() in MANIFEST_SUFFIXES:
-            found = list(_manifest_items(path, defaults, remarks))
+            yield from _manifest_items(path, defaults, remarks)
         else:
-            found = [_item({"file": str(path)}, Path.cwd(), defaults, str(path))]
-        items.update(dict.fromkeys(found))
-    return list(items), remarks
+            yield _item({"file": str(path)}, Path.cwd(), defaults, str(path))
 
 
 def files_in_folder(folder: Path) -> list[Path]:
@@ -69,39 +75,45 @@ def files_in_folder(folder: Path) -> list[Path]:
 
 
 def _manifest_items(path: Path, defaults: dict[str, Any], remarks: list[str]) -> Iterator[Item]:
-    rows = list(_rows(path))
-    if not rows:
+    ignored: set[str] = set()
+    line = None
+    for line, row in _rows(path):
+        for column in map(str, row.keys() - set(COLUMNS) - ignored):
+            near = get_close_matches(column.lower(), COLUMNS, n=1, cutoff=0.75)
+            if near:
+                raise UsageError(
+                    f"{path}: unknown column {column!r}; did you mean {near[0]!r}? Valid: {', '.join(COLUMNS)}"
+                )
+            ignored.add(column)
+        yield _item(row, path.parent, defaults, f"{path}:{line}")
+    if line is None:
         raise UsageError(
             f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"
         )
-    ignored = sorted({str(key) for _, row in rows for key in row} - set(COLUMNS))
-    for column in ignored:
-        near = get_close_matches(column.lower(), COLUMNS, n=1, cutoff=0.75)
-        if near:
-            raise UsageError(
-                f"{path}: unknown column {column!r}; did you mean {near[0]!r}? Valid: {', '.join(COLUMNS)}"
-            )
     if ignored:
-        remarks.append(f"{path}: columns not used: {', '.join(ignored)}")
-    for line, row in rows:
-        yield _item(row, path.parent, defaults, f"{path}:{line}")
+        remarks.append(f"{path}: columns not used: {', '.join(sorted(ignored))}")
 
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            yield from _csv_rows(path, stream) if path.suffix.lower() == ".csv" else _jsonl_rows(path, stream)
     except UnicodeDecodeError as error:
         raise UsageError(
             f"{path}: not UTF-8 text ({error.reason} at byte {error.start}); save the manifest as UTF-8"
         ) from error
-    if path.suffix.lower() == ".csv":
-        reader = csv.DictReader(text.splitlines())
-        for row in reader:
-            if None in row:
-                raise UsageError(f"{path}:{reader.line_num}: more values than columns; quote values that hold a comma")
-            yield reader.line_num, row
-        return
-    for number, line in enumerate(text.splitlines(), 1):
+
+
+def _csv_rows(path: Path, stream: TextIO) -> Iterator[tuple[int, dict[str, Any]]]:
+    reader = csv.DictReader(stream)
+    for row in reader:
+        if None in row:
+            raise UsageError(f"{path}:{reader.line_num}: more values than columns; quote values that hold a comma")
+        yield reader.line_num, row
+
+
+def _jsonl_rows(path: Path, stream: TextIO) -> Iterator[tuple[int, dict[str, Any]]]:
+    for number, line in enumerate(stream, 1):
         if not line.strip():
             continue
         try:

@@ -1,25 +1,22 @@
-"""The paper's figure 2 as a list of stages, and the way of one input through it."""
+"""The paper's figure 2 as a list of stages, and the recipe that the engine follows."""
 
 from __future__ import annotations
 
-import fcntl
-import shutil
-import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Literal, cast
 
 from manitwin.assembly import assemble
 from manitwin.config import BuildConfig
-from manitwin.errors import BackendError, ManiTwinError, Rejected, TwinError, UsageError
+from manitwin.engine.recipe import INPUT, Ending, Identity
+from manitwin.errors import Rejected, TwinError, UsageError
 from manitwin.files.sniff import sniff
 from manitwin.files.source_files import MESH_SUFFIXES
 from manitwin.identity import twin_id
 from manitwin.models.registry import create, target
 from manitwin.simulate.gripper import Gripper, load_gripper
-from manitwin.stage_runner import StageCost, run_stage
+from manitwin.stage_runner import StageCost
 from manitwin.stages.candidates import CandidatesStage
 from manitwin.stages.caption import CaptionStage
 from manitwin.stages.collision import CollisionStage
@@ -39,24 +36,11 @@ from manitwin.stages.second_opinion import SecondOpinionStage
 from manitwin.stages.stage import Draft, Item, Stage
 from manitwin.stages.verify import VerifyStage
 from manitwin.stages.views import ViewsStage
-from manitwin.store import RECORD, WORK, read_record, sha256_of_json
+from manitwin.store import parse_record, sha256_of_json
 from manitwin.twin import TwinRecord
 
-REPORT = "error.txt"
 Kind = Literal["image", "text", "mesh"]
-Status = Literal["accepted", "rejected", "unfinished"]
-
-
-@dataclass(frozen=True)
-class ItemResult:
-    """What became of one item: its folder where it has one, and one line that says why."""
-
-    item: Item
-    twin_id: str
-    status: Status
-    detail: str
-    folder: Path | None
-    reused: bool = False
+KINDS_OF_INPUT: tuple[Kind, ...] = ("image", "text", "mesh")
 
 
 def check_names(config: BuildConfig) -> None:
@@ -137,98 +121,97 @@ def _generation(kind: Kind, config: BuildConfig) -> list[Stage]:
 
 
 def config_sha256(config: BuildConfig) -> str:
-    """Return the digest of everything in the configuration but the seed, which a twin states by itself.
+    """Return the digest of all in the configuration that decides a twin, but the seed, which a twin states by itself.
 
     Grippers count by their content: a changed file is another configuration.
     """
     grippers = [gripper.sha256 for gripper, _ in _grippers(config)]
-    return sha256_of_json({**config.model_dump(mode="json", exclude={"seed"}), "grippers": grippers})
-
-
-def finished_record(folder: Path, config: BuildConfig) -> TwinRecord | None:
-    """Return the record of a twin that is finished under this very configuration and seed, or None."""
-    if not (folder / RECORD).is_file():
-        return None
-    try:
-        record = read_record(folder)
-    except TwinError:
-        return None  # unreadable or of another version: built again
-    same = (record.provenance.config_sha256, record.provenance.seed) == (config_sha256(config), config.seed)
-    return record if same else None
-
-
-def build_item(
-    item: Item, out: Path, config: BuildConfig, on_stage: Callable[[str], None] = lambda name: None
-) -> ItemResult:
-    """Take one item through all stages; never raises for what the item or a backend does.
-
-    A rejection is a result. A backend that fails, or a defect, leaves the item unfinished: what its stages have done stays in
-    ``.work`` and is taken up by the next run.
-    """
-    identity = twin_id(item)
-    place = out / identity
-    done = finished_record(place, config)
-    if done is not None:
-        return ItemResult(item, identity, done.status, _line(done), place, reused=True)
-    work = out / WORK / identity
-    work.mkdir(parents=True, exist_ok=True)
-    try:
-        with _only_one(work):
-            record = _build(item, identity, out, work, config, on_stage)
-    except (BackendError, BlockingIOError) as error:
-        return ItemResult(item, identity, "unfinished", str(error), None)
-    except ManiTwinError as error:
-        return ItemResult(item, identity, "unfinished", f"{type(error).__name__}: {error}", None)
-    except Exception as error:
-        report = work / REPORT
-        report.write_text(traceback.format_exc())
-        detail = f"a defect in manitwin: {type(error).__name__}: {error}; the traceback is in {report}"
-        return ItemResult(item, identity, "unfinished", " ".join(detail.split()), None)
-    return ItemResult(item, identity, record.status, _line(record), place)
-
-
-@contextmanager
-def _only_one(work: Path) -> Iterator[None]:
-    """Hold a lock that ends with the process, so that two runs do not build one twin at a time."""
-    with (work / "lock").open("w") as lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise BlockingIOError(f"another run is building {work.name} now; wait for it, then run again") from error
-        for stale in work.glob("*/.*"):  # a stage that was cut off in the middle
-            shutil.rmtree(stale, ignore_errors=True)
-        (work / REPORT).unlink(missing_ok=True)
-        yield
-
-
-def _build(
-    item: Item, identity: str, out: Path, work: Path, config: BuildConfig, on_stage: Callable[[str], None]
-) -> TwinRecord:
-    draft = Draft(identity, item, config.seed)
-    costs: dict[str, StageCost] = {}
-    ran: list[Stage] = []
-    rejected: Rejected | None = None
-    kind = _claimed_kind(item)
-    try:
-        if item.file is not None:
-            kind = sniff(Path(item.file)).kind
-        for stage in stages_for(kind, config):
-            on_stage(stage.name)
-            ran.append(stage)
-            costs[stage.name] = run_stage(stage, draft, work)
-    except Rejected as answer:
-        rejected = answer
-    return assemble(
-        draft,
-        kind=kind,
-        stages=ran,
-        costs=costs,
-        config_sha256=config_sha256(config),
-        rejected=rejected,
-        rejecting_stage=ran[-1].name if ran else "input",
-        fresh=out / WORK / f"{identity}.finished",
-        place=out / identity,
+    return sha256_of_json(
+        {**config.model_dump(mode="json", exclude={"seed", "item_timeout_s", "run"}), "grippers": grippers}
     )
+
+
+def is_current(record: TwinRecord, config: BuildConfig) -> bool:
+    """Tell whether a record is what this configuration and seed, and the stages as they are now, would make."""
+    if (record.provenance.config_sha256, record.provenance.seed) != (config_sha256(config), config.seed):
+        return False
+    now = {stage.name: (stage.version, stage.backend) for stage in stages_for(record.source.kind, config)}
+    ran = {name: (stage.version, stage.backend) for name, stage in record.provenance.stages.items()}
+    if record.status == "accepted":
+        return ran == now
+    return all(now.get(name) == identity for name, identity in ran.items())
+
+
+@dataclass(frozen=True)
+class TwinRecipe:
+    """What the engine makes of an item: a twin."""
+
+    config: BuildConfig
+
+    @cached_property
+    def sha256(self) -> str:
+        """The digest of the configuration and of every stage that there is."""
+        stages = [
+            [kind, stage.name, stage.version, stage.backend, stage.model]
+            for kind in KINDS_OF_INPUT
+            for stage in stages_for(kind, self.config)
+        ]
+        return sha256_of_json([config_sha256(self.config), self.config.seed, stages])
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything random."""
+        return self.config.seed
+
+    def identify(self, item: Item) -> Identity:
+        """Return the id by the input's bytes, and its kind by what they are, not by what they claim to be."""
+        identity = twin_id(item)
+        if item.file is None:
+            return Identity(identity, "text")
+        try:
+            return Identity(identity, sniff(Path(item.file)).kind)
+        except Rejected as answer:
+            return Identity(identity, _claimed_kind(item), answer)
+
+    def stages(self, kind: str) -> list[Stage]:
+        """Return the stages of the paper's pipeline for a kind of input, in order."""
+        return stages_for(cast(Kind, kind), self.config)
+
+    def finish(
+        self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
+    ) -> Ending:
+        """Write the twin's folder."""
+        names = [*costs, *([stage] if rejected is not None and stage != INPUT else [])]
+        ran = [s for s in self.stages(kind) if s.name in names]
+        record = assemble(
+            draft,
+            kind=kind,
+            stages=ran,
+            costs=costs,
+            config_sha256=config_sha256(self.config),
+            rejected=rejected,
+            rejecting_stage=stage,
+            fresh=fresh,
+        )
+        return ending_of(record)
+
+    def ending_of(self, record: bytes) -> Ending | None:
+        """Return how a finished twin ended; None where this recipe would make another one."""
+        try:
+            twin = parse_record(record)
+        except TwinError:
+            return None  # unreadable or of another version: built again
+        return ending_of(twin) if is_current(twin, self.config) else None
+
+
+def ending_of(record: TwinRecord) -> Ending:
+    """Return how a twin's record says that its item ended."""
+    reason = record.rejection.reason if record.rejection is not None else None
+    if record.rejection is not None:
+        detail = record.rejection.detail
+    else:
+        detail = f"{record.grasps.verified} of {record.grasps.simulated} grasps verified" if record.grasps else ""
+    return Ending(record.status, record.revision, reason, detail)
 
 
 def _claimed_kind(item: Item) -> Kind:
@@ -236,10 +219,3 @@ def _claimed_kind(item: Item) -> Kind:
     if item.file is None:
         return "text"
     return "mesh" if Path(item.file).suffix.lower() in MESH_SUFFIXES else "image"
-
-
-def _line(record: TwinRecord) -> str:
-    if record.rejection is not None:
-        return f"{record.rejection.reason}: {record.rejection.detail}"
-    grasps = record.grasps
-    return f"{grasps.verified} of {grasps.simulated} grasps verified" if grasps else ""

@@ -8,8 +8,8 @@ from types import TracebackType
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from manitwin.executors.local import StageStarted
-from manitwin.pipeline import ItemResult
+from manitwin.build_item import ItemResult
+from manitwin.executors.whole_items import StageStarted
 from manitwin.stages.stage import Item
 
 STYLES = {"accepted": "green", "rejected": "yellow", "unfinished": "red"}

@@ -1,4 +1,7 @@
-"""Run one stage, or take its result up again: results live in ``.work/<twin_id>/<stage>/<key>``, by what decided them."""
+"""Run one stage, or take its result up again: results live in ``.work/<twin_id>/<stage>/<key>``, by what decided them.
+
+``result.json`` beside a stage's files holds its fields, the digests of all that it wrote, and what it cost.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,7 @@ import os
 import resource
 import shutil
 import time
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,12 +31,17 @@ class StageCost:
     cost_usd: float
 
 
+@dataclass(frozen=True)
+class StageRun:
+    """How a stage came by its result: the key, what it cost when it ran, and whether that was in an earlier run."""
+
+    key: str
+    cost: StageCost
+    reused: bool
+
+
 def stage_key(stage: Stage, draft: Draft) -> str:
     """Return the hash of everything that decides a stage's result: same key, same bytes."""
-    reads = {
-        n: sha256_of_json(draft.field(n)) if is_field(n) else sha256_of_artifact(draft.path(n))
-        for n in _present(stage, draft)
-    }
     decides = {
         "twin": draft.twin_id,
         "name": stage.name,
@@ -41,23 +50,30 @@ def stage_key(stage: Stage, draft: Draft) -> str:
         "backend": stage.backend,
         "model": stage.model,
         "seed": draft.seed,
-        "reads": reads,
+        "reads": {name: _digest(name, draft) for name in present_reads(stage, draft.names())},
     }
     return sha256_of_json(decides)[:24]
 
 
-def _present(stage: Stage, draft: Draft) -> list[str]:
-    """Return what the stage reads; a name that ends in ``?`` is read where it is there."""
-    names = []
+def present_reads(stage: Stage, names: Collection[str]) -> list[str]:
+    """Return what the stage reads, given the names that are there; one that ends in ``?`` is read where it is there."""
+    reads = []
     for name in stage.reads:
         optional = name.endswith("?")
         name = name.removesuffix("?")
-        if not optional or name in draft.fields or name in draft.paths:
-            names.append(name)
-    return names
+        if not optional or name in names:
+            reads.append(name)
+    return reads
 
 
-def run_stage(stage: Stage, draft: Draft, work: Path) -> StageCost:
+def _digest(name: str, draft: Draft) -> str:
+    if name not in draft.digests:
+        value = sha256_of_json(draft.field(name)) if is_field(name) else sha256_of_artifact(draft.path(name))
+        draft.digests[name] = value
+    return draft.digests[name]
+
+
+def run_stage(stage: Stage, draft: Draft, work: Path) -> StageRun:
     """Bring a stage's results into the draft, from an earlier run where one with the same key is there.
 
     Raises what the stage raises; then nothing of it is left behind. Raises ManiTwinError where a stage does not write what
@@ -65,14 +81,21 @@ def run_stage(stage: Stage, draft: Draft, work: Path) -> StageCost:
     """
     key = stage_key(stage, draft)
     place = work / stage.name / key
-    if not (place / RESULT).is_file():
+    reused = (place / RESULT).is_file()
+    if not reused:
         _run_into(stage, draft, place)
+    return StageRun(key, take_up(place, stage.writes, draft), reused)
+
+
+def take_up(place: Path, names: Iterable[str], draft: Draft) -> StageCost:
+    """Bring what a stage wrote at ``place`` into the draft."""
     result = json.loads((place / RESULT).read_text())
-    for name in stage.writes:
+    for name in names:
         if is_field(name):
             draft.fields[name] = result["fields"][name]
         else:
             draft.paths[name] = place / name
+        draft.digests[name] = result["digests"][name]
     return StageCost(**result["cost"])
 
 
@@ -89,7 +112,11 @@ def _run_into(stage: Stage, draft: Draft, place: Path) -> None:
         fields = stage.run(draft, fresh)
         cost = {"seconds": time.perf_counter() - started, "cpu_seconds": _cpu_seconds() - cpu_started}
         _check_writes(stage, fields, fresh)
-        content = {"fields": fields, "cost": {**cost, "cost_usd": 0.0}}
+        digests = {
+            name: sha256_of_json(fields[name]) if is_field(name) else sha256_of_artifact(fresh / name)
+            for name in stage.writes
+        }
+        content = {"fields": fields, "digests": digests, "cost": {**cost, "cost_usd": 0.0}}
         write_bytes_atomically(fresh / RESULT, canonical_json(content).encode())
         shutil.rmtree(place, ignore_errors=True)
         os.rename(fresh, place)

@@ -100,22 +100,28 @@ def read_record(folder: Path, verify: bool = False) -> TwinRecord:
     path = folder / RECORD
     if not path.is_file():
         raise TwinError(f"{folder}: no {RECORD}, so this is no finished twin; give a folder that `manitwin build` made")
+    content = path.read_bytes()
+    record = parse_record(content, path)
+    if verify:
+        _verify(folder, record, json.loads(content))
+    return record
+
+
+def parse_record(content: bytes, path: str | Path = RECORD) -> TwinRecord:
+    """Read the content of a twin.json; raises TwinError naming ``path``, the cause and the remedy."""
     try:
-        data = json.loads(path.read_text())
+        data = json.loads(content)
     except (json.JSONDecodeError, UnicodeDecodeError) as error:
         raise TwinError(f"{path}: not JSON ({error}); build the twin again") from error
     if not isinstance(data, dict) or data.get("schema_version") != SCHEMA_VERSION:
         version = data.get("schema_version") if isinstance(data, dict) else None
         raise TwinError(f"{path}: schema version {version}, this package reads {SCHEMA_VERSION}; build the twin again")
     try:
-        record = TwinRecord(**data)
+        return TwinRecord(**data)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise TwinError(f"{path}: {where}: {first['msg']}; build the twin again") from error
-    if verify:
-        _verify(folder, record, data)
-    return record
 
 
 def _verify(folder: Path, record: TwinRecord, data: dict[str, Any]) -> None:

@@ -1,129 +1,151 @@
-"""Build many items on this machine: one process an item at a time, so that a crash costs one item."""
+"""Do jobs on this machine: a pool of processes for each resource, in which a crash or a hang costs one job."""
 
 from __future__ import annotations
 
+import ctypes
+import faulthandler
 import multiprocessing
 import os
 import queue
-import sys
-import threading
-from collections.abc import Callable, Iterator
+import signal
+import tempfile
 from concurrent.futures import CancelledError, TimeoutError
-from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import Any, TextIO
 
 from pebble import ProcessExpired, ProcessPool
 
-from manitwin.config import BuildConfig
-from manitwin.identity import twin_id
-from manitwin.pipeline import ItemResult, build_item
-from manitwin.stages.stage import Item
+from manitwin.config import Resource, RunConfig
+from manitwin.engine.jobs import Failure, Job, Reply, WorkerSetup
+from manitwin.engine.worker import Worker
+from manitwin.executors.main_module import hidden_main_module
 
-POLL_S = 0.2
-
-
-@dataclass(frozen=True)
-class StageStarted:
-    """A worker has begun a stage of an item."""
-
-    item: Item
-    stage: str
+JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
+PR_SET_PDEATHSIG = 1  # prctl(2)
+STACK_LINES = 12
 
 
-_events: Any = None
+class LocalExecutor:
+    """One process pool a resource, made when it is first needed.
 
-
-def _start_worker(events: Any) -> None:
-    global _events
-    _events = events
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
-
-
-def _build_in_worker(item: Item, out: Path, config: BuildConfig) -> ItemResult:
-    return build_item(item, out, config, lambda stage: _events.put(StageStarted(item, stage)))
-
-
-def build_all(
-    items: list[Item],
-    out: Path,
-    config: BuildConfig,
-    *,
-    jobs: int,
-    on_stage: Callable[[StageStarted], None] = lambda event: None,
-) -> Iterator[ItemResult]:
-    """Build the items in ``jobs`` processes and yield results as they end.
-
-    A worker that crashes or exceeds ``config.item_timeout_s`` leaves its item unfinished. Closing the iterator early stops
-    the workers; finished twins and stages stay.
+    Owns: the pools, and a folder for what dying workers leave behind.
     """
-    with _hidden_main_module():
-        yield from _build_all(items, out, config, jobs, on_stage)
 
+    def __init__(self, setup: WorkerSetup, settings: RunConfig):
+        self._setup, self._settings = setup, settings
+        cpu = settings.cpu or len(os.sched_getaffinity(0))
+        self._slots: dict[Resource, int] = {
+            "cpu": cpu, "gpu": settings.gpu, "vlm": settings.vlm, "generator": settings.generator
+        }  # fmt: skip
+        self._pools: dict[Resource, ProcessPool] = {}
+        self._ended: queue.SimpleQueue[tuple[int, Reply]] = queue.SimpleQueue()
+        self._stacks = tempfile.TemporaryDirectory(prefix="manitwin-")
+        self._main = hidden_main_module()
+        self._main.__enter__()
 
-@contextmanager
-def _hidden_main_module() -> Iterator[None]:
-    """Keep spawned workers from importing the script that started this build: without a guard it would start it again."""
-    main = sys.modules["__main__"].__dict__
-    hidden: dict[str, Any] = {name: main[name] for name in ("__file__", "__spec__") if name in main}
-    main.pop("__file__", None)
-    main["__spec__"] = None
-    try:
-        yield
-    finally:
-        main.update(hidden)
+    def __enter__(self) -> LocalExecutor:
+        return self
 
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
 
-def _build_all(
-    items: list[Item], out: Path, config: BuildConfig, jobs: int, on_stage: Callable[[StageStarted], None]
-) -> Iterator[ItemResult]:
-    context = multiprocessing.get_context("spawn")
-    events = context.Queue()
-    done: queue.Queue[ItemResult] = queue.Queue()
-    stop = threading.Event()
-    listener = threading.Thread(target=_listen, args=(events, on_stage, stop), daemon=True)
-    listener.start()
-    pool = ProcessPool(max_workers=jobs, context=context, initializer=_start_worker, initargs=(events,))
-    try:
-        for item in items:
-            future = pool.schedule(_build_in_worker, args=(item, out, config), timeout=config.item_timeout_s)
-            future.add_done_callback(partial(_hand_over, item, config, done))
-        for _ in items:
-            yield done.get()
-        pool.close()
-    finally:
-        pool.stop()
-        pool.join()
-        stop.set()
-        listener.join()
-        events.close()
+    def slots(self, needs: Resource) -> int:
+        """Return how many jobs of a resource run at a time."""
+        return self._slots[needs]
 
+    def submit(self, ticket: int, job: Job) -> None:
+        """Give a job to the pool of what it needs."""
+        future = self._pool(job.needs).schedule(_do, args=(job,), timeout=self._settings.stage_timeout_s)
+        future.add_done_callback(partial(self._hand_over, ticket))
 
-def _hand_over(item: Item, config: BuildConfig, done: queue.Queue[ItemResult], future: Any) -> None:
-    done.put(_result(future, item, config))
-
-
-def _result(future: Any, item: Item, config: BuildConfig) -> ItemResult:
-    try:
-        return future.result()
-    except ProcessExpired as error:
-        cause = f"the worker process died (exit code {error.exitcode}); run again to retry this item"
-    except TimeoutError:
-        cause = f"took longer than item_timeout_s = {config.item_timeout_s:g} s; raise it in the configuration, or run again"
-    except CancelledError:
-        cause = "interrupted; run again to go on"
-    except Exception as error:  # what the worker could not turn into a result: kept visible, the other items go on
-        cause = f"a defect in manitwin: {type(error).__name__}: {error}"
-    return ItemResult(item, twin_id(item), "unfinished", cause, None)
-
-
-def _listen(events: Any, on_stage: Callable[[StageStarted], None], stop: threading.Event) -> None:
-    while not stop.is_set():
+    def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
+        """Wait for the next job that ends, and return all that have."""
+        ended = []
         try:
-            on_stage(events.get(timeout=POLL_S))
+            ended.append(self._ended.get(timeout=timeout_s))
+            while True:
+                ended.append(self._ended.get_nowait())
         except queue.Empty:
-            continue
-        except (EOFError, OSError):
-            return
+            return ended
+
+    def close(self) -> None:
+        """Stop all processes at once."""
+        for pool in self._pools.values():
+            pool.stop()
+            pool.join()
+        self._pools.clear()
+        self._stacks.cleanup()
+        self._main.__exit__(None, None, None)
+
+    def _pool(self, needs: Resource) -> ProcessPool:
+        if needs not in self._pools:
+            self._pools[needs] = ProcessPool(
+                max_workers=self._slots[needs],
+                max_tasks=JOBS_A_PROCESS,
+                context=multiprocessing.get_context("spawn"),
+                initializer=_start,
+                initargs=(self._setup, self._stacks.name, os.getpid()),
+            )
+        return self._pools[needs]
+
+    def _hand_over(self, ticket: int, future: Any) -> None:
+        self._ended.put((ticket, self._reply(future)))
+
+    def _reply(self, future: Any) -> Reply:
+        try:
+            reply: Reply = future.result()
+            return reply
+        except ProcessExpired as error:
+            return Failure("died", f"the worker process died ({_how(error.exitcode)}){self._stack(error.pid)}")
+        except TimeoutError:
+            limit = self._settings.stage_timeout_s
+            return Failure("timeout", f"took longer than run.stage_timeout_s = {limit:g} s")
+        except CancelledError:
+            return Failure("died", "cut off as the run was stopped")
+        except Exception as error:  # what cannot be sent back, say: the other jobs go on
+            return Failure("error", " ".join(f"{type(error).__name__}: {error}".split()))
+
+    def _stack(self, pid: int | None) -> str:
+        """Return the innermost lines of where a dying process was, where it could still say so."""
+        path = Path(self._stacks.name) / f"{pid}.txt"
+        lines = path.read_text(errors="replace").splitlines() if path.is_file() else []
+        calls = [line.strip() for line in lines if line.startswith("  File")][:STACK_LINES]
+        return "; it was at " + " < ".join(calls) if calls else ""
+
+
+def _how(exit_code: int | None) -> str:
+    if exit_code is not None and exit_code < 0:
+        return signal.Signals(-exit_code).name
+    return f"exit code {exit_code}"
+
+
+_worker: Worker | None = None
+_stack_file: TextIO | None = None
+
+
+def _start(setup: WorkerSetup, stacks: str, driver: int) -> None:
+    global _worker, _stack_file
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    _die_with(driver)
+    _stack_file = (Path(stacks) / f"{os.getpid()}.txt").open("w")
+    faulthandler.enable(_stack_file)
+    _worker = Worker(setup)
+
+
+def _die_with(driver: int) -> None:
+    """Have this process killed when the driver is: an orphan would work on beside the next run."""
+    try:
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    except (OSError, AttributeError):  # not Linux: an orphan ends after its job, whose result is found by its key
+        return
+    if os.getppid() != driver:
+        os._exit(1)
+
+
+def _do(job: Job) -> Reply:
+    assert _worker is not None
+    return _worker.do(job)

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from manitwin.config import CandidatesConfig
+from manitwin.config import CandidatesConfig, Resource
 from manitwin.errors import Rejected
 from manitwin.files.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
@@ -18,7 +18,7 @@ from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
 from manitwin.render.cameras import Camera, project
 from manitwin.render.markers import draw_markers
 from manitwin.render.raycast import cast_camera, merged, visible_points
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 from manitwin.stages.views import write_webp
 
 ON_SURFACE_M = 0.001  # a candidate is on the surface that is seen, to a millimetre (half of what a twin may be off)

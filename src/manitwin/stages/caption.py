@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from manitwin.config import CaptionConfig
+from manitwin.config import CaptionConfig, Resource
 from manitwin.models.annotators.protocol import Annotator
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 from manitwin.stages.subject import read_subject
 
 
@@ -20,13 +20,13 @@ class CaptionStage:
     version: ClassVar[str] = "1"
     reads: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "views/")
     writes: ClassVar[tuple[str, ...]] = ("language",)
-    needs: ClassVar[Resource] = "cpu"
 
     def __init__(self, settings: CaptionConfig, annotator: Annotator):
         self.settings = settings
         self._annotator = annotator
         self.backend = annotator.name
         self.model = annotator.model
+        self.needs: Resource = annotator.needs
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return ``language``."""

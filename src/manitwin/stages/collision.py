@@ -8,14 +8,14 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.spatial import QhullError
 
-from manitwin.config import CollisionConfig
+from manitwin.config import CollisionConfig, Resource
 from manitwin.errors import Rejected
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.hulls.decomposition import convex_decomposition
 from manitwin.geometry.hulls.error import hull_error
 from manitwin.simulate.settle import ball_stays_inside
 from manitwin.stages.object_arrays import load_solid
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 
 HULLS = "hulls.npz"
 

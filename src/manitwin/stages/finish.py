@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow.parquet
 from PIL import Image
 
-from manitwin.config import FinishConfig
+from manitwin.config import FinishConfig, Resource
 from manitwin.files.glb import read_glb
 from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
@@ -18,7 +18,7 @@ from manitwin.render.card_panels import CardGrasp, CardPoint
 from manitwin.simulate.gripper import Gripper
 from manitwin.stages.object_arrays import load_hulls, load_solid
 from manitwin.stages.quality import quality_checks
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 
 
 class FinishStage:

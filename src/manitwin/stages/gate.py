@@ -8,12 +8,12 @@ from typing import Any, ClassVar
 import numpy as np
 import trimesh
 
-from manitwin.config import GateConfig
+from manitwin.config import GateConfig, Resource
 from manitwin.errors import Rejected
 from manitwin.files.glb import read_glb
 from manitwin.geometry.repair.components import separate_objects
 from manitwin.models.annotators.protocol import Annotator, QualityVerdict, Subject
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 from manitwin.twin import Check
 
 
@@ -27,13 +27,13 @@ class GateStage:
     version: ClassVar[str] = "1"
     reads: ClassVar[tuple[str, ...]] = ("canonical.npz", "canonical.glb", "geometry", "views/")
     writes: ClassVar[tuple[str, ...]] = ("gate",)
-    needs: ClassVar[Resource] = "vlm"
 
     def __init__(self, settings: GateConfig, annotator: Annotator | None = None):
         """Take the settings and who looks at the views; without an annotator nothing is judged by eye."""
         self.settings, self.annotator = settings, annotator
         self.backend = "geometry" if annotator is None else annotator.name
         self.model: str | None = None if annotator is None else annotator.model
+        self.needs: Resource = "cpu" if annotator is None else annotator.needs
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return the field ``gate``; raises Rejected with the first check that fails, BackendError of the annotator."""

@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 from PIL import Image
 
-from manitwin.config import GenerateConfig
+from manitwin.config import GenerateConfig, Resource
 from manitwin.models.generators.protocol import GenerationRequest, Generator
 from manitwin.models.generators.run import run_generator
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 
 
 class GenerateStage:
@@ -21,13 +21,13 @@ class GenerateStage:
     version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?",)
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
-    needs: ClassVar[Resource] = "generator"
 
     def __init__(self, settings: GenerateConfig, generator: Generator):
         self.settings = settings
         self.generator = generator
         self.backend: str = generator.name
         self.model: str | None = generator.model
+        self.needs: Resource = generator.needs
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Generate; raises Rejected ``generator_failed``, or BackendError where the generator cannot work now."""

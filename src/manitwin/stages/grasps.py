@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from manitwin.config import GraspConfig
+from manitwin.config import GraspConfig, Resource
 from manitwin.geometry.grasp_diversity import approach_octants
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest
 from manitwin.simulate.grasp_selection import select_likely
@@ -20,7 +20,7 @@ from manitwin.stages.association import associate, distances_to_grasps
 from manitwin.stages.gripper_kinds import KINDS
 from manitwin.stages.object_arrays import JOINTS, load_hulls, load_solid
 from manitwin.stages.proposal_rounds import Kept, propose_in_rounds
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 
 PROPOSALS = "proposals{}.npz"
 PROPOSED = "proposals{}"

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 import trimesh
 
-from manitwin.config import MeshConfig
+from manitwin.config import MeshConfig, Resource
 from manitwin.errors import InputError
 from manitwin.files.glb import write_glb
 from manitwin.files.meshes.read import MeshFile, read_mesh
@@ -21,7 +21,7 @@ from manitwin.geometry.canonical.up import UpChoice, choose_up
 from manitwin.geometry.repair.cascade import RepairResult, repair
 from manitwin.geometry.repair.components import connected_parts
 from manitwin.models.annotators.priors import Prior, lookup
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 
 _GENERATED = "generated.glb"
 _TURNED_DEG = 10.0  # less is a scan that stands a little off its base, not another pose

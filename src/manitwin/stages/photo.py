@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from PIL import Image
 
-from manitwin.config import MattingConfig
+from manitwin.config import MattingConfig, Resource
 from manitwin.errors import InputError
 from manitwin.files.image_file import read_image
 from manitwin.models.matting import matte_photo
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 
 
 class PhotoStage:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import trimesh
 
-from manitwin.config import PhysicalConfig
+from manitwin.config import PhysicalConfig, Resource
 from manitwin.errors import BadReply, Rejected
 from manitwin.files.glb import write_glb
 from manitwin.files.meshes.textures import bake_transform
@@ -16,7 +16,7 @@ from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
 from manitwin.models.annotators.priors import Interval, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 from manitwin.stages.subject import read_subject
 from manitwin.twin import Estimate, OrientedBox, Physical
 
@@ -34,13 +34,13 @@ class PhysicalStage:
     version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/")
     writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical")
-    needs: ClassVar[Resource] = "cpu"
 
     def __init__(self, settings: PhysicalConfig, annotator: Annotator):
         self.settings = settings
         self._annotator = annotator
         self.backend = annotator.name
         self.model = annotator.model
+        self.needs: Resource = annotator.needs
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Write ``visual.glb`` and ``solid.npz`` in true metres; return ``physical``.

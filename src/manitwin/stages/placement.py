@@ -11,7 +11,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
-from manitwin.config import PlacementConfig
+from manitwin.config import PlacementConfig, Resource
 from manitwin.errors import Rejected
 from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.hulls.reduction import convex_corners
@@ -21,7 +21,7 @@ from manitwin.simulate.mujoco_settle import settle_on_plane_in_mujoco
 from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.settle import Settled, settle_on_plane
 from manitwin.stages.object_arrays import load_body, load_solid
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 
 UP = np.array([0.0, 0.0, 1.0])
 UPRIGHT_DEG = 10.0

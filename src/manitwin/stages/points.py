@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from manitwin.config import PointsConfig
+from manitwin.config import PointsConfig, Resource
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints
 from manitwin.simulate.gripper import Gripper
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 from manitwin.stages.subject import pictures, read_subject
 from manitwin.twin import FunctionalPoint, GraspPoint
 
@@ -28,7 +28,6 @@ class PointsStage:
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "language", "candidates", "visible_candidates",
     )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = ("points",)
-    needs: ClassVar[Resource] = "cpu"
 
     def __init__(self, settings: PointsConfig, annotator: Annotator, gripper: Gripper):
         self.settings = settings
@@ -36,6 +35,7 @@ class PointsStage:
         self._gripper = gripper
         self.backend = annotator.name
         self.model = annotator.model
+        self.needs: Resource = annotator.needs
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return ``points`` ``{functional, grasp}``; raises BadReply for too few, too many, or no candidates."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.config import SecondOpinionConfig
+from manitwin.config import Resource, SecondOpinionConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.grasp_diversity import approach_octants
 from manitwin.simulate.gripper import Gripper
@@ -16,7 +16,7 @@ from manitwin.stages.grasp_table import JITTERED, GripperRows, write_grasp_table
 from manitwin.stages.grasps import PROPOSALS, PROPOSED, UNFILTERED
 from manitwin.stages.robustness import ROBUSTNESS, ROBUSTNESS_FILE, rank_values
 from manitwin.stages.second_opinion import AGREEMENT, FAILS, NOT_TRIED, SECOND_OPINION
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 from manitwin.stages.verify import TRIAL, VERDICTS
 from manitwin.twin import FailureTable, GraspSummary, OtherGripper
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.config import RobustnessConfig, VerifyConfig
+from manitwin.config import Resource, RobustnessConfig, VerifyConfig
 from manitwin.simulate.gripper import Gripper
 from manitwin.simulate.perturbation import Spread, draw_perturbations
 from manitwin.simulate.robustness import Robustness, SequentialTest, try_until_clear
 from manitwin.simulate.trial import GraspTrial
 from manitwin.stages.grasps import PROPOSALS, UNFILTERED
 from manitwin.stages.object_arrays import joints_of, load_body
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 from manitwin.stages.verify import VERDICTS, trial_settings
 from manitwin.twin import RobustnessSummary
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.config import SecondOpinionConfig, VerifyConfig
+from manitwin.config import Resource, SecondOpinionConfig, VerifyConfig
 from manitwin.simulate.agreement import cohens_kappa
 from manitwin.simulate.gripper import Gripper
 from manitwin.simulate.jitter import jittered
 from manitwin.simulate.trial import GraspTrial, TrialResult
 from manitwin.stages.grasps import PROPOSALS, UNFILTERED
 from manitwin.stages.object_arrays import joints_of, load_body
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 from manitwin.stages.verify import VERDICTS, trial_settings
 from manitwin.twin import SecondOpinion as SecondOpinionRecord
 

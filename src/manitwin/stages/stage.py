@@ -14,9 +14,8 @@ from typing import Any, Literal, Protocol, runtime_checkable
 
 from pydantic import BaseModel
 
+from manitwin.config import Resource
 from manitwin.errors import ManiTwinError
-
-Resource = Literal["cpu", "gpu", "vlm", "generator"]
 
 
 def is_field(name: str) -> bool:
@@ -42,13 +41,18 @@ class Item:
 
 @dataclass
 class Draft:
-    """A twin in the making: fields and paths, by artifact name. Cheap to send to another process."""
+    """A twin in the making: fields and paths with their digests, by artifact name. Cheap to send to another process."""
 
     twin_id: str
     item: Item
     seed: int
     fields: dict[str, Any] = dataclass_field(default_factory=dict)
     paths: dict[str, Path] = dataclass_field(default_factory=dict)
+    digests: dict[str, str] = dataclass_field(default_factory=dict)
+
+    def names(self) -> set[str]:
+        """Return the names of all artifacts that are there."""
+        return self.fields.keys() | self.paths.keys()
 
     def field(self, name: str) -> Any:
         """Return the JSON value of a field artifact; raises ManiTwinError where no stage has written it."""

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.config import VerifyConfig
+from manitwin.config import Resource, VerifyConfig
 from manitwin.errors import Rejected
 from manitwin.simulate.gripper import Gripper
 from manitwin.simulate.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.stages.grasps import PROPOSALS, UNFILTERED
 from manitwin.stages.gripper_kinds import KINDS
 from manitwin.stages.object_arrays import joints_of, load_body
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 from manitwin.twin import Trial
 
 VERDICTS = "verdicts{}.npz"

@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 from PIL import Image, WebPImagePlugin
 
-from manitwin.config import ViewsConfig
+from manitwin.config import Resource, ViewsConfig
 from manitwin.files.glb import read_glb
 from manitwin.render.cameras import orbit_cameras
 from manitwin.render.renderer import shared_renderer
-from manitwin.stages.stage import Draft, Resource
+from manitwin.stages.stage import Draft
 
 VIEWS = 8
 """Paper, "Physical Property Estimation"."""

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 import trimesh
 
+from manitwin.config import Resource
 from manitwin.twin import Estimate, FunctionalPoint, GraspPoint, Language
 
 
@@ -82,6 +83,7 @@ class Annotator(Protocol):
 
     name: str
     model: str | None
+    needs: Resource
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:
         """Judge whether this is one coherent object, free of severe artifacts."""

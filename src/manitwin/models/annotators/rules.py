@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from manitwin.config import Resource
 from manitwin.models.annotators.physical_rules import estimate_physical
 from manitwin.models.annotators.point_rules import select_points
 from manitwin.models.annotators.priors import lookup
@@ -26,6 +27,7 @@ class RulesAnnotator:
 
     name = "rules"
     model: str | None = None
+    needs: Resource = "cpu"
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:
         """Judge nothing: rules cannot see."""

@@ -8,6 +8,8 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from manitwin.config import Resource
+
 
 @dataclass(frozen=True)
 class GenerationRequest:
@@ -54,6 +56,7 @@ class Generator(Protocol):
 
     name: str
     model: str | None
+    needs: Resource
 
     def submit(self, request: GenerationRequest) -> str:
         """Start a job and return its id."""

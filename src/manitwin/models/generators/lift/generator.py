@@ -13,6 +13,7 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from manitwin.config import Resource
 from manitwin.errors import Unavailable
 from manitwin.files.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
@@ -38,6 +39,7 @@ class LiftGenerator:
 
     name = "lift"
     model: str | None = None
+    needs: Resource = "cpu"
 
     def __init__(self) -> None:
         self._jobs: dict[str, _Job] = {}

@@ -1,0 +1,103 @@
+"""The way of one input through all stages in this process."""
+
+from __future__ import annotations
+
+import fcntl
+import shutil
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from manitwin.config import BuildConfig
+from manitwin.engine.recipe import INPUT, Ending, Identity
+from manitwin.errors import BackendError, ManiTwinError, Rejected
+from manitwin.pipeline import TwinRecipe
+from manitwin.stage_runner import StageCost, run_stage
+from manitwin.stages.stage import Draft, Item
+from manitwin.store import RECORD, WORK, replace_folder
+
+REPORT = "error.txt"
+Status = Literal["accepted", "rejected", "unfinished"]
+
+
+@dataclass(frozen=True)
+class ItemResult:
+    """What became of one item: its folder where it has one, and one line that says why."""
+
+    item: Item
+    twin_id: str
+    status: Status
+    detail: str
+    folder: Path | None
+    reused: bool = False
+
+
+def build_item(
+    item: Item, out: Path, config: BuildConfig, on_stage: Callable[[str], None] = lambda name: None
+) -> ItemResult:
+    """Take one item through all stages; never raises for what the item or a backend does.
+
+    A rejection is a result. A backend that fails, or a defect, leaves the item unfinished: what its stages have done stays in
+    ``.work`` and is taken up by the next run.
+    """
+    recipe = TwinRecipe(config)
+    identity = recipe.identify(item)
+    place = out / identity.twin_id
+    done = recipe.ending_of((place / RECORD).read_bytes()) if (place / RECORD).is_file() else None
+    if done is not None:
+        return ItemResult(item, identity.twin_id, done.status, _line(done), place, reused=True)
+    work = out / WORK / identity.twin_id
+    work.mkdir(parents=True, exist_ok=True)
+    try:
+        with _only_one(work):
+            ending = _build(item, identity, recipe, work, on_stage)
+            replace_folder(_fresh(work), place)
+    except (BackendError, BlockingIOError) as error:
+        return ItemResult(item, identity.twin_id, "unfinished", str(error), None)
+    except ManiTwinError as error:
+        return ItemResult(item, identity.twin_id, "unfinished", f"{type(error).__name__}: {error}", None)
+    except Exception as error:
+        report = work / REPORT
+        report.write_text(traceback.format_exc())
+        detail = f"a defect in manitwin: {type(error).__name__}: {error}; the traceback is in {report}"
+        return ItemResult(item, identity.twin_id, "unfinished", " ".join(detail.split()), None)
+    return ItemResult(item, identity.twin_id, ending.status, _line(ending), place)
+
+
+@contextmanager
+def _only_one(work: Path) -> Iterator[None]:
+    """Hold a lock that ends with the process, so that two runs do not build one twin at a time."""
+    with (work / "lock").open("w") as lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise BlockingIOError(f"another run is building {work.name} now; wait for it, then run again") from error
+        for stale in work.glob("*/.*"):  # a stage that was cut off in the middle
+            shutil.rmtree(stale, ignore_errors=True)
+        (work / REPORT).unlink(missing_ok=True)
+        yield
+
+
+def _build(item: Item, identity: Identity, recipe: TwinRecipe, work: Path, on_stage: Callable[[str], None]) -> Ending:
+    draft = Draft(identity.twin_id, item, recipe.seed)
+    costs: dict[str, StageCost] = {}
+    rejected, last = identity.rejected, INPUT
+    try:
+        for stage in recipe.stages(identity.kind) if rejected is None else []:
+            on_stage(stage.name)
+            last = stage.name
+            costs[last] = run_stage(stage, draft, work).cost
+    except Rejected as answer:
+        rejected = answer
+    return recipe.finish(draft, identity.kind, costs, rejected, last, _fresh(work))
+
+
+def _fresh(work: Path) -> Path:
+    return work.with_name(f"{work.name}.finished")
+
+
+def _line(ending: Ending) -> str:
+    return f"{ending.reason}: {ending.detail}" if ending.reason else ending.detail

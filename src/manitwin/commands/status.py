@@ -1,0 +1,96 @@
+"""``manitwin status``: how far a data set is, and why an item ended as it did."""
+
+from __future__ import annotations
+
+import time
+from datetime import timedelta
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manitwin.commands.console import out_console
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from manitwin.ledger.progress import ItemStory, Progress
+
+REFRESH_S = 2.0
+
+
+def status(
+    dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
+    watch: Annotated[bool, typer.Option("--watch", help="Show it anew every two seconds, until Ctrl-C.")] = False,
+    why: Annotated[
+        str | None,
+        typer.Option(help="Explain one item: its number, twin id, or a part of its file name.", metavar="ITEM"),
+    ] = None,
+) -> None:
+    """Say how far a data set is: by stage, how fast, what is left, what it cost, what was rejected and why."""
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.dataset_run import local_ledger
+    from manitwin.ledger.ledger import read_ledger
+    from manitwin.ledger.progress import read_progress, read_story
+
+    with read_ledger(local_ledger(DatasetRoot(dataset))) as ledger:
+        if why is not None:
+            _print_story(read_story(ledger, why))
+        elif watch:
+            from rich.live import Live
+
+            with Live(_view(read_progress(ledger)), console=out_console, auto_refresh=False) as live:
+                while True:
+                    time.sleep(REFRESH_S)
+                    live.update(_view(read_progress(ledger)), refresh=True)
+        else:
+            out_console.print(_view(read_progress(ledger)))
+
+
+def _view(progress: Progress) -> RenderableType:
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("stage")
+    for title in ("done", "running", "waiting", "rejected", "failed", "s", "CPU-s", "USD"):
+        table.add_column(title, justify="right")
+    for stage in progress.stages:
+        counts = (stage.done, stage.running, stage.waiting, stage.rejected, stage.failed)
+        table.add_row(
+            stage.stage, *(str(count or "") for count in counts), f"{stage.mean_seconds:.2f}",
+            f"{stage.mean_cpu_seconds:.2f}", f"{stage.cost_usd:.2f}" if stage.cost_usd else "",
+        )  # fmt: skip
+    total = sum(progress.items.values())
+    ended = total - progress.items["open"]
+    lines = [
+        f"{ended} of {total} items ended: "
+        + (", ".join(f"{n} {state}" for state, n in progress.items.items() if n and state != "open") or "none"),
+        f"last run: {progress.last_run or 'none'}",
+    ]
+    if progress.items_per_hour:
+        left = f", {timedelta(seconds=round(progress.left_s or 0))} left" if progress.items["open"] else ""
+        lines.append(f"{progress.items_per_hour:.0f} items an hour{left}")
+    lines.append(f"{progress.cpu_seconds / 3600:.2f} CPU hours, {progress.cost_usd:.2f} USD")
+    for title, reasons in (("rejected", progress.rejected_by_reason), ("failed", progress.failed_by_reason)):
+        if reasons:
+            lines.append(f"{title}: " + ", ".join(f"{count} {reason}" for reason, count in reasons.items()))
+    return Group(table, Text("\n".join(lines)))
+
+
+def _print_story(story: ItemStory) -> None:
+    given = {key: value for key, value in story.item.items() if value is not None}
+    lines = [
+        f"item {story.number}: " + ", ".join(f"{key} {value}" for key, value in given.items()),
+        f"twin {story.twin_id or 'not known yet'}, {story.state}"
+        + (f" ({story.reason})" if story.reason else "")
+        + (f": {story.detail}" if story.detail else ""),
+    ]
+    for row in story.stages:
+        tries = f", attempt {row.attempts}" if row.attempts > 1 else ""
+        cost = f", {row.seconds:.2f} s, {row.cpu_seconds:.2f} CPU-s" if row.seconds else ""
+        cost += f", {row.cost_usd:.4f} USD" if row.cost_usd else ""
+        error = f": {row.error}" if row.error else ""
+        lines.append(f"  {row.stage:<16} {row.state:<9} {row.key or '':<24}{cost}{tries}{error}")
+    for line in lines:
+        out_console.print(line, markup=False)

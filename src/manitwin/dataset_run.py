@@ -1,0 +1,175 @@
+"""Build a data set: a manifest in, a ledger that says what became of each item, twins and tables out."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sqlite3
+import tempfile
+import time
+from collections.abc import Callable, Iterable
+from contextlib import AbstractContextManager, closing
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Literal
+
+from pydantic import ValidationError
+
+from manitwin.config import BuildConfig
+from manitwin.dataset_root import DatasetRoot
+from manitwin.engine.driver import Driver, ItemEnded
+from manitwin.engine.executor import Executor
+from manitwin.engine.jobs import WorkerSetup
+from manitwin.engine.work import WorkFolder
+from manitwin.errors import UsageError, choose_from
+from manitwin.ledger.ledger import LEDGER, Ledger
+from manitwin.manifest import iterate_items
+from manitwin.pipeline import TwinRecipe, check_names
+from manitwin.store import canonical_json
+
+CONFIG = "config.json"
+COPY_EVERY_S = 60.0
+EXECUTORS = ("local", "ray")
+
+
+@dataclass(frozen=True)
+class RunReport:
+    """How a run ended: items of the whole data set by state, and why it stopped where it did before its end."""
+
+    counts: dict[str, int]
+    stopped: str | None
+    left: int
+    remarks: list[str] = field(default_factory=list)
+
+    @property
+    def exit_code(self) -> int:
+        """0 all accepted, 3 some rejected, 4 some failed, or open and resumable."""
+        if self.stopped or self.counts.get("open") or self.counts.get("failed"):
+            return 4
+        return 3 if self.counts.get("rejected") else 0
+
+
+def run(
+    inputs: Iterable[str | Path],
+    dataset: str | Path,
+    *,
+    config: BuildConfig | None = None,
+    executor: Literal["local", "ray"] = "local",
+    address: str | None = None,
+    defaults: dict[str, str | None] | None = None,
+    on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+) -> RunReport:
+    """Add items to a data set and work until all of it has ended; with no inputs, go on with what is there.
+
+    ``config`` None: the data set's own. A changed configuration does again what it touches. Raises UsageError for
+    wrong arguments, or where another run is at work on the data set. What becomes of an item is in the ledger.
+    """
+    if executor not in EXECUTORS:
+        raise UsageError(choose_from("executor", executor, EXECUTORS))
+    root = DatasetRoot(dataset)
+    settings = config or stored_config(root)
+    check_names(settings)
+    recipe = TwinRecipe(settings)
+    remarks: list[str] = []
+    path = local_ledger(root)
+    ledger = Ledger(path)
+    try:
+        given, new = ledger.add_items(iterate_items(inputs, defaults or {}, remarks))
+        if given and given > new:
+            remarks.append(f"{given - new} of {given} items were in the data set already")
+        root.write_bytes(CONFIG, canonical_json(settings.model_dump(mode="json")).encode())
+        setup = WorkerSetup(str(dataset), recipe, cache_folder(root), settings.run.keep_work)
+        copy = _LedgerCopy(root, path)
+        with _executor(executor, address, setup, settings) as engine:
+            driver = Driver(
+                ledger, engine, recipe, settings.run, on_ended=_both(on_ended, copy), sweep=partial(sweep, root)
+            )
+            on_start(*ledger.totals(recipe.sha256))
+            result = driver.run()
+        return RunReport(ledger.counts(), result.stopped, result.left, remarks)
+    finally:
+        ledger.close()
+        _LedgerCopy(root, path).upload()
+
+
+def stored_config(root: DatasetRoot) -> BuildConfig:
+    """Return the configuration of a data set, the defaults for a new one. Raises UsageError where it cannot be read."""
+    if not root.exists(CONFIG):
+        return BuildConfig()
+    try:
+        return BuildConfig(**json.loads(root.read_bytes(CONFIG)))
+    except (ValueError, ValidationError) as error:
+        raise UsageError(
+            f"{root.url}/{CONFIG}: not a configuration of this version ({str(error).splitlines()[0]}); give --config"
+        ) from error
+
+
+def local_ledger(root: DatasetRoot) -> Path:
+    """Return the path of the ledger: in the data set, or of a URL in the user's state folder, made from its copy there."""
+    if root.local is not None:
+        return root.local / LEDGER
+    state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "manitwin"
+    path = state / f"{_digest(root.url)}.sqlite"
+    if not path.is_file() and root.exists(LEDGER):
+        root.fetch_file(LEDGER, path)
+    return path
+
+
+def cache_folder(root: DatasetRoot) -> Path:
+    """Return where a worker keeps copies of what lies at a URL; of a local data set nothing is copied."""
+    if root.local is not None:
+        return root.local
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return home / "manitwin" / _digest(root.url)
+
+
+def sweep(root: DatasetRoot, twin_id: str) -> None:
+    """Delete what workers left half-made of a twin."""
+    WorkFolder(root, twin_id, cache_folder(root)).sweep()
+
+
+def _digest(url: str) -> str:
+    return hashlib.sha256(url.encode()).hexdigest()[:16]
+
+
+def _executor(
+    name: str, address: str | None, setup: WorkerSetup, settings: BuildConfig
+) -> AbstractContextManager[Executor]:
+    if name == "local":
+        from manitwin.executors.local import LocalExecutor
+
+        return LocalExecutor(setup, settings.run)
+    from manitwin.executors.ray_cluster import RayExecutor
+
+    return RayExecutor(setup, settings.run, address)
+
+
+def _both(first: Callable[[ItemEnded], None], second: Callable[[ItemEnded], None]) -> Callable[[ItemEnded], None]:
+    def call(event: ItemEnded) -> None:
+        first(event)
+        second(event)
+
+    return call
+
+
+class _LedgerCopy:
+    """Keeps a copy of the ledger beside the twins of a URL: the machine of the driver may be lost as well."""
+
+    def __init__(self, root: DatasetRoot, path: Path):
+        self._root, self._path, self._at = root, path, time.monotonic()
+
+    def __call__(self, event: ItemEnded) -> None:
+        if time.monotonic() - self._at > COPY_EVERY_S:
+            self.upload()
+
+    def upload(self) -> None:
+        if self._root.local is not None:
+            return
+        with tempfile.NamedTemporaryFile(suffix=".sqlite") as copy:
+            with closing(sqlite3.connect(self._path)) as source, closing(sqlite3.connect(copy.name)) as target:
+                source.backup(target)
+            self._root.put_file(Path(copy.name), LEDGER)
+        self._at = time.monotonic()

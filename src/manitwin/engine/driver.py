@@ -1,0 +1,286 @@
+"""Drive a run: admit items, give the next stage of each to a free slot of what it needs, and keep the ledger.
+
+One thread, one writer. An item that waits for a service holds no slot, and nearly finished items go first, so that few are
+under way. What is lost by a crash is at most what was running: results that are there are found again by their keys.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from heapq import heappop, heappush
+from typing import get_args
+
+from manitwin.config import Resource, RunConfig
+from manitwin.engine.executor import Executor
+from manitwin.engine.flight import Flight
+from manitwin.engine.gate import Gate
+from manitwin.engine.jobs import Failure, Reply, StageRejected, Surveyed, WriteTables
+from manitwin.engine.recipe import ASSEMBLE, INPUT, Ending, Recipe
+from manitwin.ledger.ledger import ItemState, Ledger, LedgerFull
+from manitwin.stage_runner import StageRun
+from manitwin.stages.stage import Item
+
+RESOURCES: tuple[Resource, ...] = get_args(Resource)
+LONGEST_WAIT_S = 0.5
+MAKE_ROOM = "make room, then run again to go on where it stopped"
+FAILED_AS = {"died": "crashed", "timeout": "timeout"}
+
+
+@dataclass(frozen=True)
+class ItemEnded:
+    """What became of one item."""
+
+    number: int
+    item: Item
+    twin_id: str
+    state: ItemState
+    detail: str
+
+
+@dataclass
+class RunResult:
+    """How a run ended: ``stopped`` says why before its end, ``left`` how many items wait for a service."""
+
+    stopped: str | None = None
+    left: int = 0
+
+
+class Driver:
+    """One run over a ledger's open items; ``sweep`` deletes what a worker left half-made of a twin that is given up."""
+
+    def __init__(
+        self,
+        ledger: Ledger,
+        executor: Executor,
+        recipe: Recipe,
+        settings: RunConfig,
+        on_ended: Callable[[ItemEnded], None] = lambda event: None,
+        sweep: Callable[[str], None] = lambda twin_id: None,
+        clock: Callable[[], float] = time.monotonic,
+    ):
+        self.ledger, self.executor, self.recipe, self.settings = ledger, executor, recipe, settings
+        self._on_ended, self._sweep, self._clock = on_ended, sweep, clock
+        self._gates = {
+            needs: Gate(settings.vlm_per_minute if needs == "vlm" else None, settings.patience_s, clock)
+            for needs in RESOURCES
+        }
+        self._queues: dict[Resource, list[tuple[tuple[int, int], Flight]]] = {needs: [] for needs in RESOURCES}
+        self._running: dict[int, tuple[Flight | None, Resource]] = {}
+        self._outstanding: dict[Resource, int] = dict.fromkeys(RESOURCES, 0)
+        self._plans: dict[str, list[tuple[str, Resource]]] = {}
+        self._flights = 0
+        self._last_number, self._tickets = 0, 0
+        self._more = True
+        self._tables: tuple[str, ...] | None = None
+        self._since_tables, self._table_failures, self._merged = 0, 0, False
+        self.result = RunResult()
+
+    def run(self) -> RunResult:
+        """Work until every open item has ended, waits for a service that was given up, or something stops the run."""
+        run = self.ledger.begin_run(self.recipe.sha256)
+        how = "interrupted"
+        try:
+            while self._step():
+                pass
+            how = self.result.stopped or "finished"
+        except LedgerFull as error:
+            self.result.stopped = f"{error}; {MAKE_ROOM}"
+            return self.result  # nothing can be noted any more: the next run finds what is there
+        except BaseException:
+            self.ledger.end_run(run, how)
+            raise
+        self.ledger.end_run(run, how)
+        return self.result
+
+    def _step(self) -> bool:
+        if self.result.stopped is None:
+            self._admit()
+            self._submit()
+        self.ledger.commit()
+        if not self._running and (self.result.stopped is not None or not (any(self._queues.values()) or self._more)):
+            return self.result.stopped is None and self._last_tables()
+        for ticket, reply in self.executor.ended(self._wait_s() if self._running else self._pause_s()):
+            flight, needs = self._running.pop(ticket)
+            self._outstanding[needs] -= 1
+            if flight is None:
+                self._tables_written(reply)
+            else:
+                self._handle(flight, needs, reply)
+        return True
+
+    def _wait_s(self) -> float:
+        return min(LONGEST_WAIT_S, self._pause_s())
+
+    def _pause_s(self) -> float:
+        waits = [self._gates[needs].opens_in_s() for needs in RESOURCES if self._queues[needs]]
+        return min([LONGEST_WAIT_S, *(max(wait, 0.001) for wait in waits)])
+
+    def _admit(self) -> None:
+        """Take up items while cores would else be idle."""
+        while self._more and self._flights < self.settings.in_flight:
+            missing = 2 * self.executor.slots("cpu") - len(self._queues["cpu"])
+            if missing <= 0:
+                return
+            opened = self.ledger.next_open(self._last_number, missing)
+            self._more = len(opened) == missing
+            for item in opened:
+                self._last_number = item.number
+                self._flights += 1
+                self._queue(Flight(item))
+
+    def _queue(self, flight: Flight) -> None:
+        heappush(self._queues[flight.needs], (flight.priority, flight))
+
+    def _submit(self) -> None:
+        for needs, queue in self._queues.items():
+            gate = self._gates[needs]
+            if gate.given_up:
+                self._leave(queue)
+            slots = self.executor.slots(needs)
+            most = 2 * slots if needs == "cpu" else slots  # the next job waits beside each core, so that none is idle
+            while queue and self._outstanding[needs] < most and gate.opens_in_s() <= 0:
+                flight = heappop(queue)[1]
+                gate.begin()
+                attempts = flight.opened.attempts.get(flight.stage, 0) + 1
+                self.ledger.stage_started(flight.number, flight.stage, attempts)
+                self._give(flight, needs)
+        if self._since_tables >= self.settings.index_every:
+            self._write_tables()
+
+    def _give(self, flight: Flight | None, needs: Resource) -> None:
+        self._tickets += 1
+        self._running[self._tickets] = (flight, needs)
+        self._outstanding[needs] += 1
+        job = flight.job() if flight is not None else WriteTables(self._tables or ())
+        self.executor.submit(self._tickets, job)
+
+    def _leave(self, queue: list[tuple[tuple[int, int], Flight]]) -> None:
+        """Leave the items that wait for a service to the next run."""
+        self.result.left += len(queue)
+        self._flights -= len(queue)
+        queue.clear()
+
+    def _handle(self, flight: Flight, needs: Resource, reply: Reply) -> None:
+        gate = self._gates[needs]
+        if isinstance(reply, Failure):
+            self._failed(flight, gate, reply)
+            return
+        gate.answered()
+        if isinstance(reply, Surveyed):
+            self._surveyed(flight, reply)
+        elif isinstance(reply, StageRun):
+            self._stage_done(flight, flight.stage, reply)
+            self._queue(flight)
+        elif isinstance(reply, StageRejected):
+            cost = reply.cost
+            self.ledger.stage_ended(
+                flight.number, flight.stage, "rejected", attempts=self._attempts(flight), ran=True, error=str(reply.answer),
+                seconds=cost.seconds, cpu_seconds=cost.cpu_seconds, cost_usd=cost.cost_usd,
+            )  # fmt: skip
+            flight.last, flight.rejected = flight.stage, reply
+            self._queue(flight)
+        elif isinstance(reply, Ending):
+            self.ledger.stage_ended(flight.number, ASSEMBLE, "done", attempts=self._attempts(flight), ran=True)
+            self._ended(flight, reply)
+
+    def _attempts(self, flight: Flight) -> int:
+        return flight.opened.attempts.get(flight.stage, 0) + 1
+
+    def _surveyed(self, flight: Flight, reply: Surveyed) -> None:
+        self.ledger.stage_ended(flight.number, INPUT, "done", attempts=self._attempts(flight), ran=True)
+        other = self.ledger.identify(flight.number, reply.twin_id, reply.kind)
+        if other is not None:
+            self._flights -= 1
+            detail = f"the same input as item {other}"
+            self._on_ended(ItemEnded(flight.number, flight.opened.item, reply.twin_id, "duplicate", detail))
+            return
+        flight.twin_id, flight.kind, flight.rejected = reply.twin_id, reply.kind, reply.rejected
+        if reply.kind not in self._plans:
+            self._plans[reply.kind] = [(s.name, s.needs) for s in self.recipe.stages(reply.kind)]
+        flight.plan = self._plans[reply.kind]
+        for name, ran in reply.done:
+            self._stage_done(flight, name, ran)
+        if reply.ending is None:
+            self._queue(flight)
+            return
+        self.ledger.stage_ended(flight.number, ASSEMBLE, "done", attempts=1)
+        self._ended(flight, reply.ending)
+
+    def _stage_done(self, flight: Flight, stage: str, ran: StageRun) -> None:
+        self.ledger.stage_ended(
+            flight.number, stage, "done", attempts=flight.opened.attempts.get(stage, 0) + 1, key=ran.key,
+            ran=not ran.reused, seconds=ran.cost.seconds, cpu_seconds=ran.cost.cpu_seconds, cost_usd=ran.cost.cost_usd,
+        )  # fmt: skip
+        flight.done.append((stage, ran.key))
+        flight.last = stage
+
+    def _ended(self, flight: Flight, ending: Ending) -> None:
+        self._flights -= 1
+        self._since_tables += 1
+        self.ledger.item_ended(
+            flight.number, ending.status, recipe_sha256=self.recipe.sha256, reason=ending.reason, detail=ending.detail,
+            revision=ending.revision,
+        )  # fmt: skip
+        self._on_ended(ItemEnded(flight.number, flight.opened.item, flight.twin_id, ending.status, ending.detail))
+
+    def _failed(self, flight: Flight, gate: Gate, failure: Failure) -> None:
+        """Try again later, or soon, or no more: what a service or the disk does is not the item's fault."""
+        stage, number, attempts = flight.stage, flight.number, self._attempts(flight)
+        patient = failure.kind in ("unavailable", "rate_limited", "no_space")
+        if patient or attempts < self.settings.attempts:
+            counted = attempts - 1 if patient else attempts
+            flight.opened.attempts[stage] = counted
+            self.ledger.stage_ended(number, stage, "waiting", attempts=counted, error=failure.message)
+            if failure.kind == "unavailable":
+                gate.down()
+            elif failure.kind == "rate_limited":
+                gate.wait(failure.retry_after_s)
+            elif failure.kind == "no_space":
+                self.result.stopped = f"{failure.message}; {MAKE_ROOM}"
+            self._queue(flight)
+            return
+        self._flights -= 1
+        if flight.twin_id:
+            self._sweep(flight.twin_id)
+        self.ledger.stage_ended(number, stage, "failed", attempts=attempts, error=failure.message)
+        detail = f"{stage} failed {attempts} times: {failure.message}"
+        self.ledger.item_ended(
+            number, "failed", recipe_sha256=self.recipe.sha256, reason=FAILED_AS.get(failure.kind, "error"), detail=detail
+        )  # fmt: skip
+        self._on_ended(ItemEnded(number, flight.opened.item, flight.twin_id, "failed", detail))
+
+    def _write_tables(self) -> None:
+        if self._tables is None:
+            self._tables = tuple(self.ledger.not_indexed(10 * self.settings.index_every))
+            self._since_tables = 0
+            if self._tables:
+                self._give(None, "cpu")
+            else:
+                self._tables = None
+
+    def _tables_written(self, reply: Reply) -> None:
+        if isinstance(reply, Failure):
+            self._table_failures += 1
+            if reply.kind == "no_space":
+                self.result.stopped = f"{reply.message}; {MAKE_ROOM}"
+            elif self._table_failures >= self.settings.attempts:
+                self.result.stopped = (
+                    f"the index cannot be written: {reply.message}; `manitwin check` says what is wrong"
+                )
+        elif self._tables:
+            self.ledger.indexed(self._tables)
+            self._table_failures = 0
+        self._merged = not self._tables and not isinstance(reply, Failure)
+        self._tables = None
+
+    def _last_tables(self) -> bool:
+        """Write the tables of the last items, then merge all; returns whether there is still something to do."""
+        if self._merged:
+            return False
+        self._write_tables()
+        if self._tables is None:
+            self._tables = ()
+            self._give(None, "cpu")
+        return True

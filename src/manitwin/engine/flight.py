@@ -1,0 +1,58 @@
+"""One item on its way through the stages, as the driver sees it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from manitwin.config import Resource
+from manitwin.engine.jobs import Finish, Job, RunStage, StageRejected, Survey
+from manitwin.engine.recipe import ASSEMBLE, INPUT
+from manitwin.engine.work import StageKey
+from manitwin.ledger.ledger import OpenItem
+
+
+@dataclass
+class Flight:
+    """Where an item stands; ``plan`` names its stages and what each needs, once its kind is known."""
+
+    opened: OpenItem
+    twin_id: str = ""
+    kind: str = ""
+    plan: list[tuple[str, Resource]] | None = None
+    done: list[StageKey] = field(default_factory=list)
+    rejected: StageRejected | None = None
+    last: str = INPUT
+
+    @property
+    def number(self) -> int:
+        """The item's number in the ledger."""
+        return self.opened.number
+
+    @property
+    def stage(self) -> str:
+        """What is to be done next."""
+        if self.plan is None:
+            return INPUT
+        if self.rejected is not None or len(self.done) == len(self.plan):
+            return ASSEMBLE
+        return self.plan[len(self.done)][0]
+
+    @property
+    def needs(self) -> Resource:
+        """What the next job runs on."""
+        return self.plan[len(self.done)][1] if self.plan is not None and self.stage != ASSEMBLE else "cpu"
+
+    @property
+    def priority(self) -> tuple[int, int]:
+        """Smaller goes first: items that are nearly there, then those that came first."""
+        return (-1000 if self.stage == ASSEMBLE else -len(self.done), self.number)
+
+    def job(self) -> Job:
+        """Return the next job."""
+        item, stage = self.opened.item, self.stage
+        if stage == INPUT:
+            return Survey(self.number, item)
+        if stage == ASSEMBLE:
+            return Finish(self.number, item, self.twin_id, self.kind, tuple(self.done), self.last, self.rejected)
+        position = len(self.done)
+        return RunStage(self.number, item, self.twin_id, self.kind, position, stage, self.needs, tuple(self.done))

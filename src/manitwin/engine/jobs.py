@@ -1,0 +1,103 @@
+"""What the driver asks of a worker, and what it gets back: ids, names and short texts, never meshes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from manitwin.config import Resource
+from manitwin.engine.recipe import Ending, Recipe
+from manitwin.engine.work import StageKey
+from manitwin.errors import Rejected
+from manitwin.stage_runner import StageCost, StageRun
+from manitwin.stages.stage import Item
+
+FailureKind = Literal["unavailable", "rate_limited", "no_space", "error", "died", "timeout"]
+
+
+@dataclass(frozen=True)
+class WorkerSetup:
+    """What every worker of a run is told once: the data set, the recipe, and a folder for copies where the root is a URL."""
+
+    root_url: str
+    recipe: Recipe
+    cache: Path
+    keep_work: bool
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Find out whose twin an item is and what of it is there already."""
+
+    number: int
+    item: Item
+    needs: Resource = "cpu"
+
+
+@dataclass(frozen=True)
+class Surveyed:
+    """What is there: the finished folder's ending, or the stages that need not run again."""
+
+    twin_id: str
+    kind: str
+    ending: Ending | None = None
+    done: tuple[tuple[str, StageRun], ...] = ()
+    rejected: StageRejected | None = None
+
+
+@dataclass(frozen=True)
+class RunStage:
+    """Run the stage at a position of an item's list, given the results of those before it."""
+
+    number: int
+    item: Item
+    twin_id: str
+    kind: str
+    position: int
+    stage: str
+    needs: Resource
+    done: tuple[StageKey, ...]
+
+
+@dataclass(frozen=True)
+class StageRejected:
+    """A stage's answer that nothing is to be made of the item; it cost as well."""
+
+    answer: Rejected
+    cost: StageCost
+
+
+@dataclass(frozen=True)
+class Finish:
+    """Put the finished folder together; ``stage`` is the last one that ran."""
+
+    number: int
+    item: Item
+    twin_id: str
+    kind: str
+    done: tuple[StageKey, ...]
+    stage: str
+    rejected: StageRejected | None = None
+    needs: Resource = "cpu"
+
+
+@dataclass(frozen=True)
+class WriteTables:
+    """Add finished twins to the index; with none, merge its parts into few."""
+
+    twin_ids: tuple[str, ...]
+    needs: Resource = "cpu"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a job has no answer: in one line, with the native stack where a worker died and left one."""
+
+    kind: FailureKind
+    message: str
+    retry_after_s: float | None = None
+
+
+Job = Survey | RunStage | Finish | WriteTables
+Reply = Surveyed | StageRun | StageRejected | Ending | Failure | None

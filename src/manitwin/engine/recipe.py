@@ -1,0 +1,65 @@
+"""What a run makes of each item: the engine's border to the pipeline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, Protocol
+
+from manitwin.errors import Rejected
+from manitwin.stage_runner import StageCost
+from manitwin.stages.stage import Draft, Item, Stage
+
+INPUT, ASSEMBLE = "input", "assemble"
+"""The two steps around the stages: to read what was given, and to put the folder together."""
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How an item ended: ``reason`` is the code of a rejection; ``revision`` that of the folder that says so."""
+
+    status: Literal["accepted", "rejected"]
+    revision: str
+    reason: str | None
+    detail: str
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Whose twin an item is, the kind of its input, and why nothing can be made of it where that is so."""
+
+    twin_id: str
+    kind: str
+    rejected: Rejected | None = None
+
+
+class Recipe(Protocol):
+    """The stages of every kind of input, and how their results become a folder. It is sent to every worker."""
+
+    @property
+    def sha256(self) -> str:
+        """The digest of everything in it that decides a result: items that ended under another one are done again."""
+        ...
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything random."""
+        ...
+
+    def identify(self, item: Item) -> Identity:
+        """Tell whose twin an item is, from its bytes."""
+        ...
+
+    def stages(self, kind: str) -> list[Stage]:
+        """Return the stages for a kind of input, in order."""
+        ...
+
+    def finish(
+        self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
+    ) -> Ending:
+        """Write the finished folder at ``fresh``; ``stage`` is the last one that ran."""
+        ...
+
+    def ending_of(self, record: bytes) -> Ending | None:
+        """Return how a finished folder says that its item ended; None where this recipe would make another one."""
+        ...

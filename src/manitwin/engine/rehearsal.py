@@ -1,0 +1,236 @@
+"""A recipe without meshes, to rehearse a run: stages that do nothing, or fail as the item's text says.
+
+The text of an item is words apart by spaces, each ``what:stage`` or ``what:stage:more``:
+
+    reject:b              the stage rejects the item
+    raise:b               it raises an error, each time
+    segfault:b            it kills its process with SIGSEGV, each time
+    segfault-once:b       the first time only
+    hang:b                it does not end
+    unavailable:b:/file   it raises Unavailable while that file is there
+    limited:b:/file       it raises RateLimited (0.2 s) while that file is there
+    sleep:b:1.5           it takes so many seconds
+
+Every run of a stage adds a line ``<twin_id> <stage>`` to the recipe's log, so that a test can count them.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shutil
+import signal
+import time
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NoReturn
+
+import pyarrow.parquet as pq
+import trimesh
+from pydantic import BaseModel
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.config import Resource
+from manitwin.engine.recipe import Ending, Identity
+from manitwin.errors import RateLimited, Rejected, Unavailable
+from manitwin.files.glb import write_glb
+from manitwin.stage_runner import StageCost
+from manitwin.stages.grasp_table import SCHEMA
+from manitwin.stages.stage import Draft, Item, Stage
+from manitwin.store import RUN, canonical_json, seal, sha256_of_json, write_bytes_atomically
+from manitwin.twin import SCHEMA_VERSION
+
+
+class RehearsalSettings(BaseModel):
+    """What is part of a rehearsed stage's key."""
+
+    bytes: int = 0
+
+
+class RehearsedStage:
+    """Write a field, and a file of so many bytes, after doing what the item's text says."""
+
+    backend = "rehearsal"
+    model: str | None = None
+
+    def __init__(self, name: str, reads: tuple[str, ...], needs: Resource, version: str, size: int, log: Path | None):
+        self.name, self.reads, self.needs, self.version = name, reads, needs, version
+        self.writes: tuple[str, ...] = (name, f"{name}.bin") if size else (name,)
+        self.settings = RehearsalSettings(bytes=size)
+        self._log = log
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Do as the item says; raises what it says."""
+        if self._log is not None:
+            with self._log.open("a") as stream:
+                stream.write(f"{draft.twin_id} {self.name}\n")
+        for word in (draft.item.text or "").split():
+            what, _, where = word.partition(":")
+            stage, _, more = where.partition(":")
+            if stage == self.name:
+                self._act(what, more, draft.twin_id)
+        if self.settings.bytes:
+            (folder / f"{self.name}.bin").write_bytes(b"\0" * self.settings.bytes)
+        return {self.name: {"version": self.version, "after": [draft.field(name) for name in self.reads][-1:]}}
+
+    def _act(self, what: str, more: str, twin_id: str) -> None:
+        if what == "reject":
+            raise Rejected("poor_quality", "the text says so", stage="gate")
+        if what == "raise":
+            raise RuntimeError("the text says so")
+        if what == "segfault" or (what == "segfault-once" and self._first_time(twin_id)):
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if what == "unavailable" and Path(more).exists():
+            raise Unavailable(f"{self.name}: down while {more} is there")
+        if what == "limited" and Path(more).exists():
+            raise RateLimited(f"{self.name}: asks to wait while {more} is there", 0.2)
+        if what == "sleep":
+            time.sleep(float(more))
+        if what == "hang":
+            _hang()
+
+    def _first_time(self, twin_id: str) -> bool:
+        assert self._log is not None, "a recipe without a log cannot count"
+        return self._log.read_text().splitlines().count(f"{twin_id} {self.name}") == 1
+
+
+def _hang() -> NoReturn:
+    while True:
+        time.sleep(1)
+
+
+@dataclass(frozen=True)
+class RehearsalRecipe:
+    """Stages by name and what they need, each reading the one before it; ``size`` bytes each leaves as a file."""
+
+    plan: tuple[tuple[str, Resource], ...] = (("a", "cpu"), ("b", "cpu"), ("c", "cpu"))
+    versions: tuple[tuple[str, str], ...] = ()
+    size: int = 0
+    log: Path | None = None
+    seed: int = 0
+
+    @property
+    def sha256(self) -> str:
+        """The digest of what decides the results."""
+        return sha256_of_json([self.plan, self.versions, self.size, self.seed])
+
+    def identify(self, item: Item) -> Identity:
+        """Return the hash of the text."""
+        return Identity(sha256_of_json([item.text, item.name])[:16], "text")
+
+    def stages(self, kind: str) -> list[Stage]:
+        """Return the stages."""
+        versions = dict(self.versions)
+        return [
+            RehearsedStage(
+                name, (self.plan[at - 1][0],) if at else (), needs, versions.get(name, "1"), self.size, self.log
+            )
+            for at, (name, needs) in enumerate(self.plan)
+        ]
+
+    def finish(
+        self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
+    ) -> Ending:
+        """Write a folder with a valid record."""
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        content = rehearsed_record(draft, self.sha256, rejected)
+        costs_json = {"stages": {name: vars(cost) for name, cost in costs.items()}, "host": {}}
+        write_bytes_atomically(fresh / RUN, canonical_json(costs_json).encode())
+        (fresh / "prompt.txt").write_text(draft.item.text or "")
+        if rejected is None:
+            for name, file in _cube_files().items():
+                (fresh / name).write_bytes(file)
+        record = seal(fresh, content)
+        if rejected is None:
+            return Ending("accepted", record.revision, None, "")
+        return Ending("rejected", record.revision, rejected.reason, rejected.detail)
+
+    def ending_of(self, record: bytes) -> Ending | None:
+        """Return how a folder of this very recipe ended."""
+        data = json.loads(record)
+        if data["provenance"]["config_sha256"] != self.sha256:
+            return None
+        rejection = data["rejection"]
+        if rejection is None:
+            return Ending("accepted", data["revision"], None, "")
+        return Ending("rejected", data["revision"], rejection["reason"], rejection["detail"])
+
+
+def rehearsed_record(draft: Draft, recipe_sha256: str, rejected: Rejected | None) -> dict[str, Any]:
+    """Return the content of a record: all a rehearsal can say of a twin is that it was rejected, or that it is a cube."""
+    common = {
+        "schema_version": SCHEMA_VERSION,
+        "twin_id": draft.twin_id,
+        "name": draft.item.name,
+        "status": "rejected" if rejected else "accepted",
+        "rejection": rejected and {"stage": "gate", "reason": rejected.reason, "detail": rejected.detail},
+        "source": {"kind": "text", "file": "prompt.txt", "sha256": sha256_of_json(draft.item.text), "license": "CC0-1.0"},
+        "provenance": {"manitwin_version": "rehearsal", "config_sha256": recipe_sha256, "seed": draft.seed, "stages": {}},
+        "quality": {"checks": []},
+    }  # fmt: skip
+    return common if rejected else common | CUBE
+
+
+@lru_cache(maxsize=1)
+def _cube_files() -> dict[str, bytes]:
+    cube = trimesh.creation.box([0.05] * 3)
+    cube.metadata["name"] = "cube"
+    cube.visual = TextureVisuals(
+        material=PBRMaterial(baseColorFactor=[150, 110, 70, 255], metallicFactor=0.0, roughnessFactor=0.8)
+    )
+    table = io.BytesIO()
+    pq.write_table(SCHEMA.empty_table(), table)
+    return {"visual.glb": write_glb([cube]), "grasps.parquet": table.getvalue()}
+
+
+def _estimate(value: float) -> dict[str, Any]:
+    return {"value": value, "low": value, "high": value, "source": "user"}
+
+
+_EYE3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+_EYE4 = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]]
+# A cube of 5 cm and 125 g, of which nothing was ever grasped.
+CUBE: dict[str, Any] = {
+    "mesh": {
+        "vertices": 8, "faces": 12, "watertight": True, "components": 1, "euler_number": 2, "volume_m3": 1.25e-4,
+        "area_m2": 0.015, "repairs": [],
+        "hulls": {
+            "count": 1, "max_vertices": 8, "volume_ratio": 1.0, "surface_error_p95_m": 0.0,
+            "surface_uncovered_max_m": 0.0, "keeps_opening": None,
+        },
+    },
+    "physical": {
+        "extents_m": [0.05] * 3, "obb": {"extents_m": [0.05] * 3, "obb_to_object": _EYE4}, "scale_applied": 1.0,
+        "material": "wood", "mass_kg": _estimate(0.125), "friction_static": _estimate(0.5),
+        "friction_dynamic": _estimate(0.4), "restitution": _estimate(0.1), "density_kg_m3": 1000.0,
+        "center_of_mass_m": [0.0, 0.0, 0.025], "center_of_mass_uncertainty_m": 0.0,
+        "inertia_kg_m2": [[5.2e-5 * x for x in row] for row in _EYE3], "mass_distribution": "solid",
+    },
+    "language": {
+        "category": "cube", "color": "brown", "material": "wood", "size": "small", "shape": "cube",
+        "function": "rehearsing", "caption": "a small cube", "captions": [],
+    },
+    "points": {"candidates": {"positions_m": [], "normals": []}, "functional": [], "grasp": []},
+    "grasps": {
+        "gripper": "none", "gripper_sha256": "", "proposed": 0, "proposed_by_filter": {}, "simulated": 0, "verified": 0,
+        "success_rate": 0.0, "unfiltered_simulated": 0, "unfiltered_success_rate": None, "failures": {},
+        "approach_octants": 0, "file": "grasps.parquet", "association_radius_m": 0.03,
+        "association_radius_widened": False, "share_beyond_3cm": 0.0,
+        "trial": {
+            "engine": "none", "finger_friction": 1.0, "object_friction": 0.5, "combine": "average", "force_n": 0.0,
+            "timestep_s": 0.0, "solver_iterations": 0, "max_steps": 0, "stable_frames": 0, "max_displacement_m": 0.0,
+            "slide_distance_m": 0.0,
+        },
+        "failure_table": {"by_grasp_type": {}, "by_region": {}}, "second_opinion": None, "robustness": None,
+    },
+    "placements": [
+        {
+            "position_m": [0.0] * 3, "quaternion_wxyz": [1.0, 0.0, 0.0, 0.0], "probability": 1.0, "upright": True,
+            "settled": True, "collision_radius_m": 0.0354,
+        },
+    ],
+}  # fmt: skip

@@ -1,0 +1,144 @@
+"""Do one job: what runs in a worker process, on this machine or another."""
+
+from __future__ import annotations
+
+import errno
+import shutil
+import time
+import traceback
+
+from manitwin.dataset_root import DatasetRoot, twin_name
+from manitwin.engine.jobs import (
+    Failure,
+    Finish,
+    Job,
+    Reply,
+    RunStage,
+    StageRejected,
+    Survey,
+    Surveyed,
+    WorkerSetup,
+    WriteTables,
+)
+from manitwin.engine.recipe import INPUT, Ending
+from manitwin.engine.work import WorkFolder
+from manitwin.errors import BackendError, RateLimited, Rejected, Unavailable
+from manitwin.stage_runner import StageCost, StageRun
+from manitwin.stages.stage import Draft, Item, Stage
+from manitwin.store import RECORD
+
+NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+
+
+class Worker:
+    """Does jobs one after the other; owns the stages, which are made once a kind."""
+
+    def __init__(self, setup: WorkerSetup):
+        self.setup, self.root = setup, DatasetRoot(setup.root_url)
+        self._stages: dict[str, list[Stage]] = {}
+
+    def do(self, job: Job) -> Reply:
+        """Return the job's answer; never raises but for what ends a process."""
+        try:
+            return self._do(job)
+        except RateLimited as error:
+            return Failure("rate_limited", _line(error), error.retry_after_s)
+        except Unavailable as error:
+            return Failure("unavailable", _line(error))
+        except BackendError as error:
+            return Failure("error", _line(error))
+        except OSError as error:
+            kind = "no_space" if error.errno in NO_SPACE else "error"
+            return Failure(kind, _line(error))  # type: ignore[arg-type]
+        except Exception as error:
+            where = traceback.extract_tb(error.__traceback__)[-1]
+            return Failure("error", f"{_line(error)} ({where.filename.rsplit('/', 1)[-1]}:{where.lineno})")
+
+    def _do(self, job: Job) -> Reply:
+        if isinstance(job, Survey):
+            return self._survey(job)
+        if isinstance(job, RunStage):
+            return self._run(job)
+        if isinstance(job, Finish):
+            return self._finish(job)
+        self._write_tables(job)
+        return None
+
+    def stages(self, kind: str) -> list[Stage]:
+        """Return the stages for a kind of input."""
+        if kind not in self._stages:
+            self._stages[kind] = self.setup.recipe.stages(kind)
+        return self._stages[kind]
+
+    def _survey(self, job: Survey) -> Surveyed:
+        identity = self.setup.recipe.identify(job.item)
+        ending = self._ending(identity.twin_id)
+        if identity.rejected is not None:
+            rejected = StageRejected(identity.rejected, StageCost(0.0, 0.0, 0.0))
+            return Surveyed(identity.twin_id, identity.kind, ending, rejected=rejected)
+        work, draft = self._work(identity.twin_id), self._draft(identity.twin_id, job.item)
+        work.sweep()
+        done: list[tuple[str, StageRun]] = []
+        for stage in self.stages(identity.kind):
+            found = work.find(stage, draft)
+            if found is None:
+                break
+            done.append((stage.name, found))
+        return Surveyed(identity.twin_id, identity.kind, ending, tuple(done))
+
+    def _ending(self, twin_id: str) -> Ending | None:
+        name = f"{twin_name(twin_id)}/{RECORD}"
+        return self.setup.recipe.ending_of(self.root.read_bytes(name)) if self.root.exists(name) else None
+
+    def _run(self, job: RunStage) -> StageRun | StageRejected:
+        stages = self.stages(job.kind)
+        stage, work, draft = stages[job.position], self._work(job.twin_id), self._draft(job.twin_id, job.item)
+        work.sweep()  # of a worker that died at it
+        wanted = {name.removesuffix("?") for name in stage.reads}
+        writers = {s.name for s in stages if wanted & set(s.writes)}
+        work.load(draft, [d for d in job.done if d[0] in writers], {s.name: s for s in stages}, wanted)
+        started, cpu_started = time.perf_counter(), time.process_time()
+        try:
+            return work.run(stage, draft)
+        except Rejected as answer:
+            seconds, cpu_seconds = time.perf_counter() - started, time.process_time() - cpu_started
+            return StageRejected(answer, StageCost(seconds, cpu_seconds, 0.0))
+
+    def _finish(self, job: Finish) -> Ending:
+        stages, work = {s.name: s for s in self.stages(job.kind)}, self._work(job.twin_id)
+        draft = self._draft(job.twin_id, job.item)
+        costs = work.load(draft, job.done, stages, None)
+        answer = None if job.rejected is None else job.rejected.answer
+        if job.rejected is not None and job.stage != INPUT:
+            costs[job.stage] = job.rejected.cost
+        try:
+            ending = self.setup.recipe.finish(draft, job.kind, costs, answer, job.stage, work.fresh)
+            self.root.put_folder(work.fresh, twin_name(job.twin_id))
+        finally:
+            shutil.rmtree(work.fresh, ignore_errors=True)
+        if not self.setup.keep_work:
+            work.drop()
+        return ending
+
+    def _write_tables(self, job: WriteTables) -> None:
+        from manitwin.index.parts import (  # takes a second to import, and one job in hundreds needs it
+            compact,
+            write_part,
+        )
+
+        if job.twin_ids:
+            write_part(self.root, list(job.twin_ids))
+        else:
+            compact(self.root)
+
+    def _work(self, twin_id: str) -> WorkFolder:
+        work = WorkFolder(self.root, twin_id, self.setup.cache)
+        work.place.mkdir(parents=True, exist_ok=True)
+        return work
+
+    def _draft(self, twin_id: str, item: Item) -> Draft:
+        return Draft(twin_id, item, self.setup.recipe.seed)
+
+
+def _line(error: Exception) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())

@@ -1,0 +1,115 @@
+"""Build many items on this machine: one process an item at a time, so that a crash costs one item."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import queue
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, TimeoutError
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from pebble import ProcessExpired, ProcessPool
+
+from manitwin.build_item import ItemResult, build_item
+from manitwin.config import BuildConfig
+from manitwin.executors.main_module import hidden_main_module
+from manitwin.identity import twin_id
+from manitwin.stages.stage import Item
+
+POLL_S = 0.2
+
+
+@dataclass(frozen=True)
+class StageStarted:
+    """A worker has begun a stage of an item."""
+
+    item: Item
+    stage: str
+
+
+_events: Any = None
+
+
+def _start_worker(events: Any) -> None:
+    global _events
+    _events = events
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+
+def _build_in_worker(item: Item, out: Path, config: BuildConfig) -> ItemResult:
+    return build_item(item, out, config, lambda stage: _events.put(StageStarted(item, stage)))
+
+
+def build_all(
+    items: list[Item],
+    out: Path,
+    config: BuildConfig,
+    *,
+    jobs: int,
+    on_stage: Callable[[StageStarted], None] = lambda event: None,
+) -> Iterator[ItemResult]:
+    """Build the items in ``jobs`` processes and yield results as they end.
+
+    A worker that crashes or exceeds ``config.item_timeout_s`` leaves its item unfinished. Closing the iterator early stops
+    the workers; finished twins and stages stay.
+    """
+    with hidden_main_module():
+        yield from _build_all(items, out, config, jobs, on_stage)
+
+
+def _build_all(
+    items: list[Item], out: Path, config: BuildConfig, jobs: int, on_stage: Callable[[StageStarted], None]
+) -> Iterator[ItemResult]:
+    context = multiprocessing.get_context("spawn")
+    events = context.Queue()
+    done: queue.Queue[ItemResult] = queue.Queue()
+    stop = threading.Event()
+    listener = threading.Thread(target=_listen, args=(events, on_stage, stop), daemon=True)
+    listener.start()
+    pool = ProcessPool(max_workers=jobs, context=context, initializer=_start_worker, initargs=(events,))
+    try:
+        for item in items:
+            future = pool.schedule(_build_in_worker, args=(item, out, config), timeout=config.item_timeout_s)
+            future.add_done_callback(partial(_hand_over, item, config, done))
+        for _ in items:
+            yield done.get()
+        pool.close()
+    finally:
+        pool.stop()
+        pool.join()
+        stop.set()
+        listener.join()
+        events.close()
+
+
+def _hand_over(item: Item, config: BuildConfig, done: queue.Queue[ItemResult], future: Any) -> None:
+    done.put(_result(future, item, config))
+
+
+def _result(future: Any, item: Item, config: BuildConfig) -> ItemResult:
+    try:
+        return future.result()
+    except ProcessExpired as error:
+        cause = f"the worker process died (exit code {error.exitcode}); run again to retry this item"
+    except TimeoutError:
+        cause = f"took longer than item_timeout_s = {config.item_timeout_s:g} s; raise it in the configuration, or run again"
+    except CancelledError:
+        cause = "interrupted; run again to go on"
+    except Exception as error:  # what the worker could not turn into a result: kept visible, the other items go on
+        cause = f"a defect in manitwin: {type(error).__name__}: {error}"
+    return ItemResult(item, twin_id(item), "unfinished", cause, None)
+
+
+def _listen(events: Any, on_stage: Callable[[StageStarted], None], stop: threading.Event) -> None:
+    while not stop.is_set():
+        try:
+            on_stage(events.get(timeout=POLL_S))
+        except queue.Empty:
+            continue
+        except (EOFError, OSError):
+            return

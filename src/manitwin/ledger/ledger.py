@@ -1,0 +1,269 @@
+"""Read and write a ledger."""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import sqlite3
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from manitwin.errors import BackendError, UsageError
+from manitwin.ledger.migrations import migrate
+from manitwin.stages.stage import Item
+
+ItemState = Literal["open", "accepted", "rejected", "failed", "duplicate"]
+StageState = Literal["running", "done", "rejected", "waiting", "failed"]
+ITEM_STATES = ("open", "accepted", "rejected", "failed", "duplicate")
+LEDGER = "ledger.sqlite"
+
+
+class LedgerFull(BackendError):
+    """The disk has no room for another row: what was not committed is lost, and found again by the next run."""
+
+
+@dataclass(frozen=True)
+class OpenItem:
+    """An item that has not ended, with how often each of its stages was tried."""
+
+    number: int
+    item: Item
+    attempts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class StageRow:
+    """What the ledger keeps of one stage of one item."""
+
+    stage: str
+    key: str | None
+    state: StageState
+    attempts: int
+    seconds: float
+    cpu_seconds: float
+    cost_usd: float
+    error: str | None
+
+
+class Ledger:
+    """One ledger file, open for writing by one process at a time.
+
+    Owns: the connection and the lock. Changes are kept together until ``commit``.
+    """
+
+    def __init__(self, path: Path):
+        """Open or make a ledger; raises UsageError where another run holds it."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.path = path
+        self._lock = path.with_suffix(".lock").open("w")
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            self._lock.close()
+            raise UsageError(f"{path}: another run is writing it now; wait for its end, or stop it") from error
+        self.connection = sqlite3.connect(path, isolation_level=None)
+        self.connection.execute("PRAGMA journal_mode = WAL")
+        self.connection.execute(
+            "PRAGMA synchronous = NORMAL"
+        )  # a power cut may lose the last rows, which are found again
+        migrate(self.connection, str(path))
+        self.connection.execute("BEGIN")
+
+    def commit(self) -> None:
+        """Make everything since the last commit permanent."""
+        try:
+            self.connection.execute("COMMIT")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_FULL:
+                raise
+            if self.connection.in_transaction:  # SQLite may have rolled back by itself
+                self.connection.execute("ROLLBACK")
+            raise LedgerFull(f"{self.path}: {error}") from error
+        finally:
+            if not self.connection.in_transaction:
+                self.connection.execute("BEGIN")
+
+    def close(self) -> None:
+        """Commit and give the ledger free."""
+        try:
+            self.commit()
+            self.connection.execute("ROLLBACK")
+        finally:
+            self.connection.close()
+            self._lock.close()
+
+    def add_items(self, items: Iterable[Item]) -> tuple[int, int]:
+        """Add items that are not there yet, in order, all or none; returns how many were given and how many are new."""
+        given, before = 0, self.connection.total_changes
+        self.commit()
+        try:
+            for item in items:
+                text = json.dumps(asdict(item), sort_keys=True)
+                self.connection.execute("INSERT OR IGNORE INTO items (item) VALUES (?)", (text,))
+                given += 1
+        except BaseException:
+            self.connection.execute("ROLLBACK")
+            self.connection.execute("BEGIN")
+            raise
+        self.commit()
+        return given, self.connection.total_changes - before
+
+    def begin_run(self, recipe_sha256: str) -> int:
+        """Note the begin of a run: what an earlier one left running was cut off, which is nobody's failed attempt.
+
+        Items that ended under another recipe are opened again.
+        """
+        run = self.connection.execute(
+            "INSERT INTO runs (started_at, recipe_sha256) VALUES (?, ?)", (time.time(), recipe_sha256)
+        ).lastrowid
+        self.connection.execute(
+            "UPDATE stages SET state = 'waiting', attempts = max(attempts - 1, 0) WHERE state = 'running'"
+        )
+        self.connection.execute(
+            "UPDATE items SET state = 'open' WHERE state NOT IN ('open', 'duplicate') AND recipe_sha256 <> ?",
+            (recipe_sha256,),
+        )
+        self.commit()
+        return int(run or 0)
+
+    def end_run(self, run: int, how: str) -> None:
+        """Note how a run ended."""
+        self.connection.execute("UPDATE runs SET ended_at = ?, ended_how = ? WHERE run = ?", (time.time(), how, run))
+        self.commit()
+
+    def next_open(self, after: int, count: int) -> list[OpenItem]:
+        """Return the next open items behind a number, in order."""
+        rows = self.connection.execute(
+            "SELECT number, item FROM items WHERE state = 'open' AND number > ? ORDER BY number LIMIT ?", (after, count)
+        ).fetchall()
+        return [OpenItem(number, Item(**json.loads(item)), self._attempts(number)) for number, item in rows]
+
+    def _attempts(self, number: int) -> dict[str, int]:
+        rows = self.connection.execute(
+            "SELECT stage, attempts FROM stages WHERE number = ? AND state <> 'done'", (number,)
+        )
+        return dict(rows)
+
+    def identify(self, number: int, twin_id: str, kind: str) -> int | None:
+        """Note whose twin an item is; where another item makes the same twin, end this one and return the other's number."""
+        first = self.connection.execute(
+            "SELECT number FROM items WHERE twin_id = ? AND state <> 'duplicate' AND number <> ?", (twin_id, number)
+        ).fetchone()
+        if first is None:
+            self.connection.execute("UPDATE items SET twin_id = ?, kind = ? WHERE number = ?", (twin_id, kind, number))
+            return None
+        self.connection.execute(
+            "UPDATE items SET twin_id = ?, kind = ?, state = 'duplicate', detail = ?, ended_at = ? WHERE number = ?",
+            (twin_id, kind, f"the same input as item {first[0]}", time.time(), number),
+        )
+        return int(first[0])
+
+    def stage_started(self, number: int, stage: str, attempts: int) -> None:
+        """Note that a stage is given to a worker."""
+        self.connection.execute(
+            "INSERT INTO stages (number, stage, state, attempts, at) VALUES (?, ?, 'running', ?, ?)"
+            " ON CONFLICT DO UPDATE SET state = 'running', attempts = excluded.attempts, at = excluded.at",
+            (number, stage, attempts, time.time()),
+        )
+
+    def stage_ended(
+        self,
+        number: int,
+        stage: str,
+        state: StageState,
+        *,
+        attempts: int,
+        key: str | None = None,
+        ran: bool = False,
+        seconds: float = 0.0,
+        cpu_seconds: float = 0.0,
+        cost_usd: float = 0.0,
+        error: str | None = None,
+    ) -> None:
+        """Note how a stage ended: done (``ran`` now, or found), rejected, waiting for a service, or failed for good."""
+        self.connection.execute(
+            "INSERT INTO stages (number, stage, key, state, attempts, runs, seconds, cpu_seconds, cost_usd, error, at)"
+            " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET key = excluded.key,"
+            " state = excluded.state, attempts = excluded.attempts, runs = runs + excluded.runs,"
+            " seconds = excluded.seconds, cpu_seconds = excluded.cpu_seconds, cost_usd = excluded.cost_usd,"
+            " error = excluded.error, at = excluded.at",
+            (number, stage, key, state, attempts, int(ran), seconds, cpu_seconds, cost_usd, error, time.time()),
+        )
+
+    def item_ended(
+        self,
+        number: int,
+        state: ItemState,
+        *,
+        recipe_sha256: str,
+        reason: str | None = None,
+        detail: str = "",
+        revision: str | None = None,
+    ) -> None:
+        """Note how an item ended; a twin of a new revision is to be indexed again."""
+        self.connection.execute(
+            "UPDATE items SET state = ?, reason = ?, detail = ?, recipe_sha256 = ?, ended_at = ?,"
+            " indexed = CASE WHEN revision IS ? THEN indexed ELSE 0 END, revision = ? WHERE number = ?",
+            (state, reason, detail, recipe_sha256, time.time(), revision, revision, number),
+        )
+
+    def reopen(self, numbers: Iterable[int]) -> int:
+        """Open ended items again, their attempts forgotten; returns how many."""
+        count = 0
+        for number in numbers:
+            self.connection.execute("UPDATE items SET state = 'open' WHERE number = ?", (number,))
+            self.connection.execute("DELETE FROM stages WHERE number = ? AND state <> 'done'", (number,))
+            count += 1
+        self.commit()
+        return count
+
+    def counts(self) -> dict[str, int]:
+        """Return the number of items by state."""
+        return dict(self.connection.execute("SELECT state, count(*) FROM items GROUP BY state"))
+
+    def totals(self, recipe_sha256: str) -> tuple[int, int]:
+        """Return how many items there are, and how many are open, or to be opened again under this recipe."""
+        row = self.connection.execute(
+            "SELECT count(*), coalesce(sum(state = 'open' OR (state <> 'duplicate' AND recipe_sha256 <> ?)), 0) FROM items",
+            (recipe_sha256,),
+        ).fetchone()
+        return int(row[0]), int(row[1])
+
+    def not_indexed(self, count: int) -> list[str]:
+        """Return ids of finished twins that no table has yet."""
+        rows = self.connection.execute(
+            "SELECT twin_id FROM items WHERE indexed = 0 AND state IN ('accepted', 'rejected') AND revision IS NOT NULL"
+            " ORDER BY number LIMIT ?",
+            (count,),
+        )
+        return [twin_id for (twin_id,) in rows]
+
+    def indexed(self, twin_ids: Iterable[str]) -> None:
+        """Note that the tables have these twins."""
+        self.connection.executemany("UPDATE items SET indexed = 1 WHERE twin_id = ?", ((i,) for i in twin_ids))
+
+
+@contextmanager
+def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
+    """Open a ledger for reading, also while a run writes it; raises UsageError where there is none."""
+    if not path.is_file():
+        raise UsageError(f"{path}: no ledger; `manitwin run MANIFEST -o DATASET` makes one")
+    connection = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+    connection.row_factory = sqlite3.Row
+    try:
+        yield connection
+    finally:
+        connection.close()
+
+
+def stage_rows(connection: sqlite3.Connection, number: int) -> list[StageRow]:
+    """Return the stages of one item in the order in which they were last touched."""
+    columns = "stage, key, state, attempts, seconds, cpu_seconds, cost_usd, error"
+    rows: list[Any] = connection.execute(
+        f"SELECT {columns} FROM stages WHERE number = ? ORDER BY at", (number,)
+    ).fetchall()
+    return [StageRow(**dict(zip(columns.split(", "), row, strict=True))) for row in rows]

@@ -1,0 +1,170 @@
+"""What the driver does with items, results and failures; workers are this process."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from rehearsals import rehearse, runs
+
+from manitwin.config import RunConfig
+from manitwin.dataset_root import twin_name
+from manitwin.engine.rehearsal import RehearsalRecipe
+from manitwin.index.parts import indexed_twins
+
+
+@pytest.fixture
+def recipe(tmp_path: Path) -> RehearsalRecipe:
+    return RehearsalRecipe(log=tmp_path / "log")
+
+
+def folders(root: Path) -> set[str]:
+    return {path.parent.name for path in (root / "twins").glob("*/*/twin.json")}
+
+
+def test_every_item_ends_once_with_a_folder_and_a_row_in_the_tables(tmp_path: Path, recipe: RehearsalRecipe) -> None:
+    run = rehearse(tmp_path / "d", [f"item {n}" for n in range(7)] + ["bad reject:b"], recipe=recipe)
+    assert run.result.stopped is None and run.result.left == 0 and run.wrong == []
+    assert sorted(event.number for event in run.ended) == list(range(1, 9))
+    assert sorted(run.states.values()) == ["accepted"] * 7 + ["rejected"]
+    assert len(folders(tmp_path / "d")) == 8
+    assert set(indexed_twins(run.root)) == folders(tmp_path / "d")
+    counts = runs(tmp_path / "log")
+    assert set(counts.values()) == {1} and len(counts) == 7 * 3 + 2, "nothing follows the stage that rejects"
+
+
+def test_a_second_run_does_nothing(tmp_path: Path, recipe: RehearsalRecipe) -> None:
+    rehearse(tmp_path / "d", ["one", "two"], recipe=recipe)
+    again = rehearse(tmp_path / "d", ["one", "two", "three"], recipe=recipe)
+    assert [event.item.text for event in again.ended] == ["three"]
+    assert set(runs(tmp_path / "log").values()) == {1}
+
+
+def test_a_changed_stage_is_done_again_with_what_follows_and_nothing_else(
+    tmp_path: Path, recipe: RehearsalRecipe
+) -> None:
+    first = rehearse(tmp_path / "d", ["one", "bad reject:a"], recipe=recipe)
+    changed = rehearse(tmp_path / "d", recipe=replace(recipe, versions=(("b", "2"),)))
+    twins = {event.item.text: event.twin_id for event in first.ended}
+    counts = runs(tmp_path / "log")
+    assert {stage: counts[twins["one"], stage] for stage in "abc"} == {"a": 1, "b": 2, "c": 2}
+    assert counts[twins["bad reject:a"], "b"] == 0, "what a rejects, b never sees"
+    assert changed.wrong == []
+    back = rehearse(tmp_path / "d", recipe=recipe)  # the results of before are still there
+    assert runs(tmp_path / "log")[twins["one"], "b"] == 2
+    assert back.states["one"] == "accepted" and back.wrong == []
+
+
+def test_two_items_of_one_twin_make_one_folder(tmp_path: Path, recipe: RehearsalRecipe) -> None:
+    from manitwin.stages.stage import Item
+
+    run = rehearse(tmp_path / "d", ["same"], recipe=recipe)
+    assert run.states == {"same": "accepted"}
+    from manitwin.ledger.ledger import Ledger
+
+    ledger = Ledger(tmp_path / "d" / "ledger.sqlite")
+    ledger.add_items([Item(file=None, text="same", license="MIT")])  # the licence is not part of who a twin is
+    ledger.close()
+    again = rehearse(tmp_path / "d", recipe=recipe)
+    assert [event.state for event in again.ended] == ["duplicate"]
+    assert "item 1" in again.ended[0].detail
+    assert len(folders(tmp_path / "d")) == 1 and again.wrong == []
+
+
+def test_what_fails_is_tried_three_times_and_quarantined_with_its_error(
+    tmp_path: Path, recipe: RehearsalRecipe
+) -> None:
+    run = rehearse(tmp_path / "d", ["bad raise:b", "good"], recipe=recipe)
+    assert run.states == {"bad raise:b": "failed", "good": "accepted"}
+    assert run.attempts["bad raise:b", "b"] == 3
+    assert "the text says so" in (run.errors["bad raise:b", "b"] or "")
+    assert "b failed 3 times" in run.ended[-1].detail
+    again = rehearse(tmp_path / "d", recipe=recipe)
+    assert again.ended == [], "a failed item waits for a person"
+
+
+def test_a_service_that_is_down_costs_no_attempt_and_leaves_its_items_to_the_next_run(
+    tmp_path: Path, recipe: RehearsalRecipe
+) -> None:
+    down = tmp_path / "down"
+    down.touch()
+    recipe = replace(recipe, plan=(("a", "cpu"), ("ask", "vlm"), ("c", "cpu")))
+    texts = [f"item {n} unavailable:ask:{down}" for n in range(5)]
+    first = rehearse(tmp_path / "d", texts, recipe=recipe)
+    assert first.result.left == 5 and set(first.states.values()) == {"open"} and first.wrong == []
+    assert all(first.attempts[text, "ask"] == 0 for text in texts if (text, "ask") in first.attempts)
+    counts = runs(tmp_path / "log")
+    assert sum(count for (_, stage), count in counts.items() if stage == "a") == 5, "what can be done is done"
+    down.unlink()
+    second = rehearse(tmp_path / "d", recipe=recipe)
+    assert set(second.states.values()) == {"accepted"} and second.wrong == []
+    assert {count for (_, stage), count in runs(tmp_path / "log").items() if stage != "ask"} == {1}
+
+
+def test_a_short_failure_of_a_service_is_waited_for(tmp_path: Path, recipe: RehearsalRecipe) -> None:
+    down = tmp_path / "down"
+    down.touch()
+    asked = []
+
+    class Repaired(RehearsalRecipe):
+        def stages(self, kind: str):  # type: ignore[no-untyped-def]
+            stages = super().stages(kind)
+            act = stages[1]._act
+
+            def once(what: str, more: str, twin: str) -> None:
+                asked.append(what)
+                try:
+                    act(what, more, twin)
+                finally:
+                    down.unlink(missing_ok=True)
+
+            stages[1]._act = once
+            return stages
+
+    run = rehearse(
+        tmp_path / "d",
+        [f"a unavailable:b:{down}", f"b limited:b:{down}"],
+        recipe=Repaired(log=recipe.log),
+        settings=RunConfig(patience_s=30),
+    )
+    assert set(run.states.values()) == {"accepted"} and len(asked) == 3
+    assert set(run.attempts.values()) == {1}
+
+
+def test_a_lost_folder_is_found_missing_and_made_again_from_its_stages(tmp_path: Path, recipe: RehearsalRecipe) -> None:
+    import shutil
+
+    from manitwin.ledger.audit import disagreements
+    from manitwin.ledger.ledger import Ledger
+
+    run = rehearse(tmp_path / "d", ["one", "two"], recipe=recipe)
+    shutil.rmtree(tmp_path / "d" / twin_name(run.ended[0].twin_id))
+    ledger = Ledger(tmp_path / "d" / "ledger.sqlite")
+    found = list(disagreements(ledger, run.root, True))
+    assert len(found) == 1 and "no folder" in found[0].what
+    for each in found:
+        assert each.repair is not None
+        each.repair()
+    ledger.close()
+    again = rehearse(tmp_path / "d", recipe=recipe)
+    assert again.wrong == [] and len(again.ended) == 1
+    assert set(runs(tmp_path / "log").values()) == {1}
+
+
+def test_a_result_that_is_not_there_is_done_again(tmp_path: Path, recipe: RehearsalRecipe) -> None:
+    from manitwin.ledger.audit import disagreements
+    from manitwin.ledger.ledger import Ledger
+
+    run = rehearse(tmp_path / "d", ["one"], recipe=recipe)
+    next((tmp_path / "d" / ".work" / run.ended[0].twin_id / "b").glob("*/result.json")).write_text("{ half")
+    ledger = Ledger(tmp_path / "d" / "ledger.sqlite")
+    assert [f.what for f in disagreements(ledger, run.root, True)] == [
+        "item 1, stage b: done in the ledger, and its result is not there"
+    ]
+    ledger.close()
+
+
+def test_work_is_dropped_where_nobody_wants_to_resume(tmp_path: Path, recipe: RehearsalRecipe) -> None:
+    run = rehearse(tmp_path / "d", ["one"], recipe=recipe, settings=RunConfig(keep_work=False))
+    assert run.wrong == [] and list((tmp_path / "d" / ".work").iterdir()) == []
