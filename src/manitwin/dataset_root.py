@@ -37,7 +37,7 @@ class DatasetRoot:
 
     def __init__(self, url: str | Path):
         try:
-            self.fs, self.path = url_to_fs(str(url))
+            self.fs, self.path = url_to_fs(str(url), use_listings_cache=False)  # others write there as well
         except (ValueError, ImportError) as error:
             raise UsageError(f"{url}: {error}; give a folder, or a URL such as s3://bucket/name") from error
         self.url = str(url)
@@ -64,7 +64,7 @@ class DatasetRoot:
     def write_bytes(self, name: str, content: bytes) -> None:
         """Write a file whole or not at all."""
         if self.local is not None:
-            place = self.local / name
+            place = Path(self.full(name))
             place.parent.mkdir(parents=True, exist_ok=True)
             write_bytes_atomically(place, content)
         else:
@@ -73,7 +73,7 @@ class DatasetRoot:
     def put_file(self, source: Path, name: str) -> None:
         """Copy a local file to a name, whole or not at all."""
         if self.local is not None:
-            place = self.local / name
+            place = Path(self.full(name))
             place.parent.mkdir(parents=True, exist_ok=True)
             beside = place.with_name(f".{place.name}.{os.getpid()}")
             shutil.copyfile(source, beside)
@@ -93,7 +93,6 @@ class DatasetRoot:
 
     def names_below(self, name: str) -> list[str]:
         """Return the names of all files below a folder, sorted; empty where there is none."""
-        self.fs.invalidate_cache()
         root = self.path.rstrip("/") + "/"
         found = self.fs.find(self.full(name)) if self.fs.exists(self.full(name)) else []
         return sorted(str(path).removeprefix(root) for path in found)
@@ -104,7 +103,7 @@ class DatasetRoot:
         On a local root ``fresh`` must be on the same file system, and is renamed.
         """
         if self.local is not None:
-            replace_folder(fresh, self.local / name)
+            replace_folder(fresh, Path(self.full(name)))
             return
         files = sorted((p for p in fresh.rglob("*") if p.is_file()), key=lambda p: (p.name == RECORD, p))
         names = [f"{name}/{path.relative_to(fresh).as_posix()}" for path in files]
@@ -118,7 +117,7 @@ class DatasetRoot:
     def fetch_folder(self, name: str, to: Path) -> Path:
         """Return a local folder with a folder's files: itself where the root is local, else a copy at ``to``."""
         if self.local is not None:
-            return self.local / name
+            return Path(self.full(name))
         for each in self.names_below(name):
             self.fetch_file(each, to / each.removeprefix(f"{name}/"))
         return to
@@ -132,7 +131,6 @@ class DatasetRoot:
                     yield twin_id
 
     def _children(self, name: str) -> list[str]:
-        self.fs.invalidate_cache()
         if not self.exists(name):
             return []
         return [PurePosixPath(path).name for path in self.fs.ls(self.full(name), detail=False)]

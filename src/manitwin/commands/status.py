@@ -29,21 +29,22 @@ def status(
     """Say how far a data set is: by stage, how fast, what is left, what it cost, what was rejected and why."""
     from manitwin.dataset_root import DatasetRoot
     from manitwin.dataset_run import local_ledger
-    from manitwin.ledger.ledger import read_ledger
+    from manitwin.ledger.ledger import is_written, read_ledger
     from manitwin.ledger.progress import read_progress, read_story
 
-    with read_ledger(local_ledger(DatasetRoot(dataset))) as ledger:
+    path = local_ledger(DatasetRoot(dataset))
+    with read_ledger(path) as ledger:
         if why is not None:
             _print_story(read_story(ledger, why))
         elif watch:
             from rich.live import Live
 
-            with Live(_view(read_progress(ledger)), console=out_console, auto_refresh=False) as live:
+            with Live(_view(read_progress(ledger, is_written(path))), console=out_console, auto_refresh=False) as live:
                 while True:
                     time.sleep(REFRESH_S)
-                    live.update(_view(read_progress(ledger)), refresh=True)
+                    live.update(_view(read_progress(ledger, is_written(path))), refresh=True)
         else:
-            out_console.print(_view(read_progress(ledger)))
+            out_console.print(_view(read_progress(ledger, is_written(path))))
 
 
 def _view(progress: Progress) -> RenderableType:
@@ -66,7 +67,7 @@ def _view(progress: Progress) -> RenderableType:
     lines = [
         f"{ended} of {total} items ended: "
         + (", ".join(f"{n} {state}" for state, n in progress.items.items() if n and state != "open") or "none"),
-        f"last run: {progress.last_run or 'none'}",
+        f"last run: {progress.last_run}",
     ]
     if progress.items_per_hour:
         left = f", {timedelta(seconds=round(progress.left_s or 0))} left" if progress.items["open"] else ""

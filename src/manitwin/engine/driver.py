@@ -101,7 +101,7 @@ class Driver:
         self.ledger.commit()
         if not self._running and (self.result.stopped is not None or not (any(self._queues.values()) or self._more)):
             return self.result.stopped is None and self._last_tables()
-        for ticket, reply in self.executor.ended(self._wait_s() if self._running else self._pause_s()):
+        for ticket, reply in self.executor.ended(self._wait_s()):
             flight, needs = self._running.pop(ticket)
             self._outstanding[needs] -= 1
             if flight is None:
@@ -111,11 +111,9 @@ class Driver:
         return True
 
     def _wait_s(self) -> float:
-        return min(LONGEST_WAIT_S, self._pause_s())
-
-    def _pause_s(self) -> float:
+        """Return how long to wait for an answer: no longer than until a gate opens for those that wait behind it."""
         waits = [self._gates[needs].opens_in_s() for needs in RESOURCES if self._queues[needs]]
-        return min([LONGEST_WAIT_S, *(max(wait, 0.001) for wait in waits)])
+        return min([LONGEST_WAIT_S, *(wait for wait in waits if wait > 0)])
 
     def _admit(self) -> None:
         """Take up items while cores would else be idle."""

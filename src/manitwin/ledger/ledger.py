@@ -70,7 +70,12 @@ class Ledger:
         self.connection.execute(
             "PRAGMA synchronous = NORMAL"
         )  # a power cut may lose the last rows, which are found again
-        migrate(self.connection, str(path))
+        try:
+            migrate(self.connection, str(path))
+        except BaseException:
+            self.connection.close()
+            self._lock.close()
+            raise
         self.connection.execute("BEGIN")
 
     def commit(self) -> None:
@@ -258,6 +263,19 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
         yield connection
     finally:
         connection.close()
+
+
+def is_written(path: Path) -> bool:
+    """Tell whether a run is at work on a ledger now."""
+    lock = path.with_suffix(".lock")
+    if not lock.is_file():
+        return False
+    with lock.open() as stream:
+        try:
+            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+    return False
 
 
 def stage_rows(connection: sqlite3.Connection, number: int) -> list[StageRow]:

@@ -40,7 +40,6 @@ class Progress:
     left_s: float | None
     cost_usd: float
     cpu_seconds: float
-    running: bool
     last_run: str
 
 
@@ -58,8 +57,8 @@ class ItemStory:
     stages: list[StageRow]
 
 
-def read_progress(connection: sqlite3.Connection, now: float | None = None) -> Progress:
-    """Count everything; the ledger may be written at the same time."""
+def read_progress(connection: sqlite3.Connection, at_work: bool, now: float | None = None) -> Progress:
+    """Count everything; the ledger may be written at the same time: ``at_work`` tells whether it is."""
     now = time.time() if now is None else now
     states = dict.fromkeys(ITEM_STATES, 0)
     states |= dict(connection.execute("SELECT state, count(*) FROM items GROUP BY state").fetchall())
@@ -75,8 +74,7 @@ def read_progress(connection: sqlite3.Connection, now: float | None = None) -> P
         left_s=states["open"] / rate * 3600 if rate else None,
         cost_usd=sum(stage.cost_usd for stage in stages),
         cpu_seconds=sum(stage.mean_cpu_seconds * (stage.done + stage.rejected) for stage in stages),
-        running=run is not None and run["ended_at"] is None,
-        last_run="" if run is None else run["ended_how"] or "at work, or cut off",
+        last_run="none" if run is None else run["ended_how"] or ("at work" if at_work else "cut off"),
     )
 
 

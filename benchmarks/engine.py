@@ -1,0 +1,103 @@
+"""Measure what the engine of a run costs by itself: stages that do nothing, in real worker processes, with a real ledger.
+
+    python benchmarks/engine.py [--items 10000] [--stages 10] [--jobs 2] [--curve CSV] [--ray]
+
+Prints wall and CPU milliseconds an item-stage (CPU of driver and workers together; input and assembly count as stages: they
+are jobs), and the driver's memory over the run, which ``--curve`` writes as items ended, resident megabytes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import tempfile
+import time
+from pathlib import Path
+
+from manitwin.config import RunConfig
+from manitwin.engine.driver import Driver, ItemEnded
+from manitwin.engine.jobs import WorkerSetup
+from manitwin.engine.rehearsal import RehearsalRecipe
+from manitwin.executors.local import LocalExecutor
+from manitwin.ledger.ledger import Ledger
+from manitwin.stages.stage import Item
+
+EVERY = 500
+
+
+def main() -> None:
+    """Run once and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--items", type=int, default=10_000)
+    parser.add_argument("--stages", type=int, default=10)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--curve", type=Path)
+    parser.add_argument("--ray", action="store_true")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        _run(Path(folder), arguments)
+
+
+def _run(root: Path, arguments: argparse.Namespace) -> None:
+    recipe = RehearsalRecipe(tuple((f"stage_{n}", "cpu") for n in range(arguments.stages)))
+    settings = RunConfig(cpu=arguments.jobs, index_every=5000, keep_work=False)
+    setup = WorkerSetup(str(root), recipe, root / "cache", keep_work=False)
+    ledger = Ledger(root / "ledger.sqlite")
+    ledger.add_items(Item(file=None, text=f"item {n}") for n in range(arguments.items))
+    curve: list[tuple[int, float]] = []
+    ended = 0
+
+    def count(event: ItemEnded) -> None:
+        nonlocal ended
+        ended += 1
+        if ended % EVERY == 0:
+            curve.append((ended, resident_mb()))
+
+    started, cpu_started = time.perf_counter(), cpu_seconds()
+    executor = _executor(setup, settings, arguments.ray)
+    try:
+        result = Driver(ledger, executor, recipe, settings, on_ended=count).run()
+        driver_cpu = time.process_time()
+    finally:
+        executor.close()
+        counts = ledger.counts()
+        ledger.close()
+    seconds, cpu = time.perf_counter() - started, cpu_seconds() - cpu_started
+    jobs = arguments.items * (arguments.stages + 2)
+    print(f"{counts}, stopped: {result.stopped}")
+    print(
+        f"{jobs} item-stages in {seconds:.1f} s: {1e3 * seconds / jobs:.2f} ms wall, {1e3 * cpu / jobs:.2f} CPU-ms each"
+    )
+    print(f"of which the driver {1e3 * driver_cpu / jobs:.2f} CPU-ms")
+    megabytes = [value for _, value in curve]
+    if megabytes:
+        tenth = megabytes[max(len(megabytes) // 10, 1) - 1]
+        print(
+            f"driver: {tenth:.0f} MB after a tenth of the items, {megabytes[-1]:.0f} MB at the end, {max(megabytes):.0f} MB most"
+        )
+    if arguments.curve:
+        arguments.curve.write_text("items,driver_mb\n" + "".join(f"{n},{mb:.1f}\n" for n, mb in curve))
+
+
+def _executor(setup: WorkerSetup, settings: RunConfig, ray: bool):  # type: ignore[no-untyped-def]
+    if not ray:
+        return LocalExecutor(setup, settings)
+    from manitwin.executors.ray_cluster import RayExecutor
+
+    return RayExecutor(setup, settings, None)
+
+
+def resident_mb() -> float:
+    """Return this process' resident memory now."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
+def cpu_seconds() -> float:
+    """Return the CPU seconds of this process and of its children that have ended."""
+    own, children = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime
+
+
+if __name__ == "__main__":
+    main()
