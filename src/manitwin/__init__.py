@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from manitwin.api import BuildReport, build, load, schema
+    from manitwin.index.dataset import Dataset
     from manitwin.loaded_twin import Twin
 
-__all__ = ["BuildReport", "Twin", "build", "load", "schema"]
+__all__ = ["BuildReport", "Dataset", "Twin", "build", "load", "schema"]
+_ELSEWHERE = {"Dataset": "manitwin.index.dataset", "Twin": "manitwin.loaded_twin"}
 
 
 def __getattr__(name: str) -> Any:
@@ -17,4 +19,4 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'manitwin' has no attribute {name!r}; it has {', '.join(__all__)}")
     from importlib import import_module
 
-    return getattr(import_module("manitwin.loaded_twin" if name == "Twin" else "manitwin.api"), name)
+    return getattr(import_module(_ELSEWHERE.get(name, "manitwin.api")), name)

@@ -1,0 +1,45 @@
+"""``manitwin index``: write the tables of a data set again from its folders."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from manitwin.commands.console import err_console, out_console
+
+
+def index(
+    dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
+    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one a core.")] = None,
+) -> None:
+    """Write the index of a data set again, from its twins alone; the old one serves until the new one is whole."""
+    import os
+
+    from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    from manitwin.dataset_root import TWINS, DatasetRoot
+    from manitwin.errors import UsageError
+    from manitwin.index.rebuild import rebuild
+
+    if jobs is not None and jobs < 1:
+        raise UsageError(f"jobs is {jobs}; give 1 or more")
+    root = DatasetRoot(dataset)
+    if not root.exists(TWINS):
+        raise UsageError(
+            f"{dataset}: no data set ({TWINS}/ is missing); give the folder or URL that manitwin run wrote"
+        )
+    columns = (TextColumn("reading"), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=err_console, transient=True) as progress:
+        task = progress.add_task("reading", total=None)
+        written = rebuild(
+            root,
+            jobs=jobs or os.cpu_count() or 1,
+            on_start=lambda twins: progress.update(task, total=twins),
+            on_read=lambda twins: progress.advance(task, twins),
+        )
+    for line in written.unreadable:
+        err_console.print(f"left out: {line}", markup=False)
+    accepted, rejected, grasps = (written.rows(table) for table in ("twins", "rejections", "grasps"))
+    out_console.print(f"{accepted} accepted, {rejected} rejected, {grasps} grasps indexed in {dataset}", markup=False)
+    raise typer.Exit(4 if written.unreadable else 0)
