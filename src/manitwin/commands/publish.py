@@ -1,0 +1,64 @@
+"""``manitwin publish``: a data set as shards, tables and a card that others can download."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manitwin.commands.console import err_console, out_console
+
+if TYPE_CHECKING:
+    from manitwin.publish.publish import Published, ShardDone
+
+SHARD_SIZE_MB = 1000  # as in publish/publish.py, which is imported when it is needed
+
+
+def publish(
+    dataset: Annotated[str, typer.Argument(help="A data set: a folder or a URL.", metavar="DATASET")],
+    out: Annotated[str, typer.Option("--out", "-o", help="A new folder or URL, or an older publication.")],
+    license_allow: Annotated[
+        str | None,
+        typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: all but 'unknown'."),
+    ] = None,
+    shard_size_mb: Annotated[int, typer.Option(help="The most that a shard may have, in 10^6 bytes.")] = SHARD_SIZE_MB,
+    twins_per_shard: Annotated[int | None, typer.Option(help="The most twins of a shard; default: any number.")] = None,
+    name: Annotated[str | None, typer.Option(help="What the card calls it; default: the name of OUT.")] = None,
+) -> None:
+    """Write a data set as WebDataset shards, Parquet tables and a dataset card."""
+    from manitwin.publish.publish import publish as publish_dataset
+
+    published = publish_dataset(
+        dataset,
+        out,
+        license_allow=None if license_allow is None else license_allow.split(","),
+        shard_size_mb=shard_size_mb,
+        twins_per_shard=twins_per_shard,
+        name=name,
+        on_shard=_say_shard,
+    )
+    for line in outcome_lines(published):
+        out_console.print(line, markup=False)
+    out_console.print(f"in {out}", markup=False)
+
+
+def outcome_lines(published: Published) -> list[str]:
+    """Return what to say of a publication: what went out, and what did not and why."""
+    kept = f", {published.kept_shards:,} of them there already" if published.kept_shards else ""
+    lines = [
+        f"{published.twins:,} twins in {published.shards:,} shards{kept}; "
+        f"{published.files:,} files, {published.bytes / 1e6:,.1f} MB"
+    ]
+    if published.left_out:
+        by_licence = ", ".join(f"{name} {count:,}" for name, count in published.left_out.items())
+        lines.append(f"{sum(published.left_out.values()):,} left out by licence: {by_licence}")
+    if published.rejected:
+        lines.append(f"{published.rejected:,} rejected ones are not published")
+    if published.without_attribution:
+        lines.append(f"{published.without_attribution:,} are under a licence that asks for attribution, and have none")
+    return lines
+
+
+def _say_shard(done: ShardDone) -> None:
+    what = "there already" if done.kept else "written"
+    err_console.print(f"{done.number}/{done.total} {done.name} {what}", markup=False)

@@ -1,0 +1,92 @@
+"""Which twins may go out, under which licences, and whom to name for them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from manitwin.errors import UsageError
+from manitwin.publish.markdown import plain, table
+
+UNKNOWN = "unknown"
+LICENSES_MD = "LICENSES.md"
+
+_IDS_SHOWN = 50
+"""Twins of one author that are listed; of more the index tells."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The ids of the twins that go out and of those that stay here, and how many of these there are by licence."""
+
+    published: frozenset[str]
+    kept_back: frozenset[str]
+    left_out: dict[str, int]
+
+
+def select(twins: Iterable[Mapping[str, Any]], allow: Iterable[str] | None) -> Selection:
+    """Choose the twins whose licence is named in ``allow`` (in any case), or known at all where nothing is named.
+
+    ``twins`` are rows with ``twin_id`` and ``license``. Raises UsageError where nothing may go out.
+    """
+    named = None if allow is None else {name.strip().lower() for name in allow if name.strip()}
+    published, kept_back, left_out = set[str](), set[str](), Counter[str]()
+    for twin in twins:
+        licence = (twin["license"] or UNKNOWN).lower()
+        if licence in named if named is not None else licence != UNKNOWN:
+            published.add(twin["twin_id"])
+        else:
+            kept_back.add(twin["twin_id"])
+            left_out[twin["license"] or UNKNOWN] += 1
+    if not published:
+        there = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items())) or "none"
+        raise UsageError(
+            f"no twin may go out; licences of the accepted twins: {there}; "
+            f"name those that may in --license-allow, {UNKNOWN!r} too if you know that you may"
+        )
+    return Selection(frozenset(published), frozenset(kept_back), dict(sorted(left_out.items())))
+
+
+def without_attribution(twins: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return the ids of twins under a Creative Commons licence that asks for attribution, of which none is known."""
+    return [t["twin_id"] for t in twins if t["license"].upper().startswith("CC-BY") and not t["attribution"]]
+
+
+def licenses_page(name: str, twins: Sequence[Mapping[str, Any]]) -> str:
+    """Return LICENSES.md: every licence, whom to credit under it, and for which twins.
+
+    ``twins`` are rows with ``twin_id``, ``license``, ``attribution``, sorted by id.
+    """
+    by_licence: dict[str, dict[str, list[str]]] = {}
+    for twin in twins:
+        authors = by_licence.setdefault(twin["license"], {})
+        authors.setdefault(twin["attribution"] or "", []).append(twin["twin_id"])
+    lines = [
+        f"# Licences of {plain(name)}",
+        "",
+        "Each twin is a work made of its source (a photo, a text or a mesh, which is in the shard too) and stays under that "
+        "source's licence. Licence, attribution and the source's sha256 of every single twin are the columns `license`, "
+        "`attribution` and `source_sha256` of `index/twins-*.parquet`.",
+        "",
+        *table(
+            ["licence", "twins"],
+            [[_linked(k), f"{sum(map(len, v.values())):,}"] for k, v in sorted(by_licence.items())],
+        ),
+    ]
+    missing = without_attribution(twins)
+    if missing:
+        lines += ["", f"**{len(missing):,} twins are under a licence that asks for attribution, and none is known.**"]
+    for licence, authors in sorted(by_licence.items()):
+        lines += ["", f"## {plain(licence)}", ""]
+        for author, ids in sorted(authors.items()):
+            shown = ", ".join(ids[:_IDS_SHOWN])
+            more = f" and {len(ids) - _IDS_SHOWN:,} more" if len(ids) > _IDS_SHOWN else ""
+            lines.append(f"- {plain(author) or 'no attribution known'}: {shown}{more}")
+    return "\n".join(lines) + "\n"
+
+
+def _linked(licence: str) -> str:
+    spdx = licence != UNKNOWN and not licence.startswith("LicenseRef-") and " " not in licence
+    return f"[{plain(licence)}](https://spdx.org/licenses/{licence}.html)" if spdx else plain(licence)

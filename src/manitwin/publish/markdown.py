@@ -1,0 +1,20 @@
+"""Words and numbers as Markdown."""
+
+from __future__ import annotations
+
+import html
+import re
+from collections.abc import Sequence
+
+
+def plain(text: str) -> str:
+    """Return text as one line that Markdown and HTML show as it is."""
+    one_line = html.escape(" ".join(text.split()), quote=False)
+    return re.sub(r"([\\`*_\[\]|#])", r"\\\1", one_line)
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> list[str]:
+    """Return the lines of a table whose first column is words and whose others are numbers (or as ``align`` says: ``lr``)."""
+    sides = align or "l" + "r" * (len(head) - 1)
+    rule = ["---" if side == "l" else "---:" for side in sides]
+    return [f"| {' | '.join(cells)} |" for cells in (head, rule, *rows)]

@@ -1,0 +1,149 @@
+"""The folder or URL that a data set is published to: files appear whole, and an interrupted one is gone on with.
+
+OUT/SHA256SUMS is written last: a publication that has it is whole. Until then OUT/.publish/ holds a receipt of every shard
+that is finished; a shard whose receipt says what is to be in it is not written again.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from hashlib import sha256
+from pathlib import Path, PurePosixPath
+from typing import Any, BinaryIO
+
+import pyarrow.parquet as pq
+
+from manitwin.dataset_root import DatasetRoot
+from manitwin.errors import UsageError
+from manitwin.publish.shard_plan import Shard, check_hub_limits
+from manitwin.publish.tables import SHARDS_FILE
+from manitwin.store import canonical_json, sha256_of_file
+
+SUMS = "SHA256SUMS"
+OPEN = ".publish"
+_STARTED = f"{OPEN}/started"
+_FOLDERS = ("data", "index", "pictures")
+
+
+class Publication:
+    """Write files below one root and remember their digests.
+
+    Owns: everything below ``data/``, ``index/``, ``pictures/`` and ``.publish/`` of the root.
+    """
+
+    def __init__(self, root: DatasetRoot):
+        self.root = root
+        self.digests: dict[str, str] = {}
+        self.sizes: dict[str, int] = {}
+        self._receipts: dict[str, dict[str, Any]] = {}
+
+    def begin(self) -> None:
+        """Open a new publication, an interrupted one or an older one. Raises UsageError where something else is there."""
+        root = self.root
+        root.fs.invalidate_cache()
+        if not root.exists(_STARTED):
+            if root.exists(SUMS) and root.exists(SHARDS_FILE):
+                for row in pq.read_table(io.BytesIO(root.read_bytes(SHARDS_FILE))).to_pylist():
+                    self._write_receipt(row)
+            elif self._visible_entries():
+                raise UsageError(
+                    f"{root.url}: not empty, and no publication of manitwin; give a folder that is new or empty"
+                )
+            root.write_bytes(_STARTED, b"")
+        root.remove(SUMS)
+        for name in root.names_below(OPEN):
+            if name.endswith(".json"):
+                receipt = json.loads(root.read_bytes(name))
+                self._receipts[receipt["shard"]] = receipt
+            elif name != _STARTED:
+                root.remove(name)  # half a shard
+
+    def _visible_entries(self) -> list[str]:
+        path = self.root.path
+        if not self.root.fs.exists(path):
+            return []
+        names = [PurePosixPath(str(entry)).name for entry in self.root.fs.ls(path, detail=False)]
+        return [name for name in names if not name.startswith(".")]
+
+    def has(self, shard: Shard) -> bool:
+        """Tell whether a shard is there with what is to be in it; its digest then counts as written."""
+        receipt = self._receipts.get(shard.name)
+        if receipt is None or receipt["contents_sha256"] != shard.contents_sha256 or not self.root.exists(shard.name):
+            return False
+        if self.root.fs.info(self.root.full(shard.name))["size"] != receipt["bytes"]:
+            return False
+        self.digests[shard.name], self.sizes[shard.name] = receipt["sha256"], receipt["bytes"]
+        return True
+
+    def write_shard(self, shard: Shard, write: Callable[[BinaryIO], None]) -> None:
+        """Write a shard to a temporary file, put it in its place and note that it is there."""
+        receipt = _receipt_name(shard.name)
+        with self._incoming() as path:
+            with path.open("wb") as stream:
+                write(stream)
+                stream.flush()
+                os.fsync(stream.fileno())
+            self.digests[shard.name], self.sizes[shard.name] = sha256_of_file(path), path.stat().st_size
+            self.root.remove(receipt)  # what it says of an older shard is true no longer
+            self._place(path, shard.name)
+        self._write_receipt(self.row(shard))
+
+    def row(self, shard: Shard) -> dict[str, Any]:
+        """Return a written shard as a row of the table of shards."""
+        return {
+            "shard": shard.name,
+            "twins": len(shard.twins),
+            "bytes": self.sizes[shard.name],
+            "sha256": self.digests[shard.name],
+            "contents_sha256": shard.contents_sha256,
+        }
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a small file."""
+        self.root.write_bytes(name, content)
+        self.digests[name], self.sizes[name] = sha256(content).hexdigest(), len(content)
+
+    def finish(self) -> None:
+        """Remove what an older publication had more, and write the digests of all files."""
+        check_hub_limits({**self.sizes, SUMS: 0})
+        for folder in _FOLDERS:
+            for name in self.root.names_below(folder):
+                if name not in self.digests:
+                    self.root.remove(name)
+                    self._remove_empty_folder(name)
+        lines = [f"{digest}  {name}\n" for name, digest in sorted(self.digests.items())]
+        self.root.write_bytes(SUMS, "".join(lines).encode())
+        self.root.remove(OPEN)
+
+    def _remove_empty_folder(self, name: str) -> None:
+        if self.root.local is not None:
+            folder = (self.root.local / name).parent
+            if not any(folder.iterdir()):
+                folder.rmdir()
+
+    @contextmanager
+    def _incoming(self) -> Iterator[Path]:
+        """Yield the path of a temporary file: on the root's own file system where that is local."""
+        place = None if self.root.local is None else self.root.local / OPEN
+        with tempfile.TemporaryDirectory(prefix="incoming-", dir=place) as scratch:
+            yield Path(scratch) / "shard.tar"
+
+    def _place(self, path: Path, name: str) -> None:
+        if self.root.local is None:
+            self.root.put_file(path, name)
+            return
+        place = self.root.local / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(path, place)
+
+    def _write_receipt(self, row: dict[str, Any]) -> None:
+        self.root.write_bytes(_receipt_name(row["shard"]), canonical_json(row).encode())
+
+
+def _receipt_name(shard: str) -> str:
+    return f"{OPEN}/{PurePosixPath(shard).stem}.json"
