@@ -15,8 +15,12 @@ import typer
 
 from manitwin.commands.check import check
 from manitwin.commands.console import err_console, out_console
+from manitwin.commands.index import index
+from manitwin.commands.publish import publish
+from manitwin.commands.query import query
 from manitwin.commands.retry import retry
 from manitwin.commands.run import run
+from manitwin.commands.stats import stats
 from manitwin.commands.status import status
 from manitwin.errors import BackendError, ManiTwinError, UsageError
 
@@ -98,10 +102,8 @@ def build(
     raise typer.Exit(report.exit_code)
 
 
-app.command()(run)
-app.command()(status)
-app.command()(retry)
-app.command()(check)
+for command in (run, status, retry, check, index, query, stats, publish):
+    app.command()(command)
 
 
 @app.command()

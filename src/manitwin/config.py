@@ -201,7 +201,8 @@ class GenerateConfig(Section):
 class RunConfig(Section):
     """How a run works through its items; nothing here decides what a twin is.
 
-    ``cpu``, ``gpu``, ``vlm`` and ``generator`` are slots: so many stages of that kind at a time (cpu 0: one a core).
+    ``cpu``, ``gpu``, ``vlm`` and ``generator`` are slots: so many stages of that kind at a time (cpu 0: one a core). On a
+    Ray cluster the gpu slots are its cards, and cpu 0 is all of its cores.
     ``vlm_per_minute`` bounds how many stages that ask a VLM begin in a minute. A stage that kills its worker or fails is
     tried ``attempts`` times. A service that is down is asked again for ``patience_s`` before its items are left for the
     next run. ``in_flight`` bounds the items that are begun and not ended.

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import shutil
 import signal
 import time
@@ -82,7 +81,7 @@ class RehearsedStage:
         if what == "raise":
             raise RuntimeError("the text says so")
         if what == "segfault" or (what == "segfault-once" and self._first_time(twin_id)):
-            os.kill(os.getpid(), signal.SIGSEGV)
+            signal.raise_signal(signal.SIGSEGV)
         if what == "unavailable" and Path(more).exists():
             raise Unavailable(f"{self.name}: down while {more} is there")
         if what == "limited" and Path(more).exists():
