@@ -82,6 +82,19 @@ def test_failed_stage_leaves_nothing_behind(tmp_path: Path, error: Exception) ->
     assert list((tmp_path / "counting").iterdir()) == []
 
 
+def test_what_services_charge_is_kept_and_not_charged_again(tmp_path: Path) -> None:
+    class Paid(Counting):
+        def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+            draft.cost_usd += 0.02
+            return super().run(draft, folder)
+
+    first, second = draft(), draft()
+    first.cost_usd = 7.0  # of the stage before
+    ran, again = run_stage(Paid(), first, tmp_path), run_stage(Paid(), second, tmp_path)
+    assert (ran.cost.cost_usd, ran.reused) == (0.02, False)
+    assert (again.cost.cost_usd, again.reused) == (0.02, True)
+
+
 def test_stage_that_does_not_write_what_it_declares_is_a_defect(tmp_path: Path) -> None:
     stage = Counting()
     stage.writes = ("count", "data.bin", "pictures/", "more")  # type: ignore[misc]

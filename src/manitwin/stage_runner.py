@@ -108,6 +108,7 @@ def _run_into(stage: Stage, draft: Draft, place: Path) -> None:
     shutil.rmtree(fresh, ignore_errors=True)
     fresh.mkdir(parents=True)
     try:
+        draft.cost_usd = 0.0
         started, cpu_started = time.perf_counter(), _cpu_seconds()
         fields = stage.run(draft, fresh)
         cost = {"seconds": time.perf_counter() - started, "cpu_seconds": _cpu_seconds() - cpu_started}
@@ -116,7 +117,7 @@ def _run_into(stage: Stage, draft: Draft, place: Path) -> None:
             name: sha256_of_json(fields[name]) if is_field(name) else sha256_of_artifact(fresh / name)
             for name in stage.writes
         }
-        content = {"fields": fields, "digests": digests, "cost": {**cost, "cost_usd": 0.0}}
+        content = {"fields": fields, "digests": digests, "cost": {**cost, "cost_usd": draft.cost_usd}}
         write_bytes_atomically(fresh / RESULT, canonical_json(content).encode())
         shutil.rmtree(place, ignore_errors=True)
         os.rename(fresh, place)

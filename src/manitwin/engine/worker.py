@@ -102,7 +102,7 @@ class Worker:
             return work.run(stage, draft)
         except Rejected as answer:
             seconds, cpu_seconds = time.perf_counter() - started, time.process_time() - cpu_started
-            return StageRejected(answer, StageCost(seconds, cpu_seconds, 0.0))
+            return StageRejected(answer, StageCost(seconds, cpu_seconds, draft.cost_usd))
 
     def _finish(self, job: Finish) -> Ending:
         stages, work = {s.name: s for s in self.stages(job.kind)}, self._work(job.twin_id)

@@ -41,7 +41,10 @@ class Item:
 
 @dataclass
 class Draft:
-    """A twin in the making: fields and paths with their digests, by artifact name. Cheap to send to another process."""
+    """A twin in the making: fields and paths with their digests, by artifact name. Cheap to send to another process.
+
+    ``cost_usd`` is what services charged for the stage that runs: a stage adds to it.
+    """
 
     twin_id: str
     item: Item
@@ -49,6 +52,7 @@ class Draft:
     fields: dict[str, Any] = dataclass_field(default_factory=dict)
     paths: dict[str, Path] = dataclass_field(default_factory=dict)
     digests: dict[str, str] = dataclass_field(default_factory=dict)
+    cost_usd: float = 0.0
 
     def names(self) -> set[str]:
         """Return the names of all artifacts that are there."""
