@@ -90,5 +90,5 @@ def choose_from(kind: str, name: str, valid: Iterable[str]) -> str:
     """Describe an unknown name: the nearest valid one first, then all of them."""
     valid = sorted(valid)
     near = get_close_matches(name, valid, n=1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    hint = f"; did you mean {near[0]!r}?" if near else "."
     return f"unknown {kind} {name!r}{hint} Valid: {', '.join(valid)}"

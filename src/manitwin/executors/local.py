@@ -20,7 +20,7 @@ from pebble import ProcessExpired, ProcessPool
 from manitwin.config import Resource, RunConfig
 from manitwin.engine.jobs import Failure, Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
-from manitwin.executors.main_module import hidden_main_module
+from manitwin.main_module import hidden_main_module
 
 JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
 PR_SET_PDEATHSIG = 1  # prctl(2)

@@ -17,8 +17,8 @@ from pebble import ProcessExpired, ProcessPool
 
 from manitwin.build_item import ItemResult, build_item
 from manitwin.config import BuildConfig
-from manitwin.executors.main_module import hidden_main_module
 from manitwin.identity import twin_id
+from manitwin.main_module import hidden_main_module
 from manitwin.stages.stage import Item
 
 POLL_S = 0.2

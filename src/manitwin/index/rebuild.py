@@ -17,6 +17,7 @@ from manitwin.index.merge import merged, write_rows
 from manitwin.index.part_list import INDEX, Part, PartList, in_order_of_twins, sweep
 from manitwin.index.parts import rows_of_twins
 from manitwin.index.tables import TABLES, joined, parquet
+from manitwin.main_module import hidden_main_module
 
 CHUNK = 64
 """Twins of a task: some seconds of work, some thousand rows."""
@@ -53,8 +54,7 @@ def rebuild(
     """Replace a data set's index by one made of its folders alone: the same rows as one that was written as the run went.
 
     ``on_start`` is told how many twins there are, ``on_read`` how many more of them have been read. The old index stays until
-    the new one is whole. A script that calls this needs ``if __name__ == "__main__":``, as workers are spawned. Raises
-    TwinError where a worker process dies: nothing has changed then.
+    the new one is whole. Raises TwinError where a worker process dies: nothing has changed then.
     """
     ids = list(root.twin_ids())
     on_start(len(ids))
@@ -62,7 +62,7 @@ def rebuild(
     parts: list[Part] = []
     unreadable: list[str] = []
     number = _first_unused_number(root)
-    with tempfile.TemporaryDirectory(prefix="manitwin-index-") as scratch:
+    with hidden_main_module(), tempfile.TemporaryDirectory(prefix="manitwin-index-") as scratch:
         grasps = 0
         for read in _read_all(root, chunks, Path(scratch), jobs):
             unreadable += read.unreadable
