@@ -7,7 +7,6 @@ from pathlib import Path
 import fsspec
 import pyarrow as pa
 import pytest
-from twin_folders import twin_id, write_accepted, write_rejected, write_set
 
 from manitwin.dataset_root import DatasetRoot, twin_name
 from manitwin.errors import TwinError, UsageError
@@ -17,6 +16,7 @@ from manitwin.index.parts import compact, indexed_twins, write_part
 from manitwin.index.query import Index
 from manitwin.index.rebuild import rebuild
 from manitwin.index.tables import TABLES
+from twin_folders import twin_id, write_accepted, write_rejected, write_set
 
 
 def contents(root: DatasetRoot) -> dict[str, pa.Table]:

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import fsspec
 import pytest
-from twin_folders import twin_id, write_rejected, write_set
 
 from manitwin.dataset_root import DatasetRoot
 from manitwin.errors import UsageError
 from manitwin.index.parts import compact, rows_of_twins, write_part
 from manitwin.index.query import Index
 from manitwin.index.tables import TABLES
+from twin_folders import twin_id, write_rejected, write_set
 
 HOSTILE = [
     "1=1; COPY twins TO 'STOLEN'",
