@@ -14,7 +14,7 @@ from PIL import Image, ImageOps
 
 import manitwin
 import manitwin.config
-from manitwin.pipeline import ItemResult
+from manitwin.build_item import ItemResult
 from manitwin.twin import TwinRecord
 
 pytestmark = pytest.mark.shared_data
