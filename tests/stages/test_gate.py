@@ -18,7 +18,7 @@ from manitwin.twin import REJECTION_REASONS
 class _Eye:
     """An annotator that only judges quality."""
 
-    name, model = "eye", "v1"
+    name, model, needs = "eye", "v1", "vlm"
 
     def __init__(self, verdict: QualityVerdict):
         self.verdict = verdict
