@@ -205,7 +205,8 @@ class RunConfig(Section):
     Ray cluster the gpu slots are its cards, and cpu 0 is all of its cores.
     ``vlm_per_minute`` bounds how many stages that ask a VLM begin in a minute. A stage that kills its worker or fails is
     tried ``attempts`` times. A service that is down is asked again for ``patience_s`` before its items are left for the
-    next run. ``in_flight`` bounds the items that are begun and not ended.
+    next run. ``in_flight`` bounds the items that are begun and not ended. The tables get ``index_every`` twins at a time
+    (0: none, ``manitwin index`` writes them).
     """
 
     cpu: int = Field(default=0, ge=0)
@@ -217,7 +218,7 @@ class RunConfig(Section):
     stage_timeout_s: float = Field(default=1800.0, gt=0)
     patience_s: float = Field(default=1800.0, ge=0)
     in_flight: int = Field(default=1000, ge=1)
-    index_every: int = Field(default=500, ge=1)
+    index_every: int = Field(default=500, ge=0)
     keep_work: bool = True
 
 

@@ -168,3 +168,11 @@ def test_a_result_that_is_not_there_is_done_again(tmp_path: Path, recipe: Rehear
 def test_work_is_dropped_where_nobody_wants_to_resume(tmp_path: Path, recipe: RehearsalRecipe) -> None:
     run = rehearse(tmp_path / "d", ["one"], recipe=recipe, settings=RunConfig(keep_work=False))
     assert run.wrong == [] and list((tmp_path / "d" / ".work").iterdir()) == []
+
+
+def test_tables_may_be_left_to_another_command(tmp_path: Path, recipe: RehearsalRecipe) -> None:
+    run = rehearse(tmp_path / "d", ["one"], recipe=recipe, settings=RunConfig(index_every=0))
+    assert run.states == {"one": "accepted"} and run.wrong == []
+    assert indexed_twins(run.root) == {}
+    again = rehearse(tmp_path / "d", recipe=recipe)
+    assert len(indexed_twins(again.root)) == 1

@@ -144,7 +144,7 @@ class Driver:
                 attempts = flight.opened.attempts.get(flight.stage, 0) + 1
                 self.ledger.stage_started(flight.number, flight.stage, attempts)
                 self._give(flight, needs)
-        if self._since_tables >= self.settings.index_every:
+        if self.settings.index_every and self._since_tables >= self.settings.index_every:
             self._write_tables()
 
     def _give(self, flight: Flight | None, needs: Resource) -> None:
@@ -275,7 +275,7 @@ class Driver:
 
     def _last_tables(self) -> bool:
         """Write the tables of the last items, then merge all; returns whether there is still something to do."""
-        if self._merged:
+        if self._merged or not self.settings.index_every:
             return False
         self._write_tables()
         if self._tables is None:
