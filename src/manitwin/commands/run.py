@@ -11,7 +11,7 @@ from manitwin.commands import options
 from manitwin.commands.console import err_console, out_console, print_estimate
 
 if TYPE_CHECKING:
-    from manitwin.dataset_run import ExecutorName
+    from manitwin.dataset_run import ExecutorName, RunReport
     from manitwin.engine.driver import ItemEnded
 
 STYLES = {"accepted": "green", "rejected": "yellow", "failed": "red", "duplicate": "dim"}
@@ -89,15 +89,7 @@ def run(
         on_start=started,
         on_ended=_print_item if lines else lambda event: None,
     )
-    for remark in report.remarks:
-        err_console.print(remark, markup=False)
-    out_console.print(", ".join(f"{count} {state}" for state, count in report.counts.items()), markup=False)
-    if report.left:
-        err_console.print(f"{report.left} items wait for a service that does not answer", markup=False)
-    if report.stopped:
-        err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
-    if report.exit_code == 4:
-        err_console.print(f"manitwin status {dataset} says more; run the same command again to go on", markup=False)
+    _print_report(report, dataset)
     raise typer.Exit(report.exit_code)
 
 
@@ -109,6 +101,20 @@ def _executor(name: str) -> ExecutorName:
         if name == known:
             return known
     raise UsageError(choose_from("executor", name, EXECUTORS))
+
+
+def _print_report(report: RunReport, dataset: str) -> None:
+    for remark in report.remarks:
+        err_console.print(remark, markup=False)
+    out_console.print(", ".join(f"{count} {state}" for state, count in report.counts.items()), markup=False)
+    if report.left:
+        # a run that was stopped says by itself what for: no money left, a key that is refused
+        why = "" if report.stopped else " for a service that does not answer"
+        err_console.print(f"{report.left} items wait{why}", markup=False)
+    if report.stopped:
+        err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
+    if report.exit_code == 4:
+        err_console.print(f"manitwin status {dataset} says more; run the same command again to go on", markup=False)
 
 
 def _print_item(event: ItemEnded) -> None:

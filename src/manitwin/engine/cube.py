@@ -67,7 +67,7 @@ CUBE: dict[str, Any] = {
 @lru_cache(maxsize=1)
 def cube_files() -> dict[str, bytes]:
     """Return the files that go with the record: the cube that is seen, and an empty table of grasps."""
-    cube = trimesh.creation.box([0.05] * 3)
+    cube = trimesh.creation.box([0.05] * 3).apply_translation([0, 0, 0.025])  # it stands on z = 0
     cube.metadata["name"] = "cube"
     cube.visual = TextureVisuals(
         material=PBRMaterial(baseColorFactor=[150, 110, 70, 255], metallicFactor=0.0, roughnessFactor=0.8)

@@ -176,7 +176,9 @@ def test_broken_mesh_is_never_taken(tmp_path: Path, fault: str, texture: bool) -
     with FakeServer(FakeHunyuan3d(faults=Faults({fault: ALWAYS}))) as server:
         error = BadReply if fault == "empty_mesh" else Rejected
         generator = client(server, options={"texture": texture})
-        refused(error, lambda: driven(generator, tmp_path, KeptJobs(), config))
+        said = refused(error, lambda: driven(generator, tmp_path, KeptJobs(), config))
+    assert ("empty" in said or "no mesh" in said) if fault == "empty_mesh" else "generator_failed" in said
+    assert not list(tmp_path.rglob("*.glb")), "nothing is left that could be taken for a mesh"
 
 
 def test_answer_that_is_no_base64_is_a_bad_reply() -> None:

@@ -15,10 +15,11 @@ from manitwin.config import VlmConfig
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Unavailable
 from manitwin.fakes.anthropic_messages import FakeAnthropic
 from manitwin.fakes.faults import ALWAYS, Faults
-from manitwin.fakes.server import FakeServer, Request, Response
+from manitwin.fakes.server import FakeServer, Response
 from manitwin.models.vlm.anthropic_messages import AnthropicMessages
 from manitwin.models.vlm.protocol import Turn
 from manitwin.models.vlm.structured import ask
+from scripted_service import Script
 
 
 def chat(server: FakeServer, key: str | None = KEY, waits: Waits | None = None, **changes: Any) -> AnthropicMessages:
@@ -29,16 +30,6 @@ def chat(server: FakeServer, key: str | None = KEY, waits: Waits | None = None, 
 def fake(faults: dict[str, int] | None = None, **options: Any) -> Iterator[FakeServer]:
     with FakeServer(FakeAnthropic(Faults(faults or {}), KEY, answer_mug, **options)) as server:
         yield server
-
-
-class Says:
-    """A service with one answer."""
-
-    def __init__(self, response: Response):
-        self.response = response
-
-    def answer(self, request: Request, base_url: str) -> Response:
-        return self.response
 
 
 def test_question_is_answered_and_charged() -> None:
@@ -147,13 +138,13 @@ def test_invalid_schema_is_no_lack_of_structured_output() -> None:
     "body", [b"<html>", b"[]", b"{}", b'{"content": [{"type": "text"}], "stop_reason": "end_turn"}']
 )
 def test_body_of_another_form_is_a_bad_reply(body: bytes) -> None:
-    with FakeServer(Says(Response(200, body))) as server, pytest.raises(BadReply):
+    with FakeServer(Script(Response(200, body))) as server, pytest.raises(BadReply):
         chat(server).ask(question())
 
 
 def test_context_that_ends_is_no_answer() -> None:
     said = {"content": [{"type": "text", "text": "{"}], "stop_reason": "model_context_window_exceeded", "usage": {}}
-    with FakeServer(Says(Response(200, said))) as server, pytest.raises(BadReply, match=r"vlm\.picture_px"):
+    with FakeServer(Script(Response(200, said))) as server, pytest.raises(BadReply, match=r"vlm\.picture_px"):
         chat(server).ask(question())
 
 
@@ -165,7 +156,7 @@ def test_tokens_of_a_prompt_cache_count_as_read() -> None:
         "model": "claude-x-1",
         "usage": usage,
     }
-    with FakeServer(Says(Response(200, said))) as server:
+    with FakeServer(Script(Response(200, said))) as server:
         reply = chat(server).ask(question())
     assert (reply.usage.input_tokens, reply.usage.output_tokens, json.loads(reply.text)) == (23, 3, MUG)
 
@@ -174,7 +165,7 @@ def test_tokens_of_a_prompt_cache_count_as_read() -> None:
 def test_key_that_a_server_repeats_is_not_passed_on(status: int) -> None:
     secret = "sk-ant-very-secret-0123456789"
     echo = Response(status, {"type": "error", "error": {"type": secret, "message": f"not with {secret}"}})
-    with FakeServer(Says(echo)) as server:
+    with FakeServer(Script(echo)) as server:
         asker = chat(server, key=secret, retries=0)
         with pytest.raises((AccessDenied, BadReply, RateLimited, Unavailable)) as caught:
             asker.ask(question())

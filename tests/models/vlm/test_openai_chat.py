@@ -18,12 +18,13 @@ from manitwin.config import VlmConfig
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Unavailable
 from manitwin.fakes.faults import ALWAYS, Faults
 from manitwin.fakes.openai_chat import FakeOpenAi
-from manitwin.fakes.server import FakeServer, Request, Response
+from manitwin.fakes.server import FakeServer, Response
 from manitwin.models.vlm.openai_chat import OpenAiChat
 from manitwin.models.vlm.openai_completion import completion
 from manitwin.models.vlm.probe import probe
 from manitwin.models.vlm.protocol import Turn
 from manitwin.models.vlm.structured import ask
+from scripted_service import Script
 
 
 def chat(server: FakeServer, key: str | None = KEY, waits: Waits | None = None, **changes: Any) -> OpenAiChat:
@@ -34,16 +35,6 @@ def chat(server: FakeServer, key: str | None = KEY, waits: Waits | None = None, 
 def fake(faults: dict[str, int] | None = None, **options: Any) -> Iterator[FakeServer]:
     with FakeServer(FakeOpenAi(Faults(faults or {}), KEY, answer_mug, **options)) as server:
         yield server
-
-
-class Says:
-    """A service with one answer."""
-
-    def __init__(self, response: Response):
-        self.response = response
-
-    def answer(self, request: Request, base_url: str) -> Response:
-        return self.response
 
 
 def test_question_is_answered_and_charged_by_the_tokens_that_the_server_counts() -> None:
@@ -253,22 +244,22 @@ def test_unknown_model_is_named() -> None:
     ],
 )
 def test_body_of_another_form_is_a_bad_reply(body: bytes) -> None:
-    with FakeServer(Says(Response(200, body))) as server, pytest.raises(BadReply, match="no chat completion"):
+    with FakeServer(Script(Response(200, body))) as server, pytest.raises(BadReply, match="no chat completion"):
         chat(server).ask(question())
 
 
 def test_tokens_are_estimated_where_the_server_counts_none() -> None:
     said = {"choices": [{"message": {"content": json.dumps(MUG)}, "finish_reason": "stop"}]}
-    with FakeServer(Says(Response(200, said))) as server, counted() as bill:
+    with FakeServer(Script(Response(200, said))) as server, counted() as bill:
         reply = chat(server).ask(question())
     assert reply.usage.output_tokens == -(-len(reply.text) // 4)
     assert bill.usd > 0
 
 
 def test_redirect_is_not_followed_with_the_key() -> None:
-    with FakeServer(Says(Response(200, {}))) as elsewhere:
+    with FakeServer(Script(Response(200, {}))) as elsewhere:
         moved = Response(307, b"", {"Location": f"{elsewhere.url}/v1/chat/completions"})
-        with FakeServer(Says(moved)) as server, pytest.raises(BadReply, match="redirects"):
+        with FakeServer(Script(moved)) as server, pytest.raises(BadReply, match="redirects"):
             chat(server).ask(question())
     assert elsewhere.requests == []
 
@@ -291,7 +282,7 @@ def test_key_that_a_server_repeats_is_not_passed_on(
 ) -> None:
     secret = "sk-very-secret-0123456789"
     echo = Response(status, {"error": {"message": f"not with {secret}", "code": secret}})
-    with FakeServer(Says(echo)) as server, caplog.at_level(logging.DEBUG):
+    with FakeServer(Script(echo)) as server, caplog.at_level(logging.DEBUG):
         asker = chat(server, key=secret, retries=0)
         with pytest.raises((AccessDenied, BadReply, RateLimited, Unavailable)) as caught:
             asker.ask(question())

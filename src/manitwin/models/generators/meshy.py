@@ -19,7 +19,7 @@ from manitwin.models.generators.protocol import Generated, GenerationRequest, Jo
 from manitwin.models.generators.service import usd_per_job
 from manitwin.models.generators.submission import checked_address, data_uri, submit_paid
 from manitwin.models.services.http import Service
-from manitwin.models.services.keys import key_from_environment, split_url
+from manitwin.models.services.keys import bearer, key_from_environment, split_url
 
 VENDOR = "https://api.meshy.ai"
 KEY = "MESHY_API_KEY"
@@ -57,7 +57,7 @@ class MeshyGenerator:
         self._service = Service(
             "meshy",
             base_url,
-            authorization={"Authorization": f"Bearer {key}"} if key else {},
+            authorization=bearer(key),
             services=config.services,
             key=key,
             remedy=f"check {KEY} and your credits at https://www.meshy.ai/settings/api",

@@ -18,7 +18,7 @@ from manitwin.errors import BadReply, ConfigError, choose_from
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
 from manitwin.models.generators.service import address, chosen, png_of, usd_per_job
 from manitwin.models.services.http import FormFile, Gone, Refusal, Service, refusal_by_status
-from manitwin.models.services.keys import key_from_environment, split_url
+from manitwin.models.services.keys import bearer, key_from_environment, split_url
 from manitwin.models.services.refusal import kind_of_status
 
 URL = "https://api.hyper3d.com/api/v2"
@@ -72,7 +72,7 @@ class RodinGenerator:
         self._service = Service(
             self.name,
             url,
-            authorization={} if key is None else {"Authorization": f"Bearer {key}"},
+            authorization=bearer(key),
             services=config.services,
             key=key,
             remedy=f"check {' or '.join(KEYS)}, and the plan and credits at hyper3d.ai",

@@ -174,6 +174,7 @@ class _Drive:
         self._wait_for(job_id)
         generated = self.generator.fetch(job_id, self.folder)
         if not generated.path.is_file() or generated.path.stat().st_size == 0:
+            generated.path.unlink(missing_ok=True)
             raise BadReply(f"{self.generator.name}: its job is done but left no mesh; run it again")
         wrong = None if self.generator.needs == "cpu" else flaw(generated.path)
         if wrong is not None:

@@ -46,6 +46,11 @@ def key_from_environment(names: Sequence[str], url: str, what: str) -> str | Non
     raise ConfigError(f"{what} needs a key: set {' or '.join(names)} in the environment")
 
 
+def bearer(key: str | None) -> dict[str, str]:
+    """Return the header that most services take a key in; none without a key."""
+    return {"Authorization": f"Bearer {key}"} if key else {}
+
+
 def redacted(text: str, key: str | None) -> str:
     """Return one line of at most 300 characters in which the key does not appear."""
     line = " ".join(text.split())

@@ -5,12 +5,10 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Mapping
 from hashlib import sha256
 from pathlib import Path
 
-from manitwin.models.vlm.client import ChatClient
-from manitwin.models.vlm.prices import TokenPrice
+from manitwin.models.vlm.client import Around, ChatClient
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
 from manitwin.models.vlm.question_digest import question_digest
 
@@ -21,7 +19,7 @@ def default_folder() -> Path:
     return (Path(base) if os.path.isabs(base) else Path.home() / ".cache") / "manitwin" / "vlm"
 
 
-class Cached:
+class Cached(Around):
     """A chat model that is asked each question once.
 
     An answer is kept under the question, its turns and what else ``decides`` it: server, model and settings. Several
@@ -30,21 +28,11 @@ class Cached:
     """
 
     def __init__(self, inner: ChatClient, folder: Path):
-        self.inner, self.folder = inner, folder
-        self.name, self.model = inner.name, inner.model
+        super().__init__(inner)
+        self.folder = folder
 
     def __repr__(self) -> str:
         return f"Cached({self.inner!r}, {str(self.folder)!r})"
-
-    @property
-    def price(self) -> TokenPrice:
-        """What tokens cost of an answer that is not kept yet."""
-        return self.inner.price
-
-    @property
-    def decides(self) -> Mapping[str, str | float | None]:
-        """What decides an answer besides the question."""
-        return self.inner.decides
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Answer a question from the folder, or ask and keep the answer."""

@@ -17,6 +17,7 @@ from typing import Any
 from manitwin.config import ServicesConfig, VlmConfig
 from manitwin.errors import BadReply, ConfigError
 from manitwin.models.services.http import Service
+from manitwin.models.services.keys import bearer
 from manitwin.models.services.refusal import Refusal, refusal_by_status
 from manitwin.models.vlm.completion import Completion
 from manitwin.models.vlm.openai_dialect import instructions_with_schema, titled_schema
@@ -34,7 +35,7 @@ def _key_headers(base_url: str, key: str | None) -> dict[str, str]:
     if key is None:
         return {}
     own = {"x-api-key": key}
-    return own if base_url == ANTHROPIC_URL else own | {"Authorization": f"Bearer {key}"}
+    return own if base_url == ANTHROPIC_URL else own | bearer(key)
 
 
 class AnthropicMessages:

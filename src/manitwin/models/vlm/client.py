@@ -23,6 +23,24 @@ class ChatClient(ChatModel, Protocol):
     def decides(self) -> Mapping[str, str | float | None]: ...
 
 
+class Around:
+    """A chat client around another one, which it is like but for how it answers."""
+
+    def __init__(self, inner: ChatClient):
+        self.inner = inner
+        self.name, self.model = inner.name, inner.model
+
+    @property
+    def price(self) -> TokenPrice:
+        """What tokens cost, where they have to be paid."""
+        return self.inner.price
+
+    @property
+    def decides(self) -> Mapping[str, str | float | None]:
+        """What decides an answer besides the question."""
+        return self.inner.decides
+
+
 @runtime_checkable
 class Forgetful(Protocol):
     """A chat model that keeps answers, and can drop one that turned out to be of no use."""

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from manitwin.errors import BadReply, ConfigError
-from manitwin.models.vlm.client import ChatClient, Forgetful
+from manitwin.models.vlm.client import Around, ChatClient, Forgetful
 from manitwin.models.vlm.prices import FREE, TokenPrice
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
 from manitwin.models.vlm.question_digest import question_digest
@@ -69,31 +69,21 @@ class Replay:
         return reply
 
 
-class Recorded:
+class Recorded(Around):
     """A chat model whose answers are added to a record, by any number of processes at once.
 
     An answer that is there already is not added again. Raises ConfigError for a record of another model.
     """
 
     def __init__(self, inner: ChatClient, path: Path):
-        self.inner, self.path = inner, path
-        self.name, self.model = inner.name, inner.model
+        super().__init__(inner)
+        self.path = path
         self._there, self._read_to = set[tuple[str, str]](), 0
         with _locked(self.path) as stream:
             self._read_on(stream)
 
     def __repr__(self) -> str:
         return f"Recorded({self.inner!r}, {str(self.path)!r})"
-
-    @property
-    def price(self) -> TokenPrice:
-        """What tokens cost."""
-        return self.inner.price
-
-    @property
-    def decides(self) -> Mapping[str, str | float | None]:
-        """What decides an answer besides the question."""
-        return self.inner.decides
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Answer a question, and record the answer."""
