@@ -97,15 +97,15 @@ class DatasetRoot:
         found = self.fs.find(self.full(name)) if self.fs.exists(self.full(name)) else []
         return sorted(str(path).removeprefix(root) for path in found)
 
-    def put_folder(self, fresh: Path, name: str) -> None:
-        """Move a finished local folder to its name; its record goes last, and what the older one had more goes then.
+    def put_folder(self, fresh: Path, name: str, record: str = RECORD) -> None:
+        """Move a finished local folder to its name; its ``record`` goes last, and what the older one had more goes then.
 
         On a local root ``fresh`` must be on the same file system, and is renamed.
         """
         if self.local is not None:
             replace_folder(fresh, Path(self.full(name)))
             return
-        files = sorted((p for p in fresh.rglob("*") if p.is_file()), key=lambda p: (p.name == RECORD, p))
+        files = sorted((p for p in fresh.rglob("*") if p.is_file()), key=lambda p: (p.name == record, p))
         names = [f"{name}/{path.relative_to(fresh).as_posix()}" for path in files]
         before = self.names_below(name)
         for path, target in zip(files, names, strict=True):

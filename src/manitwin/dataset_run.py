@@ -13,20 +13,22 @@ from contextlib import AbstractContextManager, closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 from pydantic import ValidationError
 
-from manitwin.config import BuildConfig
+from manitwin.config import BuildConfig, RunConfig
 from manitwin.dataset_root import DatasetRoot
 from manitwin.engine.driver import Driver, ItemEnded
 from manitwin.engine.executor import Executor, InlineExecutor
 from manitwin.engine.jobs import WorkerSetup
+from manitwin.engine.recipe import Recipe
 from manitwin.engine.work import WorkFolder
 from manitwin.errors import UsageError, choose_from
 from manitwin.ledger.ledger import LEDGER, Ledger
 from manitwin.manifest import iterate_items
 from manitwin.pipeline import TwinRecipe, check_names, estimate_usd
+from manitwin.stages.stage import Item
 from manitwin.store import canonical_json
 
 CONFIG = "config.json"
@@ -70,28 +72,66 @@ def run(
     ``config`` None: the data set's own. A changed configuration does again what it touches. Raises UsageError for
     wrong arguments, or where another run is at work on the data set. What becomes of an item is in the ledger.
     """
-    if executor not in EXECUTORS:
-        raise UsageError(choose_from("executor", executor, EXECUTORS))
     root = DatasetRoot(dataset)
     settings = config or stored_config(root)
     check_names(settings)
-    recipe = TwinRecipe(settings)
     remarks: list[str] = []
+
+    def started(items: int, opened: int) -> None:
+        on_estimate(estimate_usd(settings))
+        on_start(items, opened)
+
+    return drive(
+        TwinRecipe(settings),
+        iterate_items(inputs, defaults or {}, remarks, texts),
+        root,
+        settings.run,
+        configuration=settings.model_dump(mode="json"),
+        executor=executor,
+        address=address,
+        max_cost_usd=settings.services.max_cost_usd,
+        remarks=remarks,
+        on_start=started,
+        on_ended=on_ended,
+    )
+
+
+def drive(
+    recipe: Recipe,
+    items: Iterable[Item],
+    root: DatasetRoot,
+    settings: RunConfig,
+    *,
+    configuration: dict[str, Any],
+    executor: ExecutorName = "local",
+    address: str | None = None,
+    max_cost_usd: float | None = None,
+    remarks: list[str] | None = None,
+    on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+) -> RunReport:
+    """Add items to the ledger below a root and make of each what the recipe says, until all have ended.
+
+    ``configuration`` is left beside the ledger. What was remarked while items were read is in ``remarks``. Raises
+    UsageError for wrong arguments, or where another run is at work there.
+    """
+    if executor not in EXECUTORS:
+        raise UsageError(choose_from("executor", executor, EXECUTORS))
+    remarks = [] if remarks is None else remarks
     path = local_ledger(root)
     ledger = Ledger(path)
     try:
-        given, new = ledger.add_items(iterate_items(inputs, defaults or {}, remarks, texts))
+        given, new = ledger.add_items(items)
         if given and given > new:
             remarks.append(f"{given - new} of {given} items were in the data set already")
-        root.write_bytes(CONFIG, canonical_json(settings.model_dump(mode="json")).encode())
-        setup = WorkerSetup(str(dataset), recipe, cache_folder(root), settings.run.keep_work)
+        root.write_bytes(CONFIG, canonical_json(configuration).encode())
+        setup = WorkerSetup(root.url, recipe, cache_folder(root), settings.keep_work)
         copy = _LedgerCopy(root, path)
         with _executor(executor, address, setup, settings) as engine:
             driver = Driver(
-                ledger, engine, recipe, settings.run, on_ended=_both(on_ended, copy), sweep=partial(sweep, root),
-                max_cost_usd=settings.services.max_cost_usd,
+                ledger, engine, recipe, settings, on_ended=_both(on_ended, copy), sweep=partial(sweep, root),
+                max_cost_usd=max_cost_usd,
             )  # fmt: skip
-            on_estimate(estimate_usd(settings))
             on_start(*ledger.totals(recipe.sha256))
             result = driver.run()
         return RunReport(ledger.counts(), result.stopped, result.left, remarks)
@@ -141,17 +181,17 @@ def _digest(url: str) -> str:
 
 
 def _executor(
-    name: str, address: str | None, setup: WorkerSetup, settings: BuildConfig
+    name: str, address: str | None, setup: WorkerSetup, settings: RunConfig
 ) -> AbstractContextManager[Executor]:
     if name == "local":
         from manitwin.executors.local import LocalExecutor
 
-        return LocalExecutor(setup, settings.run)
+        return LocalExecutor(setup, settings)
     if name == "inline":
         return closing(InlineExecutor(setup))
     from manitwin.executors.ray_cluster import RayExecutor
 
-    return RayExecutor(setup, settings.run, address)
+    return RayExecutor(setup, settings, address)
 
 
 def _both(first: Callable[[ItemEnded], None], second: Callable[[ItemEnded], None]) -> Callable[[ItemEnded], None]:

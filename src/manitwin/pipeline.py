@@ -9,6 +9,7 @@ from typing import Literal, cast
 
 from manitwin.assembly import assemble
 from manitwin.config import BuildConfig
+from manitwin.dataset_root import twin_name
 from manitwin.engine.recipe import INPUT, Ending, Identity
 from manitwin.errors import Rejected, TwinError, UsageError
 from manitwin.files.sniff import sniff
@@ -37,7 +38,7 @@ from manitwin.stages.second_opinion import SecondOpinionStage
 from manitwin.stages.stage import Draft, Item, PaidStage, Stage
 from manitwin.stages.verify import VerifyStage
 from manitwin.stages.views import ViewsStage
-from manitwin.store import parse_record, sha256_of_json
+from manitwin.store import RECORD, parse_record, sha256_of_json
 from manitwin.twin import StageProvenance, TwinRecord
 
 Kind = Literal["image", "text", "mesh"]
@@ -171,6 +172,15 @@ class TwinRecipe:
     def seed(self) -> int:
         """The seed of everything random."""
         return self.config.seed
+
+    @property
+    def record(self) -> str:
+        """The record of a twin."""
+        return RECORD
+
+    def folder_of(self, twin_id: str) -> str:
+        """Return the twin's folder."""
+        return twin_name(twin_id)
 
     def identify(self, item: Item) -> Identity:
         """Return the id by the input's bytes, and its kind by what they are, not by what they claim to be."""

@@ -1,4 +1,7 @@
-"""What a run makes of each item: the engine's border to the pipeline."""
+"""What a run makes of each item: the engine's border to the pipeline, and to the applications.
+
+The engine speaks of twins; an application's recipe makes a folder of its own kind under the same rules, by an id of its own.
+"""
 
 from __future__ import annotations
 
@@ -44,6 +47,15 @@ class Recipe(Protocol):
     @property
     def seed(self) -> int:
         """The seed of everything random."""
+        ...
+
+    @property
+    def record(self) -> str:
+        """The file that makes a folder a finished one; it is written last."""
+        ...
+
+    def folder_of(self, twin_id: str) -> str:
+        """Return the name of an item's finished folder below the data set's root."""
         ...
 
     def identify(self, item: Item) -> Identity:

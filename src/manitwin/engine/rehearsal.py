@@ -30,12 +30,13 @@ from pydantic import BaseModel
 
 from manitwin.charges import charge
 from manitwin.config import Resource
+from manitwin.dataset_root import twin_name
 from manitwin.engine.cube import CUBE, cube_files
 from manitwin.engine.recipe import Ending, Identity
 from manitwin.errors import AccessDenied, RateLimited, Rejected, Unavailable
 from manitwin.stage_runner import StageCost
 from manitwin.stages.stage import Draft, Item, Stage
-from manitwin.store import RUN, canonical_json, seal, sha256_of_json, write_bytes_atomically
+from manitwin.store import RECORD, RUN, canonical_json, seal, sha256_of_json, write_bytes_atomically
 from manitwin.twin import SCHEMA_VERSION
 
 
@@ -122,6 +123,15 @@ class RehearsalRecipe:
     def sha256(self) -> str:
         """The digest of what decides the results."""
         return sha256_of_json([self.plan, self.versions, self.size, self.seed])
+
+    @property
+    def record(self) -> str:
+        """The record of a twin."""
+        return RECORD
+
+    def folder_of(self, twin_id: str) -> str:
+        """Return the twin's folder."""
+        return twin_name(twin_id)
 
     def identify(self, item: Item) -> Identity:
         """Return the hash of the text."""

@@ -9,7 +9,7 @@ import traceback
 from dataclasses import replace
 
 from manitwin.charges import counted
-from manitwin.dataset_root import DatasetRoot, twin_name
+from manitwin.dataset_root import DatasetRoot
 from manitwin.engine.jobs import (
     Failure,
     Finish,
@@ -28,7 +28,7 @@ from manitwin.errors import AccessDenied, BackendError, RateLimited, Rejected, U
 from manitwin.models.generators.job_memory import RootJobMemory
 from manitwin.stage_runner import JOBS, StageCost, StageRun, lost_usd
 from manitwin.stages.stage import Draft, Item, Stage
-from manitwin.store import RECORD, WORK
+from manitwin.store import WORK
 
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
@@ -101,8 +101,9 @@ class Worker:
         return Surveyed(identity.twin_id, identity.kind, ending, tuple(done))
 
     def _ending(self, twin_id: str) -> Ending | None:
-        name = f"{twin_name(twin_id)}/{RECORD}"
-        return self.setup.recipe.ending_of(self.root.read_bytes(name)) if self.root.exists(name) else None
+        recipe = self.setup.recipe
+        name = f"{recipe.folder_of(twin_id)}/{recipe.record}"
+        return recipe.ending_of(self.root.read_bytes(name)) if self.root.exists(name) else None
 
     def _run(self, job: RunStage) -> StageRun | StageRejected:
         stages = self.stages(job.kind)
@@ -127,7 +128,7 @@ class Worker:
             costs[job.stage] = job.rejected.cost
         try:
             ending = self.setup.recipe.finish(draft, job.kind, costs, answer, job.stage, work.fresh)
-            self.root.put_folder(work.fresh, twin_name(job.twin_id))
+            self.root.put_folder(work.fresh, self.setup.recipe.folder_of(job.twin_id), self.setup.recipe.record)
         finally:
             shutil.rmtree(work.fresh, ignore_errors=True)
         if not self.setup.keep_work:

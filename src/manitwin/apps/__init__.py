@@ -1,0 +1,1 @@
+"""What twins are used for: one folder an application of the paper."""

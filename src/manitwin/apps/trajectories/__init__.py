@@ -1,0 +1,1 @@
+"""Manipulation data (paper, Manipulation Data Generation and Cross-Embodiment Data): demonstrations planned and proven."""

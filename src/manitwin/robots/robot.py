@@ -1,0 +1,50 @@
+"""A robot as data: an arm with a parallel gripper, as planner and simulation take it.
+
+World frame: the arm's base link at the origin, +Z up, +X forward; the table's top is the plane z = 0 below it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.simulate.hands.parallel import ParallelGripper
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """Where an object on the table can be reached from above: an annular sector about the base's axis, +X in its middle."""
+
+    min_radius_m: float
+    max_radius_m: float
+    half_angle_rad: float
+
+
+@dataclass(frozen=True)
+class Robot:
+    """An arm of n revolute joints and a hand of two prismatic fingers that open by equal amounts.
+
+    ``urdf`` is the whole robot as text, its meshes by absolute path. ``gripper_to_tip (4, 4)`` is the pose of the twin's grasp
+    frame (+Z approach, X closing) in the frame of ``tip_link``. ``finger_joints`` go from 0 (closed) to half of the opening;
+    the first one's finger is on the side of +X of the grasp frame. ``hand_links`` are the links behind the tip that may touch
+    the held object, ``finger_links`` those two that press on it. ``disabled_pairs`` are pairs of links that are not tested for
+    collision with each other.
+    """
+
+    name: str
+    sha256: str
+    source: str
+    urdf: str
+    arm_joints: tuple[str, ...]
+    finger_joints: tuple[str, str]
+    tip_link: str
+    gripper_to_tip: np.ndarray
+    gripper: ParallelGripper
+    hand_links: tuple[str, ...]
+    finger_links: tuple[str, str]
+    disabled_pairs: tuple[tuple[str, str], ...]
+    home_rad: np.ndarray
+    velocity_limits_rad_s: np.ndarray
+    acceleration_limits_rad_s2: np.ndarray
+    workspace: Workspace

@@ -1,0 +1,1 @@
+"""Scenes of several twins: the scene file, and the way into simulators and pictures."""
