@@ -89,7 +89,7 @@ def test_changed_setting_runs_its_stage_and_what_follows_only(samples: dict[str,
     work = out / ".work" / report.results[0].twin_id
     runs = {folder.name: len(list(folder.iterdir())) for folder in work.iterdir() if folder.is_dir()}
     assert runs["placement"] == runs["finish"] == 2
-    assert runs["mesh"] == runs["verify"] == runs["collision"] == 1
+    assert runs["mesh"] == runs["points"] == runs["collision"] == 1
 
 
 def test_mass_properties_agree_with_mujoco(samples: dict[str, Twin]) -> None:

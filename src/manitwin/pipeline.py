@@ -79,12 +79,12 @@ def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
         GateStage(config.gate, annotator),
         PhysicalStage(config.physical, annotator),
         CollisionStage(config.collision),
+        PlacementStage(config.placement),
         CaptionStage(config.caption, annotator),
         CandidatesStage(config.candidates),
         PointsStage(config.points, annotator, first),
         *(stage for gripper, suffix in grippers for stage in _trials(gripper, suffix, config)),
         RecordGraspsStage(config.second_opinion, grippers),
-        PlacementStage(config.placement),
         FinishStage(config.finish, first),
     ]
 

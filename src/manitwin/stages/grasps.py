@@ -13,9 +13,11 @@ import numpy as np
 
 from manitwin.config import GraspConfig, Resource
 from manitwin.geometry.grasp_diversity import approach_octants
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest
 from manitwin.simulate.grasp_selection import select_likely
 from manitwin.simulate.gripper import Gripper
+from manitwin.simulate.hands.parallel import ParallelGripper
 from manitwin.stages.association import associate, distances_to_grasps
 from manitwin.stages.given_grasps import with_given
 from manitwin.stages.gripper_kinds import KINDS
@@ -23,6 +25,7 @@ from manitwin.stages.object_arrays import JOINTS, load_hulls, load_solid
 from manitwin.stages.proposal_rounds import Kept, propose_in_rounds
 from manitwin.stages.stage import Draft
 from manitwin.stages.subject import read_given
+from manitwin.stages.support_rounds import on_support, with_support_rounds
 
 PROPOSALS = "proposals{}.npz"
 PROPOSED = "proposals{}"
@@ -36,8 +39,8 @@ class GraspsStage:
     rejects the object; another one is left with no proposals and the reason.
     """
 
-    version = "2"
-    reads: ClassVar[tuple[str, ...]] = ("solid.npz", "hulls.npz", "points", "physical", "geometry?")
+    version = "3"
+    reads: ClassVar[tuple[str, ...]] = ("solid.npz", "hulls.npz", "points", "physical", "placements", "geometry?")
 
     def __init__(self, settings: GraspConfig, grasper: Grasper, gripper: Gripper, suffix: str = ""):
         """Take the settings, who proposes, and for which gripper."""
@@ -56,6 +59,7 @@ class GraspsStage:
         request = self._request(draft)
         screen = KINDS[self.gripper.kind].screen(request)
         kept = propose_in_rounds(request, self.grasper, screen, settings)
+        kept = with_support_rounds(kept, request, self.grasper, screen, settings)
         kept, given = with_given(kept, read_given(draft), self.gripper, screen, request, settings.simulated)
         if not len(kept.proposals):
             answer = screen.why_none(kept.counts)
@@ -71,7 +75,9 @@ class GraspsStage:
             object_size_m=float(np.linalg.norm(request.solid.extents)),
         )
         near = association.index + len(given)
-        chosen = np.concatenate([np.arange(len(given)), _likely(kept, near, settings.simulated)])
+        chosen = np.concatenate(
+            [np.arange(len(given)), _likely(kept, near, self._on_support(kept, near, request), settings)]
+        )
         self._write(folder / self.file, request, kept, chosen, points, given)
         octants = approach_octants(kept.proposals.gripper_to_object)
         return {
@@ -90,6 +96,16 @@ class GraspsStage:
             }
         }
 
+    def _on_support(self, kept: Kept, near: np.ndarray, request: GraspRequest) -> list[np.ndarray]:
+        """Tell of each support which of the kept are near a point and leave room for it ``(N,)``."""
+        gripper = self.gripper
+        if not isinstance(gripper, ParallelGripper):
+            return []
+        is_near = np.zeros(len(kept.proposals), bool)
+        is_near[near] = True
+        radius_m = float("inf")  # what is near enough was decided by the association
+        return [is_near & on_support(kept, gripper, support, radius_m) for support in request.supports]
+
     def _request(self, draft: Draft) -> GraspRequest:
         physical, points = draft.field("physical"), draft.field("points")
         return GraspRequest(
@@ -104,6 +120,7 @@ class GraspsStage:
             seed=draft.seed,
             grasp_points_m=np.array([p["position_m"] for p in points["grasp"]]),
             grasp_types=tuple(p["type"] for p in points["grasp"]),
+            supports=picked_from(draft.field("placements")),
         )
 
     def _write(
@@ -143,11 +160,37 @@ class GraspsStage:
         np.savez(path, allow_pickle=False, **arrays)
 
 
-def _likely(kept: Kept, near: np.ndarray, count: int) -> np.ndarray:
-    if not len(near):
-        return near
-    some = kept.proposals.take(near)
-    return near[select_likely(some.gripper_to_object, some.depth_m, kept.merits.take(near), count)]
+def picked_from(placements: list[dict[str, Any]]) -> tuple[np.ndarray, ...]:
+    """Return ``object_to_plane (4, 4)`` of the placements that robots will find the object in.
+
+    These are the most probable of those that stayed, and the most probable upright one of them.
+    """
+    settled = sorted((p for p in placements if p["settled"]), key=lambda p: -p["probability"])
+    upright = [p for p in settled if p["upright"]]
+    first = [*settled[:1], *(p for p in upright[:1] if p is not settled[0])]
+    return tuple(
+        transform(rotation_from_quaternion_wxyz(np.array(p["quaternion_wxyz"])), np.array(p["position_m"]))
+        for p in first
+    )
+
+
+def _likely(kept: Kept, near: np.ndarray, on_support: list[np.ndarray], settings: GraspConfig) -> np.ndarray:
+    """Choose among the kept at ``near``; of those in each of ``on_support`` (``(N,)`` bool) no less than their share."""
+    chosen = _select(kept, near, settings.simulated)
+    wanted = round(settings.on_support_share * settings.simulated)
+    short = [np.flatnonzero(free) for free in on_support if free[chosen].sum() < min(wanted, int(free.sum()))]
+    if not short:
+        return chosen
+    sure = np.unique(np.concatenate([_select(kept, free, wanted) for free in short]))
+    rest = np.setdiff1d(near, sure)
+    return np.sort(np.concatenate([sure, _select(kept, rest, settings.simulated - len(sure))]))
+
+
+def _select(kept: Kept, among: np.ndarray, count: int) -> np.ndarray:
+    if not len(among) or count <= 0:
+        return among[:0]
+    some = kept.proposals.take(among)
+    return among[select_likely(some.gripper_to_object, some.depth_m, kept.merits.take(among), count)]
 
 
 def _hand_joints(proposals: GraspProposals) -> dict[str, np.ndarray]:
