@@ -8,6 +8,7 @@
     ├── TwinError             a finished twin folder that cannot be read or written
     ├── AssetError            an asset of another tool that cannot be read
     ├── ExportError           a twin that cannot be written in a format
+    ├── EpisodesError         recorded episodes that cannot be read or written
     └── BackendError          something else failed; the item stays resumable                exit 4
         ├── Unavailable       it does not answer, or is not installed
         ├── Unsupported       it cannot do what is asked, now or later: choose another
@@ -47,6 +48,10 @@ class AssetError(ManiTwinError):
 
 class ExportError(ManiTwinError):
     """A twin that has not what a format needs, or whose licence does not allow it."""
+
+
+class EpisodesError(ManiTwinError):
+    """A file or folder of recorded episodes that is incomplete, altered, or not in the layout it should be in."""
 
 
 class Rejected(ManiTwinError):

@@ -131,15 +131,15 @@ def write(folder: Path, old: str, new: str) -> str:
 
 
 def test_missing_distribution_names_the_extra(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"pip install 'manitwin\[hands\]'"):
+    with pytest.raises(UsageError, match=r"pip install 'manitwin\[robots\]'"):
         load_gripper(write(tmp_path, '"example-robot-data"', '"example-robot-data-that-is-not-there"'))
 
 
 def test_urdf_beside_the_file_may_not_leave_its_folder(tmp_path: Path) -> None:
-    beside = write(tmp_path, 'distribution = "example-robot-data"\nextra = "hands"\n', "")
+    beside = write(tmp_path, 'distribution = "example-robot-data"\nextra = "robots"\n', "")
     with pytest.raises(UsageError, match=r"is not there"):
         load_gripper(beside)
-    outside = write(tmp_path, 'distribution = "example-robot-data"\nextra = "hands"\nfile = "cmeel', 'file = "../cmeel')
+    outside = write(tmp_path, 'distribution = "example-robot-data"\nextra = "robots"\nfile = "cmeel', 'file = "../cmeel')
     with pytest.raises(UsageError, match=r"leaves the folder"):
         load_gripper(outside)
 

@@ -27,9 +27,9 @@ class Robot:
 
     ``urdf`` is the whole robot as text, its meshes by absolute path. ``gripper_to_tip (4, 4)`` is the pose of the twin's grasp
     frame (+Z approach, X closing) in the frame of ``tip_link``. ``finger_joints`` go from 0 (closed) to half of the opening;
-    the first one's finger is on the side of +X of the grasp frame. ``hand_links`` are the links behind the tip that may touch
-    the held object, ``finger_links`` those two that press on it. ``disabled_pairs`` are pairs of links that are not tested for
-    collision with each other.
+    the first one's finger is on the side of +X of the grasp frame. ``hand_links`` are the palm, which comes first, and all
+    that hangs from it: they may touch the held object. ``finger_links`` are those two that press on it. ``disabled_pairs``
+    are pairs of links that are not tested for collision with each other.
     """
 
     name: str

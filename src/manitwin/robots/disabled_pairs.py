@@ -1,0 +1,126 @@
+"""Pairs of links that need not be tested for collision with each other: an SRDF's, or found by trying.
+
+The criteria are those of MoveIt's setup assistant (Coleman et al. 2014): adjacent links, links in contact in the default
+state, and links in contact always (there 95 % of random states).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manitwin.errors import Unavailable, UsageError
+from manitwin.robots.definition import RobotDefinition
+from manitwin.robots.links import links_of_urdf
+from manitwin.robots.urdf_tree import UrdfTree, child_of, parent_of, parse_xml
+from manitwin.simulate.hands.urdf import LinkShape
+
+STATES = 300
+CONTACT_SHARE = 0.9
+SEED = 0
+Pairs = tuple[tuple[str, str], ...]
+
+
+def disabled_pairs(
+    tree: UrdfTree, srdf: Path | None, definition: RobotDefinition, finger_joints: tuple[str, str]
+) -> Pairs:
+    """Return the pairs, each sorted, all sorted; raises Unavailable without the extra that computes them."""
+    pairs = _adjacent(tree) | _within_hand(tree, finger_joints)
+    if srdf is not None:
+        pairs |= _of_srdf(srdf, tree)
+    else:
+        pairs |= _in_contact(tree, definition)
+    return tuple(sorted(pairs))
+
+
+def _pair(first: str, second: str) -> tuple[str, str]:
+    return (first, second) if first < second else (second, first)
+
+
+def _adjacent(tree: UrdfTree) -> set[tuple[str, str]]:
+    """Links that a joint holds together; a link without shapes stands for what hangs from it by a fixed joint."""
+    return {
+        _pair(first, second)
+        for joint in tree.joints.values()
+        for first in _solid(tree, parent_of(joint), up=True)
+        for second in _solid(tree, child_of(joint), up=False)
+        if first != second
+    }
+
+
+def _solid(tree: UrdfTree, link: str, up: bool) -> Iterable[str]:
+    """Return the link itself, or the nearest links with shapes above or below it."""
+    if tree.links[link].find("collision") is not None:
+        return [link]
+    near = [
+        (parent_of(joint) if up else child_of(joint))
+        for joint in tree.joints.values()
+        if (child_of(joint) if up else parent_of(joint)) == link and joint.get("type") == "fixed"
+    ]
+    return [name for other in near for name in _solid(tree, other, up)]
+
+
+def _within_hand(tree: UrdfTree, finger_joints: tuple[str, str]) -> set[tuple[str, str]]:
+    """The hand's own links: its fingers meet when it is closed."""
+    hand = tree.below(parent_of(tree.joint(finger_joints[0])))
+    return {_pair(first, second) for first, second in combinations(hand, 2)}
+
+
+def _of_srdf(path: Path, tree: UrdfTree) -> set[tuple[str, str]]:
+    found = set()
+    for element in parse_xml(path).findall("disable_collisions"):
+        first, second = element.get("link1"), element.get("link2")
+        if first in tree.links and second in tree.links:
+            found.add(_pair(first, second))
+    if not found:
+        raise UsageError(f"{path}: no pair of the robot's links in it; leave srdf out, and the pairs are computed")
+    return found
+
+
+def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, str]]:
+    """Pairs in contact at home, or in most of many random states, of the links' convex hulls."""
+    try:
+        import coal
+        import pinocchio as pin
+    except ImportError as error:
+        raise Unavailable("robots without an SRDF want pin and coal: pip install 'manitwin[robots]'") from error
+    urdf = tree.text()
+    model, geometry = pin.buildModelFromXML(urdf), pin.GeometryModel()
+    owners: list[str] = []
+    for link in links_of_urdf(urdf):
+        frame = model.frames[model.getBodyId(link.name)]
+        for shape in link.shapes:
+            placement = frame.placement * pin.SE3(np.ascontiguousarray(shape.shape_to_link))
+            convex = _convex(coal, shape)
+            geometry.addGeometryObject(pin.GeometryObject(f"{len(owners)}", frame.parentJoint, placement, convex))
+            owners.append(link.name)
+    geometry.addAllCollisionPairs()
+    data, geometry_data = model.createData(), geometry.createData()
+    links = [_pair(owners[pair.first], owners[pair.second]) for pair in geometry.collisionPairs]
+    home = pin.neutral(model)
+    for name, value in zip(definition.arm_joints, definition.home_rad, strict=True):
+        home[model.joints[model.getJointId(name)].idx_q] = value
+    rng = np.random.default_rng(SEED)
+    count: dict[tuple[str, str], int] = {}
+    for state in range(STATES + 1):
+        at_home = state == 0
+        joints = home if at_home else rng.uniform(model.lowerPositionLimit, model.upperPositionLimit)
+        pin.computeCollisions(model, data, geometry, geometry_data, joints, False)
+        touching = {pair for pair, r in zip(links, geometry_data.collisionResults, strict=True) if r.isCollision()}
+        for pair in touching:
+            count[pair] = count.get(pair, 0) + (STATES if at_home else 1)
+    return {pair for pair, times in count.items() if times >= CONTACT_SHARE * STATES}
+
+
+def _convex(coal: Any, shape: LinkShape) -> Any:
+    if shape.half_extents_m is not None:
+        return coal.Box(*(2 * shape.half_extents_m))
+    if shape.radius_m is not None:
+        return coal.Sphere(shape.radius_m)
+    points = coal.StdVec_Vec3s()
+    points.extend(np.asarray(shape.corners_m))
+    return coal.ConvexBase.convexHull(points, True, "Qt")

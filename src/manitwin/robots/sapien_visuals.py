@@ -1,0 +1,90 @@
+"""What a robot's links look like, for pictures."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sapien
+from lxml import etree  # type: ignore[import-untyped]
+from sapien import physx
+
+from manitwin.robots.joints import origin_of
+
+_GREY = (0.7, 0.7, 0.7, 1.0)
+Visual = tuple[str, np.ndarray, str, tuple[Any, ...], tuple[float, ...] | None]
+
+
+def add_visuals(
+    urdf: str,
+    bodies: dict[str, physx.PhysxArticulationLinkComponent],
+    part_of: dict[str, tuple[str, np.ndarray]],
+) -> None:
+    """Give the bodies in a scene the visuals of their links; ``part_of`` says which link is where in which body."""
+    from sapien import render
+
+    components: dict[str, Any] = {}
+    for link, shape_to_link, kind, numbers, rgba in _visuals(urdf):
+        body, link_to_body = part_of[link]
+        shape = _shape(kind, numbers, rgba)
+        shape.local_pose = sapien.Pose(link_to_body @ shape_to_link)
+        if body not in components:
+            components[body] = render.RenderBodyComponent()
+        components[body].attach(shape)
+    for name, component in components.items():
+        bodies[name].entity.add_component(component)
+
+
+def _shape(kind: str, numbers: tuple[Any, ...], rgba: tuple[float, ...] | None) -> Any:
+    from sapien import render
+
+    material = render.RenderMaterial(base_color=list(rgba or _GREY), roughness=0.6)
+    if kind == "mesh":
+        path, scale = numbers
+        own = rgba is None and not path.lower().endswith(".stl")  # an STL has no colours of its own
+        scale_xyz = np.array(scale, np.float32)
+        return (
+            render.RenderShapeTriangleMesh(path, scale_xyz)
+            if own
+            else render.RenderShapeTriangleMesh(path, scale_xyz, material)
+        )
+    if kind == "box":
+        return render.RenderShapeBox(np.array(numbers, np.float32) / 2, material)
+    if kind == "sphere":
+        return render.RenderShapeSphere(numbers[0], material)
+    return render.RenderShapeCylinder(numbers[0], numbers[1] / 2, material)
+
+
+@lru_cache(maxsize=16)
+def _visuals(urdf: str) -> tuple[Visual, ...]:
+    robot = etree.fromstring(urdf.encode(), etree.XMLParser(remove_comments=True, resolve_entities=False))
+    named = {one.get("name"): _color(one) for one in robot.findall("material")}
+    found = []
+    for link in robot.findall("link"):
+        for visual in link.findall("visual"):
+            material, geometry = visual.find("material"), visual.find("geometry")[0]
+            rgba = None if material is None else (_color(material) or named.get(material.get("name")))
+            pose, numbers = origin_of(visual), _numbers(geometry)
+            if geometry.tag == "cylinder":  # URDF's lies along Z, SAPIEN's along X
+                pose = pose @ _X_TO_Z
+            found.append((link.get("name"), pose, geometry.tag, numbers, rgba))
+    return tuple(found)
+
+
+_X_TO_Z = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
+
+
+def _color(material: etree._Element) -> tuple[float, ...] | None:
+    color = material.find("color")
+    return None if color is None else tuple(float(word) for word in color.get("rgba").split())
+
+
+def _numbers(geometry: etree._Element) -> tuple[Any, ...]:
+    if geometry.tag == "mesh":
+        return geometry.get("filename"), tuple(float(word) for word in geometry.get("scale", "1 1 1").split())
+    if geometry.tag == "box":
+        return tuple(float(word) for word in geometry.get("size").split())
+    if geometry.tag == "sphere":
+        return (float(geometry.get("radius")),)
+    return float(geometry.get("radius")), float(geometry.get("length"))
