@@ -66,7 +66,8 @@ PlanFailure = Literal[
 class PickPlacePlan:
     """One grasp's motions: reach, approach, (close), lift, carry, lower, (open), retreat.
 
-    ``gripper_to_object`` is the grasp that is used: a candidate, or the same turned by 180 degrees about the approach axis.
+    ``gripper_to_object`` is the grasp that is used: a candidate, or the same turned by 180 degrees about the approach axis
+    or drawn back along it by a few millimetres.
     """
 
     grasp: Grasp

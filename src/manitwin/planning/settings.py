@@ -1,0 +1,32 @@
+"""What the planner may spend, and how far from things it keeps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class PlannerSettings:
+    """Lengths in metres, work in counts: no clock decides what is found.
+
+    ``margin_m`` is kept in free motion, and lowered step by step to ``clearance_m`` where start or goal are nearer;
+    ``clearance_m`` is kept on straight lines. Defaults: the planning study of the reference (10 mm against tunnelling,
+    10 cm approach, 12 cm lift, checks every 0.02 rad). Where the hand has no room, a grasp is drawn back along its approach,
+    by no more than leaves the contact on a pad of 18 mm: a thin thing that lies is out of reach of a hand that was verified
+    without a table.
+    """
+
+    approach_m: float = 0.10
+    draw_backs_m: tuple[float, ...] = (0.0, 0.002, 0.004, 0.006, 0.008)
+    lift_m: float = 0.12
+    margin_m: float = 0.010
+    clearance_m: float = 0.002
+    check_step_rad: float = 0.02
+    check_step_m: float = 0.005
+    search_step_rad: float = 0.05
+    extension_rad: float = 1.0
+    iterations: int = 400
+    shortcuts: int = 30
+    max_grasps: int = 40
+    starts: int = 6
+    solutions: int = 2
