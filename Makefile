@@ -1,7 +1,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test vlm-real usd-validate lint lock lock-vlm-real lock-usd-validate clean
+.PHONY: setup demo test vlm-real usd-validate lerobot-real lint lock lock-vlm-real lock-usd-validate lock-lerobot-real clean
 
 setup:
 	@$(PYTHON) scripts/setup.py
@@ -21,6 +21,10 @@ usd-validate: setup
 	@$(BIN)/python scripts/setup_usd_validator.py
 	@USD_VALIDATOR_REQUIRED=1 $(BIN)/python -m pytest tests/export/test_usd_validator.py
 
+lerobot-real: setup
+	@$(BIN)/python scripts/setup_lerobot.py
+	@LEROBOT_REQUIRED=1 $(BIN)/python -m pytest tests/apps/trajectories/test_real_lerobot.py
+
 lint: setup
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
@@ -38,5 +42,10 @@ lock-usd-validate:
 	@$(BIN)/uv pip compile --quiet --universal --generate-hashes --python-version 3.11 --no-annotate --no-header \
 	  tests/export/usd_validator.in -o tests/export/usd_validator.lock
 
+lock-lerobot-real:
+	@$(BIN)/uv pip compile --quiet --universal --generate-hashes --python-version 3.11 --no-annotate --no-header \
+	  --override tests/apps/trajectories/real_lerobot.overrides tests/apps/trajectories/real_lerobot.in \
+	  -o tests/apps/trajectories/real_lerobot.lock
+
 clean:
-	rm -rf .venv .venv-vlm .venv-usd-validate demo
+	rm -rf .venv .venv-vlm .venv-usd-validate .venv-lerobot demo

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 OUTCOMES = (
     "kept", "unplanned_contact", "disturbed", "misplaced", "toppled", "dropped", "not_lifted", "replan_failed", "unsettled",
-    "no_plan",
+    "no_plan", "no_room",
 )  # fmt: skip
 """``kept`` succeeded and touched nothing by accident; ``unplanned_contact`` and ``disturbed`` (another object moved by more than
 1 cm or 5 degrees) succeeded otherwise; from ``misplaced`` to ``replan_failed`` the execution failed; ``unsettled`` is a start
-that did not stand; ``no_plan`` was never executed."""
+that did not stand, ``no_room`` one that could not be set up; ``no_plan`` was never executed."""
+
+EXECUTION_FAILURES = ("misplaced", "toppled", "dropped", "not_lifted", "replan_failed")
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class Attempt:
     @property
     def planned(self) -> bool:
         """Whether a plan was found, so that it was executed."""
-        return self.outcome not in ("no_plan", "unsettled")
+        return self.outcome not in ("no_plan", "no_room", "unsettled")
 
     @property
     def succeeded(self) -> bool:

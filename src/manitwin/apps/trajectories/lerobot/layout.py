@@ -1,0 +1,51 @@
+"""Names of files and features of a LeRobotDataset v3.0.
+
+Source: lerobot 0.4.4, datasets/utils.py, datasets/lerobot_dataset.py and datasets/compute_stats.py.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+VERSION = "v3.0"
+INFO, STATS, TASKS = "meta/info.json", "meta/stats.json", "meta/tasks.parquet"
+CHUNKS_SIZE = 1000
+"""Files of a folder ``chunk-000``."""
+
+DATA_FILES_SIZE_IN_MB, VIDEO_FILES_SIZE_IN_MB = 100, 200
+DATA_PATH = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+EPISODES_PATH = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+VIDEO_PATH = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
+
+DEFAULT_FEATURES: dict[str, str] = {
+    "timestamp": "float32",
+    "frame_index": "int64",
+    "episode_index": "int64",
+    "index": "int64",
+    "task_index": "int64",
+}
+"""Features that every set has, with their types; each is one number a frame."""
+
+QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
+STATISTICS = ("min", "max", "mean", "std", "count", *QUANTILES)
+
+TIMESTAMP_TOLERANCE_S = 1e-4
+"""How far LeRobot lets a timestamp be from the grid of frames (``tolerance_s`` of LeRobotDataset)."""
+
+
+def place_of(number: int) -> tuple[int, int]:
+    """Return the chunk and the file in it of the n-th file."""
+    return divmod(number, CHUNKS_SIZE)
+
+
+def video_key(camera: str) -> str:
+    """Return the feature's name of a camera's pictures."""
+    return f"observation.images.{camera}"
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write JSON as LeRobot has it: keys in their order, four blanks, no NaN."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps(value, indent=4, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
