@@ -14,9 +14,13 @@ from typing import cast
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
+from manitwin.app_config import LayoutsConfig, PicturesConfig, TrajectoriesConfig
 from manitwin.config import BuildConfig
 
 PAGE = Path(__file__).parent / "configuration.md"
+APPLICATIONS: dict[str, type[BaseModel]] = {
+    "layout": LayoutsConfig, "trajectories": TrajectoriesConfig, "render": PicturesConfig
+}  # fmt: skip
 INTRODUCTION = """# Settings
 
 A TOML file given with `--config run.toml`. What it does not say keeps its default; an unknown key is an error that names the
@@ -65,22 +69,34 @@ def _range(field: FieldInfo) -> str:
 
 def page() -> str:
     """Return the whole page."""
+    text = [INTRODUCTION, *_settings(BuildConfig, "## General\n")]
+    for command, model in APPLICATIONS.items():
+        words = " ".join((model.__doc__ or "").split()).replace("``", "`")
+        text += _settings(model, f"# Settings of `manitwin {command}`\n\n{words}\n")
+    return "\n".join(text)
+
+
+def _settings(kind: type[BaseModel], title: str) -> list[str]:
     sections = {
         n: f.annotation
-        for n, f in BuildConfig.model_fields.items()
-        if isinstance(f.annotation, type) and issubclass(f.annotation, BaseModel)
+        for n, f in kind.model_fields.items()
+        if isinstance(f.annotation, type)
+        and issubclass(f.annotation, BaseModel)
+        and (kind is BuildConfig or n != "run")
     }
     plain = [
-        f"| `{n}` | `{_default(f)}` | {_range(f)} |" for n, f in BuildConfig.model_fields.items() if n not in sections
+        f"| `{n}` | `{_default(f)}` | {_range(f)} |"
+        for n, f in kind.model_fields.items()
+        if n not in sections and n != "run"
     ]
-    text = [INTRODUCTION, "## General\n", "| setting | default | range |", "|---|---|---|", *plain, ""]
+    text = [title, "| setting | default | range |", "|---|---|---|", *plain, ""]
     for name, section in sections.items():
         model = cast(type[BaseModel], section)
         table = rows(model)
         text += [f"## [{name}]\n", " ".join((model.__doc__ or "").split()).replace("``", "`"), ""]
         if table:
             text += ["| setting | default | range |", "|---|---|---|", *table, ""]
-    return "\n".join(text)
+    return text
 
 
 if __name__ == "__main__":

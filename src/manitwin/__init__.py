@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from manitwin.api import BuildReport, build, export_twin, load, schema
+    from manitwin.api import BuildReport, build, export_twin, load, load_scene, schema
     from manitwin.index.dataset import Dataset
     from manitwin.loaded_twin import Twin
+    from manitwin.scenes.loaded_scene import Scene
 
-__all__ = ["BuildReport", "Dataset", "Twin", "build", "export_twin", "load", "schema"]
-_ELSEWHERE = {"Dataset": "manitwin.index.dataset", "Twin": "manitwin.loaded_twin"}
+__all__ = ["BuildReport", "Dataset", "Scene", "Twin", "build", "export_twin", "load", "load_scene", "schema"]
+_ELSEWHERE = {"Dataset": "manitwin.index.dataset", "Scene": "manitwin.scenes.loaded_scene", "Twin": "manitwin.loaded_twin"}
 
 
 def __getattr__(name: str) -> Any:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.config import BuildConfig
     from manitwin.executors.whole_items import StageStarted
     from manitwin.loaded_twin import Twin
+    from manitwin.scenes.loaded_scene import Scene
     from manitwin.twin import TwinRecord
 
 
@@ -148,6 +149,17 @@ def load(folder: str | Path, verify: bool = False) -> Twin:
     from manitwin.loaded_twin import Twin
 
     return Twin(folder, verify=verify)
+
+
+def load_scene(scene: str | Path, dataset: str | Path | None = None) -> Scene:
+    """Load a scene of ``manitwin layout`` by its file or folder; ``dataset`` None: the one that it was sampled from.
+
+    Raises UsageError where the scene cannot be read, or does not lie in the folder that says whose twins it has.
+    """
+    from manitwin.scenes.loaded_scene import Scene
+    from manitwin.scenes.scene_folders import dataset_of
+
+    return Scene.read(scene, dataset_of(Path(scene)) if dataset is None else dataset)
 
 
 def export_twin(

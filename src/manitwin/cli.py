@@ -22,13 +22,16 @@ from manitwin.commands.export import export
 from manitwin.commands.fake import fake
 from manitwin.commands.import_ import import_
 from manitwin.commands.index import index
+from manitwin.commands.layout import layout
 from manitwin.commands.prompts import prompts
 from manitwin.commands.publish import publish
 from manitwin.commands.query import query
+from manitwin.commands.render import render
 from manitwin.commands.retry import retry
 from manitwin.commands.run import run
 from manitwin.commands.stats import stats
 from manitwin.commands.status import status
+from manitwin.commands.trajectories import trajectories
 from manitwin.errors import BackendError, ManiTwinError, UsageError
 
 TYPER_INTERRUPTED = 130
@@ -52,6 +55,9 @@ for command in (build, run, status, retry, check, index, query, stats, publish, 
 
 
 app.command("import")(import_)
+app.command()(layout)
+app.command()(trajectories)
+app.command()(render)
 
 
 @app.command()

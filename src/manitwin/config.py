@@ -233,8 +233,8 @@ class EpisodeSettings(Section):
     """
 
     timestep_s: float = Field(default=1 / 240, gt=0)
-    solver_iterations: int = Field(default=20, ge=1)
-    solver_iterations_held: int = Field(default=50, ge=1)
+    solver_iterations: int = Field(default=10, ge=1)
+    solver_iterations_held: int = Field(default=40, ge=1)
     contact_offset_m: float = Field(default=0.002, gt=0)
     furniture_friction: float = Field(default=0.5, ge=0)
     closing_force_n: float | None = Field(default=None, gt=0)

@@ -92,6 +92,24 @@ def seal(folder: Path, record: dict[str, Any]) -> TwinRecord:
     return TwinRecord(**whole)
 
 
+def amend(folder: Path, files: dict[str, bytes]) -> TwinRecord:
+    """Give a finished twin new content of some of its files: each is renamed over the old one, twin.json last.
+
+    The record gets their digests and a new revision; nothing else in it changes. A crash in between leaves a twin whose
+    digests do not match, which ``verify_record`` says. Raises TwinError where the twin has no such file.
+    """
+    record = read_record(folder).model_dump(mode="json")
+    unknown = files.keys() - record["files"].keys()
+    if unknown:
+        raise TwinError(f"{folder}: the twin has no {', '.join(sorted(unknown))}; it has {', '.join(record['files'])}")
+    for name, content in sorted(files.items()):
+        write_bytes_atomically(folder / name, content)
+        record["files"][name] = hashlib.sha256(content).hexdigest()
+    record["revision"] = revision_of(record)
+    write_bytes_atomically(folder / RECORD, canonical_json(record).encode())
+    return TwinRecord(**record)
+
+
 def read_record(folder: Path, verify: bool = False) -> TwinRecord:
     """Read twin.json; with ``verify``, also check its revision and the digest of every file it names.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -16,6 +16,8 @@ License = Annotated[str | None, typer.Option(help="Licence of the inputs (SPDX).
 Attribution = Annotated[str | None, typer.Option(help="Whom to credit for the inputs.")]
 Jobs = Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one a core.")]
 Seed = Annotated[int | None, typer.Option(help="Seed of everything random; default: the configuration's.")]
+Executor = Annotated[str, typer.Option(help="local, ray for a cluster, or inline: this process, for a debugger.")]
+Address = Annotated[str | None, typer.Option(help="Ray's address ('auto'); none: a cluster of this machine.")]
 Config = Annotated[Path | None, typer.Option(help="A TOML file of settings.")]
 Grippers = Annotated[
     list[str] | None,
@@ -47,3 +49,12 @@ Quick = Annotated[
 Record = Annotated[
     Path | None, typer.Option(help="Add every answer of the model to this file, for --vlm replay:FILE.", metavar="FILE")
 ]
+
+
+def run_settings(jobs: int | None) -> dict[str, Any]:
+    """Return what ``--jobs`` says of an application's run; raises UsageError."""
+    from manitwin.errors import UsageError
+
+    if jobs is not None and jobs < 1:
+        raise UsageError(f"jobs is {jobs}; give 1 or more")
+    return {"index_every": 0, "keep_work": False, **({} if jobs is None else {"cpu": jobs})}

@@ -29,12 +29,8 @@ def run(
     ] = "",
     config: options.Config = None,
     text: options.Text = None,
-    executor: Annotated[
-        str, typer.Option(help="local, ray for a cluster, or inline: this process, for a debugger.")
-    ] = "local",
-    address: Annotated[
-        str | None, typer.Option(help="Ray's address ('auto'); none: a cluster of this machine.")
-    ] = None,
+    executor: options.Executor = "local",
+    address: options.Address = None,
     jobs: options.Jobs = None,
     seed: options.Seed = None,
     gripper: options.Grippers = None,
@@ -82,7 +78,7 @@ def run(
         dataset,
         texts=text or [],
         config=settings,
-        executor=_executor(executor),
+        executor=chosen_executor(executor),
         address=address,
         defaults={"units": units, "up": up, "license": license, "attribution": attribution},
         on_estimate=print_estimate,
@@ -93,7 +89,8 @@ def run(
     raise typer.Exit(report.exit_code)
 
 
-def _executor(name: str) -> ExecutorName:
+def chosen_executor(name: str) -> ExecutorName:
+    """Return the executor of a name; raises UsageError."""
     from manitwin.dataset_run import EXECUTORS
     from manitwin.errors import UsageError, choose_from
 

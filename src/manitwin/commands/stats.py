@@ -11,14 +11,25 @@ from manitwin.commands.console import out_console
 
 
 def stats(
-    dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
+    dataset: Annotated[
+        str, typer.Argument(help="A data set (a folder or URL), or a folder of episodes.", metavar="DATASET|EPISODES")
+    ],
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The folder to write into; default: DATASET/statistics.")
     ] = None,
 ) -> None:
-    """Write a data set's statistics: a page to read, its figures, and its numbers with the SQL that gives each."""
+    """Write the statistics of a data set, or of episodes: a page, its figures, and its numbers with the SQL of each."""
+    from manitwin.apps.trajectories.attempts_table import ATTEMPTS
     from manitwin.dataset_root import DatasetRoot
     from manitwin.statistics.of_dataset import write_statistics
 
-    written = write_statistics(DatasetRoot(dataset), out)
+    root = DatasetRoot(dataset)
+    if root.local is not None and root.exists(ATTEMPTS):
+        from manitwin.apps.trajectories.statistics.report import episode_statistics
+
+        report = episode_statistics(root.local)
+        out_console.print(report.text(), markup=False, soft_wrap=True)
+        out_console.print(str(report.write(out or root.local / "statistics")), markup=False)
+        return
+    written = write_statistics(root, out)
     out_console.print(f"{written.summary}: {written.page}", markup=False)

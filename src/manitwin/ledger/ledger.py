@@ -225,6 +225,12 @@ class Ledger:
         self.commit()
         return count
 
+    def revised(self, twin_id: str, revision: str) -> None:
+        """Note that a finished twin was amended; it is to be indexed again."""
+        self.connection.execute(
+            "UPDATE items SET revision = ?, indexed = 0 WHERE twin_id = ? AND state = 'accepted'", (revision, twin_id)
+        )
+
     def counts(self) -> dict[str, int]:
         """Return the number of items by state."""
         return dict(self.connection.execute("SELECT state, count(*) FROM items GROUP BY state"))

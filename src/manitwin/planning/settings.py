@@ -20,7 +20,7 @@ class PlannerSettings:
     draw_backs_m: tuple[float, ...] = (0.0, 0.002, 0.004, 0.006, 0.008)
     lift_m: float = 0.12
     margin_m: float = 0.010
-    clearance_m: float = 0.002
+    clearance_m: float = 0.001
     check_step_rad: float = 0.02
     check_step_m: float = 0.005
     search_step_rad: float = 0.05

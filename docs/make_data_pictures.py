@@ -1,0 +1,103 @@
+"""Make layouts.png, episode.png and episode.webp beside this file, of the twins of the project's own samples.
+
+    manitwin build samples/samples.csv -o demo
+    python docs/make_data_pictures.py demo
+
+layouts.png shows a layout on each kind of furniture, its depth, normals and instance ids; episode.png moments of one episode
+from three cameras; episode.webp the whole of it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from manitwin.app_config import LayoutsConfig, TrajectoriesConfig
+from manitwin.apps.furniture_pictures import lighting_of
+from manitwin.apps.layouts.preview import scene_pictures
+from manitwin.apps.layouts.run import make_layouts
+from manitwin.apps.trajectories.cameras import named_cameras
+from manitwin.apps.trajectories.collect import batch_folders, stored_episodes
+from manitwin.apps.trajectories.replay_pictures import Replay, twin_drawable
+from manitwin.apps.trajectories.run import make_episodes
+from manitwin.apps.trajectories.stored_episode import StoredEpisode
+from manitwin.apps.trajectories.video import write_animation
+from manitwin.config import LayoutSettings
+from manitwin.robots.load import load_robot
+from manitwin.scenes.scene import Furniture, Light
+from manitwin.scenes.scene_file import read_scene
+from manitwin.scenes.scene_folders import scene_name
+from manitwin.scenes.twin_source import TwinSource
+
+DOCS = Path(__file__).resolve().parent
+TILE_PX, ANIMATION_PX = 300, 360
+CAMERAS = ("front", "side", "wrist")
+MOMENTS = 6
+SEED = 3
+
+
+def sheet(rows: list[list[np.ndarray]]) -> Image.Image:
+    """Return pictures of one size as a table, with thin white lines between them."""
+    height, width, _ = rows[0][0].shape
+    page = Image.new("RGB", (len(rows[0]) * (width + 4) - 4, len(rows) * (height + 4) - 4), "white")
+    for y, row in enumerate(rows):
+        for x, picture in enumerate(row):
+            page.paste(Image.fromarray(picture), (x * (width + 4), y * (height + 4)))
+    return page
+
+
+def layouts(twins: Path, work: Path) -> Image.Image:
+    """Draw a layout on a table, a tray and a shelf: colours, depth, normals, ids."""
+    rows = []
+    source = TwinSource(twins)
+    for surface in ("table", "tray", "shelf"):
+        config = LayoutsConfig(seed=SEED, layout=LayoutSettings(objects=(4, 6), surface=surface, clutter="dense"))
+        make_layouts(twins, work / surface, 1, config, executor="inline")
+        scene = read_scene(work / surface / scene_name(f"layout_{SEED}_000000"))
+        frames, ids = scene_pictures(scene, source.folder, width_px=TILE_PX, height_px=TILE_PX)
+        front, oblique = frames["front"], frames["oblique"]
+        hues = np.random.default_rng(0).integers(60, 255, (max(ids.values()) + 1, 3), np.uint8)
+        hues[0] = 0
+        near = np.where(oblique.depth_m > 0, oblique.depth_m, np.nan)
+        grey = 255 * (1 - (near - np.nanmin(near)) / (np.nanmax(near) - np.nanmin(near)))
+        depth = np.repeat(np.nan_to_num(grey).astype(np.uint8)[..., None], 3, axis=2)
+        normals = (127.5 * (oblique.normals + 1) * (oblique.depth_m > 0)[..., None]).astype(np.uint8)
+        rows.append([front.rgb, oblique.rgb, depth, normals, hues[oblique.ids]])
+    return sheet(rows)
+
+
+def pictures(episode: StoredEpisode, twins: Path, size_px: int) -> list[list[np.ndarray]]:
+    """Return all frames of an episode from each camera."""
+    robot, source = load_robot(episode.robot.name), TwinSource(twins)
+    visuals = [twin_drawable(source.folder(thing.twin_id)) for thing in episode.objects]
+    lighting = lighting_of(tuple(episode.facts["ambient"]), tuple(Light(**each) for each in episode.facts["lights"]))
+    with Replay(robot, visuals, furniture=Furniture(**episode.facts["furniture"]), lighting=lighting, seed=1) as replay:
+        frames = replay.frames(episode.recording, named_cameras(CAMERAS, robot), width_px=size_px, height_px=size_px)
+        return [[frame.rgb for frame in each] for each in frames]
+
+
+def main() -> None:
+    """Make the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("twins", type=Path, help="what `manitwin build samples/samples.csv` wrote")
+    twins = parser.parse_args().twins
+    with tempfile.TemporaryDirectory() as folder:
+        layouts(twins, Path(folder)).save(DOCS / "layouts.png", optimize=True)
+        out = Path(folder) / "episodes"
+        make_episodes(twins, out, 4, TrajectoriesConfig(seed=SEED, others=2, batch=2), executor="inline")
+        episode = next(stored_episodes(batch_folders(out)))
+    frames = pictures(episode, twins, TILE_PX)
+    moments = np.linspace(10, len(frames) - 1, MOMENTS).astype(int)
+    sheet([[frames[m][camera] for m in moments] for camera in range(len(CAMERAS))]).save(
+        DOCS / "episode.png", optimize=True
+    )
+    small = pictures(episode, twins, ANIMATION_PX)
+    write_animation((np.hstack([each[0], each[2]]) for each in small[::2]), DOCS / "episode.webp", quality=55)
+
+
+if __name__ == "__main__":
+    main()

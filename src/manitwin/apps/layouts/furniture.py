@@ -1,0 +1,90 @@
+"""Tables, shelves and trays: boxes, and where on them objects may stand."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.scenes.scene import Furniture, SupportRegion, SurfaceBox
+
+MATERIALS = ("wood", "metal", "marble", "cloth")
+BOARD_M = 0.02
+TABLE_M = 0.04
+EDGE_M = 0.03  # what stands on a surface keeps away from its edge
+
+_TABLE_CENTER_M, _TABLE_HALF_M = (0.4, 0.0), (0.65, 0.7)
+_ON_TABLE = SupportRegion(name="table", center_m=(0.62, 0.0), half_extents_m=(0.4, 0.67), height_m=0.0)
+"""Of the table's 1.3 m from x = -0.25, what lies 0.22 m and more in front of the origin: a robot's base stands there."""
+
+_TRAY_HALF_M, _TRAY_FLOOR_M, _RIM_M, _RIM_WALL_M = (0.22, 0.32), 0.01, 0.03, 0.01
+_SHELF_HALF_M, _SHELF_RISE_M, _SHELF_BOARDS = (0.17, 0.5), 0.34, 2
+
+
+def make_furniture(kind: str, rng: np.random.Generator) -> Furniture:
+    """Return a table with its top at z = 0, or that with a tray or a shelf on it; materials and places are drawn."""
+    table = _box("table", (*_TABLE_CENTER_M, -TABLE_M / 2), (*_TABLE_HALF_M, TABLE_M / 2), _material(rng))
+    if kind == "table":
+        return Furniture(kind=kind, support_height_m=0.0, boxes=(table,), supports=(_ON_TABLE,))
+    if kind == "tray":
+        return _tray(table, rng)
+    return _shelf(table, rng)
+
+
+def _tray(table: SurfaceBox, rng: np.random.Generator) -> Furniture:
+    """A tray with a rim of 3 cm above its floor."""
+    material = _material(rng)
+    x, y = _rounded(rng.uniform(0.48, 0.62)), _rounded(rng.uniform(-0.15, 0.15))
+    half_x, half_y = _TRAY_HALF_M
+    floor = _box("tray", (x, y, _TRAY_FLOOR_M / 2), (half_x, half_y, _TRAY_FLOOR_M / 2), material)
+    wall, rise = _RIM_WALL_M / 2, (_TRAY_FLOOR_M + _RIM_M) / 2
+    rims = [
+        _box(f"tray_rim_{i}", (x + sx * (half_x + wall), y, rise), (wall, half_y + 2 * wall, rise), material)
+        for i, sx in enumerate((-1, 1))
+    ] + [
+        _box(f"tray_rim_{i + 2}", (x, y + sy * (half_y + wall), rise), (half_x, wall, rise), material)
+        for i, sy in enumerate((-1, 1))
+    ]
+    inside = SupportRegion(name="tray", center_m=(x, y), half_extents_m=_TRAY_HALF_M, height_m=_TRAY_FLOOR_M)
+    return Furniture(kind="tray", support_height_m=_TRAY_FLOOR_M, boxes=(table, floor, *rims), supports=(inside,))
+
+
+def _shelf(table: SurfaceBox, rng: np.random.Generator) -> Furniture:
+    """Two boards between two sides, a back behind them; open to the front, where a robot is, and above."""
+    material = _material(rng)
+    x = _rounded(rng.uniform(0.55, 0.65))
+    half_x, half_y = _SHELF_HALF_M
+    tops = [BOARD_M + i * _SHELF_RISE_M for i in range(_SHELF_BOARDS)]
+    boards = [
+        _box(f"shelf_{i}", (x, 0.0, top - BOARD_M / 2), (half_x, half_y, BOARD_M / 2), material)
+        for i, top in enumerate(tops)
+    ]
+    height, wall = tops[-1] + 0.1, BOARD_M / 2
+    sides = [
+        _box(f"shelf_side_{i}", (x, sy * (half_y + wall), height / 2), (half_x, wall, height / 2), material)
+        for i, sy in enumerate((-1, 1))
+    ]
+    back = _box("shelf_back", (x + half_x + wall, 0.0, height / 2), (wall, half_y + 2 * wall, height / 2), material)
+    supports = tuple(
+        SupportRegion(
+            name=f"shelf_{i}",
+            center_m=(x, 0.0),
+            half_extents_m=_SHELF_HALF_M,
+            height_m=top,
+            clearance_m=_SHELF_RISE_M - BOARD_M if i + 1 < _SHELF_BOARDS else None,
+        )
+        for i, top in enumerate(tops)
+    )
+    return Furniture(kind="shelf", support_height_m=tops[0], boxes=(table, *boards, *sides, back), supports=supports)
+
+
+def _box(
+    name: str, center_m: tuple[float, float, float], half_m: tuple[float, float, float], material: str
+) -> SurfaceBox:
+    return SurfaceBox(name=name, center_m=center_m, half_extents_m=half_m, material=material)
+
+
+def _material(rng: np.random.Generator) -> str:
+    return MATERIALS[int(rng.integers(len(MATERIALS)))]
+
+
+def _rounded(value: float) -> float:
+    return round(float(value), 4)

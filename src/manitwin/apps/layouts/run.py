@@ -1,0 +1,96 @@
+"""Make many layouts: the engine's run, and what came of it in a few lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from manitwin.app_config import LayoutsConfig
+from manitwin.apps.layouts.pool import pool_of
+from manitwin.apps.layouts.recipe import LayoutsRecipe
+from manitwin.dataset_root import DatasetRoot
+from manitwin.dataset_run import ExecutorName, RunReport, drive, local_ledger
+from manitwin.engine.driver import ItemEnded
+from manitwin.errors import UsageError
+from manitwin.ledger.ledger import read_ledger
+from manitwin.scenes.scene import SCENE
+from manitwin.scenes.scene_file import parse_scene
+from manitwin.scenes.scene_folders import scene_name
+
+
+@dataclass(frozen=True)
+class LayoutTotals:
+    """What came of all layouts below a root; the most of each measure is over the accepted ones."""
+
+    accepted: int
+    rejected: dict[str, int]
+    repaired: int
+    objects: int
+    max_moved_m: float
+    max_turned_rad: float
+    max_penetration_m: float
+    cpu_seconds: float
+
+    @property
+    def acceptance(self) -> float:
+        """The accepted share of those that ended."""
+        return self.accepted / max(1, self.accepted + sum(self.rejected.values()))
+
+
+def make_layouts(
+    dataset: str | Path,
+    out: str | Path,
+    count: int,
+    config: LayoutsConfig,
+    *,
+    executor: ExecutorName = "local",
+    address: str | None = None,
+    on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+) -> RunReport:
+    """Sample the layouts number 0 to ``count - 1`` of a data set's twins below ``out``; those that are there stay.
+
+    Raises UsageError for a data set without twins, categories that it has not, or where another run is at work at ``out``.
+    """
+    if count < 1:
+        raise UsageError(f"{count} layouts; ask for 1 or more")
+    place = _absolute(dataset)
+    pool = pool_of(place)
+    for category in config.layout.include:
+        pool.of_category(category)
+    recipe = LayoutsRecipe(config, place)
+    configuration = {"kind": "layouts", "dataset": place, **config.model_dump(mode="json")}
+    return drive(
+        recipe, recipe.items(count), DatasetRoot(out), config.run, configuration=configuration, executor=executor,
+        address=address, on_start=on_start, on_ended=on_ended,
+    )  # fmt: skip
+
+
+def layout_totals(out: str | Path) -> LayoutTotals:
+    """Add up what the ledger and the scenes say."""
+    root = DatasetRoot(out)
+    with read_ledger(local_ledger(root)) as ledger:
+        rows = ledger.execute(
+            "SELECT reason, count(*) FROM items WHERE state = 'rejected' GROUP BY reason ORDER BY reason"
+        )
+        rejected = {str(reason): int(count) for reason, count in rows}
+        ids = [row[0] for row in ledger.execute("SELECT twin_id FROM items WHERE state = 'accepted' ORDER BY number")]
+        (cpu_seconds,) = ledger.execute("SELECT coalesce(sum(cpu_seconds), 0) FROM stages").fetchone()
+    scenes = [parse_scene(root.read_bytes(f"{scene_name(each)}/{SCENE}"), each) for each in ids]
+    return LayoutTotals(
+        accepted=len(scenes),
+        rejected=rejected,
+        repaired=sum(scene.repairs > 0 for scene in scenes),
+        objects=sum(len(scene.objects) for scene in scenes),
+        max_moved_m=max((scene.measures.max_moved_m for scene in scenes), default=0.0),
+        max_turned_rad=max((scene.measures.max_turned_rad for scene in scenes), default=0.0),
+        max_penetration_m=max((scene.measures.max_penetration_m for scene in scenes), default=0.0),
+        cpu_seconds=float(cpu_seconds),
+    )
+
+
+def _absolute(place: str | Path) -> str:
+    """Return a folder's absolute path: workers may run elsewhere; a URL stays as it is."""
+    root = DatasetRoot(place)
+    return root.url if root.local is None else str(root.local.resolve())

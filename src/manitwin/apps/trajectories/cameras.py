@@ -1,0 +1,85 @@
+"""Named cameras around a robot's workspace, and one on its hand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.errors import UsageError, choose_from
+from manitwin.geometry.poses import transform
+from manitwin.render.cameras import Camera, look_at
+from manitwin.robots.robot import Robot
+
+FOV_Y_RAD = 0.75
+WRIST_FOV_Y_RAD = 1.2  # about that of the small cameras that are mounted on hands (69 degrees)
+WRIST_CLEARANCE_M = 0.045  # of the camera from the palm
+
+
+@dataclass(frozen=True)
+class NamedCamera:
+    """A pinhole camera that stands in the world, or rides on the hand (``on_hand``).
+
+    ``camera_to_mount (4, 4)``, OpenGL axes, is its pose in the world, or in the grasp frame (+Z approach, X closing).
+    """
+
+    name: str
+    camera_to_mount: np.ndarray
+    fov_y_rad: float
+    on_hand: bool = False
+
+    def placed(self, gripper_to_world: np.ndarray, width_px: int, height_px: int) -> Camera:
+        """Return the camera in the world, for a hand at ``gripper_to_world (4, 4)``."""
+        pose = gripper_to_world @ self.camera_to_mount if self.on_hand else self.camera_to_mount
+        return Camera(pose, self.fov_y_rad, width_px, height_px)
+
+
+def named_cameras(names: Iterable[str], robot: Robot) -> list[NamedCamera]:
+    """Return cameras by name: ``front`` looks at the robot from beyond its workspace, ``side`` from its right, ``top`` straight
+    down (the robot at the left), ``wrist`` along the hand's approach, past the fingers.
+
+    They are placed by the robot's workspace and hand. Raises UsageError for a name that is none of these.
+    """
+    makers = {"front": _front, "side": _side, "top": _top, "wrist": _wrist}
+    cameras = []
+    for name in names:
+        if name not in makers:
+            raise UsageError(choose_from("camera", name, makers))
+        cameras.append(makers[name](robot))
+    return cameras
+
+
+def _front(robot: Robot) -> NamedCamera:
+    reach = robot.workspace.max_radius_m
+    return _standing("front", np.array([0.62 * reach + 1.15, 0.0, 0.95]), np.array([0.45 * reach, 0.0, 0.22]))
+
+
+def _side(robot: Robot) -> NamedCamera:
+    reach = robot.workspace.max_radius_m
+    return _standing("side", np.array([0.55 * reach, -1.5, 0.65]), np.array([0.5 * reach, 0.0, 0.22]))
+
+
+def _top(robot: Robot) -> NamedCamera:
+    middle = (robot.workspace.min_radius_m + robot.workspace.max_radius_m) / 2
+    return _standing("top", np.array([middle, 0.0, 1.75]), np.array([middle, 0.0, 0.0]))
+
+
+def _standing(name: str, eye: np.ndarray, target: np.ndarray) -> NamedCamera:
+    return NamedCamera(name, look_at(eye, target), FOV_Y_RAD)
+
+
+def _wrist(robot: Robot) -> NamedCamera:
+    """Beside the palm, on the side where the fingers do not move, turned towards what they hold."""
+    palm = [box.placed() for box in robot.gripper.palm_boxes]
+    thick = max((float(pose[1, 3] + np.abs(pose[1, :3]) @ half) for pose, half in palm), default=0.0)
+    eye = np.array([0.0, thick + WRIST_CLEARANCE_M, 0.45 * robot.gripper.tip_depth_m])
+    target = np.array([0.0, 0.02, robot.gripper.tip_depth_m + 0.03])
+    backward = (eye - target) / np.linalg.norm(eye - target)
+    right = np.array([1.0, 0.0, 0.0])
+    return NamedCamera(
+        "wrist",
+        transform(np.stack([right, np.cross(backward, right), backward], 1), eye),
+        WRIST_FOV_Y_RAD,
+        on_hand=True,
+    )

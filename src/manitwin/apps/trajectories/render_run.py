@@ -1,0 +1,70 @@
+"""Draw all kept episodes of a run, and write them into its LeRobot data set."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from manitwin.app_config import PicturesConfig
+from manitwin.apps.trajectories.cameras import named_cameras
+from manitwin.apps.trajectories.collect import LEROBOT, batch_folders, stored_episodes
+from manitwin.apps.trajectories.lerobot.videos import CameraVideos, Clip
+from manitwin.apps.trajectories.lerobot.write import Written, write_lerobot
+from manitwin.apps.trajectories.pictures_recipe import PicturesRecipe, batch_name, read_pictures
+from manitwin.dataset_root import DatasetRoot
+from manitwin.dataset_run import CONFIG, ExecutorName, RunReport, drive
+from manitwin.engine.driver import ItemEnded
+from manitwin.errors import EpisodesError
+from manitwin.robots.load import load_robot
+from manitwin.stages.stage import Item
+
+PICTURES = "pictures"
+
+
+def draw_episodes(
+    out: Path,
+    config: PicturesConfig,
+    *,
+    executor: ExecutorName = "local",
+    address: str | None = None,
+    on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+) -> RunReport:
+    """Draw the kept episodes of a finished run below ``out/pictures``; what is there already stays.
+
+    Raises EpisodesError where there are none, UsageError for an unknown camera.
+    """
+    said = _said(out)
+    named_cameras(config.cameras, load_robot(said["robot"]))
+    items = (Item(file=None, text=folder.name) for folder in batch_folders(out))
+    recipe = PicturesRecipe(config, str(out.resolve()), said["dataset"], said["robot"])
+    return drive(
+        recipe, items, DatasetRoot(out / PICTURES), config.run, configuration=config.model_dump(mode="json"),
+        executor=executor, address=address, on_start=on_start, on_ended=on_ended,
+    )  # fmt: skip
+
+
+def write_with_pictures(out: Path, cameras: tuple[str, ...]) -> Written:
+    """Write the LeRobot data set of a run again, with the films of these cameras."""
+    folders = batch_folders(out)
+    clips: dict[str, dict[str, Clip]] = {camera: {} for camera in cameras}
+    for folder in folders:
+        place = out / PICTURES / batch_name(folder.name)
+        for episode_id, first in read_pictures(place).first_frames.items():
+            for camera in cameras:
+                clips[camera][episode_id] = Clip(place / f"{camera}.mp4", first)
+    videos = [CameraVideos(camera, clips[camera]) for camera in cameras]
+    return write_lerobot(stored_episodes(folders), out / LEROBOT, videos=videos)
+
+
+def _said(out: Path) -> dict[str, str]:
+    try:
+        said: dict[str, str] = json.loads((out / CONFIG).read_bytes())
+    except (OSError, ValueError) as error:
+        raise EpisodesError(
+            f"{out}/{CONFIG}: no episodes there ({error}); `manitwin trajectories` makes some"
+        ) from error
+    if "robot" not in said:
+        raise EpisodesError(f"{out}/{CONFIG}: not of episodes; give the folder that `manitwin trajectories` wrote")
+    return said

@@ -1,0 +1,84 @@
+"""Make many episodes: the engine's run over batches, and what is made of them at its end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from manitwin.app_config import TrajectoriesConfig
+from manitwin.apps.layouts.pool import pool_of
+from manitwin.apps.trajectories.attempts_table import ATTEMPTS, read_attempts
+from manitwin.apps.trajectories.batch import batches
+from manitwin.apps.trajectories.recipe import EpisodesRecipe
+from manitwin.apps.trajectories.retirement import Retirement, find_retirements, retire
+from manitwin.dataset_root import DatasetRoot
+from manitwin.dataset_run import CONFIG, ExecutorName, RunReport, drive
+from manitwin.engine.driver import ItemEnded
+from manitwin.errors import UsageError
+from manitwin.robots.load import load_robot
+from manitwin.scenes.scene_folders import SCENES, scene_ids
+from manitwin.scenes.twin_source import TwinSource
+
+KIND = "trajectories"
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where episodes come from: a data set of twins, and scenes of them or none."""
+
+    dataset: str
+    scenes: str | None
+
+    @classmethod
+    def of(cls, place: str | Path) -> Source:
+        """Tell scenes from twins; raises UsageError for what is neither."""
+        root = DatasetRoot(place)
+        path = root.url if root.local is None else str(root.local.resolve())
+        if root.exists(SCENES) and root.exists(CONFIG):
+            said = json.loads(root.read_bytes(CONFIG))
+            if "dataset" not in said:
+                raise UsageError(
+                    f"{place}/{CONFIG}: does not say whose twins these scenes are of; make the layouts again"
+                )
+            return cls(said["dataset"], path)
+        return cls(path, None)
+
+
+def make_episodes(
+    place: str | Path,
+    out: str | Path,
+    count: int,
+    config: TrajectoriesConfig,
+    *,
+    executor: ExecutorName = "local",
+    address: str | None = None,
+    on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+) -> RunReport:
+    """Attempt ``count`` episodes with the twins, or in the scenes, of a place; those that are there stay.
+
+    Raises UsageError for a place without twins or scenes, an unknown robot, or where another run is at work at ``out``.
+    """
+    if count < 1:
+        raise UsageError(f"{count} episodes; ask for 1 or more")
+    robot, source = load_robot(config.robot), Source.of(place)
+    if source.scenes is None:
+        deal = batches(
+            robot.name, count, config.batch, twin_ids=[twin.twin_id for twin in pool_of(source.dataset).twins]
+        )
+    else:
+        deal = batches(robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)))
+    configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
+    return drive(
+        EpisodesRecipe(config, source.dataset, source.scenes), (batch.item() for batch in deal), DatasetRoot(out),
+        config.run, configuration=configuration, executor=executor, address=address, on_start=on_start, on_ended=on_ended,
+    )  # fmt: skip
+
+
+def retire_failing(out: Path) -> tuple[list[Retirement], int]:
+    """Retire the grasps that a finished run says fail; returns them, and how many were not retired before."""
+    said = json.loads((out / CONFIG).read_bytes())
+    found = find_retirements(read_attempts(out / ATTEMPTS), failed_share=said["retire_failed_share"])
+    return found, retire(TwinSource(said["dataset"]), found)

@@ -1,0 +1,88 @@
+"""``manitwin layout``: scenes of several twins."""
+
+from __future__ import annotations
+
+from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from manitwin.commands import options
+from manitwin.commands.console import err_console, out_console
+from manitwin.commands.run import chosen_executor
+
+if TYPE_CHECKING:
+    from manitwin.app_config import LayoutsConfig
+
+
+def layout(
+    dataset: Annotated[str, typer.Argument(help="A data set, or a folder of twins.", metavar="DATASET")],
+    out: Annotated[str, typer.Option("--out", "-o", help="The folder to write scenes into.")],
+    count: Annotated[int, typer.Option("-n", help="How many layouts.")] = 100,
+    objects: Annotated[str | None, typer.Option(help="How many objects: LOW..HIGH.", metavar="LOW..HIGH")] = None,
+    surface: Annotated[str | None, typer.Option(help="table, shelf or tray.")] = None,
+    clutter: Annotated[str | None, typer.Option(help="How close they stand: sparse, medium or dense.")] = None,
+    include: Annotated[
+        list[str] | None, typer.Option(help="A category that must be there; may be repeated.", metavar="CATEGORY")
+    ] = None,
+    stacked: Annotated[int | None, typer.Option(help="How many stand on another object.")] = None,
+    contained: Annotated[int | None, typer.Option(help="How many lie in a vessel.")] = None,
+    robot: Annotated[str | None, typer.Option(help="Stay in the workspace of this robot.")] = None,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="Also draw each: colours, depth, normals, instance ids.")
+    ] = False,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    jobs: options.Jobs = None,
+    executor: options.Executor = "local",
+    address: options.Address = None,
+) -> None:
+    """Sample scenes of twins at rest on a table, a shelf or a tray; run it again to go on where it stopped."""
+    from manitwin.apps.layouts.run import layout_totals, make_layouts
+
+    given = {
+        "objects": None if objects is None else _range(objects), "surface": surface, "clutter": clutter, "robot": robot,
+        "include": tuple(include) if include else None, "stacked": stacked, "contained": contained,
+    }  # fmt: skip
+    settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
+    if pictures:
+        from manitwin.render.device import require_renderer
+
+        require_renderer()
+    report = make_layouts(
+        dataset, out, count, settings, executor=chosen_executor(executor), address=address,
+        on_start=lambda items, opened: out_console.print(f"{items} layouts, {opened} to do", markup=False),
+    )  # fmt: skip
+    totals = layout_totals(out)
+    ended = totals.accepted + sum(totals.rejected.values())
+    why = "".join(f", {n} {reason}" for reason, n in totals.rejected.items())
+    out_console.print(f"{totals.accepted} of {ended} layouts accepted ({totals.acceptance:.1%}){why}", markup=False)
+    out_console.print(
+        f"{totals.objects} objects; {totals.repaired} layouts were repaired; as they settled, objects moved at most "
+        f"{1000 * totals.max_moved_m:.1f} mm and turned {degrees(totals.max_turned_rad):.1f} degrees; they overlap by at most "
+        f"{1000 * totals.max_penetration_m:.2f} mm; {totals.cpu_seconds / max(1, ended):.2f} CPU-s each",
+        markup=False,
+    )
+    if report.stopped:
+        err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
+    raise typer.Exit(report.exit_code)
+
+
+def _range(text: str) -> tuple[int, int]:
+    from manitwin.errors import UsageError
+
+    low, _, high = text.partition("..")
+    try:
+        return int(low), int(high or low)
+    except ValueError:
+        raise UsageError(f"--objects {text}: give LOW..HIGH, such as 3..12") from None
+
+
+def _settings(
+    file: Path | None, layout: dict[str, Any], seed: int | None, pictures: bool, jobs: int | None
+) -> LayoutsConfig:
+    from manitwin.app_config import LayoutsConfig, load_app_config
+
+    given = {"seed": seed, "pictures": pictures or None, "layout": layout, "run": options.run_settings(jobs)}
+    return load_app_config(LayoutsConfig, file, given)

@@ -1,0 +1,46 @@
+"""``manitwin render``: pictures of recorded episodes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.commands import options
+from manitwin.commands.console import err_console, out_console
+from manitwin.commands.run import chosen_executor
+
+
+def render(
+    episodes: Annotated[Path, typer.Argument(help="What `manitwin trajectories` wrote.", metavar="EPISODES")],
+    cameras: Annotated[str | None, typer.Option(help="By commas: front, side, top, wrist.")] = None,
+    size: Annotated[int | None, typer.Option(help="Width and height of a picture in pixels.")] = None,
+    codec: Annotated[str | None, typer.Option(help="mpeg4 (fast), or vp9 (plays in browsers).")] = None,
+    config: options.Config = None,
+    jobs: options.Jobs = None,
+    executor: options.Executor = "local",
+    address: options.Address = None,
+) -> None:
+    """Draw the kept episodes by showing their states again, and add the films to the LeRobot data set."""
+    from manitwin.app_config import PicturesConfig, load_app_config
+    from manitwin.apps.trajectories.render_run import draw_episodes, write_with_pictures
+    from manitwin.render.device import require_renderer
+
+    names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
+    given = {"cameras": names, "size_px": size, "codec": codec, "run": options.run_settings(jobs)}
+    settings = load_app_config(PicturesConfig, config, given)
+    if executor != "ray":
+        require_renderer()
+    report = draw_episodes(
+        episodes, settings, executor=chosen_executor(executor), address=address,
+        on_start=lambda items, opened: out_console.print(f"{items} batches, {opened} to do", markup=False),
+    )  # fmt: skip
+    if report.exit_code == 4:
+        err_console.print(f"manitwin status {episodes}/pictures says more; run the same command again", markup=False)
+        raise typer.Exit(4)
+    written = write_with_pictures(episodes, settings.cameras)
+    out_console.print(
+        f"{written.episodes} episodes, {written.frames} frames, {len(settings.cameras)} cameras: {episodes}/lerobot",
+        markup=False,
+    )

@@ -1,0 +1,67 @@
+"""``manitwin trajectories``: demonstrations of twins, planned and proven in physics."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.commands import options
+from manitwin.commands.console import err_console, out_console
+from manitwin.commands.run import chosen_executor
+
+
+def trajectories(
+    source: Annotated[
+        str,
+        typer.Argument(help="A data set, a folder of twins, or scenes of `manitwin layout`.", metavar="DATASET|SCENES"),
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write episodes into.")],
+    count: Annotated[int, typer.Option("-n", help="How many episodes to attempt.")] = 100,
+    robot: Annotated[str | None, typer.Option(help="A robot by name, or a TOML file that describes one.")] = None,
+    skill: Annotated[str | None, typer.Option(help="What to do: pick_place.")] = None,
+    others: Annotated[int | None, typer.Option(help="So many other objects around, where twins are given.")] = None,
+    retire: Annotated[
+        bool, typer.Option("--retire/--no-retire", help="Retire grasps that fail, in their twins' records.")
+    ] = True,
+    formats: Annotated[
+        str, typer.Option("--format", help="What to write beside the batches: lerobot, maniskill, or both by a comma.")
+    ] = "lerobot,maniskill",
+    seed: options.Seed = None,
+    config: options.Config = None,
+    jobs: options.Jobs = None,
+    executor: options.Executor = "local",
+    address: options.Address = None,
+) -> None:
+    """Plan and execute pick-and-place episodes, and keep what succeeded; run it again to go on where it stopped."""
+    from manitwin.app_config import TrajectoriesConfig, load_app_config
+    from manitwin.apps.trajectories.collect import chosen_formats, collect
+    from manitwin.apps.trajectories.run import make_episodes, retire_failing
+
+    wanted = chosen_formats(formats)
+    given = {"seed": seed, "robot": robot, "skill": skill, "others": others, "run": options.run_settings(jobs)}
+    settings = load_app_config(TrajectoriesConfig, config, given)
+    report = make_episodes(
+        source, out, count, settings, executor=chosen_executor(executor), address=address,
+        on_start=lambda items, opened: out_console.print(f"{items} batches, {opened} to do", markup=False),
+    )  # fmt: skip
+    for remark in report.remarks:
+        err_console.print(remark, markup=False)
+    if report.exit_code == 4:
+        if report.stopped:
+            err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
+        err_console.print(f"manitwin status {out} says more; run the same command again to go on", markup=False)
+        raise typer.Exit(4)
+    collected = collect(out, wanted)
+    for line in collected.lines:
+        out_console.print(line, markup=False)
+    if retire:
+        found, fresh = retire_failing(out)
+        out_console.print(f"{len(found)} grasps fail end to end, {fresh} of them retired now", markup=False)
+        for each in found:
+            what = ", ".join(f"{n} {outcome}" for outcome, n in each.outcomes.items())
+            out_console.print(
+                f"  {each.twin_id} {each.grasp_id}: {each.failed} of {each.executed} ({what})", markup=False
+            )
+    out_console.print(f"manitwin stats {out} says more", markup=False)

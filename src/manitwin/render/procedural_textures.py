@@ -1,0 +1,183 @@
+"""Wood, metal, marble and cloth as images: seamless, of a seed, for furniture that a scene stands on.
+
+All noise is made in the frequency domain, so a texture continues across its edges without a seam.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import scipy.fft
+
+from manitwin.errors import UsageError, choose_from
+
+TEXTURE_PX = 1024
+
+Image = np.ndarray
+
+
+@dataclass(frozen=True)
+class ProceduralTexture:
+    """A square that repeats every ``size_m`` metres.
+
+    ``color (H, W, 3) uint8`` sRGB and ``roughness (H, W) uint8`` (255: matt), as glTF 2.0 has them; the first row is the
+    top (v = 1). Grain runs along u. ``metallic`` is 0 or 1.
+    """
+
+    color: np.ndarray
+    roughness: np.ndarray
+    metallic: float
+    size_m: float
+
+
+@lru_cache(maxsize=32)  # 4 MB each
+def procedural_texture(material: str, seed: int, *, size_px: int = TEXTURE_PX) -> ProceduralTexture:
+    """Make a texture of ``wood``, ``metal`` (brushed), ``marble`` or ``cloth``; tone, scale and pattern follow the seed.
+
+    Raises UsageError for another material. Same material, seed and size: same pixels.
+    """
+    if material not in _MAKERS:
+        raise UsageError(choose_from("furniture material", material, _MAKERS))
+    return _MAKERS[material](np.random.default_rng([seed, sorted(_MAKERS).index(material)]), size_px)
+
+
+def periodic_noise(
+    rng: np.random.Generator, size_px: int, *, wavelengths: tuple[float, float], slope: float = 1.0
+) -> Image:
+    """Return noise ``(size, size)`` of mean 0 and deviation 1 that repeats; amplitudes fall with frequency to the ``slope``.
+
+    ``wavelengths`` are the longest ones along u and v, as shares of the square: unequal ones stretch the noise.
+    """
+    u, v = (np.asarray(f(size_px, 1 / size_px), np.float32) for f in (scipy.fft.rfftfreq, scipy.fft.fftfreq))
+    squared = (u * wavelengths[0]) ** 2 + ((v * wavelengths[1]) ** 2)[:, None]
+    spectrum = np.maximum(squared, 1) ** np.float32(-(slope + 1) / 2) * np.exp(
+        np.complex64(2j * np.pi) * rng.random(squared.shape, dtype=np.float32)
+    )
+    spectrum[0, 0] = 0
+    noise = scipy.fft.irfft2(spectrum, s=(size_px, size_px))
+    return np.asarray(noise / noise.std(), np.float32)
+
+
+def _wood(rng: np.random.Generator, size: int) -> ProceduralTexture:
+    """Boards side by side, each cut from its own log: growth rings, fine fibres, pores."""
+    dark, light = _WOODS[int(rng.integers(len(_WOODS)))]
+    boards = int(rng.integers(6, 11))
+    rings = float(rng.uniform(2.5, 5.0))  # across a board
+    edges = np.rint(np.linspace(0, size, boards + 1)).astype(int)
+    warp = periodic_noise(rng, size, wavelengths=(1.2, 0.12), slope=1.6)
+    fibre = periodic_noise(rng, size, wavelengths=(0.15, 0.004), slope=0.5)
+    pores = periodic_noise(rng, size, wavelengths=(0.03, 0.003), slope=0.2)
+    grain, tone, joint = np.empty((size, size)), np.empty((size, size)), np.zeros((size, size))
+    across = np.arange(size)[:, None]
+    for low, high in pairwise(edges):
+        inside = slice(low, high)
+        shift = int(rng.integers(size))
+        y = (across[inside] - low) / (high - low)
+        depth = y * rings + 0.55 * np.roll(warp, shift, axis=1)[inside] + rng.uniform(0, 1)
+        ring = depth % 1.0
+        grain[inside] = np.where(ring < 0.82, ring / 0.82, (1 - ring) / 0.18)  # slow in spring, ends sharply in autumn
+        tone[inside] = rng.normal(0.0, 0.10)
+        joint[low] = 1.0
+    gap = np.minimum(cv2.GaussianBlur(np.vstack([joint] * 3), (0, 0), size / 1024 * 0.9)[size : 2 * size] * 2.2, 1)
+    share = np.clip(0.62 - 0.30 * grain + tone + 0.10 * fibre - 0.10 * np.maximum(pores - 1.2, 0), 0, 1)
+    color = _mixed(dark, light, share) * (1 - 0.75 * gap)[..., None]
+    roughness = 0.46 + 0.10 * (1 - share) + 0.25 * gap
+    return _texture(color * _tint(rng, 0.05), roughness, 0.0, 1.0)
+
+
+def _metal(rng: np.random.Generator, size: int) -> ProceduralTexture:
+    """Sheet metal that was brushed along u: streaks, and clouds of wear."""
+    base = _METALS[int(rng.integers(len(_METALS)))]
+    streaks = periodic_noise(rng, size, wavelengths=(0.5, 0.002), slope=0.15)
+    wear = periodic_noise(rng, size, wavelengths=(0.5, 0.5), slope=1.2)
+    color = base * (1 + 0.035 * streaks + 0.02 * wear)[..., None]
+    roughness = rng.uniform(0.34, 0.46) + 0.03 * streaks + 0.025 * wear
+    return _texture(color * _tint(rng, 0.02), roughness, 1.0, 1.0)
+
+
+def _marble(rng: np.random.Generator, size: int) -> ProceduralTexture:
+    """Clouds under veins: lines along which a warped field passes through zero (after Perlin 1985, "An Image Synthesizer")."""
+    ground, cloud, vein = _MARBLES[int(rng.integers(len(_MARBLES)))]
+    clouds = periodic_noise(rng, size, wavelengths=(0.5, 0.5), slope=1.1)
+    veins = np.zeros((size, size))
+    for length, width, strength in ((0.9, 0.030, 1.0), (0.45, 0.020, 0.55), (0.2, 0.018, 0.25)):
+        field = periodic_noise(rng, size, wavelengths=(length, length), slope=1.0)
+        patches = np.clip(periodic_noise(rng, size, wavelengths=(0.4, 0.4), slope=1.0) * 0.5 + 0.4, 0, 1)
+        veins = np.maximum(veins, strength * patches * np.exp(-np.abs(field) / width))
+    color = _mixed(ground, cloud, np.clip(0.35 + 0.3 * clouds, 0, 1))
+    color += (vein - color) * np.clip(veins, 0, 1)[..., None] * 0.8
+    roughness = 0.20 + 0.05 * np.clip(veins, 0, 1) + 0.01 * clouds
+    return _texture(color * _tint(rng, 0.03), roughness, 0.0, float(rng.uniform(0.9, 1.3)))
+
+
+def _cloth(rng: np.random.Generator, size: int) -> ProceduralTexture:
+    """Plain weave of uneven yarns, in one colour or in stripes or checks of two (half of the seeds each)."""
+    first = _CLOTHS[int(rng.integers(len(_CLOTHS)))]
+    second = first * 0.55 + 0.42 if first.max() < 0.55 else first * 0.72
+    threads = size // 8  # eight pixels for a period of two yarns
+    across, along = np.meshgrid(*[(np.arange(size) + 0.5) * threads / size] * 2)
+    over = (np.floor(across * 2) + np.floor(along * 2)) % 2 < 1  # which of warp and weft lies on top
+    warp, weft = np.abs(np.sin(2 * np.pi * across)), np.abs(np.sin(2 * np.pi * along))
+    height = np.where(over, weft * (0.6 + 0.4 * warp), warp * (0.6 + 0.4 * weft))
+    yarn = np.where(
+        over,
+        periodic_noise(rng, size, wavelengths=(0.3, 0.004), slope=0.3),
+        periodic_noise(rng, size, wavelengths=(0.004, 0.3), slope=0.3),
+    )
+    bands = int(rng.integers(8, 18)) * 2
+    pattern, stripes = int(rng.integers(4)), lambda x: np.floor(x * bands / threads) % 2
+    dyed = {0: 0 * across, 1: 0 * across, 2: stripes(along), 3: 0.5 * (stripes(along) + stripes(across))}[pattern]
+    color = _mixed(first, second, dyed) * (0.80 + 0.20 * height + 0.05 * yarn)[..., None]
+    return _texture(color * _tint(rng, 0.08), 0.92 - 0.06 * height, 0.0, 0.5)
+
+
+def _mixed(zero: Image, one: Image, share: Image) -> Image:
+    return zero + (one - zero) * share[..., None]
+
+
+def _tint(rng: np.random.Generator, spread: float) -> Image:
+    """Return factors ``(3,)`` that shift hue and lightness a little."""
+    return np.exp(rng.normal(0, spread) + rng.normal(0, spread / 2, 3))
+
+
+def _texture(color: Image, roughness: Image, metallic: float, size_m: float) -> ProceduralTexture:
+    def to_bytes(image: Image) -> Image:
+        pixels = np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)
+        pixels.flags.writeable = False  # it is kept and given again
+        return pixels
+
+    return ProceduralTexture(to_bytes(color), to_bytes(roughness), metallic, size_m)
+
+
+def _srgb(*hexes: str) -> tuple[Image, ...]:
+    return tuple(np.array([int(code[i : i + 2], 16) for i in (0, 2, 4)]) / 255 for code in hexes)
+
+
+# sRGB, picked by eye
+_WOODS = (  # autumn and spring wood of oak, beech, walnut, birch, cherry
+    _srgb("8a6238", "c9a26b"),
+    _srgb("a9744a", "dcb488"),
+    _srgb("4a2f1e", "8a6243"),
+    _srgb("c2a070", "ead4aa"),
+    _srgb("7d4226", "b9764a"),
+)
+_METALS = _srgb("b4b2ae", "c6c8ca", "c3b48f")  # steel, aluminium, brass
+_MARBLES = (  # ground, cloud and vein of white, cream, green and black marble
+    _srgb("f0eeea", "d8d8d6", "77777a"),
+    _srgb("eadfc8", "d9c6a2", "9a7247"),
+    _srgb("2f4a40", "1f352e", "b9c9bd"),
+    _srgb("2a2a2c", "1b1b1d", "d0c8b8"),
+)
+_CLOTHS = _srgb("c9c2b4", "3c5a78", "8c3b36", "5d7356", "d8b45a", "55565c", "e6e2d8", "6a4f74")
+
+_MAKERS: dict[str, Callable[[np.random.Generator, int], ProceduralTexture]] = {
+    "cloth": _cloth,
+    "marble": _marble,
+    "metal": _metal,
+    "wood": _wood,
+}

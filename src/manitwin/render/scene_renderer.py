@@ -1,0 +1,258 @@
+"""Pictures of scenes of many rigid things: colour, depth, normals and ids, from several cameras at once.
+
+Things are uploaded once; from frame to frame only their poses change. Colour is drawn with twice the pixels each way by
+``shaders/scene``, a forward shader with one shadow map a light and a map of heights for ambient occlusion. Depth, normals
+and ids are drawn by ``shaders/geometry`` with one sample a pixel, at its centre: they are those of the rays through the
+pixels' centres, and no mean of two things.
+"""
+
+from __future__ import annotations
+
+import atexit
+import warnings
+import weakref
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import trimesh
+
+from manitwin.errors import UsageError
+from manitwin.geometry.poses import transform
+from manitwin.render.cameras import Camera
+from manitwin.render.device import require_renderer
+from manitwin.render.drawable import Drawable, drawable
+from manitwin.render.sapien_shape import triangle_mesh_shape
+from manitwin.render.scene_lighting import STUDIO, Lighting
+from manitwin.render.surfaces import Surface, plain_part, surface
+
+SHADERS = Path(__file__).parent / "shaders"
+SUPERSAMPLE = 2  # the shader spreads its shadow samples over blocks of 2 x 2
+NEAR_M, FAR_M = 0.01, 30.0
+MAX_LIGHTS = 5  # shaders/scene has room for six, of which one looks down for the sky
+SHADOW_MAP_PX, HEIGHT_MAP_PX = 1024, 512
+PICTURE_FORMATS = {
+    "Color": "R8G8B8A8Unorm",
+    "Albedo": "R8G8B8A8Unorm",
+    "Normal": "R16G16B16A16Sfloat",
+    "WorldNormal": "R32G32B32A32Sfloat",
+    "Distance": "R32Sfloat",
+}
+NOTHING = 0
+"""The id of what is no thing of the scene: the floor and the backdrop."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """What is behind a scene: a level floor that fades into an even backdrop. sRGB; ``floor_z_m`` in the world frame."""
+
+    floor_z_m: float = -0.75
+    floor: tuple[int, int, int] = (172, 170, 166)
+    backdrop: tuple[int, int, int] = (214, 217, 221)
+
+
+@dataclass(frozen=True)
+class ShadowRegion:
+    """The ball in which shadows are drawn; the smaller, the sharper. World frame, metres."""
+
+    center_m: tuple[float, float, float] = (0.3, 0.0, 0.3)
+    radius_m: float = 1.3
+
+
+@dataclass(frozen=True)
+class SceneFrame:
+    """A picture of size (H, W) from one camera; all but ``rgb`` are None where they were not asked for.
+
+    ``rgb (H, W, 3) uint8`` sRGB. Of the surface at each pixel's centre: ``depth_m (H, W) float32`` along the viewing axis
+    (0: the camera sees none), ``normals (H, W, 3) float32``, the unit shading normal in the world frame, towards the
+    camera's side, and ``ids (H, W) uint16``, 0 for floor and backdrop.
+    """
+
+    rgb: np.ndarray
+    depth_m: np.ndarray | None = None
+    normals: np.ndarray | None = None
+    ids: np.ndarray | None = None
+
+
+class SceneRenderer:
+    """A scene that is kept and drawn many times. Close it at the end, or use it in a ``with`` statement.
+
+    Raises RendererMissing where no device renders.
+    """
+
+    def __init__(
+        self, lighting: Lighting = STUDIO, *, room: Room | None = Room(), shadows: ShadowRegion = ShadowRegion()
+    ) -> None:
+        require_renderer()
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # SAPIEN warns of drivers that it looks for and does not need
+            import sapien
+            import sapien.render
+        self._sapien: Any = sapien
+        sapien.render.set_log_level("error")
+        for picture, pixel_format in PICTURE_FORMATS.items():
+            sapien.render.set_picture_format(picture, pixel_format)
+        self._scene: Any = sapien.Scene([sapien.render.RenderSystem()])
+        self._entities: dict[str, tuple[int, Any]] = {}
+        self._casters: dict[str, Any] = {}
+        self._cameras: dict[tuple[str, int, int, int], tuple[Any, Any]] = {}
+        self._backdrop = np.zeros(3) if room is None else np.array(room.backdrop, float)
+        self._add_lights(lighting, shadows)
+        if room is not None:
+            self._add_floor(room)
+        _open_renderers.add(self)
+
+    def __enter__(self) -> SceneRenderer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give back what the driver holds."""
+        _open_renderers.discard(self)
+        self._cameras.clear()
+        self._entities.clear()
+        self._casters.clear()
+        if self._scene is not None:
+            self._scene.clear()
+        self._scene = None
+
+    @property
+    def ids(self) -> dict[str, int]:
+        """The ids of the things by name, from 1 in the order in which they were added."""
+        return {name: number for name, (number, _) in self._entities.items()}
+
+    def add(self, name: str, thing: Drawable | Sequence[trimesh.Trimesh], pose: np.ndarray | None = None) -> int:
+        """Add a thing, or its visual parts in its own frame, at ``thing_to_world (4, 4)``; returns its id.
+
+        Raises UsageError for a name that is taken.
+        """
+        if name in self._entities:
+            raise UsageError(f"the scene has a thing {name!r} already; give each its own name")
+        thing = thing if isinstance(thing, Drawable) else drawable(thing)
+        render, number = self._sapien.render, len(self._entities) + 1
+        seen = render.RenderBodyComponent()
+        for each in thing.surfaces:
+            seen.attach(triangle_mesh_shape(render, each, mipmaps=True))
+        entity = self._placed(seen, np.eye(4) if pose is None else pose)
+        for part in seen._internal_node.children:  # the only way to it in SAPIEN 3.0.3
+            part.cast_shadow = False
+        self._entities[name] = number, entity
+        self._casters[name] = self._shadow_caster(thing.shadow, entity.pose)
+        return number
+
+    def _shadow_caster(self, shape: Surface, pose: Any) -> Any:
+        """Add something that is not seen but throws a shadow."""
+        body = self._sapien.render.RenderBodyComponent()
+        body.attach(triangle_mesh_shape(self._sapien.render, shape, mipmaps=False))
+        entity = self._placed(body, np.eye(4))
+        entity.set_pose(pose)
+        body.shading_mode = 1  # drawn by a second G-buffer shader, which shaders/scene has not, and into shadow maps
+        return entity
+
+    def set_pose(self, name: str, pose: np.ndarray) -> None:
+        """Move a thing to ``thing_to_world (4, 4)``."""
+        placed = self._sapien.Pose(pose)
+        self._entities[name][1].set_pose(placed)
+        self._casters[name].set_pose(placed)
+
+    def render(self, cameras: Sequence[Camera], *, geometry: bool = False) -> list[SceneFrame]:
+        """Draw the scene from each camera (``camera_to_object`` is its pose in the world), with ``geometry`` all of a frame."""
+        color = [self._camera("scene", i, camera, SUPERSAMPLE) for i, camera in enumerate(cameras)]
+        numbers = [self._camera("geometry", i, camera, 1) for i, camera in enumerate(cameras)] if geometry else []
+        self._scene.update_render()
+        for component in (*color, *numbers):
+            component.take_picture()
+        if not geometry:
+            return [SceneFrame(self._rgb(c, camera)) for c, camera in zip(color, cameras, strict=True)]
+        return [
+            SceneFrame(self._rgb(c, camera), *self._geometry(g))
+            for c, g, camera in zip(color, numbers, cameras, strict=True)
+        ]
+
+    def _rgb(self, component: Any, camera: Camera) -> np.ndarray:
+        picture = cv2.resize(
+            component.get_picture("Color"), (camera.width_px, camera.height_px), interpolation=cv2.INTER_AREA
+        )
+        if picture[..., 3].min() == 255:
+            return np.ascontiguousarray(picture[..., :3])
+        empty = (1 - picture[..., 3:].astype(np.float32) / 255) * self._backdrop.astype(np.float32)
+        return np.rint(np.minimum(picture[..., :3] + empty, 255)).astype(np.uint8)
+
+    def _geometry(self, component: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        normals, entity = component.get_picture("WorldNormal"), component.get_picture("Segmentation")[..., 0]
+        depth = component.get_picture("Distance").reshape(entity.shape)
+        table = np.zeros(int(entity.max()) + 1, np.uint16)
+        for number, thing in self._entities.values():
+            if thing.per_scene_id < len(table):
+                table[thing.per_scene_id] = number
+        return depth, np.ascontiguousarray(normals[..., :3]), table[entity]
+
+    def _camera(self, shader: str, slot: int, camera: Camera, k: int) -> Any:
+        key = (shader, slot, camera.width_px * k, camera.height_px * k)
+        if key not in self._cameras:
+            component = self._sapien.render.RenderCameraComponent(key[2], key[3], str(SHADERS / shader))
+            self._cameras[key] = component, self._placed(component, np.eye(4))
+        component, entity = self._cameras[key]
+        component.set_fovy(camera.fov_y_rad, True)
+        component.near, component.far = NEAR_M, FAR_M
+        right, up, backward = camera.camera_to_object[:3, :3].T
+        entity.set_pose(self._sapien.Pose(transform(np.stack([-backward, -right, up], 1), camera.position)))
+        return component
+
+    def _placed(self, component: Any, pose: np.ndarray) -> Any:
+        entity = self._sapien.Entity()
+        entity.add_component(component)
+        entity.set_pose(self._sapien.Pose(pose))
+        self._scene.add_entity(entity)
+        return entity
+
+    def _add_lights(self, lighting: Lighting, region: ShadowRegion) -> None:
+        if len(lighting.lights) > MAX_LIGHTS:
+            raise UsageError(f"a scene has at most {MAX_LIGHTS} directional lights, not {len(lighting.lights)}")
+        if sum(light.casts_shadow for light in lighting.lights) > 1:
+            raise UsageError("of a scene's directional lights one at most casts shadows; switch it off for the others")
+        lighting = lighting.exposed()
+        self._scene.set_ambient_light(lighting.ambient.tolist())
+        # the order is the shader's: one that looks down, one with shadows, the others
+        self._add_shadowed(np.array([0.0, 0.0, -1.0]), np.zeros(3), region, HEIGHT_MAP_PX)
+        for light in sorted(lighting.lights, key=lambda light: not light.casts_shadow):
+            if light.casts_shadow:
+                self._add_shadowed(light.direction, light.color, region, SHADOW_MAP_PX)
+            else:
+                self._scene.add_directional_light(light.direction.tolist(), light.color.tolist())
+
+    def _add_shadowed(self, direction: np.ndarray, color: np.ndarray, region: ShadowRegion, map_px: int) -> None:
+        self._scene.add_directional_light(
+            direction.tolist(),
+            color.tolist(),
+            shadow=True,
+            position=list(region.center_m),
+            shadow_scale=region.radius_m,
+            shadow_near=-2 * region.radius_m,
+            shadow_far=2 * region.radius_m,
+            shadow_map_size=map_px,
+        )
+
+    def _add_floor(self, room: Room) -> None:
+        corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [12, 12, 1] + [0, 0, room.floor_z_m]
+        floor = plain_part(trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False), room.floor, roughness=0.9)
+        shape = triangle_mesh_shape(self._sapien.render, surface(floor), mipmaps=False)
+        shape.material.set_emission([0.0, 0.0, 0.0, 1.0])  # tells the shader to fade it
+        body = self._sapien.render.RenderBodyComponent()
+        body.attach(shape)
+        self._placed(body, np.eye(4))
+
+
+_open_renderers: weakref.WeakSet[SceneRenderer] = weakref.WeakSet()
+
+
+@atexit.register
+def _close_all() -> None:
+    """Drop renderers while the interpreter is whole: SAPIEN 3.0.3 crashes when they are dropped later."""
+    for renderer in list(_open_renderers):
+        renderer.close()

@@ -1,0 +1,208 @@
+#version 450
+// Surfaces under directional lights and soft surroundings. The first light shines straight down and has no colour: its
+// shadow map is a map of heights, which says how much of the sky a point sees. The second one may throw shadows. Maps are
+// named by constants: lavapipe is much slower where an index is computed.
+
+
+// SAPIEN sets these by their names, and wants all of them
+layout(constant_id = 0) const int NUM_DIRECTIONAL_LIGHTS = 3;
+layout(constant_id = 1) const int NUM_DIRECTIONAL_LIGHT_SHADOWS = 2;
+layout(constant_id = 2) const int NUM_POINT_LIGHTS = 0;
+layout(constant_id = 3) const int NUM_POINT_LIGHT_SHADOWS = 0;
+layout(constant_id = 4) const int NUM_SPOT_LIGHTS = 0;
+layout(constant_id = 5) const int NUM_SPOT_LIGHT_SHADOWS = 0;
+layout(constant_id = 6) const int NUM_TEXTURED_LIGHT_SHADOWS = 0;
+
+layout(set = 1, binding = 0) uniform CameraBuffer {
+  mat4 viewMatrix;
+  mat4 projectionMatrix;
+  mat4 viewMatrixInverse;
+  mat4 projectionMatrixInverse;
+  float width;
+  float height;
+} cameraBuffer;
+
+struct PointLight {
+  vec4 position;
+  vec4 emission;
+};
+
+struct DirectionalLight {
+  vec4 direction;
+  vec4 emission;
+};
+
+struct SpotLight {
+  vec4 position;
+  vec4 direction;
+  vec4 emission;
+};
+
+layout(set = 0, binding = 0) uniform SceneBuffer {
+  vec4 ambientLight;
+  DirectionalLight directionalLights[6];
+  PointLight pointLights[10];
+  SpotLight spotLights[10];
+  SpotLight texturedLights[1];
+} sceneBuffer;
+
+struct LightBuffer {
+  mat4 viewMatrix;
+  mat4 viewMatrixInverse;
+  mat4 projectionMatrix;
+  mat4 projectionMatrixInverse;
+  int width;
+  int height;
+};
+
+layout(set = 0, binding = 1) uniform ShadowBuffer {
+  LightBuffer pointLightBuffers[60];
+  LightBuffer directionalLightBuffers[6];
+  LightBuffer spotLightBuffers[10];
+  LightBuffer texturedLightBuffers[1];
+} shadowBuffer;
+
+layout(set = 0, binding = 2) uniform samplerCube samplerPointLightDepths[10];
+layout(set = 0, binding = 3) uniform sampler2D samplerDirectionalLightDepths[6];
+layout(set = 0, binding = 4) uniform sampler2D samplerSpotLightDepths[10];
+layout(set = 0, binding = 5) uniform sampler2D samplerTexturedLightDepths[1];
+layout(set = 0, binding = 6) uniform sampler2D samplerTexturedLightTextures[1];
+
+layout(set = 2, binding = 0) uniform sampler2D samplerAlbedo;
+layout(set = 2, binding = 1) uniform sampler2D samplerNormal;
+layout(set = 2, binding = 2) uniform sampler2D samplerGbufferDepth;
+
+layout(location = 0) in vec2 inUV;
+
+layout(location = 0) out vec4 outColor;
+
+const float PI = 3.14159265;
+const float FADE_FROM = 1.6, FADE_TO = 4.5;  // metres from the z axis: where a floor that fades does so
+
+const float LIGHT_WIDTH = 0.15;     // added to the width of highlights: lamps are no points (Karis 2013, area lights)
+const float SHADOW_RADIUS = 0.009;  // metres: half the width of a shadow's soft edge
+const float SHADOW_BIAS = 0.0012;   // metres along the light
+const float STEEPEST = 4;           // tangent of the angle at which a surface's own plane is followed no further
+const float SKY_RADIUS = 0.085;     // metres around a point in which it looks for what hides the sky
+const float SKY_BIAS = 0.006;       // metres: more than one texel of the map of heights is wide
+const float SKY_REACH = 0.16;       // metres above it from which on things hide less of the sky
+
+// Points of a disc (Vogel 1979, golden angle). The samples of a pixel, two each way, turn them by eighths of a turn, so
+// that a pixel has four times as many.
+const int TAPS = 4;
+const vec2 DISC[TAPS] = vec2[](vec2(0.3536, 0.0000), vec2(-0.4516, 0.4137), vec2(0.0691, -0.7876), vec2(0.5688, 0.7419));
+const vec2 TURNS[4] = vec2[](vec2(1, 0), vec2(0.9239, 0.3827), vec2(0.7071, 0.7071), vec2(0.3827, 0.9239));
+
+mat2 turned() {
+  vec2 turn = TURNS[(int(gl_FragCoord.x) & 1) + 2 * (int(gl_FragCoord.y) & 1)];
+  return mat2(turn.x, turn.y, -turn.y, turn.x);
+}
+
+// The share of a light that arrives at p. Depths are compared with the surface's own plane at each texel, so that a plane
+// never shades itself (Isidoro 2006, "Shadow Mapping: GPU-based Tips and Techniques", receiver plane depth bias).
+float lightShare(sampler2D depths, mat4 view, mat4 proj, vec3 p, vec3 n, mat2 turn) {
+  vec3 scale = vec3(proj[0][0], proj[1][1], proj[2][2]);
+  vec3 at = (view * vec4(p, 1)).xyz * scale + proj[3].xyz;
+  if (any(greaterThan(abs(at.xy), vec2(0.98))) || at.z > 1) return 1;
+  vec3 facing = mat3(view) * n;
+  vec2 slope = -facing.xy / (abs(facing.z) > 0.02 ? facing.z : 0.02);
+  slope *= min(1, STEEPEST / max(length(slope), 1e-3));
+  vec2 size = vec2(textureSize(depths, 0)), toTexel = 0.5 * size, perTexel = 2 / size;
+  vec2 gradient = slope * scale.z / scale.xy;
+  float radius = SHADOW_RADIUS * abs(scale.x), lit = 0, base = at.z - SHADOW_BIAS * abs(scale.z) - dot(gradient, at.xy);
+  for (int k = 0; k < TAPS; ++k) {
+    ivec2 texel = ivec2((at.xy + radius * (turn * DISC[k]) + 1) * toTexel);
+    float plane = base + dot(gradient, (vec2(texel) + 0.5) * perTexel - 1);
+    lit += texelFetch(depths, texel, 0).x < plane ? 0 : 1;
+  }
+  return lit / TAPS;
+}
+
+// The share of the sky that p sees past the heights around it: horizon-based, after Bavoil et al. 2008, with one sample a
+// direction. The map looks straight down on the scene.
+float skyShare(sampler2D heights, mat4 view, mat4 proj, vec3 p, vec3 n, mat2 turn) {
+  p += n * (0.004 + 0.5 * SKY_RADIUS * length(n.xy));
+  vec3 at = (view * vec4(p, 1)).xyz * vec3(proj[0][0], proj[1][1], proj[2][2]) + proj[3].xyz;
+  if (any(greaterThan(abs(at.xy), vec2(0.9))) || at.z > 1) return 1;
+  vec2 toTexel = 0.5 * vec2(textureSize(heights, 0));
+  float radius = SKY_RADIUS * abs(proj[0][0]), toMetres = 1 / abs(proj[2][2]), hidden = 0;
+  for (int k = 0; k < TAPS; ++k) {
+    vec2 way = turn * DISC[k];
+    float top = texelFetch(heights, ivec2((at.xy + radius * way + 1) * toTexel), 0).x;
+    float above = max((at.z - top) * toMetres - SKY_BIAS, 0);
+    float slope = above / (SKY_RADIUS * length(DISC[k]) + 0.004);
+    hidden += slope * inversesqrt(1 + slope * slope) / (1 + above * above / (SKY_REACH * SKY_REACH));
+  }
+  return 1 - hidden / TAPS;
+}
+
+// Diffuse and specular reflection of a directional light: Lambert, and GGX with Smith's masking as of Karis 2013, "Real
+// Shading in Unreal Engine 4".
+vec3 lit(vec3 toLight, vec3 n, vec3 v, float nv, vec3 diffuse, vec3 fresnel, float roughness) {
+  vec3 h = normalize(toLight + v);
+  float nl = clamp(dot(n, toLight), 0, 1), nh = clamp(dot(n, h), 0, 1), vh = clamp(dot(v, h), 0, 1);
+  float alpha = min(roughness * roughness + LIGHT_WIDTH, 1), alpha2 = alpha * alpha;
+  float k = (alpha + 2 * roughness + 1) / 8;
+  float lobe = nh * nh * (alpha2 - 1) + 1;
+  float masked = 4 * lobe * lobe * (nv * (1 - k) + k) * (nl * (1 - k) + k);
+  vec3 mirrored = fresnel + (1 - fresnel) * exp2((-5.55473 * vh - 6.98316) * vh);
+  return nl / PI * (diffuse + mirrored * alpha2 / max(masked, 1e-6));
+}
+
+// Radiance of the surroundings in a direction of height in [-1, 1], 1 on average over the upper half: darker below,
+// brightest above. Spread over the half space it changes half as much.
+float glow(float height, float spread) {
+  return 0.82 + height * mix(0.36, 0.18, spread) - 0.25 * smoothstep(0.0, 0.6, -height) * (1 - spread);
+}
+
+// What a surface reflects of even surroundings: x times its fresnel colour plus y. A fit to SAPIEN's split-sum table
+// (Karis 2013) in roughness and 1 - nv, off by 0.09 at most.
+vec2 reflected(float roughness, float nv) {
+  float f = 1 - nv, f4 = f * f * f * f, r = roughness;
+  vec2 share = vec2(1 + r * r * (0.19 * f - 0.62) + f4 * (-0.74 + r * (-0.61 + r * 2.56)),
+                    f4 * (0.73 + r * (-1.10 + r * 0.31)));
+  return max(share, vec2(0));
+}
+
+// Linear up to 0.7, then bent so that white is approached and never passed.
+vec3 exposed(vec3 x) {
+  return mix(x, 1 - 0.3 * exp2((0.7 - x) * (1.442695 / 0.3)), step(vec3(0.7), x));
+}
+
+void main() {
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  float depth = texelFetch(samplerGbufferDepth, pixel, 0).x;
+  if (depth == 1) {
+    outColor = vec4(0);
+    return;
+  }
+  vec4 stored = texelFetch(samplerAlbedo, pixel, 0), normal = texelFetch(samplerNormal, pixel, 0);
+  vec3 albedo = stored.rgb * stored.rgb;
+  float metallic = stored.a, roughness = abs(normal.w);
+  vec4 inCamera = cameraBuffer.projectionMatrixInverse * vec4(inUV * 2 - 1, depth, 1);
+  vec3 inPosition = (cameraBuffer.viewMatrixInverse * vec4(inCamera.xyz / inCamera.w, 1)).xyz;
+
+  vec3 n = normal.xyz, v = normalize(cameraBuffer.viewMatrixInverse[3].xyz - inPosition);
+  float nv = clamp(dot(n, v), 1e-6, 1);
+  vec3 diffuse = albedo * (1 - metallic), fresnel = mix(vec3(0.04), albedo, metallic);
+
+  mat2 turn = turned();
+  float sky = skyShare(samplerDirectionalLightDepths[0], shadowBuffer.directionalLightBuffers[0].viewMatrix,
+                       shadowBuffer.directionalLightBuffers[0].projectionMatrix, inPosition, n, turn);
+  vec2 share = reflected(roughness, nv);
+  float mirroredHeight = 2 * dot(n, v) * n.z - v.z;
+  vec3 color = glow(n.z, 1) * diffuse + glow(mirroredHeight, roughness) * (fresnel * share.x + share.y);
+  color *= sceneBuffer.ambientLight.rgb * sky;
+  for (int i = 1; i < NUM_DIRECTIONAL_LIGHTS; ++i) {
+    vec3 toLight = -sceneBuffer.directionalLights[i].direction.xyz;
+    if (dot(n, toLight) <= 0) continue;
+    float arriving = 0.5 + 0.5 * sky;  // lights without a map of their own
+    if (i == 1 && NUM_DIRECTIONAL_LIGHT_SHADOWS > 1) {
+      arriving = lightShare(samplerDirectionalLightDepths[1], shadowBuffer.directionalLightBuffers[1].viewMatrix,
+                            shadowBuffer.directionalLightBuffers[1].projectionMatrix, inPosition, n, turn);
+    }
+    color += arriving * sceneBuffer.directionalLights[i].emission.rgb * lit(toLight, n, v, nv, diffuse, fresnel, roughness);
+  }
+  float shown = normal.w < 0 ? 1 - smoothstep(FADE_FROM, FADE_TO, length(inPosition.xy)) : 1;
+  outColor = vec4(pow(exposed(color), vec3(1 / 2.2)) * shown, shown);
+}

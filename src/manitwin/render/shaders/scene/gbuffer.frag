@@ -1,0 +1,22 @@
+#version 450
+// Materials of what a camera sees. They are lit in deferred.frag, once a pixel: lavapipe shades blocks of pixels for every
+// triangle, and things have as many triangles as pixels in a small picture.
+
+#include "../blocks.glsl"
+
+layout(location = 0) in vec3 inNormal;  // in the world's axes
+layout(location = 1) in vec2 inUV;
+
+layout(location = 0) out vec4 outAlbedo;  // square roots of it: 8 bits, finer in the dark; and metallic
+layout(location = 1) out vec4 outNormal;  // and roughness, below zero for a floor that fades with distance
+
+const int COLOR_TEXTURE = 1, ROUGHNESS_TEXTURE = 2, METALLIC_TEXTURE = 8;  // bits of textureMask
+
+void main() {
+  int mask = materialBuffer.textureMask;
+  vec3 albedo = (mask & COLOR_TEXTURE) != 0 ? texture(colorTexture, inUV).rgb : materialBuffer.baseColor.rgb;
+  float roughness = (mask & ROUGHNESS_TEXTURE) != 0 ? texture(roughnessTexture, inUV).r : materialBuffer.roughness;
+  float metallic = (mask & METALLIC_TEXTURE) != 0 ? texture(metallicTexture, inUV).r : materialBuffer.metallic;
+  outAlbedo = vec4(sqrt(albedo), metallic);
+  outNormal = vec4(normalize(inNormal), materialBuffer.emission.a > 0 ? -roughness : roughness);
+}

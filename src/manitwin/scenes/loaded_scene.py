@@ -1,0 +1,91 @@
+"""A scene in memory: its record with the twins that stand in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.loaded_twin import Twin
+from manitwin.scenes.placed_object import PlacedObject, StaticBox
+from manitwin.scenes.scene import Furniture, SceneObject, SceneRecord
+from manitwin.scenes.scene_file import read_scene
+from manitwin.scenes.twin_source import TwinSource
+from manitwin.simulate.rigid_body import RigidBody
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from manitwin.scenes.sapien_scene import SapienEntities
+
+
+class Scene:
+    """A layout: which twins stand where. World frame, metres, +Z up; a twin is read when it is asked for."""
+
+    def __init__(self, record: SceneRecord, twins: TwinSource):
+        """Take a record and the place that its twins are found in."""
+        self.record = record
+        self._source = twins
+        self._twins: dict[str, Twin] = {}
+        self._bodies: dict[str, RigidBody] = {}
+
+    @classmethod
+    def read(cls, scene: str | Path, dataset: str | Path) -> Scene:
+        """Read a scene's file or folder; ``dataset`` is what it was sampled from. Raises UsageError."""
+        return cls(read_scene(Path(scene)), TwinSource(dataset))
+
+    def __repr__(self) -> str:
+        return f"Scene({self.record.scene_id}, {len(self.record.objects)} objects on a {self.record.furniture.kind})"
+
+    def twin(self, twin_id: str) -> Twin:
+        """Return one of the scene's twins; raises UsageError where it is not in the data set."""
+        if twin_id not in self._twins:
+            self._twins[twin_id] = self._source.twin(twin_id)
+        return self._twins[twin_id]
+
+    def body(self, twin_id: str) -> RigidBody:
+        """Return the rigid body of one of the scene's twins."""
+        if twin_id not in self._bodies:
+            self._bodies[twin_id] = self.twin(twin_id).rigid_body()
+        return self._bodies[twin_id]
+
+    def placed_objects(self) -> list[PlacedObject]:
+        """Return the objects with their bodies, in the record's order; raises UsageError for a twin that is not there."""
+        return [
+            PlacedObject(each.name, each.twin_id, self.body(each.twin_id), object_pose(each))
+            for each in self.record.objects
+        ]
+
+    def static_boxes(self) -> list[StaticBox]:
+        """Return the furniture."""
+        return furniture_boxes(self.record.furniture)
+
+    def add_to_sapien(self, scene: Any, *, visual: bool = True) -> SapienEntities:
+        """Add objects and furniture to a SAPIEN 3 scene, with ``visual`` their looks and lights too; returns them by name.
+
+        With ``visual`` the scene needs a render system.
+        """
+        from manitwin.scenes.sapien_scene import add_to_sapien
+
+        return add_to_sapien(scene, self, visual=visual)
+
+    def to_mujoco(self) -> mujoco.MjModel:
+        """Return a MuJoCo model: the objects are free bodies of their names, ``qpos0`` is the recorded scene."""
+        from manitwin.scenes.mujoco_scene import to_mujoco
+
+        return to_mujoco(self)
+
+
+def object_pose(placed: SceneObject) -> np.ndarray:
+    """Return the recorded ``object_to_world (4, 4)``."""
+    return transform(rotation_from_quaternion_wxyz(np.array(placed.quaternion_wxyz)), np.array(placed.position_m))
+
+
+def furniture_boxes(furniture: Furniture) -> list[StaticBox]:
+    """Return the boxes of a piece of furniture."""
+    return [
+        StaticBox(each.name, np.array(each.half_extents_m), transform(translation=np.array(each.center_m)))
+        for each in furniture.boxes
+    ]

@@ -1,0 +1,113 @@
+"""Whole runs: bricks on a table are picked and placed, recorded, collected, and resumed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from grasped_twins import write_brick
+from manitwin.app_config import LayoutsConfig, TrajectoriesConfig
+from manitwin.apps.layouts.run import make_layouts
+from manitwin.apps.trajectories.attempts_table import ATTEMPTS, read_attempts
+from manitwin.apps.trajectories.collect import batch_folders, collect, stored_episodes
+from manitwin.apps.trajectories.episodes_stage import EPISODES
+from manitwin.apps.trajectories.lerobot.read import read_lerobot
+from manitwin.apps.trajectories.run import make_episodes
+from manitwin.config import LayoutSettings
+from manitwin.errors import UsageError
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.planning.problem import Phase
+
+CONFIG = TrajectoriesConfig(seed=5, batch=2)
+
+
+@pytest.fixture(scope="module")
+def bricks(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("bricks")
+    for number in range(3):
+        write_brick(root, number, ("brick", "block", "tea box")[number])
+    return root
+
+
+@pytest.fixture(scope="module")
+def episodes(bricks: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("episodes")
+    report = make_episodes(bricks, out, 6, CONFIG, executor="inline")
+    assert report.exit_code == 0
+    collect(out, ["lerobot", "maniskill"])
+    return out
+
+
+def test_bricks_are_put_where_they_should_be(episodes: Path) -> None:
+    attempts = list(read_attempts(episodes / ATTEMPTS))
+    assert len(attempts) == 6
+    assert sum(attempt.outcome == "kept" for attempt in attempts) >= 5
+    for episode in stored_episodes(batch_folders(episodes)):
+        goal, recording = np.array(episode.facts["goal_object_to_world"]), episode.recording
+        last = recording.object_positions_m[-1, recording.target]
+        assert np.linalg.norm(last[:2] - goal[:2, 3]) < 0.01
+        turned = rotation_from_quaternion_wxyz(recording.object_quaternions_wxyz[-1, recording.target].astype(float))
+        assert (turned @ goal[:3, :3].T)[2, 2] > np.cos(np.radians(3))
+        assert episode.attempt.position_error_m == pytest.approx(np.linalg.norm(last - goal[:3, 3]), abs=0.005)
+
+
+def test_a_recording_tells_a_pick_and_place_in_order(episodes: Path) -> None:
+    episode = next(stored_episodes(batch_folders(episodes)))
+    recording = episode.recording
+    phases = recording.phase.tolist()
+    assert phases == sorted(phases)
+    assert {Phase.REACH, Phase.CLOSE, Phase.CARRY, Phase.OPEN, Phase.RETREAT} <= set(phases)
+    carried = np.flatnonzero(recording.phase == Phase.CARRY)
+    assert (recording.object_positions_m[carried, recording.target, 2] > 0.03).all()
+    assert not recording.target_on_support[carried].any()
+    assert recording.finger_forces_n[carried].min() > 10
+    assert not recording.unplanned_contact.any()
+
+
+def test_the_same_seed_gives_the_same_bytes(bricks: Path, episodes: Path, tmp_path: Path) -> None:
+    make_episodes(bricks, tmp_path, 6, CONFIG, executor="inline")
+    names = [folder.name for folder in batch_folders(episodes)]
+    assert [folder.name for folder in batch_folders(tmp_path)] == names
+    for one, other in zip(batch_folders(episodes), batch_folders(tmp_path), strict=True):
+        for name in (EPISODES, ATTEMPTS, "batch.json"):
+            assert (one / name).read_bytes() == (other / name).read_bytes(), name
+
+
+def test_a_second_run_does_nothing_and_more_episodes_are_added(bricks: Path, episodes: Path, tmp_path: Path) -> None:
+    make_episodes(bricks, tmp_path, 3, CONFIG, executor="inline")
+    before = {folder.name: (folder / "batch.json").stat().st_mtime_ns for folder in batch_folders(tmp_path)}
+    opened: list[int] = []
+    make_episodes(bricks, tmp_path, 3, CONFIG, executor="inline", on_start=lambda items, todo: opened.append(todo))
+    assert opened == [0]
+    assert {f.name: (f / "batch.json").stat().st_mtime_ns for f in batch_folders(tmp_path)} == before
+
+
+def test_the_collected_sets_hold_what_was_kept(episodes: Path) -> None:
+    kept = sum(attempt.outcome == "kept" for attempt in read_attempts(episodes / ATTEMPTS))
+    assert len(read_lerobot(episodes / "lerobot").episodes) == kept
+    merged = json.loads((episodes / "maniskill" / "trajectory.json").read_text())
+    assert len(merged["episodes"]) == kept
+    assert pq.read_metadata(episodes / ATTEMPTS).num_rows == 6
+
+
+def test_scenes_give_episodes_too(bricks: Path, tmp_path: Path) -> None:
+    layouts = LayoutsConfig(seed=2, layout=LayoutSettings(objects=(2, 3), robot="panda"))
+    assert make_layouts(bricks, tmp_path / "scenes", 2, layouts, executor="inline").exit_code == 0
+    report = make_episodes(tmp_path / "scenes", tmp_path / "episodes", 2, CONFIG, executor="inline")
+    assert report.exit_code == 0
+    attempts = [
+        attempt for folder in batch_folders(tmp_path / "episodes") for attempt in read_attempts(folder / ATTEMPTS)
+    ]
+    assert {attempt.scene_id for attempt in attempts} == {"layout_2_000000", "layout_2_000001"}
+    assert all(attempt.others >= 1 for attempt in attempts)
+    assert any(attempt.succeeded for attempt in attempts)
+
+
+def test_what_is_no_place_of_twins_is_said(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="no accepted twin"):
+        make_episodes(tmp_path, tmp_path / "out", 1, CONFIG, executor="inline")
+    assert not (tmp_path / "out").exists()

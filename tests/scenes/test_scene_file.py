@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from manitwin.apps.layouts.sample import sample_layout
+from manitwin.config import LayoutSettings
+from manitwin.errors import UsageError
+from manitwin.scenes.scene import SCENE
+from manitwin.scenes.scene_file import read_scene, scene_bytes, write_scene
+from scene_twins import pool_of_things
+
+
+def test_scene_comes_back_as_it_was(tmp_path: Path) -> None:
+    record = sample_layout(pool_of_things(), LayoutSettings(objects=(2, 2)), 3, 1)
+    path = write_scene(record, tmp_path / "new" / "scene")
+    assert path.name == SCENE
+    assert read_scene(path) == read_scene(path.parent) == record
+    assert scene_bytes(read_scene(path)) == path.read_bytes()
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_what_is_no_scene_says_so(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"no scene\.json"):
+        read_scene(tmp_path)
+    (tmp_path / SCENE).write_text("{")
+    with pytest.raises(UsageError, match="not JSON"):
+        read_scene(tmp_path)
+    (tmp_path / SCENE).write_text(json.dumps({"schema_version": 99}))
+    with pytest.raises(UsageError, match="version 99"):
+        read_scene(tmp_path)
+    (tmp_path / SCENE).write_text(json.dumps({"schema_version": 1, "seed": "x"}))
+    with pytest.raises(UsageError, match=r"scene_id: Field required"):
+        read_scene(tmp_path)

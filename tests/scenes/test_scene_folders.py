@@ -1,0 +1,48 @@
+"""Where scenes lie, and whose twins they are of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import manitwin
+from manitwin.app_config import LayoutsConfig
+from manitwin.apps.layouts.run import layout_totals, make_layouts
+from manitwin.config import LayoutSettings
+from manitwin.errors import UsageError
+from manitwin.scenes.scene_folders import scene_ids, scene_name
+from scene_twins import write_things
+
+CONFIG = LayoutsConfig(seed=4, layout=LayoutSettings(objects=(2, 4)))
+
+
+def test_a_run_of_layouts_is_found_loaded_and_goes_on(tmp_path: Path) -> None:
+    write_things(tmp_path / "twins_here")
+    out = tmp_path / "made"
+    report = make_layouts(tmp_path / "twins_here", out, 3, CONFIG, executor="inline")
+    assert report.exit_code == 0 and scene_ids(out) == [f"layout_4_{n:06d}" for n in range(3)]
+    scene = manitwin.load_scene(out / scene_name("layout_4_000001"))
+    assert scene.to_mujoco().nbody == len(scene.placed_objects()) + 1
+    before = (out / scene_name("layout_4_000001") / "scene.json").read_bytes()
+    opened: list[int] = []
+    make_layouts(
+        tmp_path / "twins_here", out, 5, CONFIG, executor="inline", on_start=lambda items, todo: opened.append(todo)
+    )
+    assert opened == [2] and (out / scene_name("layout_4_000001") / "scene.json").read_bytes() == before
+    totals = layout_totals(out)
+    assert totals.accepted == 5 and totals.acceptance == 1.0
+    assert 0 <= totals.max_penetration_m <= 0.001 and totals.max_moved_m <= 0.01
+
+
+def test_a_category_that_no_twin_has_is_said_at_once(tmp_path: Path) -> None:
+    write_things(tmp_path / "twins_here")
+    config = LayoutsConfig(layout=LayoutSettings(include=("kettle",)))
+    with pytest.raises(UsageError, match=r"kettle.*there are: board, box, can"):
+        make_layouts(tmp_path / "twins_here", tmp_path / "made", 1, config, executor="inline")
+    assert not (tmp_path / "made").exists()
+
+
+def test_a_scene_that_lies_elsewhere_needs_its_data_set(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="say which data set"):
+        manitwin.load_scene(tmp_path / "scene.json")
