@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from manitwin.app_config import LayoutsConfig, TrajectoriesConfig
+from manitwin.app_config import LayoutsConfig, LayoutSettings, TrajectoriesConfig
 from manitwin.apps.furniture_pictures import lighting_of
 from manitwin.apps.layouts.preview import scene_pictures
 from manitwin.apps.layouts.run import make_layouts
@@ -26,7 +26,6 @@ from manitwin.apps.trajectories.replay_pictures import Replay, twin_drawable
 from manitwin.apps.trajectories.run import make_episodes
 from manitwin.apps.trajectories.stored_episode import StoredEpisode
 from manitwin.apps.trajectories.video import write_animation
-from manitwin.config import LayoutSettings
 from manitwin.robots.load import load_robot
 from manitwin.scenes.scene import Furniture, Light
 from manitwin.scenes.scene_file import read_scene

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from manitwin.app_config import LayoutSettings
 from manitwin.apps.layouts.sample import sample_layout
-from manitwin.config import LayoutSettings
 from manitwin.errors import UsageError
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_file import read_scene, scene_bytes, write_scene

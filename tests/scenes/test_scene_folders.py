@@ -7,9 +7,8 @@ from pathlib import Path
 import pytest
 
 import manitwin
-from manitwin.app_config import LayoutsConfig
+from manitwin.app_config import LayoutsConfig, LayoutSettings
 from manitwin.apps.layouts.run import layout_totals, make_layouts
-from manitwin.config import LayoutSettings
 from manitwin.errors import UsageError
 from manitwin.scenes.scene_folders import scene_ids, scene_name
 from scene_twins import write_things

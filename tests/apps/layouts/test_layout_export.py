@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from pxr import Usd, UsdGeom, UsdPhysics
 
+from manitwin.app_config import LayoutSettings
 from manitwin.apps.layouts.export_mjcf import export_mjcf
 from manitwin.apps.layouts.export_usd import export_usd
 from manitwin.apps.layouts.pool import read_pool
 from manitwin.apps.layouts.sample import sample_layout
-from manitwin.config import LayoutSettings
 from manitwin.export.write import write_exported
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.scenes.loaded_scene import Scene

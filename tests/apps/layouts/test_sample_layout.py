@@ -9,10 +9,10 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 
+from manitwin.app_config import LayoutSettings
 from manitwin.apps.layouts.clutter import LEVELS
 from manitwin.apps.layouts.pool import Pool, PoolTwin, StandingPose, read_pool
 from manitwin.apps.layouts.sample import LAYOUT_REASONS, sample_layout
-from manitwin.config import LayoutSettings
 from manitwin.errors import Rejected, UsageError
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.scenes.loaded_scene import Scene
@@ -57,7 +57,7 @@ def test_same_number_is_the_same_layout_whatever_came_before(dataset: Path) -> N
     assert scene_bytes(layout(seed=6, number=7, objects=(5, 8))) != first
     code = (
         "import sys; from manitwin.apps.layouts.pool import read_pool; from manitwin.apps.layouts.sample import sample_layout;"
-        "from manitwin.config import LayoutSettings; from manitwin.scenes.scene_file import scene_bytes;"
+        "from manitwin.app_config import LayoutSettings; from manitwin.scenes.scene_file import scene_bytes;"
         f"pool = read_pool({str(dataset)!r});"
         "sys.stdout.buffer.write(scene_bytes(sample_layout(pool, LayoutSettings(objects=(5, 8)), 5, 7)))"
     )

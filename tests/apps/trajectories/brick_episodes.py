@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 
+from manitwin.app_config import EpisodeSettings
 from manitwin.apps.trajectories.episode import EpisodeFacts, run_episode
 from manitwin.apps.trajectories.recording import Recording
 from manitwin.apps.trajectories.shape_pool import ShapePool
-from manitwin.config import EpisodeSettings
 from manitwin.geometry.poses import transform
 from manitwin.planning.pick_place import PickPlacePlanner
 from manitwin.planning.problem import Grasp, Motion, PickPlacePlan, PickPlaceProblem, PlanReport

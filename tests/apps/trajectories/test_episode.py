@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from brick_episodes import BRICK_M, GOAL, START, Deceived, brick, digest, panda, problem, run, standing
 
+from manitwin.app_config import EpisodeSettings
 from manitwin.apps.trajectories.episode import EpisodeFacts
 from manitwin.apps.trajectories.recording import RATE_HZ, Recording
-from manitwin.config import EpisodeSettings
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.planning.problem import Phase
 
@@ -157,7 +157,7 @@ def test_without_another_plan_the_first_serves_an_object_that_has_not_moved_in_t
     assert facts.replans["late_not_needed"] == 1
     facts, recording = run(problem(), Deceived(replans=False, grasp_off_m=0.01))
     assert facts.outcome == "replan_failed"
-    assert facts.slip_m == pytest.approx(0.01, abs=0.001)
+    assert facts.slip_m == pytest.approx(0.01, abs=0.002)
     assert recording is not None
     assert recording.phase[-1] == Phase.CARRY
 

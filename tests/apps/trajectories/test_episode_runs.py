@@ -10,14 +10,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from grasped_twins import write_brick
-from manitwin.app_config import LayoutsConfig, TrajectoriesConfig
+from manitwin.app_config import LayoutsConfig, LayoutSettings, TrajectoriesConfig
 from manitwin.apps.layouts.run import make_layouts
 from manitwin.apps.trajectories.attempts_table import ATTEMPTS, read_attempts
 from manitwin.apps.trajectories.collect import batch_folders, collect, stored_episodes
 from manitwin.apps.trajectories.episodes_stage import EPISODES
 from manitwin.apps.trajectories.lerobot.read import read_lerobot
 from manitwin.apps.trajectories.run import make_episodes
-from manitwin.config import LayoutSettings
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.planning.problem import Phase

@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 from brick_episodes import POOL, START, panda, problem, standing
 
+from manitwin.app_config import EpisodeSettings
 from manitwin.apps.trajectories.world import EpisodeWorld
-from manitwin.config import EpisodeSettings
 from manitwin.geometry.poses import transform
 from manitwin.planning.problem import Phase, PickPlaceProblem
 from manitwin.scenes.placed_object import PlacedObject
 from rigid_boxes import box
 
 PALM_M, FINGER_END_M = 0.066, 0.1125  # where palm and fingers end, along the approach
-
 
 
 def made(asked: PickPlaceProblem) -> EpisodeWorld:
@@ -44,18 +43,18 @@ def test_objects_are_in_the_order_of_their_names_where_they_were_put(world: Epis
 
 def test_what_stands_comes_to_rest_borne_by_the_table_and_touched_by_nobody(world: EpisodeWorld) -> None:
     world.step(60)
-    touches = world.contacts.read(Phase.REACH)
+    touches = world.contacts.touches()
     assert world.is_still()
     assert touches.on_support
     assert touches.finger_forces_n == (0.0, 0.0)
-    assert touches.unplanned == ()
+    assert world.contacts.unplanned(Phase.REACH) == set()
 
 
 def test_what_falls_is_not_still_and_falls_as_it_should() -> None:
     with made(problem(start=transform(None, START[:3, 3] + [0, 0, 0.4]))) as world:
         world.step(48)
         assert not world.is_still()
-        assert not world.contacts.read(Phase.REACH).on_support
+        assert not world.contacts.touches().on_support
         fallen_m = START[2, 3] + 0.4 - world.object_to_world(0)[2, 3]
     assert fallen_m == pytest.approx(9.81 * 0.2**2 / 2, rel=0.03)
 
@@ -78,7 +77,7 @@ def hits(asked: PickPlaceProblem, number: int, phase: Phase) -> set[tuple[str, s
         world.bodies[number].set_linear_velocity(np.array([0, 0, 1.0], np.float32))
         for _ in range(8):
             world.step()
-            found.update(world.contacts.read(phase).unplanned)
+            found.update(world.contacts.unplanned(phase))
     return found
 
 
@@ -105,6 +104,6 @@ def test_fingers_press_on_the_target_with_equal_forces_that_are_their_drives(wor
         world.expect_load(True)
         world.robot.set_opening_target(opening_m - 2 * 20.0 / 1e4)  # 20 N at the drives' stiffness of 1e4 N/m
         world.step(120)
-        touches = world.contacts.read(Phase.CLOSE)
+        touches = world.contacts.touches()
     assert touches.finger_forces_n == pytest.approx((20, 20), rel=0.08)
     assert not touches.on_support

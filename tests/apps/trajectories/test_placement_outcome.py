@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from manitwin.app_config import EpisodeSettings
 from manitwin.apps.trajectories.outcome import PlacementErrors, is_disturbed, placement_errors, placement_outcome
-from manitwin.config import EpisodeSettings
 from manitwin.geometry.poses import transform
 
 SETTINGS = EpisodeSettings()

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.config import LayoutSettings
+from manitwin.app_config import LayoutSettings
 from manitwin.robots.robot import Workspace
 from manitwin.scenes.scene import SupportRegion
 

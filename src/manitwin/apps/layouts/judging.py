@@ -8,10 +8,10 @@ from itertools import combinations
 
 import numpy as np
 
+from manitwin.app_config import LayoutSettings
 from manitwin.apps.layouts.pool import Pool
 from manitwin.apps.layouts.slots import Slot
 from manitwin.apps.layouts.stacking import mouth_of
-from manitwin.config import LayoutSettings
 from manitwin.geometry.poses import rotation_angle_rad, transform_points
 from manitwin.scenes.hull_distance import ConvexParts, PlacedParts, least_distance, overlap_depth
 from manitwin.scenes.placed_object import PlacedObject, StaticBox

@@ -7,10 +7,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from manitwin.app_config import LayoutsConfig
+from manitwin.app_config import LayoutsConfig, LayoutSettings
 from manitwin.apps.layouts.pool import pool_of
 from manitwin.apps.layouts.sample import sample_layout
-from manitwin.config import LayoutSettings, Resource
+from manitwin.config import Resource
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_file import read_scene, write_scene
 from manitwin.scenes.twin_source import TwinSource

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from manitwin.app_config import LayoutSettings
 from manitwin.apps.layouts.clutter import Patch, clutter_of, workspace_of
 from manitwin.apps.layouts.furniture import make_furniture
 from manitwin.apps.layouts.judging import Judgement, judge
@@ -17,7 +18,6 @@ from manitwin.apps.layouts.placing import Obstacles, put_on_surface
 from manitwin.apps.layouts.pool import Pool, PoolBody, PoolTwin, StandingPose
 from manitwin.apps.layouts.slots import Put, Slot, draw_slots, draw_twin
 from manitwin.apps.layouts.stacking import level_poses, mouth_of, open_poses, put_into, put_onto
-from manitwin.config import LayoutSettings
 from manitwin.errors import Rejected, UsageError
 from manitwin.geometry.poses import quaternion_wxyz, transform_points
 from manitwin.scenes.loaded_scene import furniture_boxes

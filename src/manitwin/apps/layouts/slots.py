@@ -7,8 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from manitwin.app_config import LayoutSettings
 from manitwin.apps.layouts.pool import Pool, PoolTwin
-from manitwin.config import LayoutSettings
 from manitwin.errors import UsageError
 from manitwin.scenes.hull_distance import PlacedParts
 

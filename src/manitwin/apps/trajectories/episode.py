@@ -9,6 +9,7 @@ from typing import Protocol
 
 import numpy as np
 
+from manitwin.app_config import EpisodeSettings
 from manitwin.apps.trajectories.execution import Execution
 from manitwin.apps.trajectories.outcome import (
     PlacementErrors,
@@ -21,7 +22,6 @@ from manitwin.apps.trajectories.outcome import (
 from manitwin.apps.trajectories.recording import Recording
 from manitwin.apps.trajectories.shape_pool import ShapePool
 from manitwin.apps.trajectories.world import EpisodeWorld
-from manitwin.config import EpisodeSettings
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.planning.problem import Grasp, Motion, PickPlacePlan, PickPlaceProblem, PlanFailure, PlanReport
 from manitwin.robots.robot import Robot

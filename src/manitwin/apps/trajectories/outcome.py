@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.config import EpisodeSettings
+from manitwin.app_config import EpisodeSettings
 from manitwin.geometry.poses import rotation_angle_rad, transform_points
 
 

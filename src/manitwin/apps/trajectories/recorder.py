@@ -38,13 +38,22 @@ class Recorder:
         """Take the first state."""
         self._world = world
         self._states: list[_State] = [self._state()]
-        self._touches, self._actions = [touches], list[_Action]()
+        self._touches, self._unplanned, self._actions = [touches], [False], list[_Action]()
 
-    def add(self, joint_positions_rad: np.ndarray, gripper_opening_m: float, phase: Phase, touches: Touches) -> None:
+    def add(
+        self,
+        joint_positions_rad: np.ndarray,
+        gripper_opening_m: float,
+        phase: Phase,
+        touches: Touches,
+        *,
+        unplanned: bool,
+    ) -> None:
         """Add what the controllers were told, and the state that it led to: the world's as it is."""
         self._actions.append(_Action(joint_positions_rad, gripper_opening_m, phase))
         self._states.append(self._state())
         self._touches.append(touches)
+        self._unplanned.append(unplanned)
 
     def recording(self, tip_pose: Callable[[np.ndarray], np.ndarray]) -> Recording:
         """Return what was recorded; ``tip_pose`` is the forward kinematics. Quaternions never change their sign on the way."""
@@ -65,7 +74,7 @@ class Recorder:
             tip_quaternion_wxyz=tip_quaternions.astype(np.float32),
             finger_forces_n=np.array([touches.finger_forces_n for touches in self._touches], np.float32),
             target_on_support=np.array([touches.on_support for touches in self._touches]),
-            unplanned_contact=np.array([bool(touches.unplanned) for touches in self._touches]),
+            unplanned_contact=np.array(self._unplanned),
             action_joint_positions_rad=np.array(told["joint_positions_rad"], np.float32),
             action_gripper_opening_m=np.array(told["gripper_opening_m"], np.float32),
             action_tip_position_m=told_tips[:, :3, 3].astype(np.float32),

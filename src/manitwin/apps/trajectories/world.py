@@ -13,9 +13,9 @@ import numpy as np
 import sapien
 from sapien import physx
 
+from manitwin.app_config import EpisodeSettings
 from manitwin.apps.trajectories.contacts import ContactReader, Role
 from manitwin.apps.trajectories.shape_pool import ShapePool
-from manitwin.config import EpisodeSettings
 from manitwin.planning.problem import PickPlaceProblem
 from manitwin.robots.robot import Robot
 from manitwin.robots.sapien_robot import SapienRobot
