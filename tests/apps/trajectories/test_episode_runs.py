@@ -10,14 +10,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from grasped_twins import write_brick
-from manitwin.app_config import LayoutsConfig, LayoutSettings, TrajectoriesConfig
+from manitwin.app_config import LayoutsConfig, LayoutSettings, PicturesConfig, TrajectoriesConfig
 from manitwin.apps.layouts.run import make_layouts
 from manitwin.apps.trajectories.attempts_table import ATTEMPTS, read_attempts
 from manitwin.apps.trajectories.collect import batch_folders, collect, stored_episodes
 from manitwin.apps.trajectories.episodes_stage import EPISODES
 from manitwin.apps.trajectories.lerobot.read import read_lerobot
+from manitwin.apps.trajectories.render_run import draw_episodes, write_with_pictures
 from manitwin.apps.trajectories.run import make_episodes
-from manitwin.errors import UsageError
+from manitwin.apps.trajectories.statistics.report import episode_statistics
+from manitwin.errors import EpisodesError, UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.planning.problem import Phase
 
@@ -110,3 +112,29 @@ def test_what_is_no_place_of_twins_is_said(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no accepted twin"):
         make_episodes(tmp_path, tmp_path / "out", 1, CONFIG, executor="inline")
     assert not (tmp_path / "out").exists()
+
+
+def test_pictures_are_drawn_afterwards_and_join_the_set(episodes: Path) -> None:
+    config = PicturesConfig(cameras=("front", "wrist"), size_px=64)
+    assert draw_episodes(episodes, config, executor="inline").exit_code == 0
+    opened: list[int] = []
+    draw_episodes(episodes, config, executor="inline", on_start=lambda items, todo: opened.append(todo))
+    assert opened == [0]
+    written = write_with_pictures(episodes, config.cameras)
+    loaded = read_lerobot(episodes / "lerobot", decode_videos=True)
+    assert written.episodes == len(loaded.episodes)
+    assert {"observation.images.front", "observation.images.wrist"} <= set(loaded.info["features"])
+    assert written.frames == sum(e.recording.steps for e in stored_episodes(batch_folders(episodes)))
+
+
+def test_statistics_of_a_run_name_what_was_kept(episodes: Path) -> None:
+    report = episode_statistics(episodes)
+    assert report.summary.startswith("6 episodes attempted")
+    assert report.write(episodes / "statistics").is_file()
+
+
+def test_folders_without_episodes_are_said(tmp_path: Path) -> None:
+    with pytest.raises(EpisodesError, match="manitwin trajectories"):
+        draw_episodes(tmp_path, PicturesConfig(), executor="inline")
+    with pytest.raises(UsageError, match="manitwin trajectories"):
+        collect(tmp_path, ["lerobot"])

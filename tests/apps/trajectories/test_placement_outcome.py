@@ -7,7 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from manitwin.app_config import EpisodeSettings
-from manitwin.apps.trajectories.outcome import PlacementErrors, is_disturbed, placement_errors, placement_outcome
+from manitwin.apps.trajectories.outcome import (
+    PlacementErrors,
+    is_at_rest,
+    is_disturbed,
+    placement_errors,
+    placement_outcome,
+)
 from manitwin.geometry.poses import transform
 
 SETTINGS = EpisodeSettings()
@@ -64,6 +70,15 @@ def test_verdict_at_the_limits(
 ) -> None:
     errors = PlacementErrors(position_m, float(np.radians(tilt_deg)), 3.0)
     assert placement_outcome(errors, at_rest=at_rest, released=released, settings=SETTINGS) == outcome
+
+
+def test_what_rocks_a_little_is_at_rest_and_what_creeps_or_rolls_is_not() -> None:
+    rocking = [turned("x", 0.2 * (-1) ** i, GOAL) for i in range(10)]
+    creeping = [turned("z", 0, GOAL, (0.00015 * i, 0, 0)) for i in range(10)]  # 3 mm/s at 20 rows a second
+    rolling = [turned("x", 0.1 * i, GOAL) for i in range(10)]
+    assert is_at_rest(rocking, CENTER_M, SETTINGS)
+    assert not is_at_rest(creeping, CENTER_M, SETTINGS)
+    assert not is_at_rest(rolling, CENTER_M, SETTINGS)
 
 
 def test_other_object_is_disturbed_by_a_shift_or_by_a_turn_alone() -> None:

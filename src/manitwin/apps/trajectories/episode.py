@@ -13,6 +13,7 @@ from manitwin.app_config import EpisodeSettings
 from manitwin.apps.trajectories.execution import Execution
 from manitwin.apps.trajectories.outcome import (
     PlacementErrors,
+    is_at_rest,
     is_disturbed,
     moved_m,
     placement_errors,
@@ -225,10 +226,11 @@ class _Episode:
 
     def _judge(self, world: EpisodeWorld, execution: Execution) -> None:
         settings, body = self.settings, self.problem.target.body
-        at_rest = execution.rest(round(settings.max_rest_s / settings.timestep_s))
+        last = execution.rest(round(settings.max_rest_s / settings.timestep_s))
         errors = placement_errors(execution.target_to_world(), self.goal_object_to_world, body.center_of_mass_m)
         released = max(execution.touches.finger_forces_n) == 0
         self.facts.errors = errors
+        at_rest = is_at_rest(last, body.center_of_mass_m, settings)
         failure = placement_outcome(errors, at_rest=at_rest, released=released, settings=settings)
         if failure is None and any(
             is_disturbed(placed.object_to_world, world.object_to_world(number), placed.body.center_of_mass_m, settings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 
 import numpy as np
@@ -15,6 +16,7 @@ from manitwin.robots.robot import Robot
 from manitwin.simulate.shared_target import SharedTarget
 from manitwin.simulate.trial import TrialSettings
 
+STILL_ROWS, REST_ROWS = 5, 10  # 0.25 s and 0.5 s
 STEADY_FRAMES = 6  # the hand presses for so long before it moves on: 0.1 s
 PRESSING_SHARE = 0.98  # of the closing force, at which the target has come as far as it goes
 OPENING_STEPS = 24  # after the pads have parted, before the hand withdraws
@@ -100,15 +102,16 @@ class Execution:
         """Return the hand where the joints are told to be, in the object's frame: what the arm sags by counts as in the hand."""
         return inverse(self.target_to_world()) @ self._tip_pose(self.commanded_rad)
 
-    def rest(self, max_steps: int) -> bool:
-        """Stay, at least 0.25 s and until nothing moves, to a whole row; tells whether all came to rest."""
-        looks = 0
+    def rest(self, max_steps: int) -> list[np.ndarray]:
+        """Stay until nothing has moved for a quarter of a second; returns the target's poses ``(4, 4)`` at the last rows."""
+        looks, poses = 0, deque([self.target_to_world()], maxlen=REST_ROWS)
         for _ in range(max_steps // self._steps_per_row):
             self.wait(Phase.REST, self._steps_per_row - self.steps % self._steps_per_row)
+            poses.append(self.target_to_world())
             looks = looks + 1 if self._world.is_still() else 0
-            if looks >= 5:
+            if looks >= STILL_ROWS:
                 break
-        return looks > 0
+        return list(poses)
 
     def _tell_opening(self, opening_m: float) -> None:
         self._opening_target_m = opening_m

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +42,18 @@ def moved_m(before: np.ndarray, after: np.ndarray, center_of_mass_m: np.ndarray)
 def turned_rad(before: np.ndarray, after: np.ndarray) -> float:
     """Return by what angle an object turned between two poses ``(4, 4)``."""
     return rotation_angle_rad(after[:3, :3] @ before[:3, :3].T)
+
+
+def is_at_rest(poses: Sequence[np.ndarray], center_of_mass_m: np.ndarray, settings: EpisodeSettings) -> bool:
+    """Tell whether a released object stays where it is, by its poses ``(4, 4)`` in the last half of a second.
+
+    Speeds do not tell: a tall box rocks on by a tenth of a degree, as nothing in a simulation of rigid bodies damps it.
+    """
+    return all(
+        moved_m(pose, poses[-1], center_of_mass_m) < settings.max_rest_m
+        and turned_rad(pose, poses[-1]) < np.radians(settings.max_rest_deg)
+        for pose in poses
+    )
 
 
 def placement_outcome(
