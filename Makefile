@@ -14,15 +14,15 @@ test: setup
 	@$(BIN)/python -m pytest -m "not slow" -n auto --maxprocesses 4 --dist loadfile
 
 vlm-real: setup
-	@$(BIN)/python scripts/setup_vlm_engine.py
+	@$(BIN)/python scripts/setup_side_environment.py vlm
 	@VLM_REAL_REQUIRED=1 $(BIN)/python -m pytest -m vlm_real tests/vlm_real
 
 usd-validate: setup
-	@$(BIN)/python scripts/setup_usd_validator.py
+	@$(BIN)/python scripts/setup_side_environment.py usd-validate
 	@USD_VALIDATOR_REQUIRED=1 $(BIN)/python -m pytest tests/export/test_usd_validator.py
 
 lerobot-real: setup
-	@$(BIN)/python scripts/setup_lerobot.py
+	@$(BIN)/python scripts/setup_side_environment.py lerobot
 	@LEROBOT_REQUIRED=1 $(BIN)/python -m pytest tests/apps/trajectories/test_real_lerobot.py
 
 lint: setup

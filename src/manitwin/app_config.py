@@ -21,7 +21,8 @@ class EpisodeSettings(Section):
 
     ``closing_force_n``: without it the gripper's own. ``solver_iterations_held`` are those while something is held.
     ``release_height_m`` is how far above its goal an object is let go. What moved less than ``max_placed_m`` and tilted less
-    than ``max_tilt_deg`` from its goal stands where it should; ``max_start_*`` is what a start may move until it rests,
+    than ``max_tilt_deg`` from its goal stands where it should, if it moves by no more than ``max_rest_*`` in half a second;
+    ``max_start_*`` is what a start may move until it rests,
     ``max_disturbed_*`` what may happen to the other objects.
     """
 
@@ -36,6 +37,8 @@ class EpisodeSettings(Section):
     max_rest_s: float = Field(default=2.0, gt=0)
     max_placed_m: float = Field(default=0.02, gt=0)
     max_tilt_deg: float = Field(default=10.0, gt=0, lt=180)
+    max_rest_m: float = Field(default=0.001, gt=0)
+    max_rest_deg: float = Field(default=0.5, gt=0, lt=180)
     max_start_m: float = Field(default=0.01, gt=0)
     max_start_deg: float = Field(default=5.0, gt=0, lt=180)
     max_disturbed_m: float = Field(default=0.01, gt=0)
