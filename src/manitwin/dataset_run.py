@@ -145,7 +145,10 @@ def stored_config(root: DatasetRoot) -> BuildConfig:
     if not root.exists(CONFIG):
         return BuildConfig()
     try:
-        return BuildConfig(**json.loads(root.read_bytes(CONFIG)))
+        said = json.loads(root.read_bytes(CONFIG))
+        if isinstance(said, dict) and "kind" in said:
+            raise UsageError(f"{root.url}: holds {said['kind']}, not twins; give the data set that they are of")
+        return BuildConfig(**said)
     except (ValueError, ValidationError) as error:
         raise UsageError(
             f"{root.url}/{CONFIG}: not a configuration of this version ({str(error).splitlines()[0]}); give --config"

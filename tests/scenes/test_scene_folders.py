@@ -9,6 +9,8 @@ import pytest
 import manitwin
 from manitwin.app_config import LayoutsConfig, LayoutSettings
 from manitwin.apps.layouts.run import layout_totals, make_layouts
+from manitwin.dataset_root import DatasetRoot
+from manitwin.dataset_run import stored_config
 from manitwin.errors import UsageError
 from manitwin.scenes.scene_folders import scene_ids, scene_name
 from scene_twins import write_things
@@ -29,6 +31,8 @@ def test_a_run_of_layouts_is_found_loaded_and_goes_on(tmp_path: Path) -> None:
         tmp_path / "twins_here", out, 5, CONFIG, executor="inline", on_start=lambda items, todo: opened.append(todo)
     )
     assert opened == [2] and (out / scene_name("layout_4_000001") / "scene.json").read_bytes() == before
+    with pytest.raises(UsageError, match="holds layouts, not twins"):
+        stored_config(DatasetRoot(out))
     totals = layout_totals(out)
     assert totals.accepted == 5 and totals.acceptance == 1.0
     assert 0 <= totals.max_penetration_m <= 0.001 and totals.max_moved_m <= 0.01
