@@ -40,9 +40,16 @@ def draw_episodes(
     items = (Item(file=None, text=folder.name) for folder in batch_folders(out))
     recipe = PicturesRecipe(config, str(out.resolve()), said["dataset"], said["robot"])
     return drive(
-        recipe, items, DatasetRoot(out / PICTURES), config.run, configuration={"kind": PICTURES, **config.model_dump(mode="json")},
-        executor=executor, address=address, on_start=on_start, on_ended=on_ended,
-    )  # fmt: skip
+        recipe,
+        items,
+        DatasetRoot(out / PICTURES),
+        config.run,
+        configuration={"kind": PICTURES, **config.model_dump(mode="json")},
+        executor=executor,
+        address=address,
+        on_start=on_start,
+        on_ended=on_ended,
+    )
 
 
 def write_with_pictures(out: Path, cameras: tuple[str, ...]) -> Written:
