@@ -50,10 +50,14 @@ def box_draft(folder: Path, extents_m: list[float], points: list[list[float]], m
         {"id": f"g{number}", "position_m": point, "type": types[number % 2]} for number, point in enumerate(points[1:])
     ]
     draft = Draft("box", Item(None, "box"), seed=3)
-    standing = {"position_m": [0, 0, 0], "quaternion_wxyz": [1, 0, 0, 0], "probability": 1.0, "upright": True, "settled": True}
-    draft.fields.update(
-        physical=physical, points={"functional": functional, "grasp": grasp}, placements=[standing]
-    )
+    standing = {
+        "position_m": [0, 0, 0],
+        "quaternion_wxyz": [1, 0, 0, 0],
+        "probability": 1.0,
+        "upright": True,
+        "settled": True,
+    }
+    draft.fields.update(physical=physical, points={"functional": functional, "grasp": grasp}, placements=[standing])
     draft.paths.update({name: folder / name for name in ("solid.npz", "hulls.npz")})
     return draft
 

@@ -11,7 +11,11 @@ if TYPE_CHECKING:
     from manitwin.scenes.loaded_scene import Scene
 
 __all__ = ["BuildReport", "Dataset", "Scene", "Twin", "build", "export_twin", "load", "load_scene", "schema"]
-_ELSEWHERE = {"Dataset": "manitwin.index.dataset", "Scene": "manitwin.scenes.loaded_scene", "Twin": "manitwin.loaded_twin"}
+_ELSEWHERE = {
+    "Dataset": "manitwin.index.dataset",
+    "Scene": "manitwin.scenes.loaded_scene",
+    "Twin": "manitwin.loaded_twin",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -139,7 +139,9 @@ def test_urdf_beside_the_file_may_not_leave_its_folder(tmp_path: Path) -> None:
     beside = write(tmp_path, 'distribution = "example-robot-data"\nextra = "robots"\n', "")
     with pytest.raises(UsageError, match=r"is not there"):
         load_gripper(beside)
-    outside = write(tmp_path, 'distribution = "example-robot-data"\nextra = "robots"\nfile = "cmeel', 'file = "../cmeel')
+    outside = write(
+        tmp_path, 'distribution = "example-robot-data"\nextra = "robots"\nfile = "cmeel', 'file = "../cmeel'
+    )
     with pytest.raises(UsageError, match=r"leaves the folder"):
         load_gripper(outside)
 

@@ -44,7 +44,9 @@ def test_a_goal_in_a_scene_keeps_the_way_the_object_stands() -> None:
     assert goal is not None
     turned = goal[:3, :3] @ task.objects[0].object_to_world[:3, :3].T
     assert turned[2, 2] == pytest.approx(1.0)
-    assert transform_points(goal, np.concatenate(task.objects[0].body.hulls))[:, 2].min() == pytest.approx(0.0, abs=1e-9)
+    assert transform_points(goal, np.concatenate(task.objects[0].body.hulls))[:, 2].min() == pytest.approx(
+        0.0, abs=1e-9
+    )
 
 
 def test_no_room_is_none() -> None:
