@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import pytest
+from typer.testing import CliRunner
 
 import manitwin
 from manitwin.app_config import LayoutsConfig, LayoutSettings
 from manitwin.apps.layouts.run import layout_totals, make_layouts
+from manitwin.cli import app
 from manitwin.dataset_root import DatasetRoot
 from manitwin.dataset_run import stored_config
 from manitwin.errors import UsageError
@@ -49,3 +52,15 @@ def test_a_category_that_no_twin_has_is_said_at_once(tmp_path: Path) -> None:
 def test_a_scene_that_lies_elsewhere_needs_its_data_set(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="say which data set"):
         manitwin.load_scene(tmp_path / "scene.json")
+
+
+def test_scenes_are_exported_like_twins(tmp_path: Path) -> None:
+    write_things(tmp_path / "twins_here")
+    make_layouts(tmp_path / "twins_here", tmp_path / "made", 1, CONFIG, executor="inline")
+    done = CliRunner().invoke(app, ["export", str(tmp_path / "made"), "-o", str(tmp_path / "out"), "--to", "mjcf,usd"])
+    assert done.exit_code == 0, done.output
+    model = mujoco.MjModel.from_xml_path(str(next((tmp_path / "out" / "layout_4_000000" / "mjcf").glob("*.xml"))))
+    assert model.nbody >= 3
+    assert any((tmp_path / "out" / "layout_4_000000" / "usd").iterdir())
+    refused = CliRunner().invoke(app, ["export", str(tmp_path / "made"), "-o", str(tmp_path / "out"), "--to", "urdf"])
+    assert isinstance(refused.exception, UsageError) and "Valid: mjcf, usd" in str(refused.exception)

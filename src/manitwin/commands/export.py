@@ -19,7 +19,10 @@ if TYPE_CHECKING:
 def export(
     twins: Annotated[
         list[str],
-        typer.Argument(help="Twin folders, folders of twins, or data sets (a folder or URL).", metavar="TWIN"),
+        typer.Argument(
+            help="Twin folders, folders of twins, data sets (a folder or URL); or scenes of `manitwin layout`.",
+            metavar="TWIN|SCENE",
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write OUT/<twin>/<format>/ into.")],
     to: Annotated[str, typer.Option(help="Formats by commas (mjcf,urdf,sdf,usd,...), or all.")] = "all",
@@ -28,11 +31,17 @@ def export(
         typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: any, also 'unknown'."),
     ] = None,
 ) -> None:
-    """Write twins as MJCF, URDF, SDF, USD and GLB, and for RoboTwin, ManiSkill, Isaac Lab and graspers."""
+    """Write twins as MJCF, URDF, SDF, USD and GLB, and for RoboTwin, ManiSkill, Isaac Lab and graspers; scenes as MJCF, USD."""
+    from manitwin.commands.export_scenes import export_scenes, scene_files
     from manitwin.errors import UsageError
     from manitwin.export.licenses import allowed_licenses
     from manitwin.export.registry import chosen_formats
 
+    if scenes := scene_files(twins):
+        if license_allow is not None:
+            raise UsageError("--license-allow is for twins; export those of a scene by themselves to have them judged")
+        export_scenes(scenes, out, to)
+        return
     formats = chosen_formats(to.split(","))
     allowed = None if license_allow is None else allowed_licenses(license_allow.split(","))
     if out.exists() and not out.is_dir():
