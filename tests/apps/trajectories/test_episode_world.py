@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from manitwin.app_config import EpisodeSettings
 from manitwin.apps.trajectories.world import EpisodeWorld
 from manitwin.geometry.poses import transform
 from manitwin.planning.problem import Phase, PickPlaceProblem
-from manitwin.scenes.placed_object import PlacedObject
+from manitwin.scenes.placed_object import PlacedObject, StaticBox
 from rigid_boxes import box
 
 PALM_M, FINGER_END_M = 0.066, 0.1125  # where palm and fingers end, along the approach
@@ -48,6 +49,16 @@ def test_what_stands_comes_to_rest_borne_by_the_table_and_touched_by_nobody(worl
     assert touches.on_support
     assert touches.finger_forces_n == (0.0, 0.0)
     assert world.contacts.unplanned(Phase.REACH) == set()
+
+
+def test_what_stands_on_a_tray_on_the_table_is_borne_by_it() -> None:
+    tray = StaticBox("tray", np.array([0.15, 0.15, 0.01]), transform(None, np.array([START[0, 3], START[1, 3], 0.01])))
+    on_tray = problem(start=transform(None, START[:3, 3] + [0, 0, 0.02]))
+    with made(replace(on_tray, static_boxes=(*on_tray.static_boxes, tray))) as world:
+        world.step(60)
+        assert world.is_still()
+        assert world.contacts.touches().on_support
+        assert world.object_to_world(0)[2, 3] == pytest.approx(START[2, 3] + 0.02, abs=3e-4)
 
 
 def test_what_falls_is_not_still_and_falls_as_it_should() -> None:
