@@ -26,8 +26,20 @@ FILES = (RECORD, RUN, VISUAL, GRASPS)
 """All that is read of a twin's folder; a rejected one has the first two alone."""
 
 STAGE_ORDER = (
-    *("photo", "generate", "mesh", "views", "gate", "physical", "collision", "caption", "candidates", "points"),
-    *("grasps", "verify", "second_opinion", "robustness", "record_grasps", "placement", "finish"),
+    *(
+        "photo",
+        "generate",
+        "mesh",
+        "views",
+        "gate",
+        "physical",
+        "collision",
+        "placement",
+        "caption",
+        "candidates",
+        "points",
+    ),
+    *("grasps", "verify", "second_opinion", "robustness", "record_grasps", "finish"),
 )
 """The order of ``pipeline.stages_for``; twin.json keeps its stages by name."""
 
