@@ -26,7 +26,8 @@ def with_support_rounds(
     """Propose until enough grasps near the points leave room for each of ``request.supports``, or the rounds are used up.
 
     Proposals that would reach through a support are drawn back along their approach until they do not. What has enough
-    already, has none at all, or is not for a parallel gripper, stays as it is. A grasper that bounds its rounds is asked once more at most.
+    already, has none at all, or is not for a parallel gripper, stays as it is. A grasper that bounds its rounds is asked
+    once more at most.
     """
     gripper = request.gripper
     if not isinstance(gripper, ParallelGripper) or not len(kept.proposals):
