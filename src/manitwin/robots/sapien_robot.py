@@ -13,9 +13,9 @@ from sapien import physx
 from manitwin.robots.links import bodies_of_urdf
 from manitwin.robots.robot import Robot
 from manitwin.robots.sapien_visuals import add_visuals
-from manitwin.simulate.convex_shape import convex_shape
-from manitwin.simulate.hands.urdf import Link, LinkShape
+from manitwin.simulate.hands.urdf import Link
 from manitwin.simulate.sapien_hand import HAND_COLLISION_GROUPS, MAX_DRIVE_FORCE, MIN_PATCH_RADIUS_M, PATCH_RADIUS_M
+from manitwin.simulate.sapien_links import link_shape, set_joint_and_mass
 
 # Tracks its trajectories within 0.003 rad, with velocity feed-forward; 50 solver iterations and 50 N held 298 of 304 objects
 # on their way where 20 iterations let heavy ones turn between the fingers.
@@ -24,7 +24,6 @@ ARM_STIFFNESS_NM_RAD, ARM_DAMPING_NM_S_RAD, ARM_TORQUE_LIMIT_NM = 1e4, 1e3, 200.
 FINGER_STIFFNESS_N_M, FINGER_DAMPING_N_S_M = 1e4, 100.0
 SOLVER_ITERATIONS = 50
 CONTACT_OFFSET_M = 0.002
-LEAST_MASS_KG, LEAST_MOMENT_KG_M2 = 0.01, 1e-6  # of URDF's links without mass, which PhysX refuses
 
 
 class SapienRobot:
@@ -141,14 +140,14 @@ def _articulation(
         component = physx.PhysxArticulationLinkComponent(built[link.parent] if link.parent >= 0 else None)
         is_finger = link.name in robot.finger_links
         for shape in link.shapes:
-            part = _shape(shape, pad_material if is_finger else arm_material)
+            part = link_shape(shape, pad_material if is_finger else arm_material)
             part.local_pose = sapien.Pose(shape.shape_to_link)
             part.contact_offset = contact_offset_m
             if is_finger:
                 part.patch_radius, part.min_patch_radius = PATCH_RADIUS_M, MIN_PATCH_RADIUS_M
             part.set_collision_groups(HAND_COLLISION_GROUPS)
             component.attach(part)
-        _set_joint_and_mass(component, link)
+        set_joint_and_mass(component, link)
         component.disable_gravity = True
         built.append(component)
         entity = sapien.Entity()
@@ -158,29 +157,3 @@ def _articulation(
     for entity in entities:
         scene.add_entity(entity)
     return {link.name: component for link, component in zip(links, built, strict=True)}
-
-
-def _shape(shape: LinkShape, material: physx.PhysxMaterial) -> physx.PhysxCollisionShape:
-    if shape.half_extents_m is not None:
-        return physx.PhysxCollisionShapeBox(shape.half_extents_m.astype(np.float32), material)
-    if shape.radius_m is not None:
-        return physx.PhysxCollisionShapeSphere(shape.radius_m, material)
-    if shape.corners_m is None:
-        raise AssertionError("a shape is a box, a sphere or corners")
-    return convex_shape(shape.corners_m, material)
-
-
-def _set_joint_and_mass(component: physx.PhysxArticulationLinkComponent, link: Link) -> None:
-    component.name = link.name
-    component.joint.name = link.joint
-    component.joint.type = link.joint_type
-    if link.parent >= 0:
-        component.joint.pose_in_parent = sapien.Pose(link.joint_to_parent)
-        component.joint.pose_in_child = sapien.Pose(link.joint_to_link)
-    if link.joint_type in ("revolute", "prismatic"):
-        component.joint.limit = np.array(link.limits, np.float32)
-    component.set_mass(max(link.mass_kg, LEAST_MASS_KG))
-    axes = np.eye(4)
-    axes[:3, :3], axes[:3, 3] = link.principal_axes, link.center_of_mass_m
-    component.set_cmass_local_pose(sapien.Pose(axes))
-    component.set_inertia(np.maximum(link.moments_kg_m2, LEAST_MOMENT_KG_M2).astype(np.float32))

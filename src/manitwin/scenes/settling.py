@@ -14,12 +14,12 @@ from sapien import physx
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.scenes.placed_object import PlacedObject, StaticBox
 from manitwin.scenes.sapien_scene import CONTACT_OFFSET_M, SOLVER_ITERATIONS, static_entity
+from manitwin.simulate.physx_system import scene_with_gravity
 from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.sapien_body import dynamic_component, hull_shapes
 
 # As in simulate/settle.py, where each was measured.
 TIMESTEP_S = 1 / 240
-GRAVITY_M_S2 = (0.0, 0.0, -9.81)
 CHECK_EVERY = 12  # steps between looks at whether all is still
 STILL_LOOKS = 3  # one slow look can be a turning point
 STILL_M_S, STILL_RAD_S = 1e-3, 1e-2
@@ -89,7 +89,7 @@ def settle_scene(
 
     ``give_up_m`` is how far the origin of each may move before the rest is not worth waiting for.
     """
-    scene = _scene()
+    scene = scene_with_gravity(TIMESTEP_S)
     _COOKED.begin()
     names: dict[int, str] = {}
     for box in boxes:
@@ -114,20 +114,6 @@ def settle_scene(
         scene, bodies, round(at_least_s / TIMESTEP_S), round(seconds / TIMESTEP_S), limits_m
     )
     return SettledScene(_poses(bodies), looks > 0, lost, _touching(scene, names), steps)
-
-
-def _scene() -> sapien.Scene:
-    config = physx.get_scene_config()
-    gravity = np.array(config.gravity)
-    config.gravity = np.array(GRAVITY_M_S2, dtype=np.float32)
-    physx.set_scene_config(config)  # process-wide: a new system takes it over; set back at once
-    try:
-        scene = sapien.Scene([physx.PhysxCpuSystem()])
-    finally:
-        config.gravity = gravity
-        physx.set_scene_config(config)
-    scene.set_timestep(TIMESTEP_S)
-    return scene
 
 
 def _step_until_still(

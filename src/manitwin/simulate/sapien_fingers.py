@@ -12,14 +12,13 @@ import sapien
 from sapien import physx
 
 from manitwin.geometry.poses import inverse
-from manitwin.simulate.convex_shape import convex_shape
 from manitwin.simulate.gripper import Gripper, of_kind
 from manitwin.simulate.hands.multi_finger import MultiFingerGripper
-from manitwin.simulate.hands.urdf import Link, LinkShape
 from manitwin.simulate.kept_for_hulls import KeptForHulls
 from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.sapien_body import hull_shapes
 from manitwin.simulate.sapien_hand import MIN_PATCH_RADIUS_M, PATCH_RADIUS_M
+from manitwin.simulate.sapien_links import link_shape, set_joint_and_mass
 from manitwin.simulate.sapien_scene import HandScene
 from manitwin.simulate.trial import TrialResult, TrialSettings
 from manitwin.simulate.trial_phases import run_phases
@@ -27,7 +26,6 @@ from manitwin.simulate.trial_phases import run_phases
 # Shapes with a common bit in the third word do not collide: the palm shares one with the thumb and one with the other
 # fingers; thumb and fingers have none in common, so that they stop one another.
 PALM_BITS, THUMB_BITS, FINGER_BITS = 0b11, 0b01, 0b10
-LEAST_MASS_KG, LEAST_MOMENT_KG_M2 = 0.01, 1e-6  # of URDF's links without mass; the joints' armature weighs more
 THUMB = 0
 
 
@@ -144,13 +142,13 @@ def _articulation(
         component = physx.PhysxArticulationLinkComponent(built[link.parent] if link.parent >= 0 else None)
         bits = PALM_BITS if finger < 0 else THUMB_BITS if finger == THUMB else FINGER_BITS
         for shape in link.shapes:
-            part = _shape(shape, material)
+            part = link_shape(shape, material)
             part.local_pose = sapien.Pose(shape.shape_to_link)
             part.contact_offset = settings.contact_offset_m
             part.patch_radius, part.min_patch_radius = PATCH_RADIUS_M, MIN_PATCH_RADIUS_M
             part.set_collision_groups([1, 1, bits, 0])
             component.attach(part)
-        _set_joint_and_mass(component, link)
+        set_joint_and_mass(component, link)
         component.disable_gravity = True
         built.append(component)
         entities.append(sapien.Entity())
@@ -159,30 +157,3 @@ def _articulation(
     for entity in entities:
         scene.add_entity(entity)
     return built
-
-
-def _shape(shape: LinkShape, material: physx.PhysxMaterial) -> physx.PhysxCollisionShape:
-    if shape.half_extents_m is not None:
-        return physx.PhysxCollisionShapeBox(shape.half_extents_m.astype(np.float32), material)
-    if shape.radius_m is not None:
-        return physx.PhysxCollisionShapeSphere(shape.radius_m, material)
-    if shape.corners_m is None:
-        raise AssertionError("a shape is a box, a sphere or corners")
-    return convex_shape(shape.corners_m, material)
-
-
-def _set_joint_and_mass(component: physx.PhysxArticulationLinkComponent, link: Link) -> None:
-    component.name = link.name
-    component.joint.name = link.joint
-    component.joint.type = "revolute_unwrapped" if link.joint_type == "continuous" else link.joint_type
-    if link.parent >= 0:
-        component.joint.pose_in_parent = sapien.Pose(link.joint_to_parent)
-        component.joint.pose_in_child = sapien.Pose(link.joint_to_link)
-    if link.joint_type in ("revolute", "prismatic"):
-        component.joint.limit = np.array(link.limits, np.float32)
-    component.set_mass(max(link.mass_kg, LEAST_MASS_KG))
-    axes = sapien.Pose(
-        np.block([[link.principal_axes, link.center_of_mass_m[:, None]], [np.zeros((1, 3)), np.ones((1, 1))]])
-    )
-    component.set_cmass_local_pose(axes)
-    component.set_inertia(np.maximum(link.moments_kg_m2, LEAST_MOMENT_KG_M2).astype(np.float32))

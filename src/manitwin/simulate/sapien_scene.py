@@ -10,14 +10,14 @@ drive, which the solver applies in every substep as well.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 import sapien
 from sapien import physx
 
+from manitwin.simulate.physx_system import scene_config
 from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.sapien_body import dynamic_component
 from manitwin.simulate.sapien_hand import MIN_PATCH_RADIUS_M, PATCH_RADIUS_M
@@ -56,7 +56,7 @@ class HandScene:
     ):
         """Put the body, of these ``shapes``, before the hand."""
         self.settings = settings
-        with _scene_config(gravity=[0, 0, 0], bounce_threshold=2.0, enable_enhanced_determinism=False):
+        with scene_config(gravity=[0, 0, 0], bounce_threshold=2.0, enable_enhanced_determinism=False):
             self.system = physx.PhysxCpuSystem()
         self.scene = scene = sapien.Scene([self.system])  # kept: bodies go with their scene
         self.system.timestep = settings.timestep_s
@@ -110,23 +110,6 @@ class HandScene:
         pose = self.object.entity_pose.to_transformation_matrix().astype(float)
         self.looks.append(pose)
         return pose
-
-
-@contextmanager
-def _scene_config(**values: object) -> Iterator[None]:
-    """Set SAPIEN's process-wide scene configuration, from which a new system is made, and set it back."""
-    before = physx.get_scene_config()
-    kept = {name: getattr(before, name) for name in values}
-    config = physx.get_scene_config()
-    for name, value in values.items():
-        setattr(config, name, value)
-    physx.set_scene_config(config)
-    try:
-        yield
-    finally:
-        for name, value in kept.items():
-            setattr(config, name, value)
-        physx.set_scene_config(config)
 
 
 def _object(

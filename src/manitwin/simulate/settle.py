@@ -12,6 +12,7 @@ from sapien import physx
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform_points
 from manitwin.simulate.convex_shape import convex_shape
+from manitwin.simulate.physx_system import scene_with_gravity
 from manitwin.simulate.rigid_body import RigidBody
 from manitwin.simulate.sapien_body import dynamic_component, hull_shapes
 
@@ -22,7 +23,6 @@ _CHECK_EVERY = 12  # steps between looks at whether all is still
 _STILL_M_S = 1e-3
 _STILL_RAD_S = 1e-2
 _BALL_TIMESTEP_S = 1 / 480
-_GRAVITY_M_S2 = (0.0, 0.0, -9.81)
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def settle_on_plane(
     """
     if not len(object_to_plane):
         return []
-    scene = _scene(_TIMESTEP_S)
+    scene = scene_with_gravity(_TIMESTEP_S)
     material = physx.PhysxMaterial(body.friction_static, body.friction_dynamic, 0.0)
     _add_ground(scene, material)
     reach = max(float(np.linalg.norm(hull - body.center_of_mass_m, axis=1).max()) for hull in body.hulls)
@@ -86,7 +86,7 @@ def ball_stays_inside(hulls: Sequence[np.ndarray], opening: Opening, *, seconds:
     axis = opening.axis
     along = [float((hull @ axis).max()) for hull in hulls]
     radius = min(opening.rim_radius_m, opening.depth_m) / 3
-    scene = _scene(_BALL_TIMESTEP_S)
+    scene = scene_with_gravity(_BALL_TIMESTEP_S)
     up = np.array([0.0, 0, 1])
     turn = rotation_between(axis, up)
     material = physx.PhysxMaterial(0.5, 0.5, 0.0)
@@ -112,20 +112,6 @@ def ball_stays_inside(hulls: Sequence[np.ndarray], opening: Opening, *, seconds:
     widest = max(float(np.linalg.norm((hull @ turn.T - rim)[:, :2], axis=1).max()) for hull in hulls)
     below_brim = rim[2] - end[2]
     return bool(0 < below_brim <= opening.depth_m and np.linalg.norm((end - rim)[:2]) < widest)
-
-
-def _scene(timestep_s: float) -> sapien.Scene:
-    config = physx.get_scene_config()
-    gravity = np.array(config.gravity)
-    config.gravity = np.array(_GRAVITY_M_S2, dtype=np.float32)
-    physx.set_scene_config(config)  # process-wide: a new system takes it over; set back at once
-    try:
-        scene = sapien.Scene([physx.PhysxCpuSystem()])
-    finally:
-        config.gravity = gravity
-        physx.set_scene_config(config)
-    scene.set_timestep(timestep_s)
-    return scene
 
 
 def _add(scene: sapien.Scene, component: physx.PhysxRigidBaseComponent, pose: sapien.Pose) -> None:

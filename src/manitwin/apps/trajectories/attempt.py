@@ -19,7 +19,7 @@ EXECUTION_FAILURES = ("misplaced", "toppled", "dropped", "not_lifted", "replan_f
 class Attempt:
     """One row; errors are of the released object at rest against the goal that was asked for. None: never got there.
 
-    ``plan_failures`` is JSON: how many candidate grasps failed of what. ``timings`` are CPU seconds, apart from the data.
+    ``plan_failures`` is JSON: how many candidate grasps failed of what.
     """
 
     episode_id: str

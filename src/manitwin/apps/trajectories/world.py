@@ -20,10 +20,10 @@ from manitwin.planning.problem import PickPlaceProblem
 from manitwin.robots.robot import Robot
 from manitwin.robots.sapien_robot import SapienRobot
 from manitwin.scenes.placed_object import PlacedObject, StaticBox
+from manitwin.simulate.physx_system import system_with_gravity
 from manitwin.simulate.sapien_body import dynamic_component
 from manitwin.simulate.sapien_hand import MIN_PATCH_RADIUS_M, PATCH_RADIUS_M
 from manitwin.simulate.sapien_scene import MAX_DEPENETRATION_M_S
-from manitwin.simulate.trial import GRAVITY_M_S2
 
 STILL_M_S, STILL_RAD_S = 2e-3, 2e-2
 ANGULAR_DAMPING_PER_S = 0.05
@@ -49,7 +49,7 @@ class EpisodeWorld:
         self._settings, self._pool = settings, pool
         self.placed = sorted((problem.target, *problem.obstacles), key=lambda placed: placed.name)
         self.target = self.placed.index(problem.target)
-        self._system = _system(settings.timestep_s)
+        self._system = system_with_gravity(settings.timestep_s)
         self._scene = sapien.Scene([self._system])
         surfaces = [self._add_box(box) for box in problem.static_boxes]
         self._shapes = [pool.take(placed.body.hulls) for placed in self.placed]
@@ -160,18 +160,3 @@ def _is_the_table(box: StaticBox) -> bool:
     return bool(
         box.box_to_world[2, 2] > 1 - 1e-9 and abs(top[2]) < 1e-6 and box.half_extents_m[:2].min() >= LEAST_TABLE_M
     )
-
-
-def _system(timestep_s: float) -> physx.PhysxCpuSystem:
-    """Make a system with ordinary gravity, whatever the process-wide configuration says."""
-    config = physx.get_scene_config()
-    gravity = np.array(config.gravity)
-    config.gravity = np.array([0, 0, -GRAVITY_M_S2], np.float32)
-    physx.set_scene_config(config)
-    try:
-        system = physx.PhysxCpuSystem()
-    finally:
-        config.gravity = gravity
-        physx.set_scene_config(config)
-    system.timestep = timestep_s
-    return system
