@@ -9,7 +9,7 @@ import numpy as np
 
 from manitwin.planning.hand_room import HandRoom
 from manitwin.planning.known_poses import KnownPoses
-from manitwin.planning.line_ends import HALF_TURN, LineEnds, drawn_back
+from manitwin.planning.line_ends import HALF_TURN, LineEnds
 from manitwin.planning.problem import Phase, PlanFailure
 from manitwin.planning.problem_world import ProblemWorld
 from manitwin.planning.settings import PlannerSettings
@@ -34,25 +34,24 @@ class Candidates:
         self._room, self._known, self._settings = room, known, settings
         self._ends = LineEnds(settings)
 
-    def of(self, world: ProblemWorld, indices: list[int], draw_back_m: float) -> Iterator[Candidate]:
-        """Yield both turns of each grasp, drawn back by a length along the approach."""
+    def of(self, world: ProblemWorld) -> Iterator[Candidate]:
+        """Yield both turns of each grasp."""
         grasps = world.problem.grasps
-        if not indices:
+        if not grasps:
             return
-        poses = np.array([grasps[index].gripper_to_object for index in indices])
-        poses = (poses @ drawn_back(draw_back_m))[:, None] @ TURNS
+        poses = np.array([grasp.gripper_to_object for grasp in grasps])[:, None] @ TURNS
         at_start = self._without_room(world, world.problem.target.object_to_world @ poses)
         at_goal = self._without_room(world, world.goal_object_to_world @ poses)
-        for row, index in enumerate(indices):
+        for index in range(len(grasps)):
             for turn in range(len(TURNS)):
                 failure: PlanFailure | None = None
-                if at_start[row, turn]:
+                if at_start[index, turn]:
                     failure = "approach_blocked"
-                elif at_goal[row, turn]:
+                elif at_goal[index, turn]:
                     failure = "lower_blocked"
                 else:
-                    failure = self.first_look(world, poses[row, turn])
-                yield Candidate(index, poses[row, turn], failure)
+                    failure = self.first_look(world, poses[index, turn])
+                yield Candidate(index, poses[index, turn], failure)
 
     def _without_room(self, world: ProblemWorld, gripper_to_world: np.ndarray) -> np.ndarray:
         flat = gripper_to_world.reshape(-1, 4, 4)

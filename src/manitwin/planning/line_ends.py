@@ -16,7 +16,7 @@ class LineEnds:
 
     def __init__(self, settings: PlannerSettings):
         """Take the lengths of the lines."""
-        self._back = drawn_back(settings.approach_m)
+        self._back = transform(translation=np.array([0, 0, -settings.approach_m]))
         self._lift_m = settings.lift_m
 
     def before(self, gripper_to_world: np.ndarray) -> np.ndarray:
@@ -28,8 +28,3 @@ class LineEnds:
         result = gripper_to_world.copy()
         result[..., 2, 3] += self._lift_m
         return result
-
-
-def drawn_back(length_m: float) -> np.ndarray:
-    """Return the pose ``(4, 4)`` that is so far behind, in the grasp frame."""
-    return transform(translation=np.array([0, 0, -length_m]))

@@ -28,7 +28,7 @@ from manitwin.robots.robot import Robot
 class PickPlacePlanner:
     """Plans for one robot; deterministic for a problem's seed, with work counted and never timed."""
 
-    def __init__(self, robot: Robot, timestep_s: float = 1 / 240, settings: PlannerSettings | None = None):
+    def __init__(self, robot: Robot, timestep_s: float = 1 / 120, settings: PlannerSettings | None = None):
         """Build the models of arm and hand; the shapes of bodies are kept from one problem to the next."""
         self.robot, self.settings = robot, settings or PlannerSettings()
         self.arm = ArmKinematics(robot)
@@ -48,27 +48,24 @@ class PickPlacePlanner:
     def plan(self, problem: PickPlaceProblem) -> PlanReport:
         """Plan with the first grasp that can be, itself or turned by 180 degrees about the approach axis.
 
-        Where none can, those that the hand had no room for are drawn back along their approach, step by step. At most
-        ``settings.max_grasps`` are tried beyond a look at the hand alone. What a grasp fails of is the latest stage that it
-        came to.
+        At most ``settings.max_grasps`` are tried beyond a look at the hand alone. What a grasp fails of is the latest stage
+        that it came to.
         """
         world, rng = self._world_of(problem, problem.goal_object_to_world), np.random.default_rng(problem.seed)
         tally = _Tally()
-        for draw_back_m in self.settings.draw_backs_m:
-            left = [i for i in range(len(problem.grasps)) if i not in tally.beyond_a_look]
-            for candidate in self._candidates.of(world, left, draw_back_m):
-                grasp, failure = problem.grasps[candidate.index], candidate.failure
-                if failure is None:
-                    if tally.is_new(candidate.index) and len(tally.beyond_a_look) == self.settings.max_grasps:
-                        return tally.report(None)
-                    tally.beyond_a_look.add(candidate.index)
-                    outcome = self._plan_grasp(world, grasp, candidate.gripper_to_object, rng)
-                    if isinstance(outcome, PickPlacePlan):
-                        tally.failures.pop(candidate.index, None)
-                        tally.tried.add(candidate.index)
-                        return tally.report(outcome)
-                    failure = outcome
-                tally.count(candidate.index, failure)
+        for candidate in self._candidates.of(world):
+            grasp, failure = problem.grasps[candidate.index], candidate.failure
+            if failure is None:
+                if tally.is_new(candidate.index) and len(tally.beyond_a_look) == self.settings.max_grasps:
+                    return tally.report(None)
+                tally.beyond_a_look.add(candidate.index)
+                outcome = self._plan_grasp(world, grasp, candidate.gripper_to_object, rng)
+                if isinstance(outcome, PickPlacePlan):
+                    tally.failures.pop(candidate.index, None)
+                    tally.tried.add(candidate.index)
+                    return tally.report(outcome)
+                failure = outcome
+            tally.count(candidate.index, failure)
         return tally.report(None)
 
     def plan_place(

@@ -66,8 +66,7 @@ PlanFailure = Literal[
 class PickPlacePlan:
     """One grasp's motions: reach, approach, (close), lift, carry, lower, (open), retreat.
 
-    ``gripper_to_object`` is the grasp that is used: a candidate, or the same turned by 180 degrees about the approach axis
-    or drawn back along it by a few millimetres.
+    ``gripper_to_object`` is the grasp that is used: a candidate, or the same turned by 180 degrees about the approach axis.
     """
 
     grasp: Grasp

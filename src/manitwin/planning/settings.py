@@ -11,13 +11,10 @@ class PlannerSettings:
 
     ``margin_m`` is kept in free motion, and lowered step by step to ``clearance_m`` where start or goal are nearer;
     ``clearance_m`` is kept on straight lines. Defaults: the planning study of the reference (10 mm against tunnelling,
-    10 cm approach, 12 cm lift, checks every 0.02 rad). Where the hand has no room, a grasp is drawn back along its approach,
-    by no more than leaves the contact on a pad of 18 mm: a thin thing that lies is out of reach of a hand that was verified
-    without a table.
+    10 cm approach, 12 cm lift, checks every 0.02 rad).
     """
 
     approach_m: float = 0.10
-    draw_backs_m: tuple[float, ...] = (0.0, 0.002, 0.004, 0.006, 0.008)
     lift_m: float = 0.12
     margin_m: float = 0.010
     clearance_m: float = 0.001

@@ -58,7 +58,7 @@ def test_rows_are_a_twentieth_of_a_second_apart_and_phases_in_order(kept: tuple[
 def test_actions_are_what_the_next_state_comes_to(kept: tuple[EpisodeFacts, Recording]) -> None:
     _, recording = kept
     lag_rad = np.abs(recording.action_joint_positions_rad - recording.joint_positions_rad[1:])
-    assert lag_rad.max() < 0.01
+    assert lag_rad.max() < 0.005
     assert np.linalg.norm(recording.action_tip_position_m - recording.tip_position_m[1:], axis=1).max() < 0.005
     for index in (0, -1):
         pose = panda()[1].tip_pose(recording.joint_positions_rad[index].astype(float))

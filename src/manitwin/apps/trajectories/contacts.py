@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -45,36 +45,57 @@ class ContactReader:
     ):
         """Take every body with its name and role."""
         self._system, self._max_impulse = system, max_contact_force_n * system.timestep
-        self._known = {component: (role, name) for component, name, role in bodies}
+        self._roles: dict[physx.PhysxBaseComponent, Role] = {}
+        self._names: dict[physx.PhysxBaseComponent, str] = {}
+        for component, name, role in bodies:
+            self._roles[component], self._names[component] = role, name
 
     def touches(self) -> Touches:
         """Return what touches the target."""
         impulses = [np.zeros(3), np.zeros(3)]
         on_support = False
-        for first, second, contact, sign in self._contacts():
-            if first[0] == Role.TARGET:
+        for contact in self._system.get_contacts():
+            one, two = contact.bodies
+            first, second = self._roles[one], self._roles[two]
+            if first != Role.TARGET and second != Role.TARGET:
+                continue
+            if first > Role.TARGET or second > Role.TARGET:
                 on_support = on_support or any(point.impulse.any() for point in contact.points)
-            elif second[0] == Role.TARGET and first[0] <= Role.MINUS_FINGER:
-                impulses[first[0]] += sign * _impulse(contact)
+            elif first <= Role.MINUS_FINGER:
+                impulses[first] += _impulse(contact)
+            elif second <= Role.MINUS_FINGER:
+                impulses[second] -= _impulse(contact)
         plus_n, minus_n = (float(np.linalg.norm(impulse)) / self._system.timestep for impulse in impulses)
         return Touches((plus_n, minus_n), on_support)
 
     def unplanned(self, phase: Phase) -> set[tuple[str, str]]:
         """Return the names of what touches with more than the allowed force and should not, the robot's part first."""
         impulses: dict[tuple[str, str], np.ndarray] = {}
-        for (part, part_name), (other, other_name), contact, sign in self._contacts():
-            if part >= Role.TARGET or other < Role.TARGET:
+        forbidden = _FORBIDDEN_IN_HAND if phase in IN_HAND else _FORBIDDEN
+        for contact in self._system.get_contacts():
+            first, second = contact.bodies
+            if not forbidden[self._roles[first]][self._roles[second]]:
                 continue
-            if other > Role.TARGET or part == Role.ARM or (part == Role.HAND and phase not in IN_HAND):
-                pair = part_name, other_name
-                impulses[pair] = impulses.get(pair, 0.0) + sign * _impulse(contact)
+            sign = 1.0
+            if self._roles[first] > self._roles[second]:
+                first, second, sign = second, first, -1.0
+            pair = self._names[first], self._names[second]
+            impulses[pair] = impulses.get(pair, 0.0) + sign * _impulse(contact)
         return {pair for pair, impulse in impulses.items() if np.linalg.norm(impulse) > self._max_impulse}
 
-    def _contacts(self) -> Iterator[tuple[tuple[Role, str], tuple[Role, str], physx.PhysxContact, int]]:
-        """Yield role and name of both bodies, the lower role first, their contact, and 1 where that has them in this order."""
-        for contact in self._system.get_contacts():
-            first, second = (self._known[body] for body in contact.bodies)
-            yield (first, second, contact, 1) if first <= second else (second, first, contact, -1)
+
+def _forbidden(in_hand: bool) -> list[list[bool]]:
+    """Return, for two roles in either order, whether they must not touch: a table, as it is asked for every contact."""
+
+    def is_forbidden(part: Role, other: Role) -> bool:
+        if part >= Role.TARGET or other < Role.TARGET:
+            return False
+        return other > Role.TARGET or part == Role.ARM or (part == Role.HAND and not in_hand)
+
+    return [[is_forbidden(min(one, two), max(one, two)) for two in Role] for one in Role]
+
+
+_FORBIDDEN, _FORBIDDEN_IN_HAND = _forbidden(False), _forbidden(True)
 
 
 def _impulse(contact: physx.PhysxContact) -> np.ndarray:

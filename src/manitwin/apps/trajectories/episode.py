@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from manitwin.app_config import EpisodeSettings
-from manitwin.apps.trajectories.execution import Execution
+from manitwin.apps.trajectories.execution import FRAME_S, Execution
 from manitwin.apps.trajectories.outcome import (
     PlacementErrors,
     is_at_rest,
@@ -28,7 +28,7 @@ from manitwin.planning.problem import Grasp, Motion, PickPlacePlan, PickPlacePro
 from manitwin.robots.robot import Robot
 from manitwin.simulate.trial import TrialSettings
 
-SETTLE_STEPS = 12  # between looks at whether a start has come to rest
+SETTLE_S = 0.05  # between looks at whether a start has come to rest
 SMALL_SLIP_M, SMALL_SLIP_RAD = 0.004, np.radians(2.0)  # a fifth of what a placement may be off: no reason to give up
 LEAST_LIFT_SHARE = 0.5  # of what the hand rose: less, and the object was left behind
 
@@ -125,8 +125,8 @@ class _Episode:
     def _settle(self, world: EpisodeWorld) -> bool:
         """Let the objects come to rest and make the problem that of where they are; False where one does not stand."""
         settings, looks = self.settings, 0
-        for _ in range(round(settings.max_settle_s / settings.timestep_s / SETTLE_STEPS)):
-            world.step(SETTLE_STEPS)
+        for _ in range(round(settings.max_settle_s / SETTLE_S)):
+            world.step(round(SETTLE_S / settings.timestep_s))
             looks = looks + 1 if world.is_still() else 0
             if looks >= 2:
                 break
@@ -158,7 +158,12 @@ class _Episode:
     def _closing(self) -> TrialSettings:
         gripper, settings = self.robot.gripper, self.settings
         force_n = gripper.force_n if settings.closing_force_n is None else settings.closing_force_n
-        return TrialSettings(force_n, gripper.finger_friction, timestep_s=settings.timestep_s)
+        return TrialSettings(
+            force_n,
+            gripper.finger_friction,
+            timestep_s=settings.timestep_s,
+            steps_per_frame=max(1, round(FRAME_S / settings.timestep_s)),
+        )
 
     def _execute(self, plan: PickPlacePlan, execution: Execution) -> None:
         """Pick and place; raises _Ended where the object is lost or cannot be placed."""

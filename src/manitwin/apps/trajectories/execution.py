@@ -17,12 +17,16 @@ from manitwin.simulate.shared_target import SharedTarget
 from manitwin.simulate.trial import TrialSettings
 
 STILL_ROWS, REST_ROWS = 5, 10  # 0.25 s and 0.5 s
-STEADY_FRAMES = 6  # the hand presses for so long before it moves on: 0.1 s
+FRAME_S = 1 / 60  # between two looks at how hard the hand presses
+STEADY_FRAMES = 6  # the hand presses for so long before it moves on
 PRESSING_SHARE = 0.98  # of the closing force, at which the target has come as far as it goes
-OPENING_STEPS = 24  # after the pads have parted, before the hand withdraws
-# Nine touches of fingers and table lasted 3 to 6 steps: looking at the recorded rows alone, every 12th step, missed 4 of them.
-WATCH_STEPS = 3
-TRACKING_STEPS = 12  # after a motion, for the arm to come to rest
+OPENING_S = 0.1  # after the pads have parted, before the hand withdraws
+# Nine touches of fingers and table lasted 12 to 25 ms: looking at the recorded rows alone, every 50 ms, missed 4 of them. High
+# above the table nothing is missed by looking less often, as long as nobody is awake who was touched.
+WATCH_S = 0.0125
+FREE_WATCH_S = 0.025
+FREE_PHASES = frozenset({Phase.REACH, Phase.CARRY, Phase.REST})
+TRACKING_S = 0.05  # after a motion, for the arm to come to rest
 
 
 class Execution:
@@ -38,6 +42,8 @@ class Execution:
             raise ValueError(
                 f"a timestep of {closing.timestep_s:g} s does not divide the {1 / RATE_HZ:g} s between two rows"
             )
+        self._steps_per_look = max(1, int(WATCH_S / closing.timestep_s + 1e-9))
+        self._steps_per_free_look = max(1, int(FREE_WATCH_S / closing.timestep_s + 1e-9))
         self.commanded_rad = np.array(robot.home_rad, float)
         self._opening_target_m = robot.gripper.opening_m
         self._shared = SharedTarget(robot.gripper.opening_m, closing)
@@ -61,11 +67,12 @@ class Execution:
         """Move the arm along a motion and wait until it has come to rest."""
         robot = self._world.robot
         for positions, velocities in zip(motion.positions_rad, motion.velocities_rad_s, strict=True):
-            robot.set_targets(positions, velocities)
+            # the drives pull to where the arm is to be in the middle of the step, or it would run ahead of its targets
+            robot.set_targets(positions - velocities * (self._closing.timestep_s / 2), velocities)
             self.commanded_rad = positions
             self._advance(motion.phase)
         robot.set_targets(self.commanded_rad, np.zeros_like(self.commanded_rad))
-        self.wait(motion.phase, TRACKING_STEPS)
+        self.wait(motion.phase, self._steps(TRACKING_S))
 
     def wait(self, phase: Phase, steps: int) -> None:
         """Stay where the robot is told to be."""
@@ -91,7 +98,7 @@ class Execution:
             opening_m = min(full_m, opening_m + 2 * closing.close_speed_m_s * closing.frame_s)
             self._tell_opening(opening_m)
             self.wait(Phase.OPEN, closing.steps_per_frame)
-        self.wait(Phase.OPEN, OPENING_STEPS)
+        self.wait(Phase.OPEN, self._steps(OPENING_S))
         self._world.expect_load(False)
 
     def target_to_world(self) -> np.ndarray:
@@ -113,6 +120,9 @@ class Execution:
                 break
         return list(poses)
 
+    def _steps(self, time_s: float) -> int:
+        return round(time_s / self._closing.timestep_s)
+
     def _tell_opening(self, opening_m: float) -> None:
         self._opening_target_m = opening_m
         self._world.robot.set_opening_target(opening_m)
@@ -124,21 +134,32 @@ class Execution:
     def _advance(self, phase: Phase) -> None:
         if self._presses and self.steps % self._closing.steps_per_frame == 0:
             self._tell_opening(2 * self._shared.move_on(self._world.robot.opening_m() / 2))
+        ends_row = (self.steps + 1) % self._steps_per_row == 0
+        before = self._world.robot.joint_positions() if ends_row else None
         self._world.step()
         self.steps += 1
-        if self.steps % WATCH_STEPS == 0:
-            self._watch(phase)
-        if self.steps % self._steps_per_row == 0:
-            self._record(phase)
+        self._watch(phase)
+        if before is not None:
+            self._record(phase, before)
 
     def _watch(self, phase: Phase) -> None:
+        is_free = phase in FREE_PHASES and self._world.others_are_asleep()
+        if self.steps % (self._steps_per_free_look if is_free else self._steps_per_look) != 0:
+            return
         unplanned = self._world.contacts.unplanned(phase)
         self.unplanned.update(unplanned)
         self._unplanned_since_row = self._unplanned_since_row or bool(unplanned)
 
-    def _record(self, phase: Phase) -> None:
+    def _record(self, phase: Phase, joint_positions_before_rad: np.ndarray) -> None:
+        """Add a row. Speeds are those of the last step: PhysX's are those at its end, where stiff drives have slowed down."""
+        velocities = (self._world.robot.joint_positions() - joint_positions_before_rad) / self._closing.timestep_s
         self.touches = self._world.contacts.touches()
         self._recorder.add(
-            self.commanded_rad, self._opening_target_m, phase, self.touches, unplanned=self._unplanned_since_row
+            self.commanded_rad,
+            self._opening_target_m,
+            phase,
+            velocities,
+            self.touches,
+            unplanned=self._unplanned_since_row,
         )
         self._unplanned_since_row = False

@@ -37,7 +37,7 @@ class Recorder:
     def __init__(self, world: EpisodeWorld, touches: Touches):
         """Take the first state."""
         self._world = world
-        self._states: list[_State] = [self._state()]
+        self._states: list[_State] = [self._state(np.zeros(len(world.robot.robot.arm_joints)))]
         self._touches, self._unplanned, self._actions = [touches], [False], list[_Action]()
 
     def add(
@@ -45,13 +45,14 @@ class Recorder:
         joint_positions_rad: np.ndarray,
         gripper_opening_m: float,
         phase: Phase,
+        joint_velocities_rad_s: np.ndarray,
         touches: Touches,
         *,
         unplanned: bool,
     ) -> None:
-        """Add what the controllers were told, and the state that it led to: the world's as it is."""
+        """Add what the controllers were told, and the state that it led to: the world's as it is, and the arm's speeds."""
         self._actions.append(_Action(joint_positions_rad, gripper_opening_m, phase))
-        self._states.append(self._state())
+        self._states.append(self._state(joint_velocities_rad_s))
         self._touches.append(touches)
         self._unplanned.append(unplanned)
 
@@ -82,12 +83,12 @@ class Recorder:
             phase=np.array(told["phase"], np.uint8),
         )
 
-    def _state(self) -> _State:
+    def _state(self, joint_velocities_rad_s: np.ndarray) -> _State:
         robot, bodies = self._world.robot, self._world.bodies
         poses = [body.entity_pose for body in bodies]
         return _State(
             joint_positions_rad=robot.joint_positions(),
-            joint_velocities_rad_s=robot.joint_velocities(),
+            joint_velocities_rad_s=joint_velocities_rad_s,
             gripper_opening_m=robot.opening_m(),
             tip_to_world=robot.gripper_pose(),
             object_positions_m=[pose.p for pose in poses],

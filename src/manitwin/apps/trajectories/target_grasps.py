@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -61,9 +62,14 @@ def _sources(twin: Twin, wanted: str) -> list[str]:
     summary = twin.record.grasps
     if summary is None:
         return []
-    known = {name for name in shipped_grippers() if isinstance(load_gripper(name), ParallelGripper)} | {wanted}
+    known = _parallel_grippers() | {wanted}
     names = [name for name in (summary.gripper, *sorted(summary.other_grippers)) if name in known]
     return sorted(names, key=lambda name: name != wanted)
+
+
+@cache
+def _parallel_grippers() -> frozenset[str]:
+    return frozenset(name for name in shipped_grippers() if isinstance(load_gripper(name), ParallelGripper))
 
 
 def _of_gripper(twin: Twin, name: str, gripper: ParallelGripper) -> tuple[TargetGrasp, ...]:
