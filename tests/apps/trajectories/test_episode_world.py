@@ -44,11 +44,11 @@ def test_objects_are_in_the_order_of_their_names_where_they_were_put(world: Epis
 
 def test_what_stands_comes_to_rest_borne_by_the_table_and_touched_by_nobody(world: EpisodeWorld) -> None:
     world.step(60)
-    touches = world.contacts.touches()
+    touches = world.contacts.touches(world.contacts.read())
     assert world.is_still()
     assert touches.on_support
     assert touches.finger_forces_n == (0.0, 0.0)
-    assert world.contacts.unplanned(Phase.REACH) == set()
+    assert world.contacts.unplanned(world.contacts.read(), Phase.REACH) == set()
 
 
 def test_what_stands_on_a_tray_on_the_table_is_borne_by_it() -> None:
@@ -57,7 +57,7 @@ def test_what_stands_on_a_tray_on_the_table_is_borne_by_it() -> None:
     with made(replace(on_tray, static_boxes=(*on_tray.static_boxes, tray))) as world:
         world.step(60)
         assert world.is_still()
-        assert world.contacts.touches().on_support
+        assert world.contacts.touches(world.contacts.read()).on_support
         assert world.object_to_world(0)[2, 3] == pytest.approx(START[2, 3] + 0.02, abs=3e-4)
 
 
@@ -66,7 +66,7 @@ def test_what_falls_is_not_still_and_falls_as_it_should() -> None:
     with made(problem(start=transform(None, START[:3, 3] + [0, 0, 0.4]))) as world:
         world.step(steps)
         assert not world.is_still()
-        assert not world.contacts.touches().on_support
+        assert not world.contacts.touches(world.contacts.read()).on_support
         fallen_m = START[2, 3] + 0.4 - world.object_to_world(0)[2, 3]
     assert fallen_m == pytest.approx(9.81 / 120**2 * steps * (steps + 1) / 2, rel=1e-3)  # semi-implicit Euler
 
@@ -89,7 +89,7 @@ def hits(asked: PickPlaceProblem, number: int, phase: Phase) -> set[tuple[str, s
         world.bodies[number].set_linear_velocity(np.array([0, 0, 1.0], np.float32))
         for _ in range(8):
             world.step()
-            found.update(world.contacts.unplanned(phase))
+            found.update(world.contacts.unplanned(world.contacts.read(), phase))
     return found
 
 
@@ -116,6 +116,6 @@ def test_fingers_press_on_the_target_with_equal_forces_that_are_their_drives(wor
         world.expect_load(True)
         world.robot.set_opening_target(opening_m - 2 * 20.0 / 1e4)  # 20 N at the drives' stiffness of 1e4 N/m
         world.step(120)
-        touches = world.contacts.touches()
+        touches = world.contacts.touches(world.contacts.read())
     assert touches.finger_forces_n == pytest.approx((20, 20), rel=0.08)
     assert not touches.on_support

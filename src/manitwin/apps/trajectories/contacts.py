@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -50,11 +50,16 @@ class ContactReader:
         for component, name, role in bodies:
             self._roles[component], self._names[component] = role, name
 
-    def touches(self) -> Touches:
+    def read(self) -> Sequence[physx.PhysxContact]:
+        """Return the contacts of the last step, of which the others tell; dear where many hulls stand on a table."""
+        contacts: Sequence[physx.PhysxContact] = self._system.get_contacts()
+        return contacts
+
+    def touches(self, contacts: Iterable[physx.PhysxContact]) -> Touches:
         """Return what touches the target."""
         impulses = [np.zeros(3), np.zeros(3)]
         on_support = False
-        for contact in self._system.get_contacts():
+        for contact in contacts:
             one, two = contact.bodies
             first, second = self._roles[one], self._roles[two]
             if first != Role.TARGET and second != Role.TARGET:
@@ -68,11 +73,11 @@ class ContactReader:
         plus_n, minus_n = (float(np.linalg.norm(impulse)) / self._system.timestep for impulse in impulses)
         return Touches((plus_n, minus_n), on_support)
 
-    def unplanned(self, phase: Phase) -> set[tuple[str, str]]:
+    def unplanned(self, contacts: Iterable[physx.PhysxContact], phase: Phase) -> set[tuple[str, str]]:
         """Return the names of what touches with more than the allowed force and should not, the robot's part first."""
         impulses: dict[tuple[str, str], np.ndarray] = {}
         forbidden = _FORBIDDEN_IN_HAND if phase in IN_HAND else _FORBIDDEN
-        for contact in self._system.get_contacts():
+        for contact in contacts:
             first, second = contact.bodies
             if not forbidden[self._roles[first]][self._roles[second]]:
                 continue

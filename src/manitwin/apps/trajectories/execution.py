@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from sapien import physx
 
 from manitwin.apps.trajectories.recorder import Recorder
 from manitwin.apps.trajectories.recording import RATE_HZ, Recording
@@ -21,10 +22,10 @@ FRAME_S = 1 / 60  # between two looks at how hard the hand presses
 STEADY_FRAMES = 6  # the hand presses for so long before it moves on
 PRESSING_SHARE = 0.98  # of the closing force, at which the target has come as far as it goes
 OPENING_S = 0.1  # after the pads have parted, before the hand withdraws
-# Nine touches of fingers and table lasted 12 to 25 ms: looking at the recorded rows alone, every 50 ms, missed 4 of them. High
-# above the table nothing is missed by looking less often, as long as nobody is awake who was touched.
+# Nine touches of fingers and table lasted 12 to 25 ms: looking at the recorded rows alone, every 50 ms, missed 4 of them. They
+# are looked for at every row alone where the hand is on its way high above the table, and no other object is awake: PhysX wakes
+# what is touched.
 WATCH_S = 0.0125
-FREE_WATCH_S = 0.025
 FREE_PHASES = frozenset({Phase.REACH, Phase.CARRY, Phase.REST})
 TRACKING_S = 0.05  # after a motion, for the arm to come to rest
 
@@ -43,7 +44,6 @@ class Execution:
                 f"a timestep of {closing.timestep_s:g} s does not divide the {1 / RATE_HZ:g} s between two rows"
             )
         self._steps_per_look = max(1, int(WATCH_S / closing.timestep_s + 1e-9))
-        self._steps_per_free_look = max(1, int(FREE_WATCH_S / closing.timestep_s + 1e-9))
         self.commanded_rad = np.array(robot.home_rad, float)
         self._opening_target_m = robot.gripper.opening_m
         self._shared = SharedTarget(robot.gripper.opening_m, closing)
@@ -51,7 +51,7 @@ class Execution:
         self.steps = 0
         self.unplanned: set[tuple[str, str]] = set()
         self._unplanned_since_row = False
-        self.touches = world.contacts.touches()
+        self.touches = world.contacts.touches(world.contacts.read())
         self._recorder = Recorder(world, self.touches)
 
     @property
@@ -138,22 +138,24 @@ class Execution:
         before = self._world.robot.joint_positions() if ends_row else None
         self._world.step()
         self.steps += 1
-        self._watch(phase)
-        if before is not None:
-            self._record(phase, before)
-
-    def _watch(self, phase: Phase) -> None:
         is_free = phase in FREE_PHASES and self._world.others_are_asleep()
-        if self.steps % (self._steps_per_free_look if is_free else self._steps_per_look) != 0:
-            return
-        unplanned = self._world.contacts.unplanned(phase)
+        if before is not None or (not is_free and self.steps % self._steps_per_look == 0):
+            contacts = self._world.contacts.read()
+            self._watch(phase, contacts)
+            if before is not None:
+                self._record(phase, before, contacts)
+
+    def _watch(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
+        unplanned = self._world.contacts.unplanned(contacts, phase)
         self.unplanned.update(unplanned)
         self._unplanned_since_row = self._unplanned_since_row or bool(unplanned)
 
-    def _record(self, phase: Phase, joint_positions_before_rad: np.ndarray) -> None:
+    def _record(
+        self, phase: Phase, joint_positions_before_rad: np.ndarray, contacts: Sequence[physx.PhysxContact]
+    ) -> None:
         """Add a row. Speeds are those of the last step: PhysX's are those at its end, where stiff drives have slowed down."""
         velocities = (self._world.robot.joint_positions() - joint_positions_before_rad) / self._closing.timestep_s
-        self.touches = self._world.contacts.touches()
+        self.touches = self._world.contacts.touches(contacts)
         self._recorder.add(
             self.commanded_rad,
             self._opening_target_m,
