@@ -114,17 +114,18 @@ def test_what_is_no_place_of_twins_is_said(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_pictures_are_drawn_afterwards_and_join_the_set(episodes: Path) -> None:
+def test_pictures_are_drawn_afterwards_and_join_the_set(bricks: Path, tmp_path: Path) -> None:
+    make_episodes(bricks, tmp_path, 2, CONFIG, executor="inline")
     config = PicturesConfig(cameras=("front", "wrist"), size_px=64)
-    assert draw_episodes(episodes, config, executor="inline").exit_code == 0
+    assert draw_episodes(tmp_path, config, executor="inline").exit_code == 0
     opened: list[int] = []
-    draw_episodes(episodes, config, executor="inline", on_start=lambda items, todo: opened.append(todo))
+    draw_episodes(tmp_path, config, executor="inline", on_start=lambda items, todo: opened.append(todo))
     assert opened == [0]
-    written = write_with_pictures(episodes, config.cameras)
-    loaded = read_lerobot(episodes / "lerobot", decode_videos=True)
-    assert written.episodes == len(loaded.episodes)
+    written = write_with_pictures(tmp_path, config.cameras)
+    loaded = read_lerobot(tmp_path / "lerobot", decode_videos=True)
+    assert written.episodes == len(loaded.episodes) == 2
     assert {"observation.images.front", "observation.images.wrist"} <= set(loaded.info["features"])
-    assert written.frames == sum(e.recording.steps for e in stored_episodes(batch_folders(episodes)))
+    assert written.frames == sum(e.recording.steps for e in stored_episodes(batch_folders(tmp_path)))
 
 
 def test_statistics_of_a_run_name_what_was_kept(episodes: Path) -> None:
