@@ -20,6 +20,7 @@ from pebble import ProcessExpired, ProcessPool
 from manitwin.config import Resource, RunConfig
 from manitwin.engine.jobs import Failure, Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
+from manitwin.executors.one_thread import one_thread_each
 from manitwin.main_module import hidden_main_module
 
 JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
@@ -129,7 +130,7 @@ _stack_file: TextIO | None = None
 
 def _start(setup: WorkerSetup, stacks: str, driver: int) -> None:
     global _worker, _stack_file
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    one_thread_each()
     _die_with(driver)
     _stack_file = (Path(stacks) / f"{os.getpid()}.txt").open("w")
     faulthandler.enable(_stack_file)

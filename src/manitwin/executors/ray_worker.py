@@ -13,6 +13,7 @@ from pathlib import Path
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
 from manitwin.errors import UsageError
+from manitwin.executors.one_thread import one_thread_each
 
 STACK_LINES = 12
 STALE_S = 3600.0  # a stack that nobody asked for by then is of a worker whose run is over
@@ -29,6 +30,7 @@ class RayWorker:
         here = version("manitwin")
         if here != wanted_version:
             raise UsageError(f"this node has manitwin {here} and the driver {wanted_version}; install the same on all")
+        one_thread_each()
         self._setup = setup
         self._idle: queue.SimpleQueue[Worker] = queue.SimpleQueue()
         self._stack = _stack_folder() / f"{os.getpid()}.txt"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import queue
 import threading
 from collections.abc import Callable, Iterator
@@ -19,6 +18,7 @@ from manitwin.build_item import ItemResult, build_item
 from manitwin.charges import counted
 from manitwin.config import BuildConfig
 from manitwin.errors import Unavailable
+from manitwin.executors.one_thread import one_thread_each
 from manitwin.identity import twin_id
 from manitwin.main_module import hidden_main_module
 from manitwin.stages.stage import Item
@@ -41,7 +41,7 @@ _spent_usd: Any = None
 def _start_worker(events: Any, spent_usd: Any) -> None:
     global _events, _spent_usd
     _events, _spent_usd = events, spent_usd
-    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    one_thread_each()
 
 
 def _build_in_worker(item: Item, out: Path, config: BuildConfig) -> ItemResult:
