@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import get_args
@@ -89,13 +90,14 @@ class Driver:
                 pass
             self.result.stopped = self.result.stopped or self._no_money
             how = self.result.stopped or "finished"
+            self.ledger.end_run(run, how)
         except LedgerFull as error:
             self.result.stopped = f"{error}; {MAKE_ROOM}"
-            return self.result  # nothing can be noted any more: the next run finds what is there
+            self._let_end()  # nothing can be noted any more: the next run finds what is there
         except BaseException:
-            self.ledger.end_run(run, how)
+            with suppress(LedgerFull):
+                self.ledger.end_run(run, how)
             raise
-        self.ledger.end_run(run, how)
         return self.result
 
     def _step(self) -> bool:
@@ -105,8 +107,8 @@ class Driver:
         self.ledger.commit()
         if not self._running and (self.result.stopped is not None or not (any(self._queues.values()) or self._more)):
             return self.result.stopped is None and self._give_tables(self._tables.due_at_the_end())
-        for ticket, reply in self.executor.ended(self._wait_s()):
-            flight, needs = self._running.pop(ticket)
+        ended = [(ticket, reply, *self._running.pop(ticket)) for ticket, reply in self.executor.ended(self._wait_s())]
+        for ticket, reply, flight, needs in ended:
             self._outstanding[needs] -= 1
             self._budget.end(
                 ticket, reply.charged_usd if isinstance(reply, Failure | StageRun | StageRejected) else 0.0
@@ -116,6 +118,12 @@ class Driver:
             else:
                 self._handle(flight, needs, reply)
         return True
+
+    def _let_end(self) -> None:
+        """Wait for what is under way, so that no worker is stopped in the middle of a folder."""
+        while self._running:
+            for ticket, _ in self.executor.ended(LONGEST_WAIT_S):
+                self._running.pop(ticket)
 
     def _wait_s(self) -> float:
         """Return how long to wait for an answer: no longer than until a gate opens for those that wait behind it."""
