@@ -22,11 +22,8 @@ FRAME_S = 1 / 60  # between two looks at how hard the hand presses
 STEADY_FRAMES = 6  # the hand presses for so long before it moves on
 PRESSING_SHARE = 0.98  # of the closing force, at which the target has come as far as it goes
 OPENING_S = 0.1  # after the pads have parted, before the hand withdraws
-# Nine touches of fingers and table lasted 12 to 25 ms: looking at the recorded rows alone, every 50 ms, missed 4 of them. They
-# are looked for at every row alone where the hand is on its way high above the table, and no other object is awake: PhysX wakes
-# what is touched.
+# Nine touches of fingers and table lasted 12 to 25 ms: looking at the recorded rows alone, every 50 ms, missed 4 of them.
 WATCH_S = 0.0125
-FREE_PHASES = frozenset({Phase.REACH, Phase.CARRY, Phase.REST})
 TRACKING_S = 0.05  # after a motion, for the arm to come to rest
 
 
@@ -138,8 +135,7 @@ class Execution:
         before = self._world.robot.joint_positions() if ends_row else None
         self._world.step()
         self.steps += 1
-        is_free = phase in FREE_PHASES and self._world.others_are_asleep()
-        if before is not None or (not is_free and self.steps % self._steps_per_look == 0):
+        if before is not None or self.steps % self._steps_per_look == 0:
             contacts = self._world.contacts.read()
             self._watch(phase, contacts)
             if before is not None:

@@ -56,7 +56,6 @@ class EpisodeWorld:
         self.bodies = [
             self._add_object(placed, shapes) for placed, shapes in zip(self.placed, self._shapes, strict=True)
         ]
-        self._others = [body for number, body in enumerate(self.bodies) if number != self.target]
         self.robot = SapienRobot(
             self._scene, robot, finger_force_n=closing_force_n, contact_offset_m=settings.contact_offset_m
         )
@@ -71,7 +70,7 @@ class EpisodeWorld:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        del self.contacts, self.robot, self._others, self.bodies, self._scene, self._system
+        del self.contacts, self.robot, self.bodies, self._scene, self._system
         for placed, shapes in zip(self.placed, self._shapes, strict=True):
             self._pool.give_back(placed.body.hulls, shapes)
 
@@ -101,10 +100,6 @@ class EpisodeWorld:
             )
             for body in self.bodies
         )
-
-    def others_are_asleep(self) -> bool:
-        """Tell whether nothing has touched any object but the target of late: PhysX wakes what is touched."""
-        return all(body.is_sleeping for body in self._others)
 
     def _add_box(self, box: StaticBox) -> physx.PhysxRigidStaticComponent:
         friction = self._settings.furniture_friction
