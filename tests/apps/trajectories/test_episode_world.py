@@ -10,10 +10,12 @@ import pytest
 from brick_episodes import POOL, START, panda, problem, standing
 
 from manitwin.app_config import EpisodeSettings
+from manitwin.apps.trajectories.execution import Execution
 from manitwin.apps.trajectories.world import EpisodeWorld
 from manitwin.geometry.poses import transform
 from manitwin.planning.problem import Phase, PickPlaceProblem
 from manitwin.scenes.placed_object import PlacedObject, StaticBox
+from manitwin.simulate.trial import TrialSettings
 from rigid_boxes import box
 
 PALM_M, FINGER_END_M = 0.066, 0.1125  # where palm and fingers end, along the approach
@@ -119,3 +121,16 @@ def test_fingers_press_on_the_target_with_equal_forces_that_are_their_drives(wor
         touches = world.contacts.touches(world.contacts.read())
     assert touches.finger_forces_n == pytest.approx((20, 20), rel=0.08)
     assert not touches.on_support
+
+
+@pytest.mark.parametrize("phase", [Phase.REACH, Phase.CARRY, Phase.LOWER])
+def test_touch_of_one_step_between_two_rows_is_not_missed(
+    world: EpisodeWorld, monkeypatch: pytest.MonkeyPatch, phase: Phase
+) -> None:
+    robot, planner = panda()
+    execution = Execution(world, robot, TrialSettings(50.0, 1.0, timestep_s=1 / 120), planner.tip_pose)
+    pair = ("panda_link7", "board")
+    monkeypatch.setattr(world.contacts, "unplanned", lambda contacts, asked: {pair} if execution.steps == 10 else set())
+    execution.wait(phase, 18)
+    assert execution.unplanned == {pair}
+    assert execution.recording().unplanned_contact.tolist() == [False, False, True, False]
