@@ -128,9 +128,10 @@ def install_libraries() -> None:
 
 
 def can_render() -> bool:
-    """Ask the package's own probe whether a Vulkan device can render."""
+    """Ask the package's own probe whether a Vulkan device can render: yes is a device's name, silence is no."""
     probe = [str(VENV / "bin" / "python"), "-m", "manitwin.render.device"]
-    return subprocess.run(probe, capture_output=True).returncode == 0
+    done = subprocess.run(probe, capture_output=True, text=True)
+    return done.returncode == 0 and bool(done.stdout.strip())
 
 
 def debian_mirror() -> str:

@@ -16,7 +16,7 @@ import subprocess
 import sys
 from dataclasses import asdict, dataclass
 
-from manitwin.errors import RendererMissing, UsageError
+from manitwin.errors import ManiTwinError, RendererMissing, UsageError
 
 SWITCH = "MANITWIN_RENDER_DEVICE"
 """Set to ``cpu`` to leave GPUs alone (some hang: vla-evaluation-harness#112); ``auto`` otherwise."""
@@ -156,3 +156,17 @@ def _remedy(named: str | None) -> str:
     if "fedora" in family:
         return "run: sudo dnf install -y mesa-vulkan-drivers"
     return "install Mesa's Vulkan drivers with lavapipe, version 25 or newer"
+
+
+def main() -> int:
+    """Print the device that renders, or on stderr why none does; returns the exit status: 0 or 1."""
+    try:
+        print(renderer_summary())
+    except ManiTwinError as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
