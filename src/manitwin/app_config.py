@@ -52,7 +52,8 @@ class LayoutSettings(Section):
 
     ``objects`` is the least and the largest number. ``include`` names categories that must be there, one object for each
     mention; the others are distractors. ``stacked`` objects stand on others, ``contained`` ones lie in a vessel. Without
-    ``min_gap_m`` the gap is that of the clutter level. ``workspace`` is where the named robot, or any, reaches from above:
+    ``min_gap_m`` the gap is that of the clutter level. ``upright``: what has an upright placement that stayed is put down in
+    one; what has none comes as it rests. ``workspace`` is where the named robot, or any, reaches from above:
     least and largest radius about the origin, and half of the angle about +X. ``poses_tried`` bounds the places tried for an
     object, ``repairs`` how many objects are sampled again before the layout is given up.
     """
@@ -64,6 +65,7 @@ class LayoutSettings(Section):
     include: tuple[str, ...] = ()
     stacked: int = Field(default=0, ge=0)
     contained: int = Field(default=0, ge=0)
+    upright: bool = False
     robot: str | None = None
     workspace: tuple[float, float, float] | None = None
     poses_tried: int = Field(default=120, ge=1)

@@ -28,6 +28,9 @@ def layout(
     ] = None,
     stacked: Annotated[int | None, typer.Option(help="How many stand on another object.")] = None,
     contained: Annotated[int | None, typer.Option(help="How many lie in a vessel.")] = None,
+    upright: Annotated[
+        bool, typer.Option("--upright", help="Put down upright what has an upright placement that stayed.")
+    ] = False,
     robot: Annotated[str | None, typer.Option(help="Stay in the workspace of this robot.")] = None,
     pictures: Annotated[
         bool, typer.Option("--pictures", help="Also draw each: colours, depth, normals, instance ids.")
@@ -39,11 +42,12 @@ def layout(
     address: options.Address = None,
 ) -> None:
     """Sample scenes of twins at rest on a table, a shelf or a tray; run it again to go on where it stopped."""
-    from manitwin.apps.layouts.run import layout_totals, make_layouts
+    from manitwin.apps.layouts.run import layout_totals, make_layouts, without_upright
 
     given = {
         "objects": None if objects is None else _range(objects), "surface": surface, "clutter": clutter, "robot": robot,
         "include": tuple(include) if include else None, "stacked": stacked, "contained": contained,
+        "upright": upright or None,
     }  # fmt: skip
     settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
     if pictures:
@@ -55,6 +59,8 @@ def layout(
         on_start=lambda items, opened: out_console.print(f"{items} layouts, {opened} to do", markup=False),
     )  # fmt: skip
     totals = layout_totals(out)
+    if settings.layout.upright and (lying := without_upright(dataset)):
+        out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}", markup=False)
     ended = totals.accepted + sum(totals.rejected.values())
     why = "".join(f", {n} {reason}" for reason, n in totals.rejected.items())
     out_console.print(f"{totals.accepted} of {ended} layouts accepted ({totals.acceptance:.1%}){why}", markup=False)

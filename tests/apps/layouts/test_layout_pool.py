@@ -1,12 +1,16 @@
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from manitwin.apps.layouts.pool import read_pool
+from manitwin.apps.layouts.pool import Pool, PoolTwin, StandingPose, pool_of, read_pool
+from manitwin.apps.layouts.run import without_upright
+from manitwin.dataset_root import twin_name
 from manitwin.errors import UsageError
+from manitwin.store import RECORD, seal
 from scene_twins import BOWL_HEIGHT_M, THINGS, bowl, pool_of_things, slab, write_things
 from twin_folders import write_rejected
 
@@ -39,6 +43,33 @@ def test_opening_of_a_bowl_is_as_deep_as_its_walls_are_high() -> None:
     assert opening.depth_m == pytest.approx(BOWL_HEIGHT_M - 0.006, abs=1e-3)
     np.testing.assert_allclose(opening.center_m, [0, 0, BOWL_HEIGHT_M], atol=5e-3)
     assert pool.body(box.twin_id).opening is None
+
+
+def test_upright_pool_keeps_other_placements_only_where_none_is_upright() -> None:
+    standing = StandingPose(3, np.eye(4), 0.1, 0.1, upright=True)
+    lying = StandingPose(0, np.eye(4), 0.9, 0.1)
+    body = slab("box", 0.1, 0.1, 0.1).body()
+    pool = Pool(
+        [PoolTwin("aa", "r", "cup", (lying, standing), False), PoolTwin("bb", "r", "fork", (lying,), False)],
+        lambda _: body,
+    )
+    assert [twin.stands for twin in pool.twins] == [True, False]
+    assert [twin.poses for twin in pool.upright.twins] == [(standing,), (lying,)]
+    assert [twin.poses for twin in pool.twins] == [(lying, standing), (lying,)]
+    assert pool.upright.body("aa") is pool.body("aa")
+
+
+def test_twins_without_an_upright_placement_that_stayed_are_named(tmp_path: Path) -> None:
+    ids = write_things(tmp_path, THINGS[:2])
+    assert without_upright(tmp_path) == ()
+    folder = tmp_path / twin_name(ids[1])
+    record = json.loads((folder / RECORD).read_bytes())
+    for placement in record["placements"]:
+        placement["upright"] = not placement["upright"]  # the one that is upright now did not stay
+    del record["revision"], record["files"]
+    seal(folder, record)
+    pool_of.cache_clear()
+    assert without_upright(tmp_path) == (ids[1],)
 
 
 def test_place_without_twins_says_so(tmp_path: Path) -> None:

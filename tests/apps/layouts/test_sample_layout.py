@@ -166,6 +166,53 @@ def test_what_does_not_stay_is_rejected_with_its_reason() -> None:
     assert "2 repairs" in caught.value.detail
 
 
+def pool_that_mostly_lies() -> Pool:
+    """Bottles that stand once in 25 times, and rulers that have no upright placement, though one that does not stay."""
+    bottle, ruler = slab("bottle", 0.06, 0.06, 0.2), slab("ruler", 0.2, 0.03, 0.01)
+    on_its_side = transform(Rotation.from_euler("y", 90, degrees=True).as_matrix(), np.array([-0.1, 0, 0.03]))
+    standing = StandingPose(0, np.eye(4), 0.04, 0.05, upright=True)
+    lying = StandingPose(1, on_its_side, 0.96, 0.12)
+    flat = StandingPose(2, np.eye(4), 1.0, 0.11)
+    bodies = {"b0": bottle, "b1": bottle, "r0": ruler, "r1": ruler}
+    twins = [
+        PoolTwin(name, "ab", thing.category, (flat,) if thing is ruler else (lying, standing), False)
+        for name, thing in bodies.items()
+    ]
+    return Pool(twins, lambda name: bodies[name].body())
+
+
+def axis_up(record: SceneRecord, category: str) -> list[float]:
+    return [
+        float(Rotation.from_quat(each.quaternion_wxyz, scalar_first=True).as_matrix()[2, 2])
+        for each in record.objects
+        if each.category == category
+    ]
+
+
+def test_upright_layouts_hold_only_standing_bottles_and_rulers_as_they_rest() -> None:
+    pool = pool_that_mostly_lies()
+    lain = 0
+    for number in range(3):
+        asked = {"objects": (4, 4), "include": ("bottle", "bottle", "ruler")}
+        record = sample_layout(pool, LayoutSettings(upright=True, **asked), 1, number)
+        assert min(axis_up(record, "bottle")) > np.cos(np.radians(5))
+        assert {each.placement for each in record.objects if each.category == "bottle"} == {0}
+        assert {each.placement for each in record.objects if each.category == "ruler"} == {2}
+        as_drawn = sample_layout(pool, LayoutSettings(**asked), 1, number)
+        lain += sum(up < 0.1 for up in axis_up(as_drawn, "bottle"))
+    assert lain >= 4  # of 6 or more: what this test would see without the setting
+
+
+def test_what_is_stacked_in_an_upright_layout_stands_too() -> None:
+    record = sample_layout(
+        pool_that_mostly_lies(),
+        LayoutSettings(upright=True, objects=(2, 2), stacked=1, include=("bottle",)), 1, 0,
+    )  # fmt: skip
+    stacked = next(each for each in record.objects if each.supported_by)
+    assert stacked.category != "bottle" or axis_up(record, "bottle")[-1] > 0.99
+    assert record.objects[0].placement == 0
+
+
 def test_no_vessel_to_fill_says_so() -> None:
     boxes = pool_of_things((slab("box", 0.1, 0.1, 0.1), slab("dice", 0.03, 0.03, 0.03)))
     with pytest.raises(UsageError, match="vessel"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -45,6 +45,11 @@ class PoolTwin:
     poses: tuple[StandingPose, ...]
     vessel: bool
 
+    @property
+    def stands(self) -> bool:
+        """Whether one of its placements is upright."""
+        return any(pose.upright for pose in self.poses)
+
     def is_a(self, category: str) -> bool:
         """Tell whether this is of a category: its own, or one with words before it (a frying pan is a pan)."""
         own, wanted = self.category.casefold(), " ".join(category.casefold().split())
@@ -72,10 +77,15 @@ class Pool:
     Raises UsageError where there is none.
     """
 
-    def __init__(self, twins: Iterable[PoolTwin], read_body: Callable[[str], RigidBody]):
+    def __init__(
+        self,
+        twins: Iterable[PoolTwin],
+        read_body: Callable[[str], RigidBody],
+        bodies: dict[str, PoolBody] | None = None,
+    ):
         self.twins = tuple(sorted(twins, key=lambda twin: twin.twin_id))
         self._read_body = read_body
-        self._bodies: dict[str, PoolBody] = {}
+        self._bodies: dict[str, PoolBody] = {} if bodies is None else bodies
         if not self.twins:
             raise UsageError("no accepted twin that stays where it is set down; build some first")
 
@@ -89,6 +99,15 @@ class Pool:
         while len(self._bodies) > KEPT_BODIES:
             del self._bodies[next(iter(self._bodies))]
         return found
+
+    @cached_property
+    def upright(self) -> Pool:
+        """The same twins, those that have upright placements with these alone; bodies are shared."""
+        twins = (
+            replace(twin, poses=tuple(pose for pose in twin.poses if pose.upright)) if twin.stands else twin
+            for twin in self.twins
+        )
+        return Pool(twins, self._read_body, self._bodies)
 
     def of_category(self, category: str) -> tuple[PoolTwin, ...]:
         """Return the twins of a category. Raises UsageError naming those that there are, where it has none."""

@@ -67,6 +67,11 @@ def make_layouts(
     )  # fmt: skip
 
 
+def without_upright(dataset: str | Path) -> tuple[str, ...]:
+    """Return the ids of a data set's twins that ``upright`` layouts hold as they rest: none of their placements is upright."""
+    return tuple(twin.twin_id for twin in pool_of(_absolute(dataset)).twins if not twin.stands)
+
+
 def layout_totals(out: str | Path) -> LayoutTotals:
     """Add up what the ledger and the scenes say."""
     root = DatasetRoot(out)

@@ -41,6 +41,7 @@ def sample_layout(pool: Pool, settings: LayoutSettings, seed: int, number: int) 
     not be made, UsageError for settings that the pool cannot satisfy, Unavailable for a robot without ``manitwin[robots]``.
     """
     rng = np.random.default_rng([seed, number])
+    pool = pool.upright if settings.upright else pool
     furniture = make_furniture(settings.surface, rng)
     ambient, lights = make_lights(rng)
     making = _Making(pool, settings, furniture, rng)
