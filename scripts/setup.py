@@ -1,4 +1,4 @@
-"""Set up everything in ``.venv``: the locked packages, this package, and a Vulkan driver to render with.
+"""Set up everything in ``.venv``: the locked packages, this package, the system's libraries that they want, a Vulkan driver.
 
 Runs on the system's Python alone (3.11+), on Debian 12 or Ubuntu 24.04. The second run takes a second: a stamp in the
 environment holds the digest of the lock and of ``pyproject.toml``. What needs root is installed when it may be, else the one
@@ -14,16 +14,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+from shared_libraries import missing_libraries, package_by_contents, package_by_policy
+
 ROOT = Path(__file__).resolve().parent.parent
 VENV = ROOT / ".venv"
 STAMP = VENV / "manitwin-setup.sha256"
-SHARED_LIBRARIES = {
-    "libGL.so.1": "libgl1",
-    "libgthread-2.0.so.0": "libglib2.0-0",
-    "libX11.so.6": "libx11-6",
-    "libxcb.so.1": "libxcb1",
-    "libvulkan.so.1": "libvulkan1",
-}
+LIBRARIES_STAMP = VENV / "manitwin-libraries.sha256"
 BACKPORTS = Path("/etc/apt/sources.list.d/manitwin-backports.sources")
 
 
@@ -114,17 +110,53 @@ def install_packages() -> None:
     STAMP.write_text(digest)
 
 
-def missing_libraries() -> list[str]:
-    """Return the Debian packages of shared libraries that the wheels expect and this system lacks."""
-    known = subprocess.run(["/sbin/ldconfig", "-p"], capture_output=True, text=True).stdout
-    return [package for library, package in SHARED_LIBRARIES.items() if library not in known]
-
-
 def install_libraries() -> None:
-    """Install the few system libraries that the wheels expect."""
-    packages = missing_libraries()
-    if packages and not apt_install(packages, f"system libraries are missing: {', '.join(packages)}"):
+    """Install the shared libraries of the system that the installed wheels want, as the loader tells.
+
+    Asked again only where packages or the system's libraries have changed since.
+    """
+    known = subprocess.run(["/sbin/ldconfig", "-p"], capture_output=True).stdout
+    digest = hashlib.sha256(wanted_digest().encode() + known).hexdigest()
+    if LIBRARIES_STAMP.is_file() and LIBRARIES_STAMP.read_text() == digest:
+        return
+    for packages_of in (packages_by_policy, packages_by_contents):
+        missing = missing_libraries(VENV)
+        if not missing:
+            break
+        why = f"shared libraries are missing: {', '.join(missing)}"
+        if shutil.which("apt-get") is None:
+            stop(f"{why}. Install the packages of this system that have them, then run this again")
+        packages = packages_of(missing)
+        if packages:
+            say(f"{why}: installing {' '.join(packages)}")
+            if not apt_install(packages, why):
+                sys.exit(1)
+    missing = missing_libraries(VENV)
+    if missing:
+        stop(f"no package was found for {', '.join(missing)}; install what has them, then run this again")
+    known = subprocess.run(["/sbin/ldconfig", "-p"], capture_output=True).stdout
+    LIBRARIES_STAMP.write_text(hashlib.sha256(wanted_digest().encode() + known).hexdigest())
+
+
+def packages_by_policy(libraries: list[str]) -> list[str]:
+    """Return the Debian packages named as Debian Policy names those of the libraries, where there are such packages."""
+    update = as_root(["apt-get", "update", "-qq"])
+    if update is not None:
+        subprocess.run(update, capture_output=True)
+    named = sorted({package_by_policy(library) for library in libraries})
+    return [name for name in named if subprocess.run(["apt-cache", "show", name], capture_output=True).returncode == 0]
+
+
+def packages_by_contents(libraries: list[str]) -> list[str]:
+    """Return the Debian packages that hold the libraries, by apt-file's index of all packages' files, which is installed."""
+    if not apt_install(["apt-file"], "apt-file is needed to find the packages of shared libraries"):
         sys.exit(1)
+    subprocess.run(as_root(["apt-file", "update"]) or [], capture_output=True)
+    found = []
+    for library in libraries:
+        search = subprocess.run(["apt-file", "search", f"/{library}"], capture_output=True, text=True)
+        found.append(package_by_contents(library, search.stdout.splitlines()))
+    return sorted({package for package in found if package is not None})
 
 
 def can_render() -> bool:

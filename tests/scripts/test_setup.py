@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-import importlib.util
+import importlib
+import sys
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
-SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "setup.py"
+SCRIPTS = Path(__file__).resolve().parents[2] / "scripts"
 
 
 @pytest.fixture(scope="module")
 def setup() -> ModuleType:
     """The script as a module."""
-    spec = importlib.util.spec_from_file_location("manitwin_setup", SCRIPT)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    sys.path.insert(0, str(SCRIPTS))
+    try:
+        return importlib.import_module("setup")
+    finally:
+        sys.path.remove(str(SCRIPTS))
+        sys.modules.pop("setup", None)
 
 
 def test_a_machine_whose_driver_is_missing_cannot_render(
@@ -43,3 +45,43 @@ def test_a_probe_that_says_nothing_is_a_no(setup: ModuleType, monkeypatch: pytes
     silent.chmod(0o755)
     monkeypatch.setattr(setup, "VENV", tmp_path)
     assert setup.can_render() is False
+
+
+def test_set_up_stops_where_no_package_has_a_missing_library(
+    setup: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[list[str]] = []
+
+    def package_of_none(libraries: list[str]) -> list[str]:
+        asked.append(libraries)
+        return []
+
+    monkeypatch.setattr(setup, "LIBRARIES_STAMP", tmp_path / "stamp")
+    monkeypatch.setattr(setup, "missing_libraries", lambda folder: ["libQ.so.6"])
+    monkeypatch.setattr(setup.shutil, "which", lambda name: f"/usr/bin/{name}")
+    monkeypatch.setattr(setup, "packages_by_policy", package_of_none)
+    monkeypatch.setattr(setup, "packages_by_contents", package_of_none)
+    with pytest.raises(SystemExit, match=r"no package was found for libQ\.so\.6"):
+        setup.install_libraries()
+    assert asked == [["libQ.so.6"], ["libQ.so.6"]], "by the name that policy gives, then by contents"
+    assert not (tmp_path / "stamp").exists()
+
+
+def test_libraries_are_asked_for_again_only_after_a_change(
+    setup: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    asked: list[Path] = []
+
+    def nothing_missing(folder: Path) -> list[str]:
+        asked.append(folder)
+        return []
+
+    monkeypatch.setattr(setup, "LIBRARIES_STAMP", tmp_path / "stamp")
+    monkeypatch.setattr(setup, "missing_libraries", nothing_missing)
+    setup.install_libraries()
+    first = len(asked)
+    setup.install_libraries()
+    assert first > 0 and len(asked) == first
+    (tmp_path / "stamp").write_text("of other packages")
+    setup.install_libraries()
+    assert len(asked) > first

@@ -1,0 +1,72 @@
+"""Which shared libraries of the system the installed wheels want and lack, and which Debian packages have them.
+
+The loader itself is asked (``ldd``) for every shared object and program below a folder, so that no list is kept by hand. Runs
+on the system's Python alone.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+ELF = b"\x7fELF"
+AT_A_TIME = 100  # files a call of ldd: a command line has its limits
+
+
+def missing_libraries(folder: Path) -> list[str]:
+    """Return the names of the shared libraries that objects below ``folder`` want and the loader does not find, sorted.
+
+    What another file below ``folder`` provides is not missing: wheels load each other's libraries by themselves, also under
+    a longer name (``libx.so.2`` as ``libx.so.2.0.1``).
+    """
+    objects = list(elf_files(folder))
+    bundled = {part for path in objects for part in _names_answered(path.name)}
+    wanted: set[str] = set()
+    for start in range(0, len(objects), AT_A_TIME):
+        said = subprocess.run(["ldd", *map(str, objects[start : start + AT_A_TIME])], capture_output=True, text=True)
+        wanted |= set(re.findall(r"^\s*(\S+) => not found$", said.stdout, re.MULTILINE))
+    return sorted(wanted - bundled)
+
+
+def elf_files(folder: Path) -> Iterator[Path]:
+    """Yield the shared objects and programs in the ELF format below a folder, sorted within each folder."""
+    for place, folders, names in os.walk(folder):
+        folders.sort()
+        for name in sorted(names):
+            path = Path(place, name)
+            if path.is_symlink() or not (".so" in name or os.access(path, os.X_OK)):
+                continue
+            with path.open("rb") as stream:
+                if stream.read(4) == ELF:
+                    yield path
+
+
+def _names_answered(name: str) -> list[str]:
+    """Return the library names that a file can stand for: ``libx.so.2.0.1`` also for ``libx.so.2`` and ``libx.so``."""
+    base, dot_so, version = name.partition(".so")
+    parts = version.split(".")
+    return [base + dot_so + ".".join(parts[:count]) for count in range(1, len(parts) + 1)]
+
+
+def package_by_policy(library: str) -> str:
+    """Return the name that a Debian package of a library has by Debian Policy 8.1: libgomp.so.1 is in libgomp1."""
+    base, _, version = library.partition(".so")
+    version = version.lstrip(".")
+    hyphen = "-" if version and base[-1:].isdigit() else ""
+    return f"{base}{hyphen}{version}".lower().replace("_", "-")
+
+
+def package_by_contents(library: str, apt_file_list: Iterable[str]) -> str | None:
+    """Return the package that holds a library, of the lines that ``apt-file search`` printed; None: none does.
+
+    Of several the one with the shortest name: the others are debugging, cross-building or alternative ones.
+    """
+    found = set()
+    for line in apt_file_list:
+        package, _, path = line.partition(": ")
+        if Path(path.strip()).name == library and Path(path).parts[:2] in (("/", "usr"), ("/", "lib")):
+            found.add(package.strip())
+    return min(found, key=lambda name: (len(name), name)) if found else None
