@@ -1,7 +1,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test vlm-real usd-validate lerobot-real lint lock lock-vlm-real lock-usd-validate lock-lerobot-real clean
+.PHONY: setup demo test docs vlm-real usd-validate lerobot-real lint lock lock-vlm-real lock-usd-validate lock-lerobot-real clean
 
 setup:
 	@$(PYTHON) scripts/setup.py
@@ -12,6 +12,10 @@ demo: setup
 # a file's tests stay in one process: they share what is dear to make
 test: setup
 	@$(BIN)/python -m pytest -m "not slow" -n auto --maxprocesses 4 --dist loadfile
+
+# strict: a warning, or a reference that leads nowhere, fails it
+docs: setup
+	@$(BIN)/python -m sphinx -W --keep-going -n -q -E -b html -d build/doctrees docs build/docs
 
 vlm-real: setup
 	@$(BIN)/python scripts/setup_side_environment.py vlm

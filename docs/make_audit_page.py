@@ -52,7 +52,7 @@ def section(rule: Rule) -> str:
 def page() -> str:
     """Return the whole page."""
     text = [INTRODUCTION, "| code | name | severity |", "|---|---|---|"]
-    text += [f"| [{rule.code}](#{rule.code.lower()}) | {rule.name} | {rule.severity} |" for rule in RULES]
+    text += [f"| [{rule.code}](#{rule.code.lower()}-{rule.name}) | {rule.name} | {rule.severity} |" for rule in RULES]
     for module in MODULES:
         text += ["", f"## {(module.__doc__ or '').strip()}", ""]
         text += [section(rule) for rule in module.RULES]

@@ -1,4 +1,4 @@
-"""The error tree: every failure that a user can meet is one of these.
+"""The error tree: every failure that a user can meet is one of these::
 
     ManiTwinError
     ├── UsageError            wrong arguments, a path that is not there                      exit 2

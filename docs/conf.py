@@ -1,0 +1,41 @@
+"""The site of these pages: `make docs`. Strict: every warning and every reference that leads nowhere fails it."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version as version_of
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # the extension reference_directives
+
+project = "ManiTwin"
+author = "The ManiTwin authors"
+copyright = "The ManiTwin authors, Apache-2.0"
+version = release = version_of("manitwin")
+
+extensions = ["myst_parser", "sphinx.ext.autodoc", "reference_directives"]
+exclude_patterns = ["examples/**"]
+myst_heading_anchors = 4
+myst_enable_extensions = ["colon_fence"]
+smartquotes = False  # --vlm stays an option
+
+html_theme = "furo"
+html_title = "ManiTwin"
+html_show_copyright = False
+html_copy_source = False
+html_theme_options = {"navigation_with_keys": True}
+
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+autodoc_class_signature = "separated"  # fields follow below a class: once is enough
+autodoc_preserve_defaults = True
+add_module_names = False
+maximum_signature_line_length = 100
+toc_object_entries_show_parents = "hide"
+python_use_unqualified_type_names = True
+
+nitpicky = True
+# types of other packages: their manuals are elsewhere, and nothing here loads or links what is elsewhere
+nitpick_ignore_regex = [
+    (r"py:.*", r"(np|numpy|trimesh|pathlib|Path|pa|pyarrow|mujoco|sapien|collections|typing|duckdb|_duckdb)(\..*)?"),
+]
