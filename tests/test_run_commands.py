@@ -40,8 +40,14 @@ def test_a_run_from_manifest_to_tables(tmp_path: Path, manifest: Path) -> None:
     status = manitwin("status", "data", folder=tmp_path)
     assert status.returncode == 0 and "3 of 3 items ended: 3 rejected" in status.stdout
     assert "too_small" in status.stdout and "last run: finished" in status.stdout
-    why = manitwin("status", "data", "--why", "dot.png", folder=tmp_path)
-    assert "rejected (too_small)" in why.stdout and "input" in why.stdout
+    counts = [line.split() for line in status.stdout.splitlines()]
+    columns = {line[0]: line for line in counts if line[0] in ("input", "photo")}
+    assert columns["input"][1:3] == ["1", "2"], "one is read, two rejected as they are read"
+    rejected = status.stdout.splitlines()[0].index("rejected") + len("rejected")
+    assert status.stdout.splitlines()[1][:rejected].endswith("2"), status.stdout
+    assert columns["photo"][1] == "1"
+    why = manitwin("status", "data", "--why", "text.obj", folder=tmp_path)
+    assert "rejected (wrong_type)" in why.stdout and "wrong_type: text.obj" in why.stdout
 
     retried = manitwin("retry", "data", "--state", "rejected", "--reason", "too_small", folder=tmp_path)
     assert retried.returncode == 0 and "1 items are open again" in retried.stdout

@@ -16,8 +16,8 @@ from handmade import visual
 from manitwin.dataset_root import twin_name
 from manitwin.engine.cube import CUBE
 from manitwin.files.glb import write_glb
-from manitwin.index.rows import STAGE_ORDER
 from manitwin.stages.grasp_table import SCHEMA
+from manitwin.stages.stage_order import STAGE_ORDER
 from manitwin.store import seal
 from record_overlay import overlaid
 

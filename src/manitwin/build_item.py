@@ -14,12 +14,13 @@ from typing import Literal
 
 from manitwin.config import BuildConfig
 from manitwin.dataset_root import DatasetRoot
-from manitwin.engine.recipe import INPUT, Ending, Identity
+from manitwin.engine.recipe import Ending, Identity
 from manitwin.errors import BackendError, ManiTwinError, Rejected
 from manitwin.models.generators.job_memory import RootJobMemory
 from manitwin.pipeline import TwinRecipe, expected_usd
 from manitwin.stage_runner import JOBS, StageCost, lost_usd, run_stage
 from manitwin.stages.stage import Draft, Item
+from manitwin.stages.stage_order import INPUT
 from manitwin.store import RECORD, WORK, replace_folder
 
 REPORT = "error.txt"

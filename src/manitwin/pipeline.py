@@ -10,7 +10,7 @@ from typing import Literal, cast
 from manitwin.assembly import assemble
 from manitwin.config import BuildConfig
 from manitwin.dataset_root import twin_name
-from manitwin.engine.recipe import INPUT, Ending, Identity
+from manitwin.engine.recipe import Ending, Identity
 from manitwin.errors import Rejected, TwinError, UsageError
 from manitwin.files.sniff import sniff
 from manitwin.files.source_files import MESH_SUFFIXES
@@ -36,6 +36,7 @@ from manitwin.stages.record_grasps import RecordGraspsStage
 from manitwin.stages.robustness import RobustnessStage
 from manitwin.stages.second_opinion import SecondOpinionStage
 from manitwin.stages.stage import Draft, Item, PaidStage, Stage
+from manitwin.stages.stage_order import INPUT
 from manitwin.stages.verify import VerifyStage
 from manitwin.stages.views import ViewsStage
 from manitwin.store import RECORD, parse_record, sha256_of_json

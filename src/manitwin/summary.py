@@ -7,8 +7,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.geometry.resting import rest_of, side_down, tilt_deg
 from manitwin.loaded_twin import Twin
-from manitwin.twin import Estimate, GraspSummary, OtherGripper, SecondOpinion, TwinRecord
+from manitwin.twin import Estimate, GraspSummary, OtherGripper, Placement, SecondOpinion, TwinRecord
 
 
 def estimate_text(estimate: Estimate, unit: str = "") -> str:
@@ -62,15 +64,21 @@ def _rows(record: TwinRecord) -> list[tuple[str, str]]:
         rows += [(f"point {p.id}", f"{p.type}: {p.scenario}") for p in record.points.grasp]
     if record.grasps is not None:
         rows += _grasp_rows(record.grasps)
-    for placement in record.placements or []:
-        way = "upright" if placement.upright else "lying"
-        rows.append(
-            (
-                "rests",
-                f"{way}, probability {placement.probability:.2f}, radius {100 * placement.collision_radius_m:.1f} cm",
-            )
-        )
-    return rows
+    return rows + placement_rows(record.placements or [])
+
+
+def placement_rows(placements: list[Placement]) -> list[tuple[str, str]]:
+    """Write the poses as a person reads them: those that stayed in simulation, then the others, likely ones first."""
+    ordered = sorted(placements, key=lambda placement: (not placement.settled, -placement.probability))
+    return [("rests" if p.settled else "did not settle", _placement(p)) for p in ordered]
+
+
+def _placement(placement: Placement) -> str:
+    rotation = rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz))
+    way: str = rest_of(rotation).replace("_", " ")
+    if way == "lying":
+        way = f"lying on its {side_down(rotation)} side, {tilt_deg(rotation):.0f} degrees from upright"
+    return f"{way}, probability {placement.probability:.2f}, radius {100 * placement.collision_radius_m:.1f} cm"
 
 
 def _grasp_rows(grasps: GraspSummary) -> list[tuple[str, str]]:

@@ -10,10 +10,11 @@ from manitwin.config import BuildConfig
 from manitwin.dataset_root import twin_name
 from manitwin.errors import TwinError
 from manitwin.geometry.shape_descriptor import LENGTH, shape_descriptor
-from manitwin.index.rows import STAGE_ORDER, rows_of
+from manitwin.index.rows import rows_of
 from manitwin.index.tables import DESCRIPTOR_LENGTH, TABLES
 from manitwin.pipeline import stages_for
 from manitwin.stages.grasp_table import SCHEMA
+from manitwin.stages.stage_order import STAGE_ORDER
 from manitwin.store import read_record
 from twin_folders import box, grasp_table, twin_id, write_accepted, write_rejected
 

@@ -142,3 +142,29 @@ def test_a_data_set_without_a_ledger_is_said_to_be_none(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="manitwin run"), read_ledger(tmp_path / "ledger.sqlite"):
         pass
     assert list(tmp_path.iterdir()) == []
+
+
+def test_stages_are_told_in_the_order_of_the_pipeline(path: Path, ledger: Ledger) -> None:
+    ledger.add_items(mugs(2))
+    begun = ("assemble", "verify", "photo", "finish", "verify-robotiq_2f85", "mesh", "grasps-robotiq_2f85", "input")
+    for number, stages in ((1, begun), (2, ("grasps", "gate", "record_grasps"))):
+        for stage in stages:
+            ledger.stage_ended(number, stage, "done", attempts=1)
+    ledger.commit()
+    with read_ledger(path) as connection:
+        assert [stage.stage for stage in read_progress(connection, at_work=False).stages] == [
+            *("input", "photo", "mesh", "gate", "grasps", "verify", "grasps-robotiq_2f85", "verify-robotiq_2f85"),
+            *("record_grasps", "finish", "assemble"),
+        ]
+
+
+def test_stages_of_another_recipe_stand_between_reading_and_putting_together(path: Path, ledger: Ledger) -> None:
+    ledger.add_items(mugs(3))
+    for number, stages in ((1, ("pictures", "assemble")), (2, ("layout", "pictures")), (3, ("layout", "input"))):
+        for stage in stages:
+            ledger.stage_ended(number, stage, "done", attempts=1)
+    ledger.stage_ended(1, "layout", "done", attempts=1)
+    ledger.commit()
+    with read_ledger(path) as connection:
+        told = [stage.stage for stage in read_progress(connection, at_work=False).stages]
+    assert told == ["input", "layout", "pictures", "assemble"]

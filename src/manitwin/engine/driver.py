@@ -19,11 +19,12 @@ from manitwin.engine.executor import Executor
 from manitwin.engine.flight import Flight, PlannedStage
 from manitwin.engine.gate import Gate
 from manitwin.engine.jobs import MAKE_ROOM, Failure, Job, Reply, StageRejected, Surveyed, WriteTables
-from manitwin.engine.recipe import ASSEMBLE, INPUT, Ending, Recipe
+from manitwin.engine.recipe import Ending, Recipe
 from manitwin.engine.table_writer import TableWriter
 from manitwin.ledger.ledger import ItemState, Ledger, LedgerFull
 from manitwin.stage_runner import StageRun
 from manitwin.stages.stage import Item
+from manitwin.stages.stage_order import ASSEMBLE, INPUT
 
 RESOURCES: tuple[Resource, ...] = get_args(Resource)
 LONGEST_WAIT_S = 0.5
@@ -211,7 +212,11 @@ class Driver:
             self._ended(flight, reply)
 
     def _surveyed(self, flight: Flight, reply: Surveyed) -> None:
-        self.ledger.stage_ended(flight.number, INPUT, "done", attempts=flight.attempt(INPUT), ran=True)
+        answer = None if reply.rejected is None else str(reply.rejected.answer)
+        self.ledger.stage_ended(
+            flight.number, INPUT, "done" if answer is None else "rejected", attempts=flight.attempt(INPUT), ran=True,
+            error=answer,
+        )  # fmt: skip
         other = self.ledger.identify(flight.number, reply.twin_id, reply.kind)
         if other is not None:
             self._flights -= 1

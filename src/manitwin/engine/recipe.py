@@ -13,9 +13,6 @@ from manitwin.errors import Rejected
 from manitwin.stage_runner import StageCost
 from manitwin.stages.stage import Draft, Item, Stage
 
-INPUT, ASSEMBLE = "input", "assemble"
-"""The two steps around the stages: to read what was given, and to put the folder together."""
-
 
 @dataclass(frozen=True)
 class Ending:

@@ -22,12 +22,13 @@ from manitwin.engine.jobs import (
     WorkerSetup,
     WriteTables,
 )
-from manitwin.engine.recipe import INPUT, Ending
+from manitwin.engine.recipe import Ending
 from manitwin.engine.work import WorkFolder
 from manitwin.errors import AccessDenied, BackendError, RateLimited, Rejected, Unavailable, Unsupported
 from manitwin.models.generators.job_memory import RootJobMemory
 from manitwin.stage_runner import JOBS, StageCost, StageRun, lost_usd
 from manitwin.stages.stage import Draft, Item, Stage
+from manitwin.stages.stage_order import INPUT
 from manitwin.store import WORK
 
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)

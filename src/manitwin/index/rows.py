@@ -18,30 +18,13 @@ from manitwin.geometry.shape_descriptor import ShapeDescriptor, shape_descriptor
 from manitwin.index.tables import TABLES
 from manitwin.stage_runner import StageCost
 from manitwin.stages.grasp_table import SCHEMA as GRASPS_OF_A_TWIN
+from manitwin.stages.stage_order import place_in_pipeline
 from manitwin.store import RECORD, RUN, read_record
-from manitwin.twin import GraspSummary, Points, StageProvenance, TwinRecord
+from manitwin.twin import GraspSummary, Points, TwinRecord
 
 VISUAL, GRASPS = "visual.glb", "grasps.parquet"
 FILES = (RECORD, RUN, VISUAL, GRASPS)
 """All that is read of a twin's folder; a rejected one has the first two alone."""
-
-STAGE_ORDER = (
-    *(
-        "photo",
-        "generate",
-        "mesh",
-        "views",
-        "gate",
-        "physical",
-        "collision",
-        "placement",
-        "caption",
-        "candidates",
-        "points",
-    ),
-    *("grasps", "verify", "second_opinion", "robustness", "record_grasps", "finish"),
-)
-"""The order of ``pipeline.stages_for``; twin.json keeps its stages by name."""
 
 _SEED = 0  # every data set describes shapes alike
 _Row = dict[str, Any]
@@ -99,7 +82,7 @@ def _origin(record: TwinRecord, costs: dict[str, StageCost]) -> _Row:
 
 
 def _stages(record: TwinRecord, costs: dict[str, StageCost]) -> list[_Row]:
-    ran = sorted(record.provenance.stages.items(), key=_place_in_pipeline)
+    ran = sorted(record.provenance.stages.items(), key=lambda stage: place_in_pipeline(stage[0]))
     return [
         {
             "twin_id": record.twin_id,
@@ -111,14 +94,6 @@ def _stages(record: TwinRecord, costs: dict[str, StageCost]) -> list[_Row]:
         }
         for position, (name, stage) in enumerate(ran)
     ]
-
-
-def _place_in_pipeline(stage: tuple[str, StageProvenance]) -> tuple[int, str, int]:
-    """Return what sorts stages as they ran: all trials of one gripper (``verify-robotiq_2f85``) before the next one's."""
-    name, _, gripper = stage[0].partition("-")
-    place = STAGE_ORDER.index(name) if name in STAGE_ORDER else len(STAGE_ORDER)
-    first, last = STAGE_ORDER.index("grasps"), STAGE_ORDER.index("record_grasps")
-    return (first if first <= place < last else place), gripper, place
 
 
 def _twin(record: TwinRecord, costs: dict[str, StageCost], descriptor: ShapeDescriptor) -> _Row:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from manitwin.errors import UsageError
 from manitwin.ledger.ledger import ITEM_STATES, StageRow, stage_rows
+from manitwin.stages.stage_order import place_in_pipeline
 
 RATE_OVER_S = 600.0
 
@@ -84,9 +85,10 @@ def _stages(connection: sqlite3.Connection) -> list[StageProgress]:
         " sum(state = 'waiting') AS waiting, sum(state = 'rejected') AS rejected, sum(state = 'failed') AS failed,"
         " coalesce(avg(nullif(seconds, 0)), 0) AS mean_seconds,"
         " coalesce(avg(nullif(cpu_seconds, 0)), 0) AS mean_cpu_seconds, sum(cost_usd) AS cost_usd"
-        " FROM stages GROUP BY stage ORDER BY min(at), stage"
+        " FROM stages GROUP BY stage ORDER BY count(*) DESC, min(at), stage"
     )
-    return [StageProgress(**dict(row)) for row in rows]
+    # stages of another recipe stay in the order of the query: no item comes to a stage before it was at those before
+    return sorted((StageProgress(**dict(row)) for row in rows), key=lambda stage: place_in_pipeline(stage.stage))
 
 
 def _by_reason(connection: sqlite3.Connection, state: str) -> dict[str, int]:

@@ -16,6 +16,7 @@ from manitwin.errors import Rejected
 from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.hulls.reduction import convex_corners
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform
+from manitwin.geometry.resting import rest_of
 from manitwin.geometry.stable_poses import easiest_tilt, stable_poses
 from manitwin.simulate.mujoco_settle import settle_on_plane_in_mujoco
 from manitwin.simulate.rigid_body import RigidBody
@@ -24,7 +25,6 @@ from manitwin.stages.object_arrays import load_body, load_solid
 from manitwin.stages.stage import Draft
 
 UP = np.array([0.0, 0.0, 1.0])
-UPRIGHT_DEG = 10.0
 SAME_POSE_DEG = 5.0
 SNAP_DEG = 3.0
 NUDGE_DEG = 4.0
@@ -243,7 +243,7 @@ def _add(rests: list[_Rest], found: _Rest) -> None:
 
 
 def _is_upright(rest: _Rest) -> bool:
-    return bool(rest.up @ UP > np.cos(np.radians(UPRIGHT_DEG)))
+    return rest_of(rest.rotation) == "upright"
 
 
 def _placement(rest: _Rest, outline: np.ndarray, hull_points: np.ndarray) -> dict[str, Any]:
@@ -254,7 +254,7 @@ def _placement(rest: _Rest, outline: np.ndarray, hull_points: np.ndarray) -> dic
         "position_m": [-float(center[0]), -float(center[1]), height],
         "quaternion_wxyz": quaternion_wxyz(rest.rotation).tolist(),
         "probability": rest.probability,
-        "upright": bool(_is_upright(rest)),
+        "upright": _is_upright(rest),
         "settled": bool(rest.settled),
         "collision_radius_m": radius,
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manitwin.index.rows import STAGE_ORDER
+from manitwin.stages.stage_order import STAGE_ORDER
 from manitwin.statistics.query import Column, Query, text
 
 _PLACE = f"list_position([{', '.join(map(text, STAGE_ORDER))}], split_part(stage, '-', 1))"
