@@ -45,15 +45,18 @@ def rows(model: type[BaseModel], prefix: str = "") -> list[str]:
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
             found += rows(annotation, f"{prefix}{name}.")
         else:
-            found.append(f"| `{prefix}{name}` | `{_default(field)}` | {_range(field)} |")
+            found.append(f"| `{prefix}{name}` | {_default(field)} | {_range(field)} |")
     return found
 
 
 def _default(field: FieldInfo) -> str:
-    value = field.default
-    if isinstance(value, tuple):
-        return json.dumps(value)
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    """Return the default as TOML writes it; ``not set`` where there is none, as TOML has no word for it."""
+    value = field.get_default(call_default_factory=True)
+    if value is None:
+        return "not set"
+    if isinstance(value, float):
+        return f"`{value:.4g}`"
+    return f"`{json.dumps(value, default=str)}`"
 
 
 def _range(field: FieldInfo) -> str:
@@ -85,7 +88,7 @@ def _settings(kind: type[BaseModel], title: str) -> list[str]:
         and (kind is BuildConfig or n != "run")
     }
     plain = [
-        f"| `{n}` | `{_default(f)}` | {_range(f)} |"
+        f"| `{n}` | {_default(f)} | {_range(f)} |"
         for n, f in kind.model_fields.items()
         if n not in sections and n != "run"
     ]

@@ -6,6 +6,7 @@ import re
 import shlex
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,13 @@ def test_settings_page_is_that_of_the_code() -> None:
         [sys.executable, ROOT / "docs" / "make_configuration.py", "--check"], capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_settings_page_shows_defaults_as_toml() -> None:
+    rows = re.findall(r"^\| `([\w.]+)` \| (.*?) \|", (ROOT / "docs" / "configuration.md").read_text(), re.MULTILINE)
+    assert len(rows) > 60
+    written = [(name, tomllib.loads(f"value = {text.strip('`')}")["value"]) for name, text in rows if text != "not set"]
+    assert all(default in written for default in (("options", {}), ("cache", True), ("generator", "lift")))
 
 
 def test_readme_commands_are_those_that_ci_and_tests_run() -> None:
