@@ -36,7 +36,7 @@ status: 0 no errors, 1 errors, 2 wrong use.
   moves an origin.
 - `--format json` has the numbers behind every finding; `sarif` (2.1.0) is what code hosts show beside a change.
 
-From Python: `manitwin.audit.run.audit(["assets"], ignore=["LIC"], jobs=2)` returns what was found of each asset.
+From Python: `manitwin.audit_assets(["assets"], ignore=["LIC"], jobs=2)` returns what was found of each asset.
 
 This page is written by `python docs/make_audit_page.py`.
 """

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 from manitwin.errors import UsageError
 
 if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
+    import duckdb
+
     from manitwin.build_item import ItemResult
     from manitwin.config import BuildConfig
     from manitwin.executors.whole_items import StageStarted
@@ -177,6 +179,17 @@ def export_twin(
     content = TwinContent.of(twin if isinstance(twin, Twin) else Twin(twin))
     formats = chosen_formats([to] if isinstance(to, str) else to)
     return {name: write(content, name, out, license_allow=license_allow) for name in formats}
+
+
+def statistics_connection(dataset: str | Path) -> duckdb.DuckDBPyConnection:
+    """Return DuckDB with the tables of a data set's index and the macros of ``manitwin stats``, for queries of its report.
+
+    Raises UsageError where there is no index.
+    """
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.statistics.tables import Tables
+
+    return Tables.of_index(DatasetRoot(dataset)).connection
 
 
 def schema() -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import platform
 import shutil
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from manitwin.stage_runner import StageCost
 from manitwin.stages.stage import Draft, Stage
 from manitwin.store import RUN, canonical_json, seal, write_bytes_atomically
 from manitwin.twin import REJECTION_REASONS, Rejection, TwinRecord
+from manitwin.version import installed_version
 
 
 def assemble(
@@ -46,7 +46,7 @@ def assemble(
         "rejection": _rejection(rejected, rejecting_stage).model_dump() if rejected else None,
         "source": source,
         "provenance": {
-            "manitwin_version": version("manitwin"),
+            "manitwin_version": installed_version(),
             "config_sha256": config_sha256,
             "seed": draft.seed,
             "stages": {s.name: {"version": s.version, "backend": s.backend, "model": _model(s, draft)} for s in stages},

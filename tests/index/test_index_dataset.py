@@ -1,8 +1,10 @@
 import hashlib
 import importlib.util
 import pickle
+import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import fsspec
@@ -11,11 +13,13 @@ import pytest
 
 import manitwin
 from manitwin.dataset_root import DatasetRoot
-from manitwin.errors import UsageError
+from manitwin.errors import TwinError, UsageError
 from manitwin.geometry.distance import distance_to_surface
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.index.dataset import Dataset
+from manitwin.index.part_list import read_part_list
 from manitwin.index.parts import write_part
+from manitwin.index.tables import TABLES
 from twin_folders import box, grasp_table, twin_id, write_accepted, write_set
 
 
@@ -53,9 +57,64 @@ def test_ids_records_and_twins_agree(dataset: Dataset) -> None:
     ids = dataset.ids()
     assert [record.twin_id for record in dataset.records()] == ids
     assert [twin.record.twin_id for twin in dataset] == ids
-    assert next(dataset.twins()).visual[0].extents == pytest.approx(
-        next(dataset.records()).physical.extents_m, abs=1e-6
-    )
+    assert dataset.twins()[0].visual[0].extents == pytest.approx(next(dataset.records()).physical.extents_m, abs=1e-6)
+
+
+def test_it_is_a_sequence_in_the_order_of_ids(dataset: Dataset) -> None:
+    ids = dataset.ids()
+    assert isinstance(dataset, Sequence) and len(dataset) == 6
+    assert [dataset[place].record.twin_id for place in (0, 5, -1, -6)] == [ids[0], ids[5], ids[5], ids[0]]
+    assert dataset[np.int64(2)].record.twin_id == ids[2]
+    assert [twin.record.twin_id for twin in reversed(dataset)] == ids[::-1]
+    assert ids[3] in dataset and dataset[3] in dataset and "no such twin" not in dataset and None not in dataset
+    assert dataset.index(dataset[4]) == dataset.index(ids[4]) == 4 and dataset.count(ids[4]) == 1
+    with pytest.raises(ValueError):
+        dataset.index(ids[4], 5)
+    for place in (6, -7):
+        with pytest.raises(IndexError, match=rf"no twin {place} of 6; give -6 to 5"):
+            dataset[place]
+    with pytest.raises(IndexError, match="there are none"):
+        dataset.filter("mass_kg > 100")[0]
+
+
+def test_slices_are_sequences_of_the_same_twins(dataset: Dataset) -> None:
+    ids = dataset.ids()
+    for part in (slice(1, 4), slice(None, None, -2), slice(-2, None), slice(10, 20), slice(4, 1)):
+        assert dataset[part].ids() == ids[part] and len(dataset[part]) == len(ids[part])
+        assert [twin.record.twin_id for twin in dataset[part]] == ids[part]
+    assert dataset[1:][1:][0].record.twin_id == ids[2]
+    assert isinstance(dataset[1:], Sequence) and ids[0] not in dataset[1:]
+    mugs = dataset.filter("category = 'mug'")
+    assert mugs[1:].ids() == mugs.ids()[1:]
+
+
+def test_a_twin_is_read_when_it_is_asked_for(tmp_path: Path) -> None:
+    write_part(DatasetRoot(tmp_path), write_set(tmp_path))
+    dataset = Dataset(tmp_path)
+    first, second, *_ = dataset.ids()
+    for folder in (tmp_path / "twins").glob("*/*"):
+        if folder.name != second:
+            shutil.rmtree(folder)
+    rest = dataset[::2]
+    assert len(rest) == 3 and repr(rest).startswith(f"Twins({str(tmp_path)!r}, 3: {first}")
+    assert dataset[1].record.twin_id == second
+    with pytest.raises(TwinError, match=first):
+        dataset[0]
+
+
+def test_places_follow_the_index_once_it_is_read_anew(tmp_path: Path) -> None:
+    root = DatasetRoot(tmp_path)
+    write_part(root, write_set(tmp_path))
+    dataset = Dataset(tmp_path)
+    before = dataset.ids()
+    old = read_part_list(root)
+    write_part(root, [*before, write_accepted(tmp_path, 50)])
+    assert dataset.ids() == before and old is not None  # the index is as it was when it was first asked
+    for table in TABLES:
+        root.remove(old.parts[0].file(table))  # as the next write does
+    assert len(dataset) == 7
+    assert dataset.ids() == sorted([*before, twin_id(50)]) == Dataset(tmp_path).ids()
+    assert dataset[dataset.index(twin_id(50))].record.twin_id == twin_id(50)
 
 
 def test_tables_hold_the_filtered_twins_alone(dataset: Dataset) -> None:

@@ -6,13 +6,13 @@ import json
 import math
 from collections import Counter
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import quote
 
 from manitwin.audit.finding import Finding, Rule
 from manitwin.audit.run import Audited
+from manitwin.version import installed_version
 
 ReportFormat = Literal["text", "json", "sarif"]
 PAGE = "docs/audit.md"
@@ -52,7 +52,7 @@ def explanation(rule: Rule) -> str:
 def json_of(audited: Sequence[Audited]) -> str:
     """Return all findings as JSON, sorted as they were found."""
     content = {
-        "manitwin_version": version("manitwin"),
+        "manitwin_version": installed_version(),
         "summary": {"assets": len(audited), **count_by_severity(audited)},
         "assets": [
             {
@@ -92,7 +92,7 @@ def sarif_of(audited: Sequence[Audited], rules: Sequence[Rule]) -> str:
                 "tool": {
                     "driver": {
                         "name": "manitwin audit",
-                        "version": version("manitwin"),
+                        "version": installed_version(),
                         "rules": [_rule_sarif(rule) for rule in rules],
                     }
                 },

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-import weakref
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, SupportsIndex, overload
 
 import pyarrow as pa
 
-from manitwin.dataset_root import DatasetRoot, twin_name
+from manitwin.dataset_root import DatasetRoot
 from manitwin.errors import UsageError
+from manitwin.index.part_list import PartList
 from manitwin.index.query import Index, grasps_of
 from manitwin.index.twin_files import local_files
+from manitwin.index.twins import Twins
 from manitwin.store import RECORD, read_record
 from manitwin.twin import TwinRecord
 
@@ -34,16 +33,21 @@ class Split(NamedTuple):
     test: Dataset
 
 
-class Dataset:
-    """The accepted twins of a data set, a folder or a URL, or those of them that satisfy conditions; sorted by id.
+class Dataset(Sequence["Twin"]):
+    """The accepted twins of a data set, a folder or a URL, or those of them that satisfy conditions: a sequence sorted by id.
 
-    Answers come from the index; twins' folders are read when a record or twin is asked for. Raises UsageError where there
-    is no index, and for conditions and columns that cannot be used, when it is first asked.
+    Answers come from the index; twins' folders are read when a record or twin is asked for, ``dataset[0]`` loads one, and a
+    slice is a sequence that loads none before it is asked. Raises UsageError where there is no index, and for conditions and
+    columns that cannot be used, when it is first asked; IndexError for a place that there is not.
     """
 
     def __init__(self, root: str | Path | DatasetRoot, *, _index: Index | None = None, _where: tuple[str, ...] = ()):
         self._index = _index or Index(root)
         self._where = _where
+        self._sorted: tuple[PartList, Twins] | None = None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self._index, self._where)
 
     @property
     def root(self) -> DatasetRoot:
@@ -57,16 +61,36 @@ class Dataset:
         return self._index.count("twins", self._where)
 
     def __iter__(self) -> Iterator[Twin]:
-        return self.twins()
+        return iter(self.twins())
+
+    @overload
+    def __getitem__(self, place: SupportsIndex) -> Twin: ...
+    @overload
+    def __getitem__(self, place: slice) -> Twins: ...
+    def __getitem__(self, place: SupportsIndex | slice) -> Twin | Twins:
+        return self.twins()[place]
+
+    def __reversed__(self) -> Iterator[Twin]:
+        return reversed(self.twins())
+
+    def __contains__(self, twin: object) -> bool:
+        return twin in self.twins()
+
+    def index(self, twin: Any, start: int = 0, stop: int | None = None) -> int:
+        """Return the place of a twin, given itself or its id; raises ValueError where it is not among these."""
+        return self.twins().index(twin, start, stop)
+
+    def count(self, twin: Any) -> int:
+        """Return how often a twin, given itself or its id, is among these: once or not at all."""
+        return self.twins().count(twin)
 
     def filter(self, where: str) -> Dataset:
         """Return those that also satisfy an SQL condition on the table ``twins``: ``"category = 'mug' and verified >= 20"``."""
         return Dataset(self.root, _index=self._index, _where=(*self._where, where))
 
     def ids(self) -> list[str]:
-        """Return the twins' ids."""
-        found: list[str] = self.table(["twin_id"])["twin_id"].to_pylist()
-        return found
+        """Return the twins' ids, sorted."""
+        return self.twins().ids()
 
     def records(self) -> Iterator[TwinRecord]:
         """Yield what twin.json says of each; raises TwinError for one that cannot be read."""
@@ -74,19 +98,12 @@ class Dataset:
             with local_files(self.root, twin_id, (RECORD,)) as folder:
                 yield read_record(folder)
 
-    def twins(self) -> Iterator[Twin]:
-        """Yield each as a loaded twin; of a URL, a copy, which is removed with the twin. Raises TwinError."""
-        from manitwin.loaded_twin import Twin
-
-        for twin_id in self.ids():
-            if self.root.local is not None:
-                yield Twin(self.root.local / twin_name(twin_id))
-                continue
-            copy = Path(tempfile.mkdtemp(prefix="manitwin-")) / twin_id
-            self.root.fetch_folder(twin_name(twin_id), copy)
-            twin = Twin(copy)
-            weakref.finalize(twin, shutil.rmtree, copy.parent, ignore_errors=True)
-            yield twin
+    def twins(self) -> Twins:
+        """Return them as a sequence, which stays as it is when the index changes; each is loaded when it is asked for."""
+        if self._sorted is None or self._sorted[0] is not self._index.parts:
+            ids: list[str] = self.table(["twin_id"])["twin_id"].to_pylist()
+            self._sorted = (self._index.parts, Twins(self.root, ids))
+        return self._sorted[1]
 
     def table(self, columns: Sequence[str] | None = None) -> pa.Table:
         """Return columns of the table ``twins``, by default all, a row a twin."""
@@ -150,6 +167,10 @@ class Dataset:
             framework=framework,
             seed=seed,
         )
+
+
+def _restored(index: Index, where: tuple[str, ...]) -> Dataset:
+    return Dataset(index.root, _index=index, _where=where)
 
 
 def _hash_bound(share: float) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import Any
 
 from manitwin.publish.card_statistics import category_lines, licence_lines, total_lines
@@ -14,6 +13,7 @@ from manitwin.publish.hub_license import hub_license
 from manitwin.publish.licences import LICENSES_MD, without_attribution
 from manitwin.publish.markdown import plain, table
 from manitwin.publish.tables import PUBLISHED, columns_of
+from manitwin.version import installed_version
 
 TASK_CATEGORIES = ("robotics",)
 TAGS = ("robotics", "manipulation", "grasping", "simulation", "digital-twin", "3d", "webdataset")
@@ -83,7 +83,7 @@ def dataset_card(facts: CardFacts) -> str:
         "each twin in the columns `license` and `attribution` of the table `twins`.",
         *_missing_attribution(facts),
         "",
-        f"Made with manitwin {version('manitwin')}.",
+        f"Made with manitwin {installed_version()}.",
     ]
     return "\n".join(lines) + "\n"
 

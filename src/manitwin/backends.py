@@ -1,0 +1,66 @@
+"""What a backend of your own is written against: four protocols, what they are asked and what they answer.
+
+Raise ``BackendError`` or one of its kinds where the backend fails (the item stays resumable), ``Rejected`` where the input
+is at fault.
+"""
+
+from manitwin.config import BuildConfig, Resource
+from manitwin.errors import (
+    AccessDenied,
+    BackendError,
+    BadReply,
+    ConfigError,
+    RateLimited,
+    Rejected,
+    Unavailable,
+    Unsupported,
+)
+from manitwin.models.annotators.protocol import (
+    Annotator,
+    PhysicalEstimates,
+    PointsRequest,
+    QualityVerdict,
+    SelectedPoints,
+    Subject,
+)
+from manitwin.models.generators.protocol import Generated, GenerationRequest, Generator, JobState
+from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest
+from manitwin.simulate.gripper import Gripper
+from manitwin.simulate.rigid_body import RigidBody
+from manitwin.simulate.trial import GraspTrial, TrialResult, TrialSettings
+from manitwin.twin import Estimate, FunctionalPoint, GraspPoint, Language
+
+__all__ = [
+    "AccessDenied",
+    "Annotator",
+    "BackendError",
+    "BadReply",
+    "BuildConfig",
+    "ConfigError",
+    "Estimate",
+    "FunctionalPoint",
+    "Generated",
+    "GenerationRequest",
+    "Generator",
+    "GraspPoint",
+    "GraspProposals",
+    "GraspRequest",
+    "GraspTrial",
+    "Grasper",
+    "Gripper",
+    "JobState",
+    "Language",
+    "PhysicalEstimates",
+    "PointsRequest",
+    "QualityVerdict",
+    "RateLimited",
+    "Rejected",
+    "Resource",
+    "RigidBody",
+    "SelectedPoints",
+    "Subject",
+    "TrialResult",
+    "TrialSettings",
+    "Unavailable",
+    "Unsupported",
+]
