@@ -23,11 +23,18 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_folder_takes_meshes_and_photos_but_not_textures(folder: Path) -> None:
+def test_folder_takes_meshes_and_photos_but_not_textures_and_accounts_for_every_file(folder: Path) -> None:
     (folder / "cup.glb").rename(folder / "photos" / "cup.glb")
-    items, _ = collect_items([folder])
+    items, notes = collect_items([folder])
     names = [Path(item.file or "").relative_to(folder).as_posix() for item in items]
-    assert names == ["photo.jpg", "photos/cup.glb", "with_texture/model.obj"]
+    assert names == ["photo.jpg", "photos/a.png", "photos/cup.glb", "with_texture/model.obj"]
+    (listing,) = notes.folders
+    assert listing.files == 6 == sum(path.is_file() for path in folder.rglob("*"))
+    assert {path.name for path in listing.left} == {"texture.png", "b.png"}
+    assert (
+        notes.remarks == listing.remarks()
+        and "6 files: 4 inputs (2 meshes, 2 images), 2 left alone" in notes.remarks[0]
+    )
 
 
 def test_csv_rows_override_what_holds_for_all(folder: Path) -> None:
@@ -53,17 +60,28 @@ def test_repeated_inputs_are_one_item(folder: Path) -> None:
     assert len(items) == 1
 
 
-def test_unused_columns_are_told(folder: Path) -> None:
+def test_columns_that_nobody_knows_are_a_remark_with_the_nearest_name(folder: Path) -> None:
     manifest = folder / "list.csv"
-    manifest.write_text("file,mass_kg\ncup.glb,0.1\n")
-    _, remarks = collect_items([manifest])
-    assert len(remarks) == 1 and "mass_kg" in remarks[0]
+    manifest.write_text("file,mass_kg,unit,License\ncup.glb,0.1,mm,MIT\nphoto.jpg,,,\n")
+    items, notes = collect_items([manifest])
+    assert [item.units for item in items] == ["auto", "auto"]
+    (remark,) = notes.remarks
+    assert "columns not used: 'License' (did you mean 'license'?), 'mass_kg', 'unit' (did you mean 'units'?)" in remark
+
+
+def test_columns_that_nobody_knows_are_an_error_where_it_is_asked_for(folder: Path) -> None:
+    manifest = folder / "list.csv"
+    manifest.write_text("file,unit\ncup.glb,m\n")
+    with pytest.raises(UsageError, match=r"unknown column 'unit' \(did you mean 'units'\?\); valid: file, text"):
+        collect_items([manifest], strict=True)
+    manifest.write_text("file,units\ncup.glb,m\n")
+    collect_items([manifest], strict=True)
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("file,unit\ncup.glb,m\n", "did you mean 'units'"),
+        ("fil,name\ncup.glb,cup\n", "did you mean 'file'"),
         ("file,units\ncup.glb,inch\n", "Valid: auto, cm, m, mm"),
         ("file\nnot_there.glb\n", "not_there.glb is not there"),
         ("file,text\ncup.glb,a cup\n", "either 'file' or 'text'"),
@@ -91,6 +109,10 @@ def test_path_that_is_not_there_is_a_usage_error(folder: Path) -> None:
         collect_items([folder / "nothing.png"])
 
 
-def test_folder_without_inputs_is_told(tmp_path: Path) -> None:
+def test_folder_without_inputs_is_told_with_what_it_has(tmp_path: Path) -> None:
+    (tmp_path / "photo.heic").write_bytes(b"x")
+    with pytest.raises(UsageError, match=r"no image or mesh in this folder; left alone: photo\.heic: HEIC is not read"):
+        collect_items([tmp_path])
+    (tmp_path / "photo.heic").unlink()
     with pytest.raises(UsageError, match="no image or mesh"):
         collect_items([tmp_path])

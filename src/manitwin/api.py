@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.build_item import ItemResult
     from manitwin.config import BuildConfig
     from manitwin.executors.whole_items import StageStarted
+    from manitwin.files.folder_listing import FolderListing
     from manitwin.loaded_twin import Twin
     from manitwin.scenes.loaded_scene import Scene
     from manitwin.twin import TwinRecord
@@ -23,10 +24,11 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
 
 @dataclass(frozen=True)
 class BuildReport:
-    """What became of every item of a build, in the order in which they ended."""
+    """What became of every item of a build, in the order in which they ended, and of every file of a folder given to it."""
 
     results: list[ItemResult]
     remarks: list[str] = field(default_factory=list)
+    folders: list[FolderListing] = field(default_factory=list)
 
     def count(self, status: str) -> int:
         """Return how many items ended as 'accepted', 'rejected' or 'unfinished'."""
@@ -54,6 +56,7 @@ def build(
     up: str = "auto",
     license: str | None = None,
     attribution: str | None = None,
+    strict: bool = False,
     jobs: int | None = None,
     seed: int | None = None,
     config: BuildConfig | str | Path | None = None,
@@ -72,8 +75,9 @@ def build(
 ) -> BuildReport:
     """Build twins from images, meshes, folders, manifests and ``texts`` into the folder ``out``.
 
-    ``units`` m|cm|mm|auto and ``up`` y|z|auto hold for all inputs whose manifest row does not say otherwise. A finished twin
-    of the same configuration and seed is not built again. ``grippers``: names or .toml files, the first one's grasps are the
+    ``units`` m|cm|mm|auto and ``up`` y|z|auto hold for all inputs whose manifest row does not say otherwise; with
+    ``strict`` a manifest's column that nobody knows is an error. A finished twin of the same configuration and seed is not
+    built again. ``grippers``: names or .toml files, the first one's grasps are the
     twin's own. ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services have charged
     ``max_cost_usd``, items that would cost more are left unfinished. ``record`` is a file that a VLM's answers are added to.
     ``require_agreement`` verifies only what a second engine holds too; ``quick`` leaves out second engine and robustness.
@@ -93,8 +97,8 @@ def build(
         raise UsageError(f"jobs is {jobs}; give 1 or more")
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
     check_names(settings)
-    items, remarks = collect_items(
-        given, texts, name=name, units=units, up=up, license=license, attribution=attribution
+    items, notes = collect_items(
+        given, texts, name=name, units=units, up=up, license=license, attribution=attribution, strict=strict
     )
     if not items:
         raise UsageError("nothing to build; give images, meshes, folders, manifests or texts")
@@ -108,7 +112,7 @@ def build(
     for result in build_all(items, place.resolve(), settings, jobs=jobs or os.cpu_count() or 1, on_stage=on_stage):
         results.append(result)
         on_result(result)
-    return BuildReport(results, remarks)
+    return BuildReport(results, notes.remarks, notes.folders)
 
 
 def with_flags(

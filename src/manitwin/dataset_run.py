@@ -10,7 +10,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager, closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -25,8 +25,9 @@ from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.recipe import Recipe
 from manitwin.engine.work import WorkFolder
 from manitwin.errors import UsageError, choose_from
+from manitwin.files.folder_listing import FolderListing
 from manitwin.ledger.ledger import LEDGER, Ledger
-from manitwin.manifest import iterate_items
+from manitwin.manifest import Notes, iterate_items
 from manitwin.pipeline import TwinRecipe, check_names, estimate_usd
 from manitwin.stages.stage import Item
 from manitwin.store import canonical_json
@@ -39,12 +40,16 @@ EXECUTORS: tuple[ExecutorName, ...] = get_args(ExecutorName)
 
 @dataclass(frozen=True)
 class RunReport:
-    """How a run ended: items of the whole data set by state, and why it stopped where it did before its end."""
+    """How a run ended: items of the whole data set by state, and why it stopped where it did before its end.
+
+    ``folders`` says what became of every file of a folder given to it.
+    """
 
     counts: dict[str, int]
     stopped: str | None
     left: int
     remarks: list[str] = field(default_factory=list)
+    folders: list[FolderListing] = field(default_factory=list)
 
     @property
     def exit_code(self) -> int:
@@ -63,37 +68,40 @@ def run(
     address: str | None = None,
     defaults: dict[str, str | None] | None = None,
     texts: Iterable[str] = (),
+    strict: bool = False,
     on_estimate: Callable[[dict[str, float]], None] = lambda usd_by_kind: None,
     on_start: Callable[[int, int], None] = lambda items, opened: None,
     on_ended: Callable[[ItemEnded], None] = lambda event: None,
 ) -> RunReport:
     """Add items to a data set and work until all of it has ended; with no inputs, go on with what is there.
 
-    ``config`` None: the data set's own. A changed configuration does again what it touches. Raises UsageError for
+    ``config`` None: the data set's own. A changed configuration does again what it touches. ``strict``: a manifest's column
+    that nobody knows is an error. Raises UsageError for
     wrong arguments, or where another run is at work on the data set. What becomes of an item is in the ledger.
     """
     root = DatasetRoot(dataset)
     settings = config or stored_config(root)
     check_names(settings)
-    remarks: list[str] = []
+    notes = Notes()
 
     def started(items: int, opened: int) -> None:
         on_estimate(estimate_usd(settings))
         on_start(items, opened)
 
-    return drive(
+    report = drive(
         TwinRecipe(settings),
-        iterate_items(inputs, defaults or {}, remarks, texts),
+        iterate_items(inputs, defaults or {}, notes, texts, strict=strict),
         root,
         settings.run,
         configuration=settings.model_dump(mode="json"),
         executor=executor,
         address=address,
         max_cost_usd=settings.services.max_cost_usd,
-        remarks=remarks,
+        remarks=notes.remarks,
         on_start=started,
         on_ended=on_ended,
     )
+    return replace(report, folders=notes.folders)
 
 
 def drive(

@@ -5,11 +5,13 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, TextIO, cast, get_args
 
 from manitwin.errors import UsageError, choose_from
+from manitwin.files.folder_listing import FolderListing, list_folder
 from manitwin.files.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported, read_import_record
 from manitwin.files.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
 from manitwin.stages.stage import Item
@@ -21,6 +23,14 @@ Units = Literal["m", "cm", "mm", "auto"]
 Up = Literal["y", "z", "auto"]
 
 
+@dataclass
+class Notes:
+    """What is to be said of the inputs: lines for the user, and what became of every file of each folder."""
+
+    remarks: list[str] = field(default_factory=list)
+    folders: list[FolderListing] = field(default_factory=list)
+
+
 def collect_items(
     inputs: Iterable[str | Path],
     texts: Iterable[str] = (),
@@ -30,24 +40,31 @@ def collect_items(
     up: str = "auto",
     license: str | None = None,
     attribution: str | None = None,
-) -> tuple[list[Item], list[str]]:
-    """Turn what a user typed into items, in order, without repeats; returns them and remarks for the user.
+    strict: bool = False,
+) -> tuple[list[Item], Notes]:
+    """Turn what a user typed into items, in order, without repeats; returns them and what is to be said of the inputs.
 
     The keyword arguments hold for every item whose manifest row does not say otherwise. Raises as ``iterate_items``.
     """
     defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
-    remarks: list[str] = []
-    return list(dict.fromkeys(iterate_items(inputs, defaults, remarks, texts))), remarks
+    notes = Notes()
+    return list(dict.fromkeys(iterate_items(inputs, defaults, notes, texts, strict=strict))), notes
 
 
 def iterate_items(
-    inputs: Iterable[str | Path], defaults: dict[str, str | None], remarks: list[str], texts: Iterable[str] = ()
+    inputs: Iterable[str | Path],
+    defaults: dict[str, str | None],
+    notes: Notes,
+    texts: Iterable[str] = (),
+    *,
+    strict: bool = False,
 ) -> Iterator[Item]:
-    """Yield the items one by one, so that a manifest may be of any length; remarks are added at the end of each.
+    """Yield the items one by one, so that a manifest may be of any length; notes are added at the end of each.
 
-    ``texts`` are things to make from words alone, after the ``inputs``.
+    ``texts`` are things to make from words alone, after the ``inputs``. ``strict``: a column that nobody knows is an error.
 
-    Raises UsageError for a path that is not there, a manifest that cannot be read, or an unknown value.
+    Raises UsageError for a path that is not there, a folder without inputs, a manifest that cannot be read, or an unknown
+    value.
     """
     defaults = {"units": "auto", "up": "auto", "name": None, "license": None, "attribution": None, **defaults}
     for given in inputs:
@@ -55,14 +72,9 @@ def iterate_items(
         if not path.exists():
             raise UsageError(f"{given}: not there; give an image, a mesh, a folder, or a .csv or .jsonl manifest")
         if path.is_dir():
-            found = inputs_in_folder(path)
-            if not found:
-                raise UsageError(
-                    f"{given}: no image or mesh in this folder; known: {', '.join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))}"
-                )
-            yield from (_item({"file": str(p)}, Path.cwd(), defaults, str(path)) for p in found)
+            yield from _folder_items(path, str(given), defaults, notes)
         elif path.suffix.lower() in MANIFEST_SUFFIXES:
-            yield from _manifest_items(path, defaults, remarks)
+            yield from _manifest_items(path, defaults, notes, strict)
         else:
             yield _item({"file": str(path)}, Path.cwd(), defaults, str(path))
     for text in texts:
@@ -71,45 +83,33 @@ def iterate_items(
         yield _item({"text": text}, Path.cwd(), defaults, text)
 
 
-def inputs_in_folder(folder: Path) -> list[Path]:
-    """Return the inputs below a folder, sorted: files, and the folders of imported assets, each as one input."""
-    imported = [found.parent for found in sorted(folder.rglob(IMPORT_RECORD)) if is_imported(found.parent)]
-    visible = [f for f in imported if not any(part.startswith(".") for part in f.relative_to(folder).parts)]
-    files = [file for file in files_in_folder(folder) if not any(file.is_relative_to(f) for f in imported)]
-    return sorted([*visible, *files])
+def _folder_items(folder: Path, given: str, defaults: dict[str, Any], notes: Notes) -> Iterator[Item]:
+    listing = list_folder(folder)
+    if not listing.inputs:
+        left = "".join(f"; {line.removeprefix(f'{folder}: ')}" for line in listing.remarks()[1:])
+        known = ", ".join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))
+        raise UsageError(f"{given}: no image or mesh in this folder{left}; known: {known}")
+    yield from (_item({"file": str(p)}, Path.cwd(), defaults, str(folder)) for p in listing.inputs)
+    notes.folders.append(listing)
+    notes.remarks.extend(listing.remarks())
 
 
-def files_in_folder(folder: Path) -> list[Path]:
-    """Return the inputs below a folder, sorted; beside a mesh, images are its textures and no inputs of their own."""
-    chosen: list[Path] = []
-    by_parent: dict[Path, list[Path]] = {}
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts):
-            by_parent.setdefault(path.parent, []).append(path)
-    for siblings in by_parent.values():
-        meshes = [p for p in siblings if p.suffix.lower() in MESH_SUFFIXES]
-        chosen += meshes or [p for p in siblings if p.suffix.lower() in IMAGE_SUFFIXES]
-    return sorted(chosen)
-
-
-def _manifest_items(path: Path, defaults: dict[str, Any], remarks: list[str]) -> Iterator[Item]:
-    ignored: set[str] = set()
+def _manifest_items(path: Path, defaults: dict[str, Any], notes: Notes, strict: bool) -> Iterator[Item]:
+    unknown: dict[str, str] = {}
     line = None
     for line, row in _rows(path):
-        for column in map(str, row.keys() - set(COLUMNS) - ignored):
-            near = get_close_matches(column.lower(), COLUMNS, n=1, cutoff=0.75)
-            if near:
-                raise UsageError(
-                    f"{path}: unknown column {column!r}; did you mean {near[0]!r}? Valid: {', '.join(COLUMNS)}"
-                )
-            ignored.add(column)
-        yield _item(row, path.parent, defaults, f"{path}:{line}")
+        for column in map(str, row.keys() - set(COLUMNS) - unknown.keys()):
+            near = get_close_matches(column.lower().strip(), COLUMNS, n=1, cutoff=0.6)
+            unknown[column] = f"{column!r} (did you mean {near[0]!r}?)" if near else repr(column)
+            if strict:
+                raise UsageError(f"{path}: unknown column {unknown[column]}; valid: {', '.join(COLUMNS)}")
+        yield _item(row, path.parent, defaults, f"{path}:{line}", unknown)
     if line is None:
         raise UsageError(
             f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"
         )
-    if ignored:
-        remarks.append(f"{path}: columns not used: {', '.join(sorted(ignored))}")
+    if unknown:
+        notes.remarks.append(f"{path}: columns not used: {', '.join(unknown[c] for c in sorted(unknown))}")
 
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
@@ -145,14 +145,17 @@ def _jsonl_rows(path: Path, stream: TextIO) -> Iterator[tuple[int, dict[str, Any
         yield number, row
 
 
-def _item(row: dict[str, Any], folder: Path, defaults: dict[str, Any], where: str) -> Item:
+def _item(
+    row: dict[str, Any], folder: Path, defaults: dict[str, Any], where: str, unknown: dict[str, str] | None = None
+) -> Item:
     values = {
         **defaults,
         **{key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")},
     }
     file, text = values.get("file"), values.get("text")
     if (file is None) == (text is None):
-        raise UsageError(f"{where}: a row has either 'file' or 'text'")
+        columns = f"; its unknown columns: {', '.join(unknown[c] for c in sorted(unknown))}" if unknown else ""
+        raise UsageError(f"{where}: a row has either 'file' or 'text'{columns}")
     if file is not None:
         path = Path(file) if Path(file).is_absolute() else folder / file
         if path.is_dir() and is_imported(path):

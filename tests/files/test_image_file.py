@@ -42,6 +42,25 @@ def test_bad_file_is_refused_by_name_cause_and_remedy(
     assert [word for word in words if word not in error.detail] == []
 
 
+@pytest.mark.parametrize("brands", [b"heic\0\0\0\0mif1heic", b"mif1\0\0\0\0mif1heic"])
+@pytest.mark.parametrize("name", ["photo.heic", "photo.jpg"])
+def test_heic_is_refused_with_the_remedy(tmp_path: Path, name: str, brands: bytes) -> None:
+    (tmp_path / name).write_bytes(b"\0\0\0\x18ftyp" + brands + bytes(100))
+    error = refusal(tmp_path / name)
+    assert (error.reason, error.detail) == ("wrong_type", f"{name}: HEIC is not read; convert it to PNG or JPEG")
+
+
+def test_avif_is_read_with_any_of_its_brands(tmp_path: Path) -> None:
+    path = tmp_path / "photo.avif"
+    Image.new("RGB", (48, 40), (200, 30, 30)).save(path)
+    plain = read_image(path).pixels
+    assert plain.shape == (40, 48, 3) and np.abs(plain.astype(int) - (200, 30, 30)).max() < 10
+    content = path.read_bytes()
+    assert content[8:12] == b"avif"
+    path.write_bytes(content[:8] + b"mif1" + content[12:])
+    assert (read_image(path).pixels == plain).all()
+
+
 @pytest.mark.shared_data
 def test_chosen_frame_of_an_animation_is_read_and_said(shared_data: Path) -> None:
     first = read_image(shared_data / "bad" / "animated.gif", frame=0)

@@ -37,3 +37,19 @@ def test_archive_holds_every_part_and_is_repeatable(tmp_path: Path) -> None:
 def test_single_file_is_kept_byte_for_byte(tmp_path: Path) -> None:
     (tmp_path / "a.STL").write_bytes(b"\x00\x01")
     assert pack_source(tmp_path / "a.STL") == ("source.stl", b"\x00\x01")
+
+
+def test_the_texture_that_a_ply_names_belongs_to_its_source(tmp_path: Path) -> None:
+    (tmp_path / "a.ply").write_bytes(b"ply\nformat ascii 1.0\ncomment TextureFile my colours.png\nend_header\n")
+    (tmp_path / "my colours.png").write_bytes(b"png")
+    name, content = pack_source(tmp_path / "a.ply")
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        assert (name, sorted(archive.namelist())) == ("source.zip", ["a.ply", "my colours.png"])
+
+
+def test_files_are_found_as_the_reader_finds_them(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text('mtllib "m.mtl"\n')
+    (tmp_path / "m.mtl").write_text("newmtl a\nmap_Kd -bm 0.5 tex\\my map.png\nnorm %2e%2e/secret.png\n")
+    (tmp_path / "tex").mkdir()
+    (tmp_path / "tex" / "my map.png").write_bytes(b"png")
+    assert side_files(tmp_path / "a.obj") == [tmp_path / "m.mtl", tmp_path / "tex" / "my map.png"]

@@ -45,6 +45,7 @@ def run(
     up: options.Up = "auto",
     license: options.License = None,
     attribution: options.Attribution = None,
+    strict: options.Strict = False,
     lines: Annotated[bool, typer.Option("--lines/--no-lines", help="Print a line for every item that ends.")] = True,
 ) -> None:
     """Build a data set of twins; run it again to go on where it stopped."""
@@ -81,6 +82,7 @@ def run(
         executor=chosen_executor(executor),
         address=address,
         defaults={"units": units, "up": up, "license": license, "attribution": attribution},
+        strict=strict,
         on_estimate=print_estimate,
         on_start=started,
         on_ended=_print_item if lines else lambda event: None,

@@ -11,7 +11,7 @@ import numpy as np
 from PIL import Image, ImageCms, ImageOps
 
 from manitwin.errors import InputError, choose_from
-from manitwin.files.sniff import sniff
+from manitwin.files.sniff import HEIC_NOT_READ, sniff
 
 MAX_PIXELS = 250_000_000
 MIN_SIDE_PX = 32
@@ -41,6 +41,8 @@ def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None 
         raise InputError(
             "wrong_type", f"{path.name}: is a mesh ({found.format}), not an image; give it as a mesh input"
         )
+    if found.format == "heif":
+        raise InputError("wrong_type", f"{path.name}: {HEIC_NOT_READ}")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit is checked below
         image = _open(path)

@@ -11,8 +11,11 @@ from typing import Literal
 
 from manitwin.errors import InputError
 
-IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "heif", "avif")
+IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "avif")
 MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz")
+
+HEIC_NOT_READ = "HEIC is not read; convert it to PNG or JPEG"
+"""Its only free decoder comes in wheels that bundle an encoder under the GPL."""
 
 _HEAD_BYTES = 65536
 _OBJ_KEYWORDS = frozenset(
@@ -23,7 +26,7 @@ _NUMBER = re.compile(rb"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|^[+-]?(nan|inf)"
 
 @dataclass(frozen=True)
 class Sniffed:
-    """What a file is: its kind, and its format by content (one of IMAGE_FORMATS or MESH_FORMATS)."""
+    """What a file is: its kind, and its format by content (of IMAGE_FORMATS or MESH_FORMATS, or ``heif``)."""
 
     kind: Literal["image", "mesh"]
     format: str
@@ -43,7 +46,7 @@ def sniff(path: Path) -> Sniffed:
         raise InputError("unreadable", f"{path.name}: {error.strerror or error}; check the path") from error
     if size == 0:
         raise InputError("empty", f"{path.name}: the file has zero bytes; export or download it again")
-    image = _image_format(head)
+    image = image_format(head)
     if image is not None:
         return Sniffed("image", image)
     mesh = _mesh_format(head, size, path)
@@ -56,7 +59,8 @@ def sniff(path: Path) -> Sniffed:
     )
 
 
-def _image_format(head: bytes) -> str | None:
+def image_format(head: bytes) -> str | None:
+    """Return the image format that a file's first 64 bytes show, one of IMAGE_FORMATS or ``heif``, or None."""
     if head.startswith(b"\x89PNG\r\n\x1a\n"):
         return "png"
     if head.startswith(b"\xff\xd8\xff"):
@@ -71,9 +75,11 @@ def _image_format(head: bytes) -> str | None:
     if head[:2] == b"BM" and head[6:10] == b"\0\0\0\0":
         return "bmp"
     if head[4:8] == b"ftyp":
-        if head[8:12] in (b"avif", b"avis"):
+        # ISO/IEC 23008-12: mif1 is any image of the family, and the compatible brands say which
+        brands = {head[8:12], *(head[at : at + 4] for at in range(16, min(int.from_bytes(head[:4], "big"), 64), 4))}
+        if brands & {b"avif", b"avis"}:
             return "avif"
-        if head[8:12] in (b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"):
+        if brands & {b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"}:
             return "heif"
     return None
 

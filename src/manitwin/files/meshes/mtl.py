@@ -7,12 +7,7 @@ from trimesh.visual.material import PBRMaterial
 
 from manitwin.files.meshes.source import MeshSource
 from manitwin.files.meshes.textures import decode_texture, pbr_material
-
-# options of texture maps and how many words each takes (MTL specification, "Options for texture map statements")
-_MAP_OPTIONS = {
-    "-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2,
-    "-o": 3, "-s": 3, "-t": 3, "-texres": 1, "-type": 1,
-}  # fmt: skip
+from manitwin.files.source_files import map_file_name
 
 
 def read_mtl(text: str, source: MeshSource) -> dict[str, PBRMaterial]:
@@ -55,19 +50,9 @@ def _material(name: str, values: dict[str, str], source: MeshSource) -> PBRMater
 
 
 def _map(statement: str | None, source: MeshSource) -> Image.Image | None:
-    """Read the texture of a map statement: options first, then a file name that may hold spaces."""
     if statement is None:
         return None
-    words = statement.split()
-    skip = 0
-    while skip < len(words) and words[skip].lower() in _MAP_OPTIONS:
-        option = words[skip].lower()
-        skip += 1
-        taken = 0
-        # -o, -s and -t may give fewer numbers than three
-        while taken < _MAP_OPTIONS[option] and skip < len(words) - 1 and (taken == 0 or _numbers(words[skip])):
-            skip, taken = skip + 1, taken + 1
-    name = statement if skip == 0 else " ".join(words[skip:])
+    name = map_file_name(statement)
     data = source.sibling(name, "texture")
     return None if data is None else decode_texture(data, name, source)
 

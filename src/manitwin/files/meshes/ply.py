@@ -13,6 +13,7 @@ from manitwin.files.meshes.polygons import triangle_fans
 from manitwin.files.meshes.source import MeshSource
 from manitwin.files.meshes.textures import decode_texture, make_part, pbr_material
 from manitwin.files.meshes.vertex_colors import color_by_corner
+from manitwin.files.source_files import ply_texture
 
 _REMEDY = "download or export it again"
 _TYPES = {
@@ -70,13 +71,11 @@ def _header(data: bytes, source: MeshSource) -> tuple[str, list[_Element], str |
     end = re.search(rb"^end_header[ \t]*\r?\n", data[: 1 << 20], re.MULTILINE)
     if end is None:
         raise source.unreadable("its PLY header does not end", _REMEDY)
-    encoding, texture = "", None
+    encoding = ""
     elements: list[tuple[str, int, list[_Property]]] = []
     for line in data[: end.start()].decode("utf-8", errors="replace").splitlines()[1:]:
         words = line.split()
-        if line.startswith("comment TextureFile "):
-            texture = line[len("comment TextureFile ") :].strip()
-        elif words[:1] == ["format"] and len(words) > 1:
+        if words[:1] == ["format"] and len(words) > 1:
             encoding = words[1]
         elif words[:1] == ["element"] and len(words) == 3 and words[2].isdigit():
             elements.append((words[1], int(words[2]), []))
@@ -95,7 +94,7 @@ def _header(data: bytes, source: MeshSource) -> tuple[str, list[_Element], str |
     return (
         encoding,
         [_Element(name, count, tuple(properties)) for name, count, properties in elements],
-        texture,
+        ply_texture(data[: end.start()]),
         end.end(),
     )
 

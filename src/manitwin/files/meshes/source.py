@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
-from urllib.parse import unquote
 
 from manitwin.errors import InputError
+from manitwin.files.source_files import inside_folder, spellings
 
 
 @dataclass(frozen=True)
@@ -51,10 +50,8 @@ class MeshSource:
 
         Raises InputError ``unreadable`` where all files together are larger than the limit.
         """
-        clean = name.strip().strip('"').replace("\\", "/")
-        candidates = [clean] if unquote(clean) == clean else [clean, unquote(clean)]
-        for candidate in candidates:
-            found = self._inside(candidate)
+        for spelling in spellings(name):
+            found = inside_folder(self.path.parent, spelling)
             if found is None:
                 self.find(f"{what} {_short(name)} lies outside the file's own folder and was not read")
                 return None
@@ -82,14 +79,6 @@ class MeshSource:
             raise self.unreadable(
                 f"{faces} faces are more than the limit of {self.limits.max_faces}", "simplify it, or raise the limit"
             )
-
-    def _inside(self, name: str) -> Path | None:
-        # a drive letter and a scheme both have a colon; neither is a file beside this one
-        if not name or "\0" in name or name.startswith(("/", "~")) or re.match(r"^[A-Za-z][A-Za-z0-9+.-]*:", name):
-            return None
-        folder = self.path.parent.resolve()
-        target = (folder / name).resolve()
-        return target if target.is_relative_to(folder) else None
 
     def _read(self, found: Path) -> bytes:
         self.bytes_read += found.stat().st_size
