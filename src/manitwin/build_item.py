@@ -29,7 +29,7 @@ Status = Literal["accepted", "rejected", "unfinished"]
 
 @dataclass(frozen=True)
 class ItemResult:
-    """What became of one item: its folder where it has one, and one line that says why."""
+    """What became of one item: its folder where it has one, one line that says why, and the code of a rejection."""
 
     item: Item
     twin_id: str
@@ -37,6 +37,7 @@ class ItemResult:
     detail: str
     folder: Path | None
     reused: bool = False
+    reason: str | None = None
 
 
 def build_item(
@@ -57,7 +58,7 @@ def build_item(
     place = out / identity.twin_id
     done = recipe.ending_of((place / RECORD).read_bytes()) if (place / RECORD).is_file() else None
     if done is not None:
-        return ItemResult(item, identity.twin_id, done.status, _line(done), place, reused=True)
+        return ItemResult(item, identity.twin_id, done.status, _line(done), place, reused=True, reason=done.reason)
     work = out / WORK / identity.twin_id
     work.mkdir(parents=True, exist_ok=True)
     try:
@@ -74,7 +75,7 @@ def build_item(
         report.write_text(traceback.format_exc())
         detail = f"a defect in manitwin: {type(error).__name__}: {error}; the traceback is in {report}"
         return ItemResult(item, identity.twin_id, "unfinished", " ".join(detail.split()), None)
-    return ItemResult(item, identity.twin_id, ending.status, _line(ending), place)
+    return ItemResult(item, identity.twin_id, ending.status, _line(ending), place, reason=ending.reason)
 
 
 @contextmanager

@@ -52,9 +52,14 @@ class RunReport:
     folders: list[FolderListing] = field(default_factory=list)
 
     @property
+    def open(self) -> bool:
+        """Whether the same run again would go on: what failed is not tried again by itself."""
+        return bool(self.stopped or self.counts.get("open"))
+
+    @property
     def exit_code(self) -> int:
         """0 all accepted, 3 some rejected, 4 some failed, or open and resumable."""
-        if self.stopped or self.counts.get("open") or self.counts.get("failed"):
+        if self.open or self.counts.get("failed"):
             return 4
         return 3 if self.counts.get("rejected") else 0
 

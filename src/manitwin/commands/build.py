@@ -9,6 +9,7 @@ import typer
 
 from manitwin.commands import options
 from manitwin.commands.console import err_console, out_console, print_estimate
+from manitwin.commands.why import print_causes_of_build
 
 
 def build(
@@ -79,6 +80,7 @@ def build(
     out_console.print(f"{accepted} accepted, {rejected} rejected, {unfinished} unfinished, in {out}", markup=False)
     for line in grasp_lines(summarize_grasps(report.records())):
         out_console.print(line, markup=False)
+    print_causes_of_build(report)
     if unfinished:
         err_console.print("run the same command again to go on where it stopped", markup=False)
     raise typer.Exit(report.exit_code)

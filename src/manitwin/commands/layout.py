@@ -11,6 +11,7 @@ import typer
 from manitwin.commands import options
 from manitwin.commands.console import err_console, out_console
 from manitwin.commands.run import chosen_executor
+from manitwin.commands.why import print_causes
 
 if TYPE_CHECKING:
     from manitwin.app_config import LayoutsConfig
@@ -72,6 +73,7 @@ def layout(
     )
     if report.stopped:
         err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
+    print_causes(out)
     raise typer.Exit(report.exit_code)
 
 

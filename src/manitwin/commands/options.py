@@ -47,6 +47,10 @@ RequireAgreement = Annotated[
 Quick = Annotated[
     bool, typer.Option("--quick", help="One engine, one trial a grasp: no second opinion, no robustness.")
 ]
+Twins = Annotated[
+    str | None,
+    typer.Option(help="Where the twins are now, if no longer where they were.", metavar="DATASET"),
+]
 Record = Annotated[
     Path | None, typer.Option(help="Add every answer of the model to this file, for --vlm replay:FILE.", metavar="FILE")
 ]

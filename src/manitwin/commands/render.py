@@ -10,6 +10,7 @@ import typer
 from manitwin.commands import options
 from manitwin.commands.console import err_console, out_console
 from manitwin.commands.run import chosen_executor
+from manitwin.commands.why import print_causes
 
 
 def render(
@@ -17,6 +18,7 @@ def render(
     cameras: Annotated[str | None, typer.Option(help="By commas: front, side, top, wrist.")] = None,
     size: Annotated[int | None, typer.Option(help="Width and height of a picture in pixels.")] = None,
     codec: Annotated[str | None, typer.Option(help="mpeg4 (fast), or vp9 (plays in browsers).")] = None,
+    twins: options.Twins = None,
     config: options.Config = None,
     jobs: options.Jobs = None,
     executor: options.Executor = "local",
@@ -33,11 +35,17 @@ def render(
     if executor != "ray":
         require_renderer()
     report = draw_episodes(
-        episodes, settings, executor=chosen_executor(executor), address=address,
+        episodes, settings, twins=twins, executor=chosen_executor(executor), address=address,
         on_start=lambda items, opened: out_console.print(f"{items} batches, {opened} to do", markup=False),
     )  # fmt: skip
     if report.exit_code == 4:
-        err_console.print(f"manitwin status {episodes}/pictures says more; run the same command again", markup=False)
+        if report.stopped:
+            err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
+        print_causes(f"{episodes}/pictures")
+        if report.open:
+            err_console.print(
+                f"manitwin status {episodes}/pictures says more; run the same command again", markup=False
+            )
         raise typer.Exit(4)
     written = write_with_pictures(episodes, settings.cameras)
     out_console.print(

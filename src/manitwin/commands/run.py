@@ -9,6 +9,7 @@ import typer
 
 from manitwin.commands import options
 from manitwin.commands.console import err_console, out_console, print_estimate
+from manitwin.commands.why import print_causes
 
 if TYPE_CHECKING:
     from manitwin.dataset_run import ExecutorName, RunReport
@@ -112,7 +113,8 @@ def _print_report(report: RunReport, dataset: str) -> None:
         err_console.print(f"{report.left} items wait{why}", markup=False)
     if report.stopped:
         err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
-    if report.exit_code == 4:
+    print_causes(dataset)
+    if report.open:
         err_console.print(f"manitwin status {dataset} says more; run the same command again to go on", markup=False)
 
 

@@ -13,9 +13,11 @@ from manitwin.commands.console import out_console
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from manitwin.causes import Cause
     from manitwin.ledger.progress import ItemStory, Progress
 
 REFRESH_S = 2.0
+MOST_CAUSES = 10
 
 
 def status(
@@ -27,10 +29,12 @@ def status(
     ] = None,
 ) -> None:
     """Say how far a data set is: by stage, how fast, what is left, what it cost, what was rejected and why."""
+    from manitwin.causes import group_causes
     from manitwin.dataset_root import DatasetRoot
     from manitwin.dataset_run import local_ledger
     from manitwin.ledger.ledger import is_written, read_ledger
     from manitwin.ledger.progress import read_progress, read_story
+    from manitwin.ledger.unaccepted import read_unaccepted
 
     path = local_ledger(DatasetRoot(dataset))
     with read_ledger(path) as ledger:
@@ -45,6 +49,24 @@ def status(
                     live.update(_view(read_progress(ledger, is_written(path))), refresh=True)
         else:
             out_console.print(_view(read_progress(ledger, is_written(path))))
+            _print_causes(group_causes(read_unaccepted(ledger)), dataset)
+
+
+def _print_causes(causes: list[Cause], dataset: str) -> None:
+    """Print every cause: how many it ended, one of them, and what to do."""
+    for cause in causes[:MOST_CAUSES]:
+        code = f" {cause.reason}" if cause.state == "rejected" else ""
+        out_console.print(
+            f"{cause.count} {cause.state}{code}, such as item {cause.example}: {cause.message}", markup=False
+        )
+        if cause.remedy:
+            out_console.print(f"  remedy: {cause.remedy}", markup=False)
+    if len(causes) > MOST_CAUSES:
+        out_console.print(f"and {len(causes) - MOST_CAUSES} more causes", markup=False)
+    if any(cause.state == "failed" for cause in causes):
+        out_console.print(f"`manitwin retry {dataset}` opens what failed again", markup=False)
+    if causes:
+        out_console.print(f"`manitwin status {dataset} --why {causes[0].example}` tells all of one item", markup=False)
 
 
 def _view(progress: Progress) -> RenderableType:

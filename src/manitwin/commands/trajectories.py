@@ -10,6 +10,7 @@ import typer
 from manitwin.commands import options
 from manitwin.commands.console import err_console, out_console
 from manitwin.commands.run import chosen_executor
+from manitwin.commands.why import print_causes
 
 
 def trajectories(
@@ -21,6 +22,7 @@ def trajectories(
     count: Annotated[int, typer.Option("-n", help="How many episodes to attempt.")] = 100,
     robot: Annotated[str | None, typer.Option(help="A robot by name, or a TOML file that describes one.")] = None,
     skill: Annotated[str | None, typer.Option(help="What to do: pick_place.")] = None,
+    twins: options.Twins = None,
     others: Annotated[int | None, typer.Option(help="So many other objects around, where twins are given.")] = None,
     retire: Annotated[
         bool, typer.Option("--retire/--no-retire", help="Retire grasps that fail, in their twins' records.")
@@ -43,7 +45,7 @@ def trajectories(
     given = {"seed": seed, "robot": robot, "skill": skill, "others": others, "run": options.run_settings(jobs)}
     settings = load_app_config(TrajectoriesConfig, config, given)
     report = make_episodes(
-        source, out, count, settings, executor=chosen_executor(executor), address=address,
+        source, out, count, settings, twins=twins, executor=chosen_executor(executor), address=address,
         on_start=lambda items, opened: out_console.print(f"{items} batches, {opened} to do", markup=False),
     )  # fmt: skip
     for remark in report.remarks:
@@ -51,7 +53,9 @@ def trajectories(
     if report.exit_code == 4:
         if report.stopped:
             err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
-        err_console.print(f"manitwin status {out} says more; run the same command again to go on", markup=False)
+        print_causes(str(out))
+        if report.open:
+            err_console.print(f"manitwin status {out} says more; run the same command again to go on", markup=False)
         raise typer.Exit(4)
     collected = collect(out, wanted)
     for line in collected.lines:

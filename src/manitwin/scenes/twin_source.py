@@ -26,7 +26,10 @@ class TwinSource:
                 f"{place}: a data set at a URL needs a local folder to copy its twins to; name one as cache"
             )
         if self.root.local is not None and not self.root.local.is_dir():
-            raise UsageError(f"{place}: no such folder; give a data set, or the folder that `manitwin build` made")
+            raise UsageError(
+                f"{place}: no such folder; give a data set, or the folder that `manitwin build` made (for the twins of"
+                " scenes or episodes: --twins)"
+            )
         self.flat = not self.root.exists(TWINS)
 
     def twin_ids(self) -> list[str]:
@@ -63,7 +66,7 @@ class TwinSource:
         return twin_id if self.flat else twin_name(twin_id)
 
     def _missing(self, twin_id: str) -> str:
-        return f"{self.root.url}: no twin {twin_id} there; give the data set that the scene was sampled from"
+        return f"{self.root.url}: no twin {twin_id} there; put it back, or name the data set where the twins are now (--twins)"
 
     def _flat_ids(self) -> Iterator[str]:
         assert self.root.local is not None

@@ -17,6 +17,7 @@ from manitwin.dataset_run import CONFIG, ExecutorName, RunReport, drive
 from manitwin.engine.driver import ItemEnded
 from manitwin.errors import EpisodesError
 from manitwin.robots.load import load_robot
+from manitwin.scenes.twin_source import TwinSource
 from manitwin.stages.stage import Item
 
 PICTURES = "pictures"
@@ -26,6 +27,7 @@ def draw_episodes(
     out: Path,
     config: PicturesConfig,
     *,
+    twins: str | Path | None = None,
     executor: ExecutorName = "local",
     address: str | None = None,
     on_start: Callable[[int, int], None] = lambda items, opened: None,
@@ -33,12 +35,15 @@ def draw_episodes(
 ) -> RunReport:
     """Draw the kept episodes of a finished run below ``out/pictures``; what is there already stays.
 
+    ``twins`` names where their twins are now, None: where they were as the episodes were made.
     Raises EpisodesError where there are none, UsageError for an unknown camera.
     """
     said = _said(out)
     named_cameras(config.cameras, load_robot(said["robot"]))
+    dataset = said["dataset"] if twins is None else str(Path(twins).resolve())
+    TwinSource(dataset)
     items = (Item(file=None, text=folder.name) for folder in batch_folders(out))
-    recipe = PicturesRecipe(config, str(out.resolve()), said["dataset"], said["robot"])
+    recipe = PicturesRecipe(config, str(out.resolve()), dataset, said["robot"])
     return drive(
         recipe,
         items,

@@ -18,7 +18,8 @@ from manitwin.dataset_run import CONFIG, ExecutorName, RunReport, drive
 from manitwin.engine.driver import ItemEnded
 from manitwin.errors import UsageError
 from manitwin.robots.load import load_robot
-from manitwin.scenes.scene_folders import SCENES, scene_ids
+from manitwin.scenes.scene_file import read_scene
+from manitwin.scenes.scene_folders import SCENES, scene_ids, scene_name
 from manitwin.scenes.twin_source import TwinSource
 
 KIND = "trajectories"
@@ -32,8 +33,11 @@ class Source:
     scenes: str | None
 
     @classmethod
-    def of(cls, place: str | Path) -> Source:
-        """Tell scenes from twins; raises UsageError for what is neither."""
+    def of(cls, place: str | Path, twins: str | Path | None = None) -> Source:
+        """Tell scenes from twins; raises UsageError for what is neither, and for scenes whose twins are gone.
+
+        ``twins`` names where those of the scenes are now, None: where they were as the layouts were made.
+        """
         root = DatasetRoot(place)
         path = root.url if root.local is None else str(root.local.resolve())
         if root.exists(SCENES) and root.exists(CONFIG):
@@ -42,8 +46,20 @@ class Source:
                 raise UsageError(
                     f"{place}/{CONFIG}: does not say whose twins these scenes are of; make the layouts again"
                 )
-            return cls(said["dataset"], path)
+            dataset = said["dataset"] if twins is None else str(Path(twins).resolve())
+            _check_twins(dataset, Path(path))
+            return cls(dataset, path)
+        if twins is not None:
+            raise UsageError(f"{place}: holds no scenes, whose twins could be elsewhere; leave --twins out")
         return cls(path, None)
+
+
+def _check_twins(dataset: str, scenes: Path) -> None:
+    """Raise UsageError where the twins of the first scene are not there: every batch would fail for it."""
+    source = TwinSource(dataset)
+    first = read_scene(scenes / scene_name(scene_ids(scenes)[0]))
+    for each in first.objects:
+        source.folder(each.twin_id)
 
 
 def make_episodes(
@@ -52,6 +68,7 @@ def make_episodes(
     count: int,
     config: TrajectoriesConfig,
     *,
+    twins: str | Path | None = None,
     executor: ExecutorName = "local",
     address: str | None = None,
     on_start: Callable[[int, int], None] = lambda items, opened: None,
@@ -59,11 +76,12 @@ def make_episodes(
 ) -> RunReport:
     """Attempt ``count`` episodes with the twins, or in the scenes, of a place; those that are there stay.
 
+    ``twins`` names where the twins of scenes are now, None: where they were as the layouts were made.
     Raises UsageError for a place without twins or scenes, an unknown robot, or where another run is at work at ``out``.
     """
     if count < 1:
         raise UsageError(f"{count} episodes; ask for 1 or more")
-    robot, source = load_robot(config.robot), Source.of(place)
+    robot, source = load_robot(config.robot), Source.of(place, twins)
     if source.scenes is None:
         deal = batches(
             robot.name, count, config.batch, twin_ids=[twin.twin_id for twin in pool_of(source.dataset).twins]

@@ -1,0 +1,53 @@
+"""The end of a command whose items were not all accepted: why, and what to do about it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from manitwin.commands.console import err_console
+
+if TYPE_CHECKING:
+    from manitwin.api import BuildReport
+    from manitwin.causes import Cause
+
+
+def print_causes(place: str) -> None:
+    """Print the most frequent causes that the ledger below a folder or URL tells of, with their remedies."""
+    _print(causes_of(place), f"manitwin retry {place} and the same command again", f"manitwin status {place}")
+
+
+def print_causes_of_build(report: BuildReport) -> None:
+    """Print the most frequent causes of a build's report, with their remedies."""
+    _print(causes_of_build(report), "the same command again", "in the lines above")
+
+
+def _print(causes: list[Cause], again: str, others: str) -> None:
+    from manitwin.causes import cause_lines
+
+    for line in cause_lines(causes, again=again, others=others):
+        err_console.print(line, markup=False)
+
+
+def causes_of_build(report: BuildReport) -> list[Cause]:
+    """Return why inputs of a build were not accepted, the most frequent cause first."""
+    from manitwin.causes import group_causes
+    from manitwin.ledger.unaccepted import Unaccepted
+    from manitwin.progress import title
+
+    return group_causes(
+        Unaccepted(title(result.item), result.status, result.reason, result.detail)
+        for result in report.results
+        if result.status != "accepted"
+    )
+
+
+def causes_of(place: str) -> list[Cause]:
+    """Return why the items below a folder or URL were not accepted, the most frequent cause first."""
+    from manitwin.causes import group_causes
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.dataset_run import local_ledger
+    from manitwin.ledger.ledger import read_ledger
+    from manitwin.ledger.unaccepted import read_unaccepted
+
+    with read_ledger(local_ledger(DatasetRoot(place))) as ledger:
+        return group_causes(read_unaccepted(ledger))

@@ -1,0 +1,98 @@
+"""Failures say why at once: the end of a command that was not all accepted, and what status adds."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from manitwin.cli import app
+from manitwin.dataset_root import twin_name
+from manitwin.scenes.scene_file import read_scene
+from scene_twins import THINGS, write_things
+
+
+def manitwin(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [*map(str, arguments)])
+
+
+@pytest.fixture(scope="module")
+def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Layouts of one object each, of two twins: ``data`` and ``scenes``."""
+    place = tmp_path_factory.mktemp("layouts")
+    write_things(place / "data", THINGS[1:3])
+    made = manitwin(
+        "layout", place / "data", "-o", place / "scenes", "-n", 6, "--objects", "1..1", "--executor", "inline"
+    )
+    assert made.exit_code == 0, made.output
+    assert "why" not in made.stderr
+    return place
+
+
+def without(scenes: Path, place: Path, *, twins_of_first: bool) -> Path:
+    """A copy whose scenes' twins are gone: those of the first scene, or all others. Returns the copy's scenes."""
+    shutil.copytree(scenes, place, dirs_exist_ok=True)
+    config = place / "scenes" / "config.json"
+    config.write_text(config.read_text().replace(str(scenes), str(place)))
+    folders = sorted((place / "scenes/scenes").glob("*/*"))
+    first = {each.twin_id for each in read_scene(folders[0]).objects}
+    every = {each.twin_id for folder in folders for each in read_scene(folder).objects}
+    assert every - first, "the layouts must be of both twins"
+    for twin_id in first if twins_of_first else every - first:
+        shutil.rmtree(place / "data" / twin_name(twin_id))
+    return place / "scenes"
+
+
+def test_trajectories_tell_the_most_frequent_cause_and_its_remedy(scenes: Path, tmp_path: Path) -> None:
+    place, out = without(scenes, tmp_path, twins_of_first=False), tmp_path / "episodes"
+    done = manitwin("trajectories", place, "-o", out, "-n", 6, "--executor", "inline")
+    assert done.exit_code == 4
+    lines = done.stderr.splitlines()
+    assert lines[0].startswith("why failed: ") and f"{tmp_path / 'data'}: no twin " in lines[0]
+    assert "remedy: put it back, or name the data set where the twins are now (--twins)" in lines[1]
+    assert f"manitwin retry {out} and the same command again" in lines[1]
+    assert "run the same command again" not in done.output, "by itself it would try nothing again"
+    told = manitwin("status", out)
+    assert "no twin" in told.stdout and "--why" in told.stdout
+
+    for step in (
+        ("retry", out),
+        ("trajectories", place, "-o", out, "-n", 6, "--twins", scenes / "data", "--no-retire"),
+    ):
+        done = manitwin(*step, *(["--executor", "inline"] if "trajectories" in step else []))
+        assert done.exit_code == 0, done.output
+    assert "why" not in done.stderr
+
+
+def test_scenes_whose_twins_are_gone_are_refused_before_any_work(scenes: Path, tmp_path: Path) -> None:
+    place, out = without(scenes, tmp_path, twins_of_first=True), tmp_path / "episodes"
+    done = manitwin("trajectories", place, "-o", out, "-n", 6)
+    assert done.exit_code != 0 and "name the data set where the twins are now (--twins)" in str(done.exception)
+    assert not out.exists()
+
+
+def test_twins_elsewhere_are_for_scenes_alone(scenes: Path, tmp_path: Path) -> None:
+    done = manitwin("trajectories", scenes / "data", "-o", tmp_path / "out", "--twins", scenes / "data")
+    assert "leave --twins out" in str(done.exception)
+
+
+def test_layouts_tell_why_they_were_rejected(scenes: Path, tmp_path: Path) -> None:
+    crowded = ("--objects", "60..60", "--clutter", "sparse", "--executor", "inline")
+    done = manitwin("layout", scenes / "data", "-o", tmp_path / "scenes", "-n", 2, *crowded)
+    assert done.exit_code == 3
+    assert "why rejected: 2 of 2 no_room, such as 1: no place was found" in done.stderr
+    assert "remedy: fewer --objects" in done.stderr
+
+
+def test_a_build_tells_the_most_frequent_reason_and_that_there_are_others(tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        (tmp_path / name).write_bytes(b"")
+    (tmp_path / "c.obj").write_text("no mesh")
+    done = manitwin(
+        "build", *(tmp_path / name for name in ("a.png", "b.png", "c.obj")), "-o", tmp_path / "out", "-j", 1
+    )
+    assert done.exit_code == 3, done.output
+    assert "why rejected: 2 of 3 empty, such as" in done.stderr
+    assert "remedy: export or download it again" in done.stderr and "1 other cause: in the lines above" in done.stderr
