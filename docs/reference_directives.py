@@ -20,20 +20,23 @@ from sphinx.util.docutils import SphinxDirective
 from sphinx.util.nodes import make_refnode
 
 import manitwin
+from manitwin.errors import ManiTwinError
 
 
 def public_api_markdown(names: list[str]) -> str:
-    """Return a section for every public name: functions, then classes with their members, then other values."""
-    functions, classes, values = [], [], []
+    """Return a section for every public name: functions, classes with their members, and which other pages have the rest."""
+    functions, classes, values, elsewhere = [], [], [], []
     for name in names:
         found = getattr(manitwin, name)
-        if inspect.isclass(found):
+        if inspect.isclass(found) and issubclass(found, (BaseModel, ManiTwinError)):
+            elsewhere.append(f"- {{py:class}}`manitwin.{name} <{found.__module__}.{found.__name__}>`")
+        elif inspect.isclass(found):
             classes.append(_documented("autoclass", f"manitwin.{name}", ":members:\n:show-inheritance:"))
         elif callable(found):
             functions.append(_documented("autofunction", f"manitwin.{name}"))
         else:
             values.append(_documented("autodata", f"manitwin.{name}"))
-    sections = {"Functions": functions, "Classes": classes, "Values": values}
+    sections = {"Functions": functions, "Classes": classes, "Values": values, "Records, settings and errors": elsewhere}
     return "\n\n".join("\n\n".join([f"## {title}", *texts]) for title, texts in sections.items() if texts)
 
 

@@ -1,4 +1,4 @@
-"""What a backend of your own is written against: four protocols, what they are asked and what they answer.
+"""What a backend of your own is written against: five protocols, what they are asked and what they answer.
 
 Raise ``BackendError`` or one of its kinds where the backend fails (the item stays resumable), ``Rejected`` where the input
 is at fault.
@@ -10,11 +10,14 @@ from manitwin.errors import (
     BackendError,
     BadReply,
     ConfigError,
+    ExportError,
     RateLimited,
     Rejected,
     Unavailable,
     Unsupported,
 )
+from manitwin.export.content import TwinContent
+from manitwin.export.exporter import Exported, Exporter, FormatNotes
 from manitwin.models.annotators.protocol import (
     Annotator,
     PhysicalEstimates,
@@ -38,6 +41,10 @@ __all__ = [
     "BuildConfig",
     "ConfigError",
     "Estimate",
+    "ExportError",
+    "Exported",
+    "Exporter",
+    "FormatNotes",
     "FunctionalPoint",
     "Generated",
     "GenerationRequest",
@@ -61,6 +68,7 @@ __all__ = [
     "Subject",
     "TrialResult",
     "TrialSettings",
+    "TwinContent",
     "Unavailable",
     "Unsupported",
 ]

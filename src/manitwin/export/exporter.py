@@ -6,18 +6,21 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from manitwin.export.content import TwinContent
+from manitwin.export.format_notes import FormatNotes
 
 
 @dataclass(frozen=True)
 class Exported:
     """Files by name below the export's folder, and what the format cannot say, one line each, for its README.
 
-    ``main`` is the file that a person opens.
+    ``main`` is the file that a person opens. ``notes``: where the files say what, and how they are loaded, for the README;
+    None: those that ``format_notes`` has of a built-in format.
     """
 
     files: dict[str, bytes]
     main: str
     cannot_say: tuple[str, ...] = ()
+    notes: FormatNotes | None = None
 
 
 class Exporter(Protocol):

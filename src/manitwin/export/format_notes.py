@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 QUANTITIES = ("mass", "centre of mass", "inertia", "friction", "restitution", "hulls", "frame")
 NOWHERE = "not said"
+UNTOLD = "the format's package does not tell"
 Z_UP = "the object frame: +Z up, origin at the bottom centre, metres"
 Y_UP = "glTF's: +Y up; (x, y, z) of the object frame is (x, z, -y)"
 
@@ -22,6 +23,11 @@ class FormatNotes:
     frame: str
     says: dict[str, str] = field(default_factory=dict)
     load: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, format_name: str) -> FormatNotes:
+        """Return the notes of a built-in format; of another package's, that it does not tell."""
+        return NOTES.get(format_name) or cls(format_name, UNTOLD, dict.fromkeys(QUANTITIES, UNTOLD))
 
     def where(self, quantity: str) -> str:
         """Return where a quantity is said."""

@@ -6,7 +6,7 @@ from pathlib import PurePosixPath
 
 from manitwin.export.content import TwinContent
 from manitwin.export.exporter import Exported
-from manitwin.export.format_notes import NOTES, QUANTITIES, FormatNotes
+from manitwin.export.format_notes import QUANTITIES, UNTOLD, FormatNotes
 from manitwin.export.inertial import inertial_of
 from manitwin.export.licenses import LICENSE_FILE, license_of, one_line
 from manitwin.twin import Estimate
@@ -18,7 +18,7 @@ _MARKUP = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!"})
 
 def readme(twin: TwinContent, format_name: str, exported: Exported) -> str:
     """Return the README of a twin in one format. Raises ExportError as ``inertial_of``."""
-    notes = NOTES[format_name]
+    notes = exported.notes or FormatNotes.of(format_name)
     record = twin.record
     caption = plain(record.language.caption) if record.language is not None else plain(record.name or "An object.")
     lines = [
@@ -30,7 +30,7 @@ def readme(twin: TwinContent, format_name: str, exported: Exported) -> str:
         "",
         "## What these files cannot say",
         "",
-        *[f"- {line}" for line in exported.cannot_say or ("nothing that the twin knows of its physics.",)],
+        *[f"- {line}" for line in exported.cannot_say or (_nothing_left_out(notes),)],
         "",
         *_how_to_load(twin, notes, exported),
         "## Licence",
@@ -39,6 +39,11 @@ def readme(twin: TwinContent, format_name: str, exported: Exported) -> str:
         f"See [{LICENSE_FILE}]({LICENSE_FILE}); it goes wherever these files go.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _nothing_left_out(notes: FormatNotes) -> str:
+    told = UNTOLD not in notes.says.values()
+    return "nothing that the twin knows of its physics." if told else f"{UNTOLD}."
 
 
 def plain(text: str) -> str:

@@ -1,4 +1,7 @@
-"""The formats that a twin can be written in; each is imported when it is asked for."""
+"""The formats that a twin can be written in: exporters are backends of the kind ``exporter``, imported when they are asked for.
+
+A package adds one like any backend (``models.registry``): ``BACKENDS = {"exporter": {"my_format": "my_package.export:export"}}``.
+"""
 
 from __future__ import annotations
 
@@ -7,40 +10,40 @@ from importlib import import_module
 
 from manitwin.errors import UsageError, choose_from
 from manitwin.export.exporter import Exporter
+from manitwin.models.registry import backends, target
 
-FORMATS: dict[str, str] = {
-    "mjcf": "manitwin.export.mjcf:export",
-    "urdf": "manitwin.export.urdf:export",
-    "sdf": "manitwin.export.sdf:export",
-    "usd": "manitwin.export.usd:export",
-    "usdz": "manitwin.export.usdz:export",
-    "glb": "manitwin.export.glb:export",
-    "robotwin": "manitwin.export.robotwin:export",
-    "maniskill": "manitwin.export.maniskill:export",
-    "isaaclab": "manitwin.export.isaaclab:export",
-    "graspgen": "manitwin.export.graspgen:export",
-    "isaac_grasp": "manitwin.export.isaac_grasp:export",
-}
+
+def formats() -> tuple[str, ...]:
+    """Return the names of all formats: the built-in ones in their order, then those of other packages."""
+    from manitwin.models.builtin import BACKENDS
+
+    built_in = BACKENDS["exporter"]
+    return (*built_in, *sorted(set(backends()["exporter"]) - set(built_in)))
 
 
 def exporter(name: str) -> Exporter:
-    """Return the exporter of a format. Raises UsageError for an unknown one."""
-    if name not in FORMATS:
-        raise UsageError(choose_from("format", name, FORMATS))
-    module, function = FORMATS[name].split(":")
-    found: Exporter = getattr(import_module(module), function)
+    """Return the exporter of a format. Raises UsageError for an unknown one, or where its package cannot be imported."""
+    if name not in formats():
+        raise UsageError(choose_from("format", name, formats()))
+    module, _, function = target("exporter", name).partition(":")
+    try:
+        found: Exporter = getattr(import_module(module), function)
+    except (ImportError, AttributeError) as error:
+        raise UsageError(
+            f"format {name!r} cannot be loaded: {error}; mend the package that registers it, or choose another format"
+        ) from error
     return found
 
 
 def chosen_formats(names: Iterable[str] | None) -> tuple[str, ...]:
-    """Return the formats that are meant, each once, in the order of ``FORMATS``; all of them for None or ``all``.
+    """Return the formats that are meant, each once, in the order of ``formats()``; all of them for None or ``all``.
 
     Raises UsageError for an unknown one, or where none is named.
     """
     wanted = {name.strip().lower() for name in names if name.strip()} if names is not None else {"all"}
     for name in sorted(wanted - {"all"}):
-        if name not in FORMATS:
-            raise UsageError(choose_from("format", name, {*FORMATS, "all"}))
+        if name not in formats():
+            raise UsageError(choose_from("format", name, {*formats(), "all"}))
     if not wanted:
-        raise UsageError(f"no format is named; valid: all, {', '.join(FORMATS)}")
-    return tuple(FORMATS) if "all" in wanted else tuple(name for name in FORMATS if name in wanted)
+        raise UsageError(f"no format is named; valid: all, {', '.join(formats())}")
+    return formats() if "all" in wanted else tuple(name for name in formats() if name in wanted)

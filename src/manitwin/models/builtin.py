@@ -29,4 +29,17 @@ BACKENDS: dict[str, dict[str, str]] = {
         "statics": "manitwin.simulate.suction_trial:SuctionTrial",
         "sapien_articulation": "manitwin.simulate.sapien_fingers:ArticulatedTrial",
     },
+    "exporter": {
+        "mjcf": "manitwin.export.mjcf:export",
+        "urdf": "manitwin.export.urdf:export",
+        "sdf": "manitwin.export.sdf:export",
+        "usd": "manitwin.export.usd:export",
+        "usdz": "manitwin.export.usdz:export",
+        "glb": "manitwin.export.glb:export",
+        "robotwin": "manitwin.export.robotwin:export",
+        "maniskill": "manitwin.export.maniskill:export",
+        "isaaclab": "manitwin.export.isaaclab:export",
+        "graspgen": "manitwin.export.graspgen:export",
+        "isaac_grasp": "manitwin.export.isaac_grasp:export",
+    },
 }
