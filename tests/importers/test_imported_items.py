@@ -103,5 +103,8 @@ def test_command_prints_one_line_an_asset(tmp_path: Path) -> None:
     said = " ".join(done.output.split())
     assert "mug: urdf; kept mass 0.32 kg, friction 0.55, inertia; missing restitution" in said
     assert "1 imported, 0 not" in said
+    again = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out")])
+    assert again.exit_code == 0 and "mug: imported before, left as it is" in again.output
+    assert "0 imported, 1 imported before, 0 not" in " ".join(again.output.split())
     broken = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out"), "--from", "urd"])
     assert isinstance(broken.exception, UsageError) and "did you mean 'urdf'" in str(broken.exception)

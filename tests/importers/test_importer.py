@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -163,15 +164,45 @@ def test_embodiedgen_without_an_answer_or_a_turn_is_seen(tmp_path: Path) -> None
 
 def test_one_bad_asset_does_not_stop_the_others(tmp_path: Path) -> None:
     mug_urdf(tmp_path / "in" / "a")
-    mug_urdf(tmp_path / "in" / "b")
     (tmp_path / "in" / "bad.urdf").write_text("<robot name='x'/>")
     (tmp_path / "in" / "empty.urdf").write_text(
         "<robot name='x'><link name='l'><visual><geometry><mesh filename='../x.stl'/></geometry></visual></link></robot>"
     )
     results = list(import_assets([tmp_path / "in"], tmp_path / "out"))
-    assert [r.folder.name for r in results if r.folder] == ["mug", "mug_2"]
+    assert [r.folder.name for r in results if r.folder] == ["mug"]
     assert [r.path.name for r in results if r.error] == ["bad.urdf", "empty.urdf"]
     assert "../x.stl is missing" in str(results[1].error)
+
+
+def test_another_asset_of_the_same_name_is_written_beside_the_first(tmp_path: Path) -> None:
+    (light,) = import_assets([mug_urdf(tmp_path / "a", mass_kg=0.2)], tmp_path / "out")
+    (heavy,) = import_assets([mug_urdf(tmp_path / "b", mass_kg=0.4)], tmp_path / "out")
+    assert light.folder is not None and heavy.folder is not None and heavy.folder != light.folder
+    assert [read_import_record(f / "import.json").mass_kg for f in (light.folder, heavy.folder)] == [0.2, 0.4]
+    assert re.fullmatch("mug_[0-9a-f]{8}", heavy.folder.name)
+    both = list(import_assets([tmp_path / "a", tmp_path / "b"], tmp_path / "other"))
+    assert [one.folder and one.folder.name for one in both] == ["mug", heavy.folder.name]  # whatever was there before
+
+
+def test_the_same_asset_imported_again_is_recognised_and_left_as_it_is(tmp_path: Path) -> None:
+    paths = [mug_urdf(tmp_path / "a", mass_kg=0.2), mug_urdf(tmp_path / "b", mass_kg=0.4)]
+    first = list(import_assets(paths, tmp_path / "out"))
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*")}
+    again = list(import_assets(reversed(paths), tmp_path / "out"))
+    assert [one.there_already for one in (*first, *again)] == [False, False, True, True]
+    assert [one.folder for one in again] == [one.folder for one in reversed(first)]
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*")} == before
+
+
+def test_an_import_that_was_changed_by_hand_is_not_written_over(tmp_path: Path) -> None:
+    _, folder = imported(mug_urdf(tmp_path / "in"), tmp_path / "out")
+    changed = (folder / "import.json").read_text().replace('"mug"', '"my mug"')
+    (folder / "import.json").write_text(changed)
+    _, other = imported(mug_urdf(tmp_path / "in"), tmp_path / "out")
+    assert other != folder and (folder / "import.json").read_text() == changed
+    (other / "import.json").write_text(changed)
+    with pytest.raises(UsageError, match="changed since"):
+        list(import_assets([mug_urdf(tmp_path / "in")], tmp_path / "out"))
 
 
 def test_folder_of_something_else_is_not_written_over(tmp_path: Path) -> None:

@@ -30,11 +30,15 @@ def import_(
         raise UsageError(choose_from("format", format, ("auto", *FORMATS)))
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out}: a file; give a folder to write into")
-    done = failed = 0
+    done = there = failed = 0
     for imported in import_assets(paths, out, format=format):  # type: ignore[arg-type]
         if imported.record is None or imported.folder is None:
             failed += 1
             err_console.print(f"{imported.path}: {imported.error}", markup=False)
+            continue
+        if imported.there_already:
+            there += 1
+            out_console.print(f"{imported.folder.name}: imported before, left as it is", markup=False)
             continue
         done += 1
         record = imported.record
@@ -43,7 +47,8 @@ def import_(
         out_console.print(f"{imported.folder.name}: {record.format}; kept {kept}{missing}", markup=False)
         for remark in record.remarks:
             out_console.print(f"  {remark}", markup=False)
+    before = f", {there} imported before" if there else ""
     out_console.print(
-        f"{done} imported, {failed} not; manitwin build {out} -o TWINS fills in what is missing", markup=False
+        f"{done} imported{before}, {failed} not; manitwin build {out} -o TWINS fills in what is missing", markup=False
     )
     raise typer.Exit(3 if failed else 0)

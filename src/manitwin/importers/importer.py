@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import re
 import shutil
@@ -23,15 +24,22 @@ from manitwin.store import replace_folder
 MAX_TEXTURE_SIZE = 8192
 """Textures are kept as they are: none of the collections has larger ones."""
 
+DIGEST_DIGITS = 8
+"""32 bits tell apart the few assets that share a name."""
+
 
 @dataclass(frozen=True)
 class Imported:
-    """What became of one asset: the folder and its record, or the one line that says why there is none."""
+    """What became of one asset: the folder and its record, or the one line that says why there is none.
+
+    ``there_already``: the folder holds this very asset from before and was left as it is.
+    """
 
     path: Path
     folder: Path | None
     record: ImportRecord | None
     error: str | None = None
+    there_already: bool = False
 
 
 def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
@@ -50,11 +58,10 @@ def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
 def import_assets(paths: Iterable[Path], out: Path, *, format: Format | Literal["auto"] = "auto") -> Iterator[Imported]:
     """Import all assets at and below paths into ``out``, each into a folder of its name; yield what became of each.
 
-    An asset that cannot be read is said and left out. Where two have one name, the later ones get a number. Raises
-    UsageError for a path that is not there, and where a folder of another kind has the name; an imported asset is
-    written over.
+    An asset that cannot be read is said and left out. Nothing is written over: an asset that is there already is left as it
+    is, and another one of the same name gets a folder whose name ends in a digest of what was imported. Raises UsageError
+    for a path that is not there, and where a folder of another kind has the name.
     """
-    taken: set[str] = set()
     for path in paths:
         if not path.exists():
             raise UsageError(f"{path}: not there; give an asset's file or folder, or a folder of assets")
@@ -64,11 +71,10 @@ def import_assets(paths: Iterable[Path], out: Path, *, format: Format | Literal[
             except AssetError as error:
                 yield Imported(place, None, None, str(error))
                 continue
-            folder = out / _free_name(folder_name(record), taken)
-            if folder.exists() and not is_imported(folder):
-                raise UsageError(f"{folder}: there already, and no imported asset; give another folder with -o")
-            _write(files, folder)
-            yield Imported(place, folder, record)
+            folder, there_already = _folder_for(files, out, folder_name(record))
+            if not there_already:
+                _write(files, folder)
+            yield Imported(place, folder, record, there_already=there_already)
 
 
 def folder_name(record: ImportRecord) -> str:
@@ -87,13 +93,17 @@ def _places(path: Path, format: Format | Literal["auto"]) -> list[Path]:
     return found or [path]  # then the reader says what the folder lacks
 
 
-def _free_name(name: str, taken: set[str]) -> str:
-    free, number = name, 1
-    while free in taken:
-        number += 1
-        free = f"{name}_{number}"
-    taken.add(free)
-    return free
+def _folder_for(files: dict[str, bytes], out: Path, name: str) -> tuple[Path, bool]:
+    """Return the folder of an imported asset, and whether the same asset is there already."""
+    digest = hashlib.sha256(b"".join(hashlib.sha256(files[file]).digest() for file in sorted(files))).hexdigest()
+    for folder in (out / name, out / f"{name}_{digest[:DIGEST_DIGITS]}"):
+        if not folder.exists():
+            return folder, False
+        if not is_imported(folder):
+            raise UsageError(f"{folder}: there already, and no imported asset; give another folder with -o")
+        if all((folder / file).is_file() and (folder / file).read_bytes() == files[file] for file in files):
+            return folder, True
+    raise UsageError(f"{folder}: imported before and changed since; move it away, or give another folder with -o")
 
 
 def _write(files: dict[str, bytes], folder: Path) -> None:
