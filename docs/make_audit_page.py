@@ -15,7 +15,7 @@ from manitwin.audit.rules import MODULES, RULES
 PAGE = Path(__file__).parent / "audit.md"
 INTRODUCTION = """# Audit: is this asset true?
 
-```
+```sh
 manitwin audit PATH...
 manitwin audit ASSETS --select MAS,INE001 --ignore LIC --format sarif > audit.sarif
 manitwin audit ASSETS --fix --jobs 2

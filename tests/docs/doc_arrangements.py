@@ -1,0 +1,107 @@
+"""What stands in for the documents' placeholders, what is made smaller, and what cannot run here and why: all of it.
+
+A command that a page shows and that is not named here runs as it is written. ``test_pages_run.py`` fails for an entry that
+no page uses.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+FOREIGN = "a program of others that is not here; a fake stands for it"
+NO_NETWORK = "fetches from the network"
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """How a page is run. Patterns are regular expressions, searched in what the page says.
+
+    ``rewritten`` are substitutions in order; ``not_run`` gives the reason of every step that is not run; ``slow`` are
+    steps, besides those of ``SLOW``, that only the slow test runs; ``exits`` are statuses that are not 0; ``blocks`` says what
+    reads each block that is no program, in order (``doc_blocks``; by itself: settings).
+    """
+
+    rewritten: dict[str, str] = field(default_factory=dict)
+    not_run: dict[str, str] = field(default_factory=dict)
+    slow: tuple[str, ...] = ()
+    exits: dict[str, int] = field(default_factory=dict)
+    blocks: tuple[str, ...] = ()
+
+
+SLOW = (
+    r"\bmanitwin (build|run|layout|trajectories|render|publish|prompts)\b",
+    r"\bmanitwin\.build\(",
+    r"\b(twins|SCENES|EPISODES)\b",
+)
+"""Steps that take many seconds, or want a folder that does."""
+
+EVERYWHERE: dict[str, str] = {
+    # smaller, and in one process
+    r"(manitwin (?:build|run)\b)(?!.*--config)": r"\1 --config small.toml",
+    r"(manitwin (?:build|run|layout|trajectories|render)\b)(?!.*--jobs)(?!.*--executor ray)": r"\1 --jobs 1",
+    r"(manitwin (?:layout|trajectories)\b.*) -n \d+": r"\1 -n 2",
+    r"(?<!>)> my\.toml": "> my.toml; cat small.toml >> my.toml",
+    # a port may be taken
+    r"--port \d+": "--port 0",
+    # words in capitals stand for something of the reader's
+    r"\bTWIN\b": "$TWIN",
+    r"\bPHOTO\b": "mug.jpg",
+    r"\bMANIFEST\b": "list.csv",
+    r"\bINPUT\.\.\.": "mug.jpg scans",
+    r"\bPATH\.\.\.": "ASSETS",
+    r"(?<==)(tsk_|msy_)?\.\.\.(?= |$)": "rehearsal-key",
+    # served grasps, which a name in front of the address tells apart
+    r"graspgen@tcp://\S+": "graspgen@$GRASPGEN",
+    r"graspgenx@tcp://\S+": "graspgenx@$GRASPGENX",
+}
+
+MODEL_SERVERS = {
+    r"^vllm serve": FOREIGN,
+    r"ollama (pull|serve)": FOREIGN,
+}
+HUNYUAN = {r"^python api_server\.py": FOREIGN}
+GRASP_SERVERS = {
+    r"^git clone https://github\.com/NVlabs/GraspGen ": FOREIGN,
+    r"python client-server/graspgen_server\.py": FOREIGN,
+    r"^git clone https://github\.com/NVlabs/GraspGenX ": FOREIGN,
+    r"python client-server/graspgenx_server\.py": FOREIGN,
+}
+TRIPOSR = {r'"command:python docs/examples/triposr\.py .*"': '"command:python generator.py {image} {out} {seed}"'}
+"""The program of the page wants weights; ``generator.py`` makes a cylinder."""
+
+PAGES: dict[str, Arrangement] = {
+    "README.md": Arrangement(
+        rewritten={r"^make demo": "make -o setup demo"},  # set-up is tried on a bare machine
+        not_run={r"^make test": "it is what runs this"},
+        slow=(r"^make",),
+    ),
+    "docs/backends.md": Arrangement(
+        rewritten=TRIPOSR,
+        not_run=MODEL_SERVERS | HUNYUAN | GRASP_SERVERS | {r"^BACKENDS = ": "names a package that is the reader's"},
+        blocks=("entry_point",),
+    ),
+    "docs/build.md": Arrangement(blocks=("manifest",)),
+    "docs/cluster.md": Arrangement(
+        rewritten={r" --address auto": ""},  # without one, it starts a cluster on this machine
+        not_run={r"^pip install": NO_NETWORK},
+    ),
+    "docs/episodes.md": Arrangement(
+        not_run={r"^from lerobot": "LeRobot has an environment of its own: make lerobot-real reads such a set with it"},
+    ),
+    "docs/generators.md": Arrangement(
+        rewritten=TRIPOSR,
+        not_run=HUNYUAN | {r"^git clone https://github\.com/VAST-AI-Research/TripoSR": NO_NETWORK},
+    ),
+    "docs/layouts.md": Arrangement(rewritten={"layout_1_000017": "layout_1_000001"}),
+    "docs/priors.md": Arrangement(blocks=("prior kitchen",)),
+    "docs/publish.md": Arrangement(slow=(r"\bOUT\b",), blocks=("tree OUT",)),
+    "docs/robots.md": Arrangement(blocks=("robot my_arm/my_arm.toml",)),
+    "docs/runs.md": Arrangement(
+        rewritten={r" --watch": "", "mug_0042.glb": "mug.glb"},  # watching ends with the watcher
+        slow=(r"\bDATASET\b",),
+        blocks=("tree DATASET",),
+    ),
+    "docs/served_grasps.md": Arrangement(not_run=GRASP_SERVERS),
+    "docs/twin.md": Arrangement(blocks=("tree twins/*",)),
+    "docs/vlm.md": Arrangement(not_run=MODEL_SERVERS, blocks=("settings run.toml",)),
+}

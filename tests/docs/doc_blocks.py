@@ -1,0 +1,90 @@
+"""Blocks that are no program: settings by who reads them, manifests, and lists of files by the folder that they are of."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable
+from importlib.metadata import EntryPoint
+from itertools import pairwise
+from pathlib import Path
+
+from manitwin.config import BuildConfig, load_config
+from manitwin.manifest import collect_items
+from manitwin.models.annotators.priors import _prior, _read, load_priors
+from manitwin.models.registry import GROUP
+from manitwin.robots.load import load_robot
+
+ARM_LINKS = ("base", *(f"l{i}" for i in range(1, 6)), "tool0")
+
+
+def read_block(text: str, kind: str, folder: Path) -> None:
+    """Have a block read by what reads such a file: ``kind`` is that of the table, and an argument."""
+    name, _, argument = kind.partition(" ")
+    READERS[name](text, folder, argument)
+
+
+def _settings(text: str, folder: Path, name: str) -> None:
+    """Settings that change something; they are added to the file ``name``, if the page says that they are in it."""
+    file = folder / "block.toml"
+    file.write_text(text)
+    assert load_config(file) != BuildConfig(), "it is what holds anyway"
+    if name:
+        with (folder / name).open("a") as written:
+            written.write(text)
+        load_config(folder / name)
+
+
+def _prior_of_a_category(text: str, folder: Path, domain: str) -> None:
+    for category, row in tomllib.loads(text).items():
+        assert category not in load_priors(), "it is there already"
+        _prior(category, row, domain, _read(domain).get("defaults", {}), _read("forms"))
+
+
+def _robot(text: str, folder: Path, name: str) -> None:
+    """A robot's file, beside a URDF that has the joints that it names."""
+    (folder / name).parent.mkdir()
+    (folder / name).write_text(text)
+    urdf = (folder / name).parent / tomllib.loads(text)["urdf"]["file"]
+    urdf.parent.mkdir(parents=True)
+    solid = '<collision><origin xyz="0 0 0.05"/><geometry><box size="0.05 0.05 0.1"/></geometry></collision>'
+    links = [f'<link name="{link}">{solid if link != "tool0" else ""}</link>' for link in ARM_LINKS]
+    joints = [
+        f'<joint name="j{i}" type="revolute"><parent link="{parent}"/><child link="{child}"/><origin xyz="0 0 0.15"/>'
+        f'<axis xyz="0 {i % 2} {(i + 1) % 2}"/><limit lower="-3" upper="3" velocity="2" effort="9"/></joint>'
+        for i, (parent, child) in enumerate(pairwise(ARM_LINKS), 1)
+    ]
+    urdf.write_text(f'<robot name="my_arm">{"".join(links + joints)}</robot>')
+    assert len(load_robot(str(folder / name)).arm_joints) == len(joints)
+
+
+def _entry_point(text: str, folder: Path, argument: str) -> None:
+    groups = tomllib.loads(text)["project"]["entry-points"]
+    assert list(groups) == [GROUP]
+    for name, value in groups[GROUP].items():
+        assert EntryPoint(name, value, GROUP).module.isascii()
+
+
+def _tree(text: str, folder: Path, pattern: str) -> None:
+    """A list of files: of each line all that stands before two spaces is in the folder."""
+    root = next(folder.glob(pattern), None)
+    assert root is not None, f"nothing is at {pattern}"
+    for line in text.splitlines()[1:]:
+        name = re.split(r"\s{2,}", line.strip())[0].removesuffix(" ...")
+        assert list(root.glob(re.sub(r"<[^>]*>", "*", name.rstrip("/")))), f"{name} is not in {pattern}"
+
+
+def _manifest(text: str, folder: Path, argument: str) -> None:
+    (folder / "manifest.csv").write_text(text)
+    items, remarks = collect_items([folder / "manifest.csv"])
+    assert len(items) == len(text.splitlines()) - 1 and not remarks
+
+
+READERS: dict[str, Callable[[str, Path, str], None]] = {
+    "settings": _settings,
+    "prior": _prior_of_a_category,
+    "robot": _robot,
+    "entry_point": _entry_point,
+    "tree": _tree,
+    "manifest": _manifest,
+}

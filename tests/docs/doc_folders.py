@@ -1,0 +1,115 @@
+"""What pages name and a reader has already: photos, meshes, a manifest, twins, a data set, scenes, episodes."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from functools import cached_property
+from pathlib import Path
+
+import trimesh
+from doc_pages import ROOT
+from doc_shell import Shell
+
+from foreign_assets import mug_urdf
+from grasped_twins import write_brick
+from scene_twins import THINGS, bowl, slab, write_thing
+
+SMALL = """\
+grasps.simulated = 20
+grasps.unfiltered = 0
+second_opinion.enabled = false
+robustness.enabled = false
+"""
+"""Settings under which a build shows all that a page is about in half of the time."""
+
+GENERATOR = """\
+import sys, trimesh
+_, image, out, seed = sys.argv
+trimesh.creation.cylinder(radius=0.3, height=1.0).export(out)
+"""
+
+
+class Folders:
+    """Dear folders, each made at its first use and copied to every page that names it."""
+
+    def __init__(self, root: Path):
+        self.root = root
+        (root / "small.toml").write_text(SMALL)
+
+    @cached_property
+    def twins(self) -> Path:
+        """Twins of the two samples, built by the command line."""
+        self._manitwin(f"build {ROOT}/samples/samples.csv -o twins --config small.toml --jobs 1")
+        return self.root / "twins"
+
+    @cached_property
+    def dataset(self) -> Path:
+        """A data set with an index: bricks named as pages name objects, with grasps from above that hold, and things."""
+        root = self.root / "DATASET"
+        for number, category in enumerate(("mug", "kettle", "brick")):
+            write_brick(root, number, category)
+        for number, thing in enumerate((bowl(), slab("board", 0.24, 0.16, 0.015, 0.5), THINGS[-2]), 3):
+            write_thing(root, number, thing)
+        self._manitwin("index DATASET")
+        return root
+
+    @cached_property
+    def scenes(self) -> Path:
+        """Two layouts of the data set's twins."""
+        assert self.dataset
+        self._manitwin("layout DATASET -n 2 --objects 3..4 --seed 1 -o SCENES --jobs 1")
+        return self.root / "SCENES"
+
+    @cached_property
+    def episodes(self) -> Path:
+        """Two attempts at episodes with the data set's twins."""
+        assert self.dataset
+        self._manitwin("trajectories DATASET -n 2 -o EPISODES --jobs 1")
+        return self.root / "EPISODES"
+
+    @cached_property
+    def assets(self) -> Path:
+        """A mug of another tool, as URDF."""
+        mug_urdf(self.root / "ASSETS" / "mug")
+        return self.root / "ASSETS"
+
+    def _manitwin(self, words: str) -> None:
+        Shell(self.root).run(f"manitwin {words}")
+
+    def prepare(self, page: Path, said: str) -> None:
+        """Put into a page's folder what its steps name, but for what they write themselves first."""
+        for name in ("samples", "docs", "benchmarks", "src", "scripts", "Makefile"):
+            (page / name).symlink_to(ROOT / name)
+        (page / "generator.py").write_text(GENERATOR)
+        (page / ".venv").symlink_to(ROOT / ".venv")
+        (page / "small.toml").write_text(SMALL)
+        (page / "run.toml").write_text(SMALL)
+        for name in ("mug.jpg", "photo.jpg", "photos/bottle.jpg"):
+            _copied(ROOT / "samples" / "bottle.jpg", page / name)
+        _copied(ROOT / "samples" / "mug.glb", page / "mug.glb")
+        (page / "scans").mkdir()
+        trimesh.load(ROOT / "samples" / "mug.glb", force="mesh").export(page / "scans" / "mug.obj")
+        (page / "list.csv").write_text("file,name,license\nsamples/mug.glb,mug,CC0-1.0\n")
+        kinds: dict[str, Callable[[], Path]] = {
+            "twins": lambda: self.twins,
+            "DATASET": lambda: self.dataset,
+            "SCENES": lambda: self.scenes,
+            "EPISODES": lambda: self.episodes,
+            "ASSETS": lambda: self.assets,
+        }
+        for name, folder in kinds.items():
+            first = re.search(rf"(-o )?\b{name}\b(?!\.)", said)
+            if first and not first[1]:
+                shutil.copytree(folder(), page / name)
+
+    def twin_id(self, folder: Path) -> str:
+        """Return the id of the mug's twin, if there is one in the folder."""
+        records = sorted(folder.glob("twins/*/twin.json"))
+        return records[0].parent.name if records else ""
+
+
+def _copied(source: Path, target: Path) -> None:
+    target.parent.mkdir(exist_ok=True)
+    shutil.copy(source, target)
