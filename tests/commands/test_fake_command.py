@@ -11,6 +11,7 @@ import time
 import pytest
 import typer
 
+from manitwin.commands import fake as fake_command
 from manitwin.commands.fake import fake
 from manitwin.config import ServicesConfig
 from manitwin.errors import UsageError
@@ -44,6 +45,22 @@ def test_it_serves_what_it_says_until_interrupted() -> None:
     finally:
         process.kill()
         process.wait()
+
+
+def test_an_interrupt_while_it_says_how_to_use_it_stops_it_as_well(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    console = fake_command.out_console
+    said = console.print
+
+    def interrupted(text: str, **options: bool) -> None:
+        said(text, **options)
+        if text.startswith("manitwin build"):
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(console, "print", interrupted)
+    fake("graspgen")
+    assert capsys.readouterr().out.endswith("stopped\n")
 
 
 def test_it_says_the_key_to_set() -> None:

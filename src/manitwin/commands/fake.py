@@ -32,12 +32,13 @@ def fake(
         return
     if name is None:
         raise UsageError(f"no service is named; give one of {', '.join(REHEARSALS)}")
-    with serving(name, port=port, faults=Faults.parse(fault or []), key=key, polls=polls) as server:
-        out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)", markup=False)
-        if server.key_variable is not None:
-            out_console.print(f"export {server.key_variable}={server.key}", markup=False)
-        out_console.print(f"manitwin build PHOTO -o OUT {server.option} {server.spec}", markup=False)
-        try:
+    given = Faults.parse(fault or [])
+    try:
+        with serving(name, port=port, faults=given, key=key, polls=polls) as server:
+            out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)", markup=False)
+            if server.key_variable is not None:
+                out_console.print(f"export {server.key_variable}={server.key}", markup=False)
+            out_console.print(f"manitwin build PHOTO -o OUT {server.option} {server.spec}", markup=False)
             threading.Event().wait()
-        except KeyboardInterrupt:
-            out_console.print("stopped", markup=False)
+    except KeyboardInterrupt:  # as soon as it has said where it is, it may be interrupted
+        out_console.print("stopped", markup=False)
