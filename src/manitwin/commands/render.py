@@ -17,7 +17,7 @@ def render(
     episodes: Annotated[Path, typer.Argument(help="What `manitwin trajectories` wrote.", metavar="EPISODES")],
     cameras: Annotated[str | None, typer.Option(help="By commas: front, side, top, wrist.")] = None,
     size: Annotated[int | None, typer.Option(help="Width and height of a picture in pixels.")] = None,
-    codec: Annotated[str | None, typer.Option(help="mpeg4 (fast), or vp9 (plays in browsers).")] = None,
+    codec: Annotated[str | None, typer.Option(help="vp9 (plays in browsers), or mpeg4 (quicker to write).")] = None,
     twins: options.Twins = None,
     config: options.Config = None,
     jobs: options.Jobs = None,
@@ -27,6 +27,7 @@ def render(
     """Draw the kept episodes by showing their states again, and add the films to the LeRobot data set."""
     from manitwin.app_config import PicturesConfig, load_app_config
     from manitwin.apps.trajectories.render_run import draw_episodes, write_with_pictures
+    from manitwin.apps.trajectories.video import require_encoder
     from manitwin.render.device import require_renderer
 
     names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
@@ -34,6 +35,7 @@ def render(
     settings = load_app_config(PicturesConfig, config, given)
     if executor != "ray":
         require_renderer()
+        require_encoder(settings.codec)
     report = draw_episodes(
         episodes, settings, twins=twins, executor=chosen_executor(executor), address=address,
         on_start=lambda items, opened: out_console.print(f"{items} batches, {opened} to do", markup=False),

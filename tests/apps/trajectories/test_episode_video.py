@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from manitwin.apps.trajectories.video import EpisodesVideo, write_animation
+from manitwin.app_config import PicturesConfig
+from manitwin.apps.trajectories.lerobot.videos import video_facts
+from manitwin.apps.trajectories.video import EpisodesVideo, require_encoder, write_animation
 from manitwin.errors import UsageError
 
 WIDTH, HEIGHT = 96, 64
@@ -94,6 +96,49 @@ def test_odd_sizes_and_unknown_codecs_are_refused(tmp_path: Path) -> None:
         EpisodesVideo(tmp_path / "a.mp4", width_px=95, height_px=64)
     with pytest.raises(UsageError, match="video codec 'h264'"):
         EpisodesVideo(tmp_path / "a.mp4", width_px=96, height_px=64, codec="h264")  # type: ignore[arg-type]
+
+
+def test_default_is_a_codec_that_browsers_play_with_a_licence_that_lets_everybody_carry_it(tmp_path: Path) -> None:
+    """VP9 of profile 0 (8 bits, 4:2:0), which Chromium and Firefox play; libvpx is BSD, and FFmpeg is there under the LGPL."""
+    path = tmp_path / "a.mp4"
+    with EpisodesVideo(path, width_px=WIDTH, height_px=HEIGHT, codec=PicturesConfig().codec) as video:
+        video.add(pictures(0, 3))
+    assert video_facts(path).codec == "vp9"
+    box = path.read_bytes().partition(b"vpcC")[
+        2
+    ]  # VPCodecConfigurationRecord: version, flags, profile, level, depth ...
+    profile, depth_bits, subsampling = box[4], box[6] >> 4, box[6] >> 1 & 7
+    assert (profile, depth_bits) == (0, 8) and subsampling in (0, 1)
+
+
+def test_build_without_the_encoder_says_which_has_it_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = cv2.VideoWriter
+
+    class Lacking:
+        """An OpenCV whose FFmpeg has no libvpx."""
+
+        fourcc = staticmethod(real.fourcc)
+
+        def __new__(cls, file: str, backend: int, fourcc: int, rate_hz: float, size: tuple[int, int]) -> object:
+            return real() if fourcc == real.fourcc(*"vp09") else real(file, backend, fourcc, rate_hz, size)
+
+    monkeypatch.setattr(cv2, "VideoWriter", Lacking)
+    with pytest.raises(UsageError, match=r"no encoder for vp9 \(FFmpeg with libvpx\).*opencv-python.*--codec mpeg4"):
+        require_encoder("vp9")
+    with pytest.raises(UsageError, match="no encoder for vp9"):
+        EpisodesVideo(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT)
+    assert not list(tmp_path.iterdir())
+    require_encoder("mpeg4")
+
+
+def test_folder_that_cannot_be_written_is_not_taken_for_a_missing_encoder(tmp_path: Path) -> None:
+    (tmp_path / ".a.1.mp4").mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("os.getpid", lambda: 1)
+        with pytest.raises(UsageError, match=r"a\.mp4: no video can be written there"):
+            EpisodesVideo(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT)
 
 
 @pytest.mark.parametrize("suffix", [".webp", ".gif"])

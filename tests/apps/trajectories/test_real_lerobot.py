@@ -86,7 +86,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any
     root = tmp_path_factory.mktemp("real")
     given = episodes(5)
     write_lerobot(given, root / "plain")
-    write_lerobot(given, root / "pictured", videos=[camera(root / "pictures", given, codec="mp4v")])
+    write_lerobot(given, root / "pictured", videos=[camera(root / "pictures", given)])
     environment = {
         **os.environ,
         "HF_HUB_OFFLINE": "1",

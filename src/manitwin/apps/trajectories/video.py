@@ -1,12 +1,14 @@
 """Episodes as films: many in one mp4 for data sets, one as an animated picture for documents.
 
-OpenCV's wheels bring FFmpeg under the LGPL, with two encoders that are of use in an mp4: libvpx's VP9 and FFmpeg's own
-MPEG-4 Part 2. No H.264 (libx264 is GPL) and no AV1 is among them, and their settings cannot be chosen.
+OpenCV's wheels bring FFmpeg under the LGPL 2.1, with two encoders that are of use in an mp4: VP9 of libvpx (BSD), and
+FFmpeg's own MPEG-4 Part 2. Their settings cannot be chosen (opencv/opencv#24570): a key frame is every 12th. PyAV's wheels,
+whose VP9 is 30 times as fast, bring libx264 and libx265 too, which are GPL.
 """
 
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +24,7 @@ from manitwin.errors import UsageError, choose_from
 
 Codec = Literal["vp9", "mpeg4"]
 _FOURCC = {"vp9": "vp09", "mpeg4": "mp4v"}
+_ENCODER = {"vp9": "FFmpeg with libvpx", "mpeg4": "FFmpeg"}
 ANIMATIONS = (".webp", ".gif")
 
 
@@ -44,17 +47,38 @@ class Span:
         return (self.first_frame + self.frames) / RATE_HZ
 
 
+def require_encoder(codec: Codec) -> None:
+    """Raise UsageError, naming the builds that have it, where this OpenCV cannot write a codec; nothing stands in for it."""
+    fourcc = _fourcc(codec)
+    with tempfile.TemporaryDirectory(prefix="manitwin-encoder-") as folder:
+        writer = cv2.VideoWriter(f"{folder}/a.mp4", cv2.CAP_FFMPEG, fourcc, float(RATE_HZ), (64, 64))
+        opened = writer.isOpened()
+        writer.release()
+    if not opened:
+        others = " or ".join(f"--codec {name}" for name in _FOURCC if name != codec)
+        raise UsageError(
+            f"this OpenCV ({cv2.__version__}) has no encoder for {codec} ({_ENCODER[codec]}): reinstall opencv-python or"
+            f" opencv-python-headless from PyPI, whose wheels bring it; builds of distributions may not. Or take {others}"
+        )
+
+
+def _fourcc(codec: str) -> int:
+    if codec not in _FOURCC:
+        raise UsageError(choose_from("video codec", codec, _FOURCC))
+    return cv2.VideoWriter.fourcc(*_FOURCC[codec])
+
+
 class EpisodesVideo:
     """An mp4 of episodes, one after the other, at 20 pictures a second. To be used in a ``with`` statement.
 
-    ``vp9`` plays in browsers; ``mpeg4`` is written 80 times as fast and a third smaller, plays in players and in what
+    ``vp9`` plays in browsers; ``mpeg4`` takes a hundredth of the time and half the bytes, plays in players and in what
     learning libraries decode with, and in no browser. Both are read back frame by frame exactly; same pictures, same bytes.
-    The file appears when it is complete. Raises UsageError for a size that is odd or another codec.
+    The file appears when it is complete. Raises UsageError for a size that is odd, for another codec, and as
+    ``require_encoder`` does.
     """
 
     def __init__(self, path: Path, *, width_px: int, height_px: int, codec: Codec = "vp9") -> None:
-        if codec not in _FOURCC:
-            raise UsageError(choose_from("video codec", codec, _FOURCC))
+        fourcc = _fourcc(codec)
         if width_px % 2 or height_px % 2:
             raise UsageError(
                 f"{path}: a video's width and height are even, not {width_px} x {height_px}; round them up"
@@ -62,14 +86,12 @@ class EpisodesVideo:
         self._path, self._shape, self._frames = path, (height_px, width_px, 3), 0
         self._unfinished = path.with_name(f".{path.stem}.{os.getpid()}.mp4")
         path.parent.mkdir(parents=True, exist_ok=True)
-        code = cv2.VideoWriter.fourcc(*_FOURCC[codec])
         self._writer = cv2.VideoWriter(
-            str(self._unfinished), cv2.CAP_FFMPEG, code, float(RATE_HZ), (width_px, height_px)
+            str(self._unfinished), cv2.CAP_FFMPEG, fourcc, float(RATE_HZ), (width_px, height_px)
         )
         if not self._writer.isOpened():
-            raise UsageError(
-                f"{path}: OpenCV cannot write {codec} here; install opencv-python from PyPI, or check the folder"
-            )
+            require_encoder(codec)
+            raise UsageError(f"{path}: no video can be written there; check the folder and the disk")
 
     def __enter__(self) -> EpisodesVideo:
         return self
