@@ -18,14 +18,14 @@ class Arrangement:
 
     ``rewritten`` are substitutions in order; ``not_run`` gives the reason of every step that is not run; ``slow`` are
     steps, besides those of ``SLOW``, that only the slow test runs; ``exits`` are statuses that are not 0; ``blocks`` says what
-    reads each block that is no program, in order (``doc_blocks``; by itself: settings).
+    reads each block that is no program (``doc_blocks``; TOML by itself is settings).
     """
 
     rewritten: dict[str, str] = field(default_factory=dict)
     not_run: dict[str, str] = field(default_factory=dict)
     slow: tuple[str, ...] = ()
     exits: dict[str, int] = field(default_factory=dict)
-    blocks: tuple[str, ...] = ()
+    blocks: dict[str, str] = field(default_factory=dict)
 
 
 SLOW = (
@@ -78,8 +78,8 @@ PAGES: dict[str, Arrangement] = {
     "docs/audit.md": Arrangement(
         exits={r"PATH\.\.\.": 1, "--fix": 1}
     ),  # the mug there is wrong: its collision shape fills it
-    "docs/backends.md": Arrangement(blocks=("entry_point",)),
-    "docs/build.md": Arrangement(blocks=("manifest",)),
+    "docs/backends.md": Arrangement(blocks={"entry-points": "entry_point"}),
+    "docs/build.md": Arrangement(blocks={"^file,name": "manifest", "^things: ": "account things"}),
     "docs/cluster.md": Arrangement(
         rewritten={r" --address auto": ""},  # without one, it starts a cluster on this machine
         not_run={r"^pip install": NO_NETWORK},
@@ -92,15 +92,15 @@ PAGES: dict[str, Arrangement] = {
         not_run=HUNYUAN | {r"^git clone https://github\.com/VAST-AI-Research/TripoSR": NO_NETWORK},
     ),
     "docs/layouts.md": Arrangement(rewritten={"layout_1_000017": "layout_1_000001"}),
-    "docs/priors.md": Arrangement(blocks=("prior kitchen",)),
-    "docs/publish.md": Arrangement(slow=(r"\bOUT\b",), blocks=("tree OUT",)),
-    "docs/robots.md": Arrangement(blocks=("robot my_arm/my_arm.toml",)),
+    "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),
+    "docs/publish.md": Arrangement(slow=(r"\bOUT\b",), blocks={"^OUT/": "tree OUT"}),
+    "docs/robots.md": Arrangement(blocks={"my_arm": "robot my_arm/my_arm.toml"}),
     "docs/runs.md": Arrangement(
         rewritten={r" --watch": "", "mug_0042.glb": "mug.glb"},  # watching ends with the watcher
         slow=(r"\bDATASET\b",),
-        blocks=("tree DATASET",),
+        blocks={"^DATASET/": "tree DATASET"},
     ),
     "docs/served_grasps.md": Arrangement(not_run=GRASP_SERVERS),
-    "docs/twin.md": Arrangement(blocks=("tree twins/*",)),
-    "docs/vlm.md": Arrangement(not_run=MODEL_SERVERS, blocks=("settings run.toml",)),
+    "docs/twin.md": Arrangement(blocks={"^<twin_id>/": "tree twins/*"}),
+    "docs/vlm.md": Arrangement(not_run=MODEL_SERVERS, blocks={"services": "settings run.toml"}),
 }

@@ -9,6 +9,8 @@ from importlib.metadata import EntryPoint
 from itertools import pairwise
 from pathlib import Path
 
+from PIL import Image
+
 from manitwin.config import BuildConfig, load_config
 from manitwin.manifest import collect_items
 from manitwin.models.annotators.priors import _prior, _read, load_priors
@@ -76,8 +78,19 @@ def _tree(text: str, folder: Path, pattern: str) -> None:
 
 def _manifest(text: str, folder: Path, argument: str) -> None:
     (folder / "manifest.csv").write_text(text)
-    items, remarks = collect_items([folder / "manifest.csv"])
-    assert len(items) == len(text.splitlines()) - 1 and not remarks
+    items, notes = collect_items([folder / "manifest.csv"])
+    assert len(items) == len(text.splitlines()) - 1 and not notes.remarks
+
+
+def _account(text: str, folder: Path, name: str) -> None:
+    """What is said of a folder of a mesh with its material and texture, five photos, and a file of words."""
+    (folder / name).mkdir()
+    (folder / name / "thing.obj").write_text("mtllib thing.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n")
+    (folder / name / "thing.mtl").write_text("newmtl paint\nmap_Kd paint.png\n")
+    for image in ("paint.png", *(f"photo{i}.jpg" for i in range(1, 6))):
+        Image.new("RGB", (16, 16)).save(folder / name / image)
+    (folder / name / "notes.txt").write_text("words")
+    assert collect_items([name])[1].remarks == text.splitlines()
 
 
 READERS: dict[str, Callable[[str, Path, str], None]] = {
@@ -87,4 +100,5 @@ READERS: dict[str, Callable[[str, Path, str], None]] = {
     "entry_point": _entry_point,
     "tree": _tree,
     "manifest": _manifest,
+    "account": _account,
 }
