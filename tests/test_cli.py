@@ -1,6 +1,8 @@
+import json
 import os
 import subprocess
 import sys
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -29,7 +31,10 @@ def one_line(text: str) -> str:
         (("build", "FILE", "-o", "OUT", "--nonsense"), "--nonsense"),
         (("build", "FILE", "-o", "OUT", "--quick", "--require-agreement"), "quick leaves the second engine out"),
         (("build", "FILE", "-o", "OUT", "--gripper", "panda", "--gripper", "panda"), "each may be named once"),
-        (("show", "OUT"), "no twin.json"),
+        (("show", "OUT"), "not there; give a folder that manitwin build made"),
+        (("layout", "OUT", "-o", "OUT"), "not there; give a data set"),
+        (("layout", "FILE", "-o", "OUT", "--objects", "few"), "give LOW..HIGH"),
+        (("trajectories", "FILE", "-o", "OUT", "-n", "0"), "-n is 0; give 1 or more"),
         (("paint",), "paint"),
     ],
 )
@@ -78,3 +83,93 @@ def test_schema_describes_a_twin() -> None:
     done = manitwin("schema")
     assert done.returncode == 0
     assert '"grasps"' in done.stdout and '"Estimate"' in done.stdout
+
+
+def test_alone_it_prints_the_help() -> None:
+    done = manitwin()
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Usage: manitwin [OPTIONS] COMMAND" in done.stdout and "trajectories" in done.stdout
+
+
+def test_version_is_that_of_the_package() -> None:
+    done = manitwin("--version")
+    assert (done.returncode, done.stdout) == (0, f"manitwin {version('manitwin')}\n")
+
+
+def test_error_of_a_subcommand_names_its_own_help() -> None:
+    said = one_line(manitwin("build", "--wrong").stderr)
+    assert said.startswith("manitwin build: No such option: --wrong") and said.endswith("See manitwin build --help")
+    said = one_line(manitwin("paint").stderr)
+    assert said.startswith("manitwin: No such command 'paint'") and said.endswith("See manitwin --help")
+
+
+HEAVY = (
+    "numpy", "scipy", "trimesh", "sapien", "mujoco", "pxr", "cv2", "pyarrow", "duckdb", "matplotlib", "fsspec",
+    "manitwin.pipeline",
+)  # fmt: skip
+WRONG_USE = """
+import io, json, sys
+from contextlib import redirect_stderr, redirect_stdout
+from manitwin.cli import app, main
+from manitwin.cli import err_console, out_console
+import typer
+
+found = {}
+commands = typer.main.get_command(app).commands
+lines = [[], ["--help"], ["--wrong"], ["paint"], *([name, option] for name in commands for option in ("--wrong", "--help"))]
+for line in lines + json.loads(sys.argv[1]):
+    sys.argv = ["manitwin", *line]
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()) as errors:
+        try:
+            main()
+        except SystemExit as end:
+            found[" ".join(line)] = [end.code, errors.getvalue(), [m for m in json.loads(HEAVY) if m in sys.modules]]
+print(json.dumps(found))
+"""
+WRONG_VALUES = [
+    "build",
+    "build nothing_here.png -o out",
+    "build . -o out --units inch",
+    "build . -o out --jobs 0",
+    "build . -o out --jobs many",
+    "build . -o out --gripper pandas",
+    "build . -o out --vlm nobody",
+    "build . -o out --config none.toml",
+    "run",
+    "run -o out --executor cloud",
+    "layout . -o out --surface bed",
+    "layout . -o out --objects few",
+    "layout . -o out --robot nobody",
+    "trajectories . -o out --robot nobody",
+    "trajectories . -o out --format csv",
+    "trajectories . -o out --skill pour",
+    "render . --cameras behind",
+    "render . --codec h266",
+    "render nothing_here",
+    "export . -o out --to obj",
+    "import . -o out --from obj",
+    "query . --table mugs",
+    "query . --format xml",
+    "retry . --state open",
+    "audit . --format xml",
+    "doctor everything",
+    "fake nobody",
+    "completion tcsh",
+    "show nothing_here",
+]
+
+
+def test_wrong_use_and_help_import_nothing_heavy() -> None:
+    """What is wrong is said at once: each of these takes seconds where one of the heavy modules is imported on the way."""
+    program = WRONG_USE.replace("HEAVY", repr(json.dumps(HEAVY)))
+    command = [sys.executable, "-c", program, json.dumps([line.split() for line in WRONG_VALUES])]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert {line: heavy for line, (_, _, heavy) in found.items() if heavy} == {}
+    assert {
+        line: code
+        for line, (code, *_) in found.items()
+        if (code or 0) != (0 if line.endswith("--help") or not line else 2)
+    } == {}
+    assert len(found) > 60

@@ -84,9 +84,7 @@ def build(
     Raises UsageError for wrong arguments; what happens to one item is in the report and never raised.
     """
     from manitwin.config import BuildConfig, load_config
-    from manitwin.executors.whole_items import build_all
     from manitwin.manifest import collect_items
-    from manitwin.pipeline import check_names, estimate_usd
 
     settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
     settings = with_flags(
@@ -96,7 +94,6 @@ def build(
     if jobs is not None and jobs < 1:
         raise UsageError(f"jobs is {jobs}; give 1 or more")
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
-    check_names(settings)
     items, notes = collect_items(
         given, texts, name=name, units=units, up=up, license=license, attribution=attribution, strict=strict
     )
@@ -105,6 +102,11 @@ def build(
     place = Path(out)
     if place.exists() and not place.is_dir():
         raise UsageError(f"{out}: a file; give a folder to write twins into")
+    # these take two CPU-seconds to import: what was given wrongly is said before
+    from manitwin.executors.whole_items import build_all
+    from manitwin.pipeline import check_names, estimate_usd
+
+    check_names(settings)
     place.mkdir(parents=True, exist_ok=True)
     on_estimate(estimate_usd(settings))
     on_start(len(items))

@@ -6,6 +6,7 @@ Exit status: 0 all accepted, 3 some rejected, 4 some unfinished and resumable, 2
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sys
 from pathlib import Path
@@ -16,6 +17,8 @@ import typer
 from manitwin.commands.audit import audit
 from manitwin.commands.build import build
 from manitwin.commands.check import check
+from manitwin.commands.choices import there
+from manitwin.commands.completion import COMPLETION_VARIABLE, PROGRAM, completion, completion_init
 from manitwin.commands.console import err_console, out_console
 from manitwin.commands.doctor import doctor
 from manitwin.commands.export import export
@@ -42,12 +45,30 @@ CommandLineError: type[Exception] = next(
     base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException"
 )
 
-app = typer.Typer(
-    add_completion=False,
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    help="Turn photos, texts and meshes into data-generation-ready digital twins.",
-)
+_command_path = PROGRAM  # of the command that is at work: an error names it
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        out_console.print(f"{PROGRAM} {version(PROGRAM)}", markup=False)
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _manitwin(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version, and end.", callback=_print_version, is_eager=True)
+    ] = False,
+) -> None:
+    """Turn photos, texts and meshes into data-generation-ready digital twins."""
+    global _command_path
+    _command_path = f"{PROGRAM} {context.invoked_subcommand or ''}".rstrip()
+    if context.invoked_subcommand is None:
+        out_console.print(context.get_help(), markup=False)
 
 
 for command in (build, run, status, retry, check, index, query, stats, publish, doctor, fake, prompts, export, audit):
@@ -58,10 +79,15 @@ app.command("import")(import_)
 app.command()(layout)
 app.command()(trajectories)
 app.command()(render)
+app.command()(completion)
 
 
 @app.command()
-def show(twin: Annotated[Path, typer.Argument(help="A twin folder.", metavar="TWIN")]) -> None:
+def show(
+    twin: Annotated[
+        Path, typer.Argument(help="A twin folder.", metavar="TWIN", callback=there("a folder that manitwin build made"))
+    ],
+) -> None:
     """Print a readable summary of a twin, after checking its files."""
     from manitwin.api import load
     from manitwin.summary import print_summary
@@ -78,7 +104,7 @@ def schema() -> None:
 
 
 def _fail(message: str, code: int) -> NoReturn:
-    err_console.print(f"manitwin: {' '.join(message.split())}", markup=False, style="red")
+    err_console.print(f"{_command_path}: {' '.join(message.split())}", markup=False, style="red")
     sys.exit(code)
 
 
@@ -89,13 +115,16 @@ def _interrupt(signal_number: int, frame: object) -> NoReturn:
 def main() -> None:
     """Run the command line; every error is one line."""
     signal.signal(signal.SIGTERM, _interrupt)
+    if COMPLETION_VARIABLE in os.environ:
+        completion_init()
     try:
-        status = app(standalone_mode=False)
+        status = app(prog_name=PROGRAM, standalone_mode=False)
         if status == TYPER_INTERRUPTED:
             raise KeyboardInterrupt
         sys.exit(status)
     except CommandLineError as error:
-        _fail(f"{getattr(error, 'format_message', error.__str__)()} See manitwin --help", 2)
+        message = getattr(error, "format_message", error.__str__)()
+        _fail(f"{message.removesuffix('.')}{'' if message.endswith('?') else '.'} See {_command_path} --help", 2)
     except (KeyboardInterrupt, typer.Abort):
         _fail("interrupted; run the same command again to go on where it stopped", 4)
     except UsageError as error:

@@ -28,7 +28,6 @@ from manitwin.errors import UsageError, choose_from
 from manitwin.files.folder_listing import FolderListing
 from manitwin.ledger.ledger import LEDGER, Ledger
 from manitwin.manifest import Notes, iterate_items
-from manitwin.pipeline import TwinRecipe, check_names, estimate_usd
 from manitwin.stages.stage import Item
 from manitwin.store import canonical_json
 
@@ -84,6 +83,8 @@ def run(
     that nobody knows is an error. Raises UsageError for
     wrong arguments, or where another run is at work on the data set. What becomes of an item is in the ledger.
     """
+    from manitwin.pipeline import TwinRecipe, check_names, estimate_usd  # two CPU-seconds, which `status` does without
+
     root = DatasetRoot(dataset)
     settings = config or stored_config(root)
     check_names(settings)

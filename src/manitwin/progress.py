@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from manitwin.build_item import ItemResult
-from manitwin.executors.whole_items import StageStarted
-from manitwin.stages.stage import Item
+if TYPE_CHECKING:  # what a build needs takes two CPU-seconds to import
+    from manitwin.build_item import ItemResult
+    from manitwin.executors.whole_items import StageStarted
+    from manitwin.stages.stage import Item
 
 STYLES = {"accepted": "green", "rejected": "yellow", "unfinished": "red"}
 

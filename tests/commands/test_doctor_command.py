@@ -97,7 +97,6 @@ def test_built_in_backends_have_nothing_to_ask(capsys: pytest.CaptureFixture[str
 @pytest.mark.parametrize(
     ("what", "options", "message"),
     [
-        ("brain", {}, "Valid: generator, grasper, vlm"),
         ("grasper", {"grasper": "graspgun@tcp://h:1"}, "unknown grasper"),
         (None, {"vlm": "openai:x"}, "takes no options"),
         ("vlm", {"config": Path("none.toml")}, "not there"),

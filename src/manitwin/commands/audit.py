@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from manitwin.commands import choices
 from manitwin.commands.console import err_console
 
 if TYPE_CHECKING:
@@ -16,39 +17,45 @@ if TYPE_CHECKING:
     from manitwin.audit.finding import Rule
     from manitwin.audit.run import Audited
 
-FORMATS = ("text", "json", "sarif")
-
 
 def audit(
-    paths: Annotated[list[Path] | None, typer.Argument(help="Assets, or folders of assets.", metavar="PATH...")] = None,
+    paths: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="Assets, or folders of assets.",
+            metavar="PATH...",
+            callback=choices.there("an asset, or a folder of them"),
+        ),
+    ] = None,
     select: Annotated[
         str | None, typer.Option(help="Only these rules: codes or their beginnings.", metavar="A,B")
     ] = None,
     ignore: Annotated[str | None, typer.Option(help="All but these rules.", metavar="A,B")] = None,
-    format: Annotated[str, typer.Option("--format", "-f", help="text, json or sarif.", metavar="FORMAT")] = "text",
+    format: Annotated[
+        str, choices.AUDIT_FORMATS.option("--format", "-f", help="text, json or sarif.", metavar="FORMAT")
+    ] = "text",
     fix: Annotated[bool, typer.Option("--fix", help="Mend what is safe; old files stay beside as .orig.")] = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes.")] = 1,
     explain: Annotated[str | None, typer.Option(help="Say what a rule is about, and stop.", metavar="CODE")] = None,
 ) -> None:
     """Find what is wrong with assets of any tool: mass, inertia, collision, scale, frames, grasps. Exit 1 on errors."""
+    from manitwin.errors import UsageError
+
+    if explain is None and not paths:
+        raise UsageError("no PATH given: name assets or folders of them, or --explain CODE")
     from manitwin.audit.report import explanation
     from manitwin.audit.run import audit_all, find_all
     from manitwin.audit.select import rule_of, select_rules
-    from manitwin.errors import UsageError, choose_from
 
     if explain is not None:
         sys.stdout.write(explanation(rule_of(explain)) + "\n")
         return
-    if format not in FORMATS:
-        raise UsageError(choose_from("format", format, FORMATS))
-    if not paths:
-        raise UsageError("no PATH given: name assets or folders of them, or --explain CODE")
     rules = select_rules((select or "").split(","), (ignore or "").split(","))
     if not rules:
         raise UsageError("--select and --ignore leave no rule; leave one of them out")
-    assets = find_all(paths)
+    assets = find_all(paths or [])
     if not assets:
-        raise UsageError(f"{', '.join(map(str, paths))}: no asset of a known format there")
+        raise UsageError(f"{', '.join(map(str, paths or []))}: no asset of a known format there")
     audited = []
     for each in audit_all(assets, rules, jobs=jobs, fix=fix):
         audited.append(each)

@@ -7,14 +7,19 @@ from typing import Annotated
 
 import typer
 
-from manitwin.commands import options
+from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console, print_estimate
 from manitwin.commands.why import print_causes_of_build
 
 
 def build(
     inputs: Annotated[
-        list[Path] | None, typer.Argument(help="Images, meshes, folders, or .csv/.jsonl manifests.", metavar="INPUT...")
+        list[Path] | None,
+        typer.Argument(
+            help="Images, meshes, folders, or .csv/.jsonl manifests.",
+            metavar="INPUT...",
+            callback=choices.there("an image, a mesh, a folder, or a .csv or .jsonl manifest"),
+        ),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="The folder to write twins into.")] = None,
     text: options.Text = None,
@@ -37,14 +42,15 @@ def build(
     quick: options.Quick = False,
 ) -> None:
     """Build a verified twin of every input."""
-    from manitwin.api import build as build_twins
     from manitwin.errors import UsageError
+
+    if out is None:
+        raise UsageError("no folder to write twins into; give one with -o")
+    from manitwin.api import build as build_twins
     from manitwin.progress import BuildProgress
     from manitwin.render.device import require_renderer
     from manitwin.run_summary import grasp_lines, summarize_grasps
 
-    if out is None:
-        raise UsageError("no folder to write twins into; give one with -o")
     require_renderer()
     progress = BuildProgress(out_console, err_console)
     with progress:

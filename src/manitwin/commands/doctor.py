@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from manitwin.commands import choices, options
 from manitwin.commands.console import out_console
 
 if TYPE_CHECKING:
@@ -21,18 +21,23 @@ KINDS = {"vlm": "annotator", "generator": "generator", "grasper": "grasper"}
 def doctor(
     what: Annotated[
         str | None,
-        typer.Argument(help="vlm, generator or grasper: send it one small request; none: look at this machine."),
+        choices.SERVED_KINDS.argument(
+            help="vlm, generator or grasper: send it one small request; none: look at this machine."
+        ),
     ] = None,
-    vlm: Annotated[str | None, typer.Option(help="A VLM (openai:MODEL@URL); default: the configuration's.")] = None,
-    generator: Annotated[str | None, typer.Option(help="A generator (rodin); default: the configuration's.")] = None,
+    vlm: Annotated[
+        str | None, choices.ANNOTATORS.option(help="A VLM (openai:MODEL@URL); default: the configuration's.")
+    ] = None,
+    generator: Annotated[
+        str | None, choices.GENERATORS.option(help="A generator (rodin); default: the configuration's.")
+    ] = None,
     grasper: Annotated[
-        str | None, typer.Option(help="A grasper (graspgen@tcp://HOST:5556); default: the configuration's.")
+        str | None, choices.GRASPERS.option(help="A grasper (graspgen@tcp://HOST:5556); default: the configuration's.")
     ] = None,
-    config: Annotated[Path | None, typer.Option(help="A TOML file of settings.")] = None,
+    config: options.Config = None,
 ) -> None:
     """Say what is there and what is missing on this machine, or whether a served model answers."""
-    from manitwin.config import BuildConfig, load_config
-    from manitwin.errors import UsageError, choose_from
+    from manitwin.errors import UsageError
 
     specs = {"vlm": vlm, "generator": generator, "grasper": grasper}
     if what is None:
@@ -42,9 +47,9 @@ def doctor(
         from manitwin.doctor import examine
 
         findings, wrong = examine(), "missing"
-    elif what not in KINDS:
-        raise UsageError(choose_from("thing to look at", what, KINDS))
     else:
+        from manitwin.config import BuildConfig, load_config
+
         settings = load_config(config) if config else BuildConfig()
         wrong = "failed "
         findings = [asked(KINDS[what], specs[what] or getattr(settings, KINDS[what]), settings)]

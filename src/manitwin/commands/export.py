@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from manitwin.commands import choices
 from manitwin.commands.console import err_console, out_console
 
 if TYPE_CHECKING:
@@ -22,10 +23,13 @@ def export(
         typer.Argument(
             help="Twin folders, folders of twins, data sets (a folder or URL); or scenes of `manitwin layout`.",
             metavar="TWIN|SCENE",
+            callback=choices.there("a folder that manitwin has built"),
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write OUT/<twin>/<format>/ into.")],
-    to: Annotated[str, typer.Option(help="Formats by commas (mjcf,urdf,sdf,usd,...), or all.")] = "all",
+    to: Annotated[
+        str, choices.EXPORT_FORMATS.option(help="Formats by commas (mjcf,urdf,sdf,usd,...), or all.")
+    ] = "all",
     license_allow: Annotated[
         str | None,
         typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: any, also 'unknown'."),

@@ -7,11 +7,12 @@ from typing import Annotated
 
 import typer
 
+from manitwin.commands import choices
 from manitwin.commands.console import out_console
 
 
 def fake(
-    name: Annotated[str | None, typer.Argument(help="Which service: openai, rodin, graspgen ...")] = None,
+    name: Annotated[str | None, choices.REHEARSALS.argument(help="Which service: openai, rodin, graspgen ...")] = None,
     port: Annotated[int, typer.Option(help="The port; 0: any that is free.", min=0, max=65535)] = 0,
     fault: Annotated[
         list[str] | None,

@@ -7,29 +7,35 @@ from typing import Annotated
 
 import typer
 
+from manitwin.commands import choices
 from manitwin.commands.console import err_console, out_console
 
 
 def import_(
-    paths: Annotated[list[Path], typer.Argument(help="Assets: files, folders, or folders of them.", metavar="PATH...")],
+    paths: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Assets: files, folders, or folders of them.",
+            metavar="PATH...",
+            callback=choices.there("an asset's file or folder, or a folder of assets"),
+        ),
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write imported assets into.")],
     format: Annotated[
         str,
-        typer.Option(
+        choices.IMPORT_FORMATS.option(
             "--from", help="auto, robotwin, manitwin100k, embodiedgen, urdf, mjcf, usd, gso or twin.", metavar="FORMAT"
         ),
     ] = "auto",
 ) -> None:
     """Take assets of other tools over, keep what is annotated, and say what is missing."""
-    from manitwin.assets.read import FORMATS
-    from manitwin.errors import UsageError, choose_from
+    from manitwin.errors import UsageError
+
+    if out.exists() and not out.is_dir():
+        raise UsageError(f"{out}: a file; give a folder to write into")
     from manitwin.importers.importer import import_assets
     from manitwin.importers.record import kept_words
 
-    if format != "auto" and format not in FORMATS:
-        raise UsageError(choose_from("format", format, ("auto", *FORMATS)))
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"{out}: a file; give a folder to write into")
     done = there = failed = 0
     for imported in import_assets(paths, out, format=format):  # type: ignore[arg-type]
         if imported.record is None or imported.folder is None:

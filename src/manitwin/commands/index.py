@@ -6,12 +6,20 @@ from typing import Annotated
 
 import typer
 
+from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console
 
 
 def index(
-    dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
-    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one a core.")] = None,
+    dataset: Annotated[
+        str,
+        typer.Argument(
+            help="A data set: a folder or URL.",
+            metavar="DATASET",
+            callback=choices.there("the folder or URL of a data set"),
+        ),
+    ],
+    jobs: options.Jobs = None,
 ) -> None:
     """Write the index of a data set again, from its twins alone; the old one serves until the new one is whole."""
     import os
@@ -22,8 +30,6 @@ def index(
     from manitwin.errors import UsageError
     from manitwin.index.rebuild import rebuild
 
-    if jobs is not None and jobs < 1:
-        raise UsageError(f"jobs is {jobs}; give 1 or more")
     root = DatasetRoot(dataset)
     if not root.exists(TWINS):
         raise UsageError(

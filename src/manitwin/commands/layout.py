@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manitwin.commands import options
+from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console
-from manitwin.commands.run import chosen_executor
 from manitwin.commands.why import print_causes
 
 if TYPE_CHECKING:
@@ -18,12 +17,21 @@ if TYPE_CHECKING:
 
 
 def layout(
-    dataset: Annotated[str, typer.Argument(help="A data set, or a folder of twins.", metavar="DATASET")],
+    dataset: Annotated[
+        str,
+        typer.Argument(
+            help="A data set, or a folder of twins.",
+            metavar="DATASET",
+            callback=choices.there("a data set, or the folder that manitwin build wrote"),
+        ),
+    ],
     out: Annotated[str, typer.Option("--out", "-o", help="The folder to write scenes into.")],
-    count: Annotated[int, typer.Option("-n", help="How many layouts.")] = 100,
+    count: Annotated[int, typer.Option("-n", help="How many layouts.", callback=choices.count_of("-n"))] = 100,
     objects: Annotated[str | None, typer.Option(help="How many objects: LOW..HIGH.", metavar="LOW..HIGH")] = None,
-    surface: Annotated[str | None, typer.Option(help="table, shelf or tray.")] = None,
-    clutter: Annotated[str | None, typer.Option(help="How close they stand: sparse, medium or dense.")] = None,
+    surface: Annotated[str | None, choices.SURFACES.option(help="table, shelf or tray.")] = None,
+    clutter: Annotated[
+        str | None, choices.CLUTTER.option(help="How close they stand: sparse, medium or dense.")
+    ] = None,
     include: Annotated[
         list[str] | None, typer.Option(help="A category that must be there; may be repeated.", metavar="CATEGORY")
     ] = None,
@@ -32,7 +40,7 @@ def layout(
     upright: Annotated[
         bool, typer.Option("--upright", help="Put down upright what has an upright placement that stayed.")
     ] = False,
-    robot: Annotated[str | None, typer.Option(help="Stay in the workspace of this robot.")] = None,
+    robot: Annotated[str | None, choices.ROBOTS.option(help="Stay in the workspace of this robot.")] = None,
     pictures: Annotated[
         bool, typer.Option("--pictures", help="Also draw each: colours, depth, normals, instance ids.")
     ] = False,
@@ -43,20 +51,20 @@ def layout(
     address: options.Address = None,
 ) -> None:
     """Sample scenes of twins at rest on a table, a shelf or a tray; run it again to go on where it stopped."""
-    from manitwin.apps.layouts.run import layout_totals, make_layouts, without_upright
-
     given = {
         "objects": None if objects is None else _range(objects), "surface": surface, "clutter": clutter, "robot": robot,
         "include": tuple(include) if include else None, "stacked": stacked, "contained": contained,
         "upright": upright or None,
     }  # fmt: skip
     settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
+    from manitwin.apps.layouts.run import layout_totals, make_layouts, without_upright
+
     if pictures:
         from manitwin.render.device import require_renderer
 
         require_renderer()
     report = make_layouts(
-        dataset, out, count, settings, executor=chosen_executor(executor), address=address,
+        dataset, out, count, settings, executor=options.executor_name(executor), address=address,
         on_start=lambda items, opened: out_console.print(f"{items} layouts, {opened} to do", markup=False),
     )  # fmt: skip
     totals = layout_totals(out)

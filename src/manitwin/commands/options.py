@@ -3,40 +3,54 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
+
+from manitwin.commands import choices
+
+if TYPE_CHECKING:
+    from manitwin.dataset_run import ExecutorName
 
 Text = Annotated[
     list[str] | None, typer.Option("--text", help="A thing to make from words alone; may be repeated.", metavar="WORDS")
 ]
-Units = Annotated[str, typer.Option(help="Units of meshes: m, cm, mm or auto.")]
-Up = Annotated[str, typer.Option(help="Up axis of meshes: y, z or auto.")]
+Units = Annotated[str, choices.UNITS.option(help="Units of meshes: m, cm, mm or auto.")]
+Up = Annotated[str, choices.UP.option(help="Up axis of meshes: y, z or auto.")]
 License = Annotated[str | None, typer.Option(help="Licence of the inputs (SPDX).")]
 Attribution = Annotated[str | None, typer.Option(help="Whom to credit for the inputs.")]
 Strict = Annotated[bool, typer.Option("--strict", help="A manifest column that nobody knows is an error.")]
-Jobs = Annotated[int | None, typer.Option("--jobs", "-j", help="Processes; default: one a core.")]
+Jobs = Annotated[
+    int | None,
+    typer.Option("--jobs", "-j", help="Processes; default: one a core.", callback=choices.count_of("jobs")),
+]
 Seed = Annotated[int | None, typer.Option(help="Seed of everything random; default: the configuration's.")]
-Executor = Annotated[str, typer.Option(help="local, ray for a cluster, or inline: this process, for a debugger.")]
+Executor = Annotated[
+    str, choices.EXECUTORS.option(help="local, ray for a cluster, or inline: this process, for a debugger.")
+]
 Address = Annotated[str | None, typer.Option(help="Ray's address ('auto'); none: a cluster of this machine.")]
-Config = Annotated[Path | None, typer.Option(help="A TOML file of settings.")]
+Config = Annotated[Path | None, typer.Option(help="A TOML file of settings.", callback=choices.settings_file)]
 Grippers = Annotated[
     list[str] | None,
-    typer.Option("--gripper", help="A gripper to verify for; may be repeated, the first is the twin's own."),
+    choices.GRIPPERS.option("--gripper", help="A gripper to verify for; may be repeated, the first is the twin's own."),
 ]
 Vlm = Annotated[
     str | None,
-    typer.Option(help="Who looks: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or rules.", metavar="SPEC"),
+    choices.ANNOTATORS.option(
+        help="Who looks: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or rules.", metavar="SPEC"
+    ),
 ]
 Generator = Annotated[
     str | None,
-    typer.Option(
+    choices.GENERATORS.option(
         help="Who makes meshes: rodin, tripo, meshy, hunyuan3d@URL, fal:ENDPOINT, 'command:...', lift.", metavar="SPEC"
     ),
 ]
 Grasper = Annotated[
     str | None,
-    typer.Option(help="Who proposes grasps: graspgen@tcp://HOST:PORT, graspgenx@..., antipodal.", metavar="SPEC"),
+    choices.GRASPERS.option(
+        help="Who proposes grasps: graspgen@tcp://HOST:PORT, graspgenx@..., antipodal.", metavar="SPEC"
+    ),
 ]
 MaxCost = Annotated[
     float | None, typer.Option("--max-cost", help="USD that services may charge in all; then stop, resumable.")
@@ -57,9 +71,10 @@ Record = Annotated[
 
 
 def run_settings(jobs: int | None) -> dict[str, Any]:
-    """Return what ``--jobs`` says of an application's run; raises UsageError."""
-    from manitwin.errors import UsageError
-
-    if jobs is not None and jobs < 1:
-        raise UsageError(f"jobs is {jobs}; give 1 or more")
+    """Return what ``--jobs`` says of an application's run."""
     return {"index_every": 0, "keep_work": False, **({} if jobs is None else {"cpu": jobs})}
+
+
+def executor_name(given: str) -> ExecutorName:
+    """Return what ``Executor`` holds, which was checked as it was read, under its own type."""
+    return cast("ExecutorName", given)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from manitwin.commands import choices, options
 from manitwin.commands.console import out_console
 
 if TYPE_CHECKING:
@@ -14,10 +15,17 @@ if TYPE_CHECKING:
 
 
 def prompts(
-    twin: Annotated[Path, typer.Argument(help="A twin folder.", metavar="TWIN")],
+    twin: Annotated[
+        Path,
+        typer.Argument(
+            help="A twin folder.", metavar="TWIN", callback=choices.there("a folder that manitwin build made")
+        ),
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write the questions into.")],
-    config: Annotated[Path | None, typer.Option(help="A TOML file of settings.")] = None,
-    vlm: Annotated[str, typer.Option(help="The model, as for build; nothing is sent to it.")] = "openai:MODEL",
+    config: options.Config = None,
+    vlm: Annotated[
+        str, choices.ANNOTATORS.option(help="The model, as for build; nothing is sent to it.")
+    ] = "openai:MODEL",
 ) -> None:
     """Write the questions that a vision-language model would be asked about a twin: text, pictures, schema and cost."""
     from manitwin.commands.annotator_questions import questions_about, write_questions

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from manitwin.commands import choices
 from manitwin.commands.console import err_console, out_console
 
 if TYPE_CHECKING:
@@ -15,7 +16,14 @@ SHARD_SIZE_MB = 1000  # as in publish/publish.py, which is imported when it is n
 
 
 def publish(
-    dataset: Annotated[str, typer.Argument(help="A data set: a folder or a URL.", metavar="DATASET")],
+    dataset: Annotated[
+        str,
+        typer.Argument(
+            help="A data set: a folder or a URL.",
+            metavar="DATASET",
+            callback=choices.there("the folder or URL of a data set"),
+        ),
+    ],
     out: Annotated[str, typer.Option("--out", "-o", help="A new folder or URL, or an older publication.")],
     license_allow: Annotated[
         str | None,

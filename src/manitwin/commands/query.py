@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 import typer
 
+from manitwin.commands import choices
 from manitwin.commands.console import out_console
 
 if TYPE_CHECKING:
@@ -36,20 +37,21 @@ def query(
         str | None, typer.Argument(help="An SQL condition: \"category = 'mug' and mass_kg < 0.4\". None: all rows.")
     ] = None,
     table: Annotated[
-        str, typer.Option(help="twins, points, grasps, placements, rejections or stages.", metavar="NAME")
+        str, choices.TABLES.option(help="twins, points, grasps, placements, rejections or stages.", metavar="NAME")
     ] = "twins",
     columns: Annotated[str | None, typer.Option(help="Columns to print, with commas between.", metavar="A,B")] = None,
     limit: Annotated[int | None, typer.Option(help="Print at most so many rows.", metavar="N")] = None,
-    format: Annotated[str, typer.Option("--format", "-f", help="table, csv, json or ids.", metavar="FORMAT")] = "table",
+    format: Annotated[
+        str, choices.QUERY_FORMATS.option("--format", "-f", help="table, csv, json or ids.", metavar="FORMAT")
+    ] = "table",
 ) -> None:
     """Print the rows of a data set's index that satisfy a condition, sorted by twin."""
-    from manitwin.errors import UsageError, choose_from
-    from manitwin.index.query import Index
+    from manitwin.errors import UsageError
 
-    if format not in WRITERS:
-        raise UsageError(choose_from("format", format, WRITERS))
     if format == "ids" and columns is not None:
         raise UsageError("format ids prints twins' ids alone; leave out --columns, or choose another format")
+    from manitwin.index.query import Index
+
     names = [name.strip() for name in columns.split(",")] if columns is not None else None
     if names is None and format == "table":
         names = list(SHOWN.get(table, ())) or None

@@ -7,17 +7,25 @@ from typing import Annotated
 
 import typer
 
-from manitwin.commands import options
+from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console
-from manitwin.commands.run import chosen_executor
 from manitwin.commands.why import print_causes
 
 
 def render(
-    episodes: Annotated[Path, typer.Argument(help="What `manitwin trajectories` wrote.", metavar="EPISODES")],
-    cameras: Annotated[str | None, typer.Option(help="By commas: front, side, top, wrist.")] = None,
+    episodes: Annotated[
+        Path,
+        typer.Argument(
+            help="What `manitwin trajectories` wrote.",
+            metavar="EPISODES",
+            callback=choices.there("the folder that manitwin trajectories wrote"),
+        ),
+    ],
+    cameras: Annotated[str | None, choices.CAMERAS.option(help="By commas: front, side, top, wrist.")] = None,
     size: Annotated[int | None, typer.Option(help="Width and height of a picture in pixels.")] = None,
-    codec: Annotated[str | None, typer.Option(help="vp9 (plays in browsers), or mpeg4 (quicker to write).")] = None,
+    codec: Annotated[
+        str | None, choices.CODECS.option(help="vp9 (plays in browsers), or mpeg4 (quicker to write).")
+    ] = None,
     twins: options.Twins = None,
     config: options.Config = None,
     jobs: options.Jobs = None,
@@ -26,18 +34,19 @@ def render(
 ) -> None:
     """Draw the kept episodes by showing their states again, and add the films to the LeRobot data set."""
     from manitwin.app_config import PicturesConfig, load_app_config
-    from manitwin.apps.trajectories.render_run import draw_episodes, write_with_pictures
-    from manitwin.apps.trajectories.video import require_encoder
-    from manitwin.render.device import require_renderer
 
     names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
     given = {"cameras": names, "size_px": size, "codec": codec, "run": options.run_settings(jobs)}
     settings = load_app_config(PicturesConfig, config, given)
+    from manitwin.apps.trajectories.render_run import draw_episodes, write_with_pictures
+    from manitwin.apps.trajectories.video import require_encoder
+    from manitwin.render.device import require_renderer
+
     if executor != "ray":
         require_renderer()
         require_encoder(settings.codec)
     report = draw_episodes(
-        episodes, settings, twins=twins, executor=chosen_executor(executor), address=address,
+        episodes, settings, twins=twins, executor=options.executor_name(executor), address=address,
         on_start=lambda items, opened: out_console.print(f"{items} batches, {opened} to do", markup=False),
     )  # fmt: skip
     if report.exit_code == 4:

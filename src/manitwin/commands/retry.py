@@ -6,14 +6,13 @@ from typing import Annotated
 
 import typer
 
+from manitwin.commands import choices
 from manitwin.commands.console import out_console
-
-STATES = ("failed", "rejected")
 
 
 def retry(
     dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
-    state: Annotated[str, typer.Option(help="failed or rejected.")] = "failed",
+    state: Annotated[str, choices.ENDED_STATES.option(help="failed or rejected.")] = "failed",
     stage: Annotated[str | None, typer.Option(help="Only items that ended in this stage.")] = None,
     reason: Annotated[str | None, typer.Option(help="Only items that ended for this reason.")] = None,
 ) -> None:
@@ -23,8 +22,6 @@ def retry(
     from manitwin.errors import UsageError, choose_from
     from manitwin.ledger.ledger import Ledger, read_ledger
 
-    if state not in STATES:
-        raise UsageError(choose_from("state", state, STATES))
     root = DatasetRoot(dataset)
     path = local_ledger(root)
     with read_ledger(path) as reader:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.commands import options
+from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console, print_estimate
 from manitwin.commands.why import print_causes
 
 if TYPE_CHECKING:
-    from manitwin.dataset_run import ExecutorName, RunReport
+    from manitwin.dataset_run import RunReport
     from manitwin.engine.driver import ItemEnded
 
 STYLES = {"accepted": "green", "rejected": "yellow", "failed": "red", "duplicate": "dim"}
@@ -22,7 +22,9 @@ def run(
     inputs: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="A .csv or .jsonl manifest, folders, files; none: go on with what is there.", metavar="MANIFEST"
+            help="A .csv or .jsonl manifest, folders, files; none: go on with what is there.",
+            metavar="MANIFEST",
+            callback=choices.there("an image, a mesh, a folder, or a .csv or .jsonl manifest"),
         ),
     ] = None,
     dataset: Annotated[
@@ -50,24 +52,23 @@ def run(
     lines: Annotated[bool, typer.Option("--lines/--no-lines", help="Print a line for every item that ends.")] = True,
 ) -> None:
     """Build a data set of twins; run it again to go on where it stopped."""
+    from manitwin.errors import UsageError
+
+    if not dataset:
+        raise UsageError("no data set; give a folder or URL with -o")
     from manitwin.api import with_flags
     from manitwin.config import load_config
     from manitwin.dataset_root import DatasetRoot
     from manitwin.dataset_run import run as run_dataset
     from manitwin.dataset_run import stored_config
-    from manitwin.errors import UsageError
     from manitwin.render.device import require_renderer
 
-    if not dataset:
-        raise UsageError("no data set; give a folder or URL with -o")
     settings = load_config(config) if config else stored_config(DatasetRoot(dataset))
     settings = with_flags(
         settings, seed=seed, grippers=gripper or None, vlm=vlm, generator=generator, grasper=grasper,
         max_cost_usd=max_cost, record=record, require_agreement=require_agreement, quick=quick,
     )  # fmt: skip
     if jobs is not None:
-        if jobs < 1:
-            raise UsageError(f"jobs is {jobs}; give 1 or more")
         settings = settings.model_copy(update={"run": settings.run.model_copy(update={"cpu": jobs})})
     if executor != "ray":
         require_renderer()
@@ -80,7 +81,7 @@ def run(
         dataset,
         texts=text or [],
         config=settings,
-        executor=chosen_executor(executor),
+        executor=options.executor_name(executor),
         address=address,
         defaults={"units": units, "up": up, "license": license, "attribution": attribution},
         strict=strict,
@@ -90,17 +91,6 @@ def run(
     )
     _print_report(report, dataset)
     raise typer.Exit(report.exit_code)
-
-
-def chosen_executor(name: str) -> ExecutorName:
-    """Return the executor of a name; raises UsageError."""
-    from manitwin.dataset_run import EXECUTORS
-    from manitwin.errors import UsageError, choose_from
-
-    for known in EXECUTORS:
-        if name == known:
-            return known
-    raise UsageError(choose_from("executor", name, EXECUTORS))
 
 
 def _print_report(report: RunReport, dataset: str) -> None:

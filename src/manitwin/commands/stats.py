@@ -7,12 +7,18 @@ from typing import Annotated
 
 import typer
 
+from manitwin.commands import choices
 from manitwin.commands.console import out_console
 
 
 def stats(
     dataset: Annotated[
-        str, typer.Argument(help="A data set (a folder or URL), or a folder of episodes.", metavar="DATASET|EPISODES")
+        str,
+        typer.Argument(
+            help="A data set (a folder or URL), or a folder of episodes.",
+            metavar="DATASET|EPISODES",
+            callback=choices.there("the folder or URL of a data set"),
+        ),
     ],
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="The folder to write into; default: DATASET/statistics.")

@@ -7,28 +7,38 @@ from typing import Annotated
 
 import typer
 
-from manitwin.commands import options
+from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console
-from manitwin.commands.run import chosen_executor
 from manitwin.commands.why import print_causes
 
 
 def trajectories(
     source: Annotated[
         str,
-        typer.Argument(help="A data set, a folder of twins, or scenes of `manitwin layout`.", metavar="DATASET|SCENES"),
+        typer.Argument(
+            help="A data set, a folder of twins, or scenes of `manitwin layout`.",
+            metavar="DATASET|SCENES",
+            callback=choices.there("a data set, a folder of twins, or what manitwin layout wrote"),
+        ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write episodes into.")],
-    count: Annotated[int, typer.Option("-n", help="How many episodes to attempt.")] = 100,
-    robot: Annotated[str | None, typer.Option(help="A robot by name, or a TOML file that describes one.")] = None,
-    skill: Annotated[str | None, typer.Option(help="What to do: pick_place.")] = None,
+    count: Annotated[
+        int, typer.Option("-n", help="How many episodes to attempt.", callback=choices.count_of("-n"))
+    ] = 100,
+    robot: Annotated[
+        str | None, choices.ROBOTS.option(help="A robot by name, or a TOML file that describes one.")
+    ] = None,
+    skill: Annotated[str | None, choices.SKILLS.option(help="What to do: pick_place.")] = None,
     twins: options.Twins = None,
     others: Annotated[int | None, typer.Option(help="So many other objects around, where twins are given.")] = None,
     retire: Annotated[
         bool, typer.Option("--retire/--no-retire", help="Retire grasps that fail, in their twins' records.")
     ] = True,
     formats: Annotated[
-        str, typer.Option("--format", help="What to write beside the batches: lerobot, maniskill, or both by a comma.")
+        str,
+        choices.EPISODE_FORMATS.option(
+            "--format", help="What to write beside the batches: lerobot, maniskill, or both by a comma."
+        ),
     ] = "lerobot,maniskill",
     seed: options.Seed = None,
     config: options.Config = None,
@@ -38,14 +48,15 @@ def trajectories(
 ) -> None:
     """Plan and execute pick-and-place episodes, and keep what succeeded; run it again to go on where it stopped."""
     from manitwin.app_config import TrajectoriesConfig, load_app_config
+
+    given = {"seed": seed, "robot": robot, "skill": skill, "others": others, "run": options.run_settings(jobs)}
+    settings = load_app_config(TrajectoriesConfig, config, given)
     from manitwin.apps.trajectories.collect import chosen_formats, collect
     from manitwin.apps.trajectories.run import make_episodes, retire_failing
 
     wanted = chosen_formats(formats)
-    given = {"seed": seed, "robot": robot, "skill": skill, "others": others, "run": options.run_settings(jobs)}
-    settings = load_app_config(TrajectoriesConfig, config, given)
     report = make_episodes(
-        source, out, count, settings, twins=twins, executor=chosen_executor(executor), address=address,
+        source, out, count, settings, twins=twins, executor=options.executor_name(executor), address=address,
         on_start=lambda items, opened: out_console.print(f"{items} batches, {opened} to do", markup=False),
     )  # fmt: skip
     for remark in report.remarks:
