@@ -24,7 +24,8 @@ def write(path: Path, text: str = "{}") -> Path:
         (("twin.json",), "twin"),
         (("manipulation_annotations.json", "base_rescaled.glb"), "manitwin100k"),
         (("model_data0.json", "visual/base0.glb"), "robotwin"),
-        (("model.config", "model.sdf", "meshes/model.obj"), "gso"),
+        (("model.config", "model.sdf", "metadata.pbtxt", "meshes/model.obj"), "gso"),
+        (("model.config", "model.sdf", "meshes/model.obj"), "sdf"),
         (("scene.usda",), "usd"),
     ],
 )

@@ -7,15 +7,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from exported_twins import content
 from manitwin.assets.read import read_asset
+from manitwin.audit.run import audit
 from manitwin.dataset_root import twin_name
 from manitwin.export.content import TwinContent
 from manitwin.export.registry import exporter
+from manitwin.export.write import export_twin as write_export
+from manitwin.importers.importer import import_assets
 from manitwin.loaded_twin import Twin
+from manitwin.manifest import collect_items
 from twin_folders import box, write_accepted
 
+READABLE = ("mjcf", "urdf", "sdf", "usd", "usdz", "robotwin", "isaaclab")
 
-@pytest.mark.parametrize("format", ["urdf", "mjcf"])
+
+@pytest.mark.parametrize("format", ["urdf", "mjcf", "sdf"])
 def test_export_says_what_the_twin_says(tmp_path: Path, format: str) -> None:
     folder = tmp_path / "twins" / twin_name(write_accepted(tmp_path / "twins", 1, mass_kg=0.42))
     (folder / "collision").mkdir()
@@ -23,9 +30,9 @@ def test_export_says_what_the_twin_says(tmp_path: Path, format: str) -> None:
     mesh.export(folder / "collision" / "hull_00.obj", include_normals=False)
     twin = TwinContent.of(Twin(folder))
     exported = exporter(format)(twin)
-    for name, content in exported.files.items():
+    for name, data in exported.files.items():
         (tmp_path / "out" / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / "out" / name).write_bytes(content)
+        (tmp_path / "out" / name).write_bytes(data)
     asset = read_asset(tmp_path / "out" / exported.main)
     physical = twin.physical
     assert asset.format == format
@@ -35,4 +42,42 @@ def test_export_says_what_the_twin_says(tmp_path: Path, format: str) -> None:
     assert np.allclose(asset.visual[0].bounds, mesh.bounds, atol=1e-6)
     assert len(asset.collision) == 1 and np.allclose(asset.collision[0].vertices.max(0), mesh.bounds[1], atol=1e-6)
     assert asset.missing_files == () and asset.remarks == ()
+    if format != "mjcf":  # which has no restitution
+        assert asset.contact.restitution == pytest.approx(physical.restitution.value)
     assert asset.contact.friction_static == pytest.approx(physical.friction_static.value)
+
+
+CREDIT = "Ada Lovelace; Söhne & Co. <a@example.org>"
+
+
+@pytest.fixture(scope="module")
+def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Write a twin under a licence that asks for attribution in every format that can be read back."""
+    folder = tmp_path_factory.mktemp("exports")
+    source = {"license": "CC-BY-SA-4.0", "attribution": CREDIT}
+    twin = content(folder / "twin", source=source, points={"functional": [], "grasp": []})
+    for format in READABLE:
+        write_export(twin, format, folder / format)
+    return folder
+
+
+@pytest.mark.parametrize("format", READABLE)
+def test_audit_and_import_find_the_licence_of_an_export(exports: Path, tmp_path: Path, format: str) -> None:
+    (audited,) = audit([exports / format], select=["LIC"])
+    assert audited.format is not None and audited.findings == ()
+    (imported,) = import_assets([exports / format], tmp_path)
+    assert imported.record is not None, imported.error
+    assert (imported.record.license, imported.record.attribution) == ("CC-BY-SA-4.0", CREDIT)
+    assert imported.folder is not None
+    ((item,), _) = collect_items([imported.folder])
+    assert (item.license, item.attribution) == ("CC-BY-SA-4.0", CREDIT)
+
+
+def test_an_export_of_unknown_licence_is_still_found_wanting(tmp_path: Path) -> None:
+    twin = content(tmp_path / "twin", source={"license": "unknown", "attribution": None})
+    for format in READABLE:
+        write_export(twin, format, tmp_path / "out")
+    found = audit([tmp_path / "out"], select=["LIC"])
+    assert len(found) == len(READABLE)
+    assert {finding.code for one in found for finding in one.findings} == {"LIC001"}
+    assert all(len(one.findings) == 1 for one in found)

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 import trimesh
 
-Format = Literal["twin", "urdf", "mjcf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso"]
+Format = Literal["twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso"]
 FrameKind = Literal["contact", "functional", "target", "orientation"]
 
 

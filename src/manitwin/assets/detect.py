@@ -9,6 +9,8 @@ from manitwin.assets.asset import Format
 from manitwin.errors import AssetError
 
 USD_SUFFIXES = frozenset({".usd", ".usda", ".usdc", ".usdz"})
+SCAN_METADATA = "metadata.pbtxt"
+"""Which Google Scanned Objects have, and other models of Gazebo have not."""
 _HEAD_BYTES = 1 << 16
 _FIRST_TAG = re.compile(rb"<([A-Za-z][\w.:-]*)[\s/>]")
 _MARKS = re.compile(rb"<extra_info[\s/>]|<custom_data[\s/>]")
@@ -29,7 +31,7 @@ def detect(path: Path) -> Format:
         return detect(only_file(path))
     raise AssetError(
         f"{path.name}: no asset of a known format; valid are twin folders, RoboTwin, ManiTwin-100K, EmbodiedGen and"
-        " Google Scanned Objects folders, .urdf, MJCF .xml and USD files"
+        " Google Scanned Objects folders, .urdf, .sdf, MJCF .xml and USD files"
     )
 
 
@@ -42,8 +44,8 @@ def folder_format(folder: Path) -> Format | None:
         return "manitwin100k"
     if any(_ROBOTWIN_DATA.fullmatch(name) for name in names):
         return "robotwin"
-    if {"model.config", "model.sdf"} <= names and (folder / "meshes").is_dir():
-        return "gso"
+    if {"model.config", "model.sdf"} <= names:
+        return "gso" if SCAN_METADATA in names else "sdf"
     return None
 
 
@@ -56,7 +58,7 @@ def file_format(file: Path) -> Format | None:
         return "robotwin"
     if suffix in USD_SUFFIXES:
         return "usd"
-    if suffix in (".urdf", ".xml", ".mjcf"):
+    if suffix in (".urdf", ".xml", ".mjcf", ".sdf"):
         return _xml_format(file)
     return None
 
@@ -64,12 +66,12 @@ def file_format(file: Path) -> Format | None:
 def only_file(folder: Path) -> Path:
     """Return the one main file in a folder or the folders directly in it; raises AssetError where there is not one.
 
-    Where a folder holds the same asset in several formats, URDF is taken before MJCF and that before USD.
+    Where a folder holds the same asset in several formats, URDF is taken before MJCF, SDF and USD.
     """
     for depth in ("*", "*/*"):
         files = [file for file in sorted(folder.glob(depth)) if file.is_file() and not _hidden(file, folder)]
         found = [(file, form) for file in files if (form := file_format(file)) is not None]
-        for wanted in (("urdf", "embodiedgen"), ("mjcf",), ("usd",)):
+        for wanted in (("urdf", "embodiedgen"), ("mjcf",), ("sdf", "gso"), ("usd",)):
             named = [file for file, form in found if form in wanted]
             if len(named) == 1:
                 return named[0]
@@ -99,6 +101,8 @@ def _xml_format(file: Path) -> Format | None:
     tag = first.group(1) if first else None
     if tag == b"mujoco":
         return "mjcf"
+    if tag == b"sdf":
+        return "gso" if file.name == "model.sdf" and (file.parent / SCAN_METADATA).is_file() else "sdf"
     if tag == b"robot":
         return "embodiedgen" if _MARKS.search(head) else "urdf"
     return None

@@ -9,7 +9,7 @@ from pathlib import Path
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset_files import AssetFiles
-from manitwin.assets.xml_file import MAX_NUMBER, parse_xml
+from manitwin.assets.xml_file import MAX_NUMBER, comments_before, parse_xml
 from manitwin.errors import AssetError
 
 _SECTIONS = frozenset({"compiler", "default", "asset", "worldbody"})
@@ -23,7 +23,10 @@ _MAX_ELEMENTS = 100_000
 
 @dataclass(frozen=True)
 class MjcfSource:
-    """The XML that MuJoCo is given, and what was taken from it: ``texts`` of <custom>, one ``name: data`` each."""
+    """The XML that MuJoCo is given, and what was taken from it.
+
+    ``texts`` are the comments at its head, and those of <custom> as ``name: data``.
+    """
 
     file: Path
     root: etree._Element
@@ -37,13 +40,14 @@ class MjcfSource:
 def open_mjcf(file: Path, files: AssetFiles) -> MjcfSource:
     """Parse an MJCF file and put its includes in; raises AssetError for what is broken or not read."""
     root = parse_xml(file, "mujoco")
+    comments = comments_before(root)
     _put_in_includes(file, root, files)
     if sum(1 for _ in root.iter()) > _MAX_ELEMENTS:
         raise AssetError(f"{file.name}: more than {_MAX_ELEMENTS} elements; it is no single object")
     for tag in _NOT_READ:
         if root.find(f".//{tag}") is not None:
             raise AssetError(f"{file.name}: it uses <{tag}>, which is not read; write it out as bodies and geoms")
-    texts = tuple(f"{t.get('name')}: {t.get('data')}" for t in root.iterfind("custom/text"))
+    texts = (*comments, *(f"{t.get('name')}: {t.get('data')}" for t in root.iterfind("custom/text")))
     for section in list(root):
         if section.tag not in _SECTIONS:
             root.remove(section)

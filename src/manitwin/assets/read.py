@@ -12,7 +12,7 @@ from manitwin.assets.asset import Asset, Format
 from manitwin.assets.detect import detect, file_format, folder_format, robotwin_data
 from manitwin.errors import AssetError, choose_from
 
-FORMATS: tuple[Format, ...] = ("twin", "urdf", "mjcf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
+FORMATS: tuple[Format, ...] = ("twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
 
 
 def read_asset(path: Path, format: Format | Literal["auto"] = "auto") -> Asset:

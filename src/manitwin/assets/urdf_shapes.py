@@ -60,7 +60,7 @@ class LinkShapes:
             return self._mesh_parts(shape, color)
         solid = _primitive(shape, what)
         self._files.count(len(solid.faces))
-        return [make_part(solid.vertices, solid.faces, material=_plain(color), name=str(shape.tag))]
+        return [make_part(solid.vertices, solid.faces, material=plain_material(color), name=str(shape.tag))]
 
     def _mesh_parts(self, shape: etree._Element, color: np.ndarray | None) -> list[trimesh.Trimesh]:
         name = shape.get("filename") or ""
@@ -75,7 +75,7 @@ class LinkShapes:
         parts = [bake_transform(part, np.diag([unit_m, unit_m, unit_m, 1.0])) for part in mesh.parts]
         if color is None or path.suffix.lower() not in _BARE_MESHES:
             return parts
-        return [make_part(p.vertices, p.faces, material=_plain(color), name=p.metadata["name"]) for p in parts]
+        return [make_part(p.vertices, p.faces, material=plain_material(color), name=p.metadata["name"]) for p in parts]
 
     def _candidates(self, name: str) -> Iterator[Path]:
         clean = name.replace("\\", "/").removeprefix("file://")
@@ -149,7 +149,8 @@ def _scale_numbers(text: str, what: str) -> np.ndarray:
     return numbers(text, 3, f"{what} scale")
 
 
-def _plain(rgba: np.ndarray | None) -> trimesh.visual.material.PBRMaterial:
+def plain_material(rgba: np.ndarray | None) -> trimesh.visual.material.PBRMaterial:
+    """Return a material of one sRGB colour ``(4,)`` in 0..1; grey for None."""
     if rgba is None:
         return pbr_material(base_color=(0.8, 0.8, 0.8))
     linear = srgb_to_linear(np.clip(rgba[:3], 0, 1))

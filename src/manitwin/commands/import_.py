@@ -24,7 +24,9 @@ def import_(
     format: Annotated[
         str,
         choices.IMPORT_FORMATS.option(
-            "--from", help="auto, robotwin, manitwin100k, embodiedgen, urdf, mjcf, usd, gso or twin.", metavar="FORMAT"
+            "--from",
+            help="auto, robotwin, manitwin100k, embodiedgen, urdf, mjcf, sdf, usd, gso or twin.",
+            metavar="FORMAT",
         ),
     ] = "auto",
 ) -> None:

@@ -15,7 +15,6 @@ from manitwin.assets.mjcf_shapes import BodyShapes
 from manitwin.assets.mjcf_source import MjcfSource, open_mjcf
 from manitwin.assets.mjcf_spec import compiled
 from manitwin.assets.urdf_inertial import combined
-from manitwin.assets.xml_file import comments_before
 from manitwin.errors import AssetError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
@@ -40,7 +39,7 @@ def read(path: Path) -> Asset:
     shapes = BodyShapes(result, files)
     visual, collision = shapes.of(bodies)
     names = [model.body(index).name for index, _ in bodies]
-    licence, attribution = stated_licence([*comments_before(source.root), *source.texts])
+    licence, attribution = stated_licence(source.texts)
     return Asset(
         format="mjcf",
         path=path,

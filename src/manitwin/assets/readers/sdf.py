@@ -1,0 +1,189 @@
+"""SDF: the first object of a model that is rigid, links that fixed joints join taken as one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from lxml import etree  # type: ignore[import-untyped]
+
+from manitwin.assets.asset import Asset, Contact, Inertial
+from manitwin.assets.asset_files import AssetFiles
+from manitwin.assets.detect import only_file
+from manitwin.assets.licence_text import said, stated_licence
+from manitwin.assets.sdf_poses import ModelFrames, pose_of
+from manitwin.assets.sdf_shapes import SdfShapes
+from manitwin.assets.urdf_inertial import combined
+from manitwin.assets.xml_file import comments_before, number, parse_xml, text_of
+from manitwin.errors import AssetError
+
+MAIN_FILE, CONFIG_FILE = "model.sdf", "model.config"
+_MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+@dataclass(frozen=True)
+class SdfModel:
+    """An SDF model with the links of the object that is read; ``config`` is the model.config beside it."""
+
+    file: Path
+    root: etree._Element
+    config: etree._Element | None
+    model: etree._Element
+    links: tuple[etree._Element, ...]
+    frames: ModelFrames
+    files: AssetFiles
+
+
+def read(path: Path) -> Asset:
+    """Read an SDF file, or a model's folder; the asset's axes are those of the model.
+
+    Meshes are looked up beside the file and, for ``model://``, in the model's folder. Links behind joints that move, nested
+    and included models are left out with a remark. Raises AssetError naming what is broken. Source: the SDFormat
+    specification, version 1.9.
+    """
+    opened = open_sdf(path)
+    return asset_of(opened, path)
+
+
+def open_sdf(path: Path) -> SdfModel:
+    """Parse an SDF and choose the object in it; raises AssetError."""
+    file = path
+    if path.is_dir():
+        file = path / MAIN_FILE if (path / MAIN_FILE).is_file() else only_file(path)
+    root = parse_xml(file, "sdf")
+    files = AssetFiles(file.parent)
+    files.used.add(file.resolve())
+    config = file.parent / CONFIG_FILE
+    beside = parse_xml(config, "model") if config.is_file() else None
+    if beside is not None:
+        files.used.add(config.resolve())
+    model = _only_model(file, root, files)
+    frames = ModelFrames(file, model)
+    return SdfModel(file, root, beside, model, _rigid_links(file, model, frames, files), frames, files)
+
+
+def asset_of(opened: SdfModel, path: Path) -> Asset:
+    """Return the asset that an SDF's elements describe; raises AssetError."""
+    shapes = SdfShapes(opened.file, opened.frames, opened.files)
+    visual = [part for link in opened.links for part in shapes.visual(link)]
+    collision = [shape for link in opened.links for shape in shapes.collision(link)]
+    if not visual and not collision and not opened.files.missing:
+        raise AssetError(f"{opened.file.name}: no link of it has a shape")
+    licence, attribution = _licence(opened)
+    named = None if opened.config is None else text_of(opened.config, "name")
+    return Asset(
+        format="sdf",
+        path=path,
+        name=(named or opened.model.get("name") or opened.file.stem).replace("_", " "),
+        visual=tuple(visual),
+        collision=tuple(collision),
+        up="z",
+        unit_m=1.0,
+        inertial=_declared_inertial(opened),
+        contact=_declared_contact(opened),
+        license=licence,
+        attribution=attribution,
+        files=opened.files.sorted_files(),
+        missing_files=opened.files.missing_names(),
+        remarks=tuple(opened.files.remarks),
+    )
+
+
+def _only_model(file: Path, root: etree._Element, files: AssetFiles) -> etree._Element:
+    models = root.findall("model") or root.findall("world/model")
+    if not models:
+        raise AssetError(f"{file.name}: it holds no <model>")
+    if len(models) > 1:
+        files.remark(f"it holds {len(models)} models; the first was read")
+    model = models[0]
+    for tag in ("include", "model"):
+        for other in model.findall(tag):
+            name = other.get("name") or text_of(other, "uri") or ""
+            files.remark(f"the {'included' if tag == 'include' else 'nested'} model {name[:60]!r} was left out")
+    if model.find("link") is None:
+        raise AssetError(f"{file.name}: its model has no <link>")
+    return model
+
+
+def _rigid_links(
+    file: Path, model: etree._Element, frames: ModelFrames, files: AssetFiles
+) -> tuple[etree._Element, ...]:
+    """Return the links of the first rigid group that has a shape, in the order of the file."""
+    links = {link.get("name"): link for link in model.findall("link")}
+    group = {name: {name} for name in links}
+    moves: dict[str, str] = {}
+    for joint in model.findall("joint"):
+        ends = [frames.link_of((joint.findtext(tag) or "").strip()) for tag in ("parent", "child")]
+        kind = joint.get("type") or ""
+        if ends[1] in links and kind != "fixed":
+            moves[ends[1]] = f"{joint.get('name')} ({kind})"
+        if kind == "fixed" and all(end in links for end in ends) and group[ends[0]] is not group[ends[1]]:
+            small, large = sorted((group[end] for end in ends), key=len)
+            large |= small
+            group.update(dict.fromkeys(small, large))
+    chosen: set[str] | None = None
+    for name, link in links.items():
+        shaped = link.find("visual") is not None or link.find("collision") is not None
+        if chosen is None and shaped:
+            chosen = group[name]
+        elif chosen is not None and shaped and name not in chosen:
+            how = f"moves by joint {moves[name]}" if name in moves else "is joined to nothing fixed"
+            files.remark(f"link {name!r} {how} and was left out: one rigid object is read")
+    chosen = chosen or group[next(iter(links))]
+    return tuple(link for name, link in links.items() if name in chosen)
+
+
+def _declared_inertial(opened: SdfModel) -> Inertial:
+    found = [_of_link(opened, link) for link in opened.links if link.find("inertial") is not None]
+    with_mass = [entry for entry in found if entry.mass_kg is not None]
+    return combined(with_mass) if with_mass else found[0] if found else Inertial()
+
+
+def _of_link(opened: SdfModel, link: etree._Element) -> Inertial:
+    inertial = link.find("inertial")
+    what = f"{opened.file.name}: link {link.get('name')} inertial"
+    if (inertial.get("auto") or "").strip().lower() in ("true", "1"):
+        opened.files.remark("its mass is left to the simulator to compute (auto), and is not declared")
+        return Inertial()
+    mass = text_of(inertial, "mass")
+    pose = inertial.find("pose")
+    base = None if pose is None else pose.get("relative_to")
+    to_model = opened.frames.to_model(base or link.get("name")) @ pose_of(inertial, what)
+    tensor = None
+    if inertial.find("inertia") is not None:
+        if any(text_of(inertial, f"inertia/{key}") is None for key in ("ixx", "iyy", "izz")):
+            raise AssetError(f"{what}: its inertia lacks one of ixx, iyy, izz")
+        xx, xy, xz, yy, yz, zz = (number(text_of(inertial, f"inertia/{k}") or "0", f"{what} {k}") for k in _MOMENTS)
+        rotation = to_model[:3, :3]
+        tensor = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
+    return Inertial(None if mass is None else number(mass, f"{what} mass"), to_model[:3, 3], tensor)
+
+
+def _declared_contact(opened: SdfModel) -> Contact:
+    """Return the friction of the first collision that says any: ``mu`` and ``mu2`` are two directions of one coefficient."""
+    surfaces = [surface for link in opened.links for surface in link.findall("collision/surface")]
+    said_mu = [(s, text) for s in surfaces if (text := text_of(s, "friction/ode/mu")) is not None]
+    bounces = [text for s in surfaces if (text := text_of(s, "bounce/restitution_coefficient")) is not None]
+    restitution = number(bounces[0], f"{opened.file.name}: restitution_coefficient") if bounces else None
+    if not said_mu:
+        return Contact(restitution=restitution)
+    values = [number(text, f"{opened.file.name}: mu") for _, text in said_mu]
+    if max(values) > min(values):
+        opened.files.remark(
+            f"its collisions have frictions from {min(values):g} to {max(values):g}; the first was taken"
+        )
+    second = text_of(said_mu[0][0], "friction/ode/mu2")
+    if second is not None and number(second, f"{opened.file.name}: mu2") != values[0]:
+        opened.files.remark(f"mu {values[0]:g} and mu2 {second} are two directions; the first was taken")
+    return Contact(values[0], None, restitution)
+
+
+def _licence(opened: SdfModel) -> tuple[str | None, str | None]:
+    """Return licence and attribution: what model.config says in elements of their own, else what comments state."""
+    comments = [*comments_before(opened.root), *(comments_before(opened.config) if opened.config is not None else ())]
+    licence, attribution = stated_licence(comments)
+    if opened.config is not None:
+        licence = said(text_of(opened.config, "license")) or licence
+        attribution = said(text_of(opened.config, "author/name")) or attribution
+    return licence, attribution

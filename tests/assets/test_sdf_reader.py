@@ -1,0 +1,208 @@
+"""SDF models as the specification has them: poses, joints, shapes, and files that stay in the folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from manitwin.assets.asset import Asset
+from manitwin.assets.licence_text import stated_licence
+from manitwin.assets.read import find_assets, read_asset
+from manitwin.errors import AssetError
+
+BOX = "<geometry><box><size>0.1 0.2 0.3</size></box></geometry>"
+
+
+def sdf(folder: Path, inside: str, *, root: str = "", name: str = "model.sdf") -> Path:
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_text(
+        f'<?xml version="1.0"?><sdf version="1.9">{root}<model name="thing">{inside}</model></sdf>'
+    )
+    return folder / name
+
+
+def link(name: str, inside: str = f'<visual name="v">{BOX}</visual>', pose: str = "") -> str:
+    return f'<link name="{name}">{pose}{inside}</link>'
+
+
+def read(folder: Path, inside: str, **more: str) -> Asset:
+    return read_asset(sdf(folder, inside, **more))
+
+
+def centre(asset: Asset, part: int = 0) -> list[float]:
+    return [round(float(x), 9) for x in asset.visual[part].bounds.mean(0)]
+
+
+def test_poses_of_model_link_frame_and_shape_are_joined(tmp_path: Path) -> None:
+    asset = read(
+        tmp_path,
+        '<pose>9 9 9 0 0 0</pose><frame name="f"><pose>0 0 1 0 0 1.5707963267948966</pose></frame>'
+        + link(
+            "base",
+            f'<visual name="v"><pose>0.5 0 0 0 0 0</pose>{BOX}</visual>'
+            f'<collision name="c"><pose relative_to="__model__">0 0 2 0 0 0</pose>{BOX}</collision>',
+            '<pose relative_to="f">1 0 0 0 0 0</pose>',
+        ),
+    )
+    assert centre(asset) == [0, 1.5, 1]  # the frame turns its X to the model's Y; the model's own pose is the world's
+    assert np.allclose(asset.visual[0].extents, [0.2, 0.1, 0.3])
+    assert np.allclose(asset.collision[0].vertices.mean(0), [0, 0, 2])
+
+
+@pytest.mark.parametrize(
+    "pose",
+    ['<pose degrees="true">0 0 0 90 0 0</pose>', '<pose rotation_format="quat_xyzw">0 0 0 0.5 0 0 0.5</pose>'],
+)
+def test_other_ways_to_write_a_rotation(tmp_path: Path, pose: str) -> None:
+    assert np.allclose(read(tmp_path, link("base", pose=pose)).visual[0].extents, [0.1, 0.3, 0.2])
+
+
+def test_links_on_fixed_joints_are_one_body_and_others_are_left_out(tmp_path: Path) -> None:
+    inertial = "<inertial><mass>{}</mass><inertia><ixx>1e-3</ixx><iyy>1e-3</iyy><izz>1e-3</izz></inertia></inertial>"
+    shape = f'<visual name="v">{BOX}</visual>'
+    asset = read(
+        tmp_path,
+        link("base", shape + inertial.format(1.0))
+        + link("lid", shape + inertial.format(3.0), "<pose>0 0 0.4 0 0 0</pose>")
+        + link("door", shape)
+        + '<joint name="a" type="fixed"><parent>base</parent><child>lid</child></joint>'
+        + '<joint name="hinge" type="revolute"><parent>base</parent><child>door</child></joint>'
+        + '<model name="inner"><link name="x"/></model><include><uri>model://other</uri></include>',
+    )
+    assert len(asset.visual) == 2 and asset.inertial.mass_kg == 4.0
+    assert np.allclose(asset.inertial.center_of_mass_m, [0, 0, 0.3])
+    assert np.allclose(asset.inertial.inertia_kg_m2, np.diag([2e-3 + 0.12, 2e-3 + 0.12, 2e-3]))
+    said = " | ".join(asset.remarks)
+    assert "link 'door' moves by joint hinge (revolute) and was left out" in said
+    assert "the nested model 'inner' was left out" in said and "the included model 'model://other' was left out" in said
+
+
+def test_inertia_is_turned_with_its_pose(tmp_path: Path) -> None:
+    asset = read(
+        tmp_path,
+        link(
+            "base",
+            f'<visual name="v">{BOX}</visual><inertial><pose>0.1 0 0 0 0 1.5707963267948966</pose><mass>2</mass>'
+            "<inertia><ixx>1e-3</ixx><iyy>2e-3</iyy><izz>3e-3</izz></inertia></inertial>",
+        ),
+    )
+    assert np.allclose(asset.inertial.inertia_kg_m2, np.diag([2e-3, 1e-3, 3e-3]), atol=1e-12)
+    assert np.allclose(asset.inertial.center_of_mass_m, [0.1, 0, 0])
+
+
+def test_every_solid_is_read_and_what_is_none_is_named(tmp_path: Path) -> None:
+    shapes = (
+        "<sphere><radius>0.1</radius></sphere>", "<cylinder><radius>0.1</radius><length>0.4</length></cylinder>",
+        "<capsule><radius>0.1</radius><length>0.4</length></capsule>", "<ellipsoid><radii>0.1 0.2 0.3</radii></ellipsoid>",
+        "<plane><normal>0 0 1</normal></plane>", "<empty/>",
+    )  # fmt: skip
+    inside = "".join(f'<visual name="v{i}"><geometry>{s}</geometry></visual>' for i, s in enumerate(shapes))
+    asset = read(tmp_path, link("base", inside))
+    heights = [part.extents[2] for part in asset.visual]
+    assert np.allclose(heights, [0.2, 0.4, 0.6, 0.6], atol=2e-3)
+    assert asset.remarks == ("'v4' is <plane>, not read as a shape, and was left out",)
+
+
+def test_friction_and_restitution_are_those_of_the_collisions(tmp_path: Path) -> None:
+    surface = (
+        "<surface><friction><ode><mu>{}</mu><mu2>{}</mu2></ode></friction>"
+        "<bounce><restitution_coefficient>0.2</restitution_coefficient></bounce></surface>"
+    )
+    asset = read(tmp_path, link("base", f'<collision name="c">{BOX}{surface.format(0.7, 0.5)}</collision>'))
+    assert (asset.contact.friction_static, asset.contact.friction_dynamic, asset.contact.restitution) == (
+        0.7,
+        None,
+        0.2,
+    )
+    assert asset.remarks == ("mu 0.7 and mu2 0.5 are two directions; the first was taken",)
+
+
+def mesh(uri: str, more: str = "") -> str:
+    shape = f"<geometry><mesh><uri>{uri}</uri>{more}</mesh></geometry>"
+    return link("base", f'<visual name="v">{shape}<material><diffuse>1 0 0 1</diffuse></material></visual>')
+
+
+@pytest.mark.parametrize("uri", ["meshes/a.stl", "model://thing/meshes/a.stl", "file://meshes/a.stl"])
+def test_meshes_are_found_in_the_models_folder_and_scaled(tmp_path: Path, uri: str) -> None:
+    (tmp_path / "meshes").mkdir()
+    trimesh.creation.box([1, 2, 3]).export(tmp_path / "meshes" / "a.stl")
+    asset = read(tmp_path, mesh(uri, "<scale>0.1 0.1 0.1</scale>"))
+    assert np.allclose(asset.visual[0].extents, [0.1, 0.2, 0.3]) and asset.missing_files == ()
+    assert asset.visual[0].visual.material.baseColorFactor.tolist() == [255, 0, 0, 255]  # type: ignore[union-attr]
+    assert {path.name for path in asset.files} == {"model.sdf", "a.stl"}
+
+
+@pytest.mark.parametrize("uri", ["../secret.stl", "model://thing/../../secret.stl", "file:///etc/passwd", "link.stl"])
+def test_no_file_outside_of_the_models_folder_is_read(tmp_path: Path, uri: str) -> None:
+    trimesh.creation.box([1, 2, 3]).export(tmp_path / "secret.stl")
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "link.stl").symlink_to(tmp_path / "secret.stl")
+    asset = read(tmp_path / "in", mesh(uri))
+    assert asset.visual == () and asset.missing_files == (uri,)
+    assert any("outside the asset's folder" in remark for remark in asset.remarks)
+
+
+@pytest.mark.parametrize(
+    ("inside", "message"),
+    [
+        ("", "has no <link>"),
+        (link("a") + link("a"), "that of another"),
+        (link("a", pose='<pose relative_to="b"/>') + link("b", pose='<pose relative_to="a"/>'), "goes in a circle"),
+        (link("a", pose='<pose relative_to="x">0 0 0 0 0 0</pose>'), "no frame of the model"),
+        (link("a", pose="<pose>0 0 nan 0 0 0</pose>"), "no number that an object can have"),
+        (link("a", pose="<pose>0 0 0</pose>"), "are not 6 numbers"),
+        (link("a", '<visual name="v"><geometry><box><size>1 -1 1</size></box></geometry></visual>'), "not above zero"),
+        (link("a", '<visual name="v"><geometry/></visual>'), "holds 0 shapes"),
+        (link("a", f'<visual name="v">{BOX}</visual><inertial><inertia/></inertial>'), "lacks one of ixx"),
+        (link("a", ""), "no link of it has a shape"),
+    ],
+)
+def test_what_is_broken_is_said_in_one_line(tmp_path: Path, inside: str, message: str) -> None:
+    with pytest.raises(AssetError, match=message) as caught:
+        read(tmp_path, inside)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_document_type_is_refused(tmp_path: Path) -> None:
+    path = sdf(tmp_path, link("a"))
+    path.write_text(path.read_text().replace("<sdf", '<!DOCTYPE sdf [<!ENTITY a "b">]><sdf', 1))
+    with pytest.raises(AssetError, match="document type"):
+        read_asset(path)
+
+
+def test_licence_and_author_come_from_the_config_or_the_comments(tmp_path: Path) -> None:
+    asset = read(tmp_path / "a", link("a"), root="<!-- license: MIT --><!-- attribution: Ada; Bob -->")
+    assert (asset.license, asset.attribution) == ("MIT", "Ada; Bob")
+    sdf(tmp_path / "b", link("a"))
+    (tmp_path / "b" / "model.config").write_text(
+        "<model><name>Blue_Cup</name><license>CC0-1.0</license><author><name>unknown</name></author></model>"
+    )
+    asset = read_asset(tmp_path / "b")
+    assert (asset.format, asset.name, asset.license, asset.attribution) == ("sdf", "Blue Cup", "CC0-1.0", None)
+
+
+def test_models_are_found_as_folders_and_as_single_files(tmp_path: Path) -> None:
+    sdf(tmp_path / "b", link("a"))
+    (tmp_path / "b" / "model.config").write_text("<model/>")
+    sdf(tmp_path / "c", link("a"), name="cup.sdf")
+    (tmp_path / "c" / "molecule.sdf").write_text("benzene\n  -OEChem-\n")  # the suffix is chemists' too
+    assert [path.relative_to(tmp_path).as_posix() for path in find_assets(tmp_path)] == ["b", "c/cup.sdf"]
+
+
+@pytest.mark.parametrize(
+    ("text", "licence", "attribution"),
+    [
+        ("licence: CC0; attribution: X; Y", "CC0", "X; Y"),
+        ("License: CC-BY-4.0.", "CC-BY-4.0", None),
+        ("SPDX-License-Identifier: MIT\nCopyright: Ada", "MIT", "Ada"),
+        ("license: unknown; author: none", None, None),
+        ("this has no licence", None, None),
+        ("license: " + "!" * 3_000_000 + "a", None, None),
+        (";" * 1_000_000 + " " * 1_000_000 + "license: MIT", None, None),
+    ],
+)
+def test_statements_in_words(text: str, licence: str | None, attribution: str | None) -> None:
+    assert stated_licence([text]) == (licence, attribution)
