@@ -104,7 +104,7 @@ CODECS = Choices("codec", _of("mpeg4", "vp9"))
 EPISODE_FORMATS = Choices("format", _of("lerobot", "maniskill"), listed=True)
 EXPORT_FORMATS = Choices("format", lambda: ["all", *_backends("exporter")()], listed=True)
 IMPORT_FORMATS = Choices(
-    "format", _of("auto", "twin", "urdf", "mjcf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
+    "format", _of("auto", "twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
 )
 AUDIT_FORMATS = Choices("format", _of("text", "json", "sarif"))
 QUERY_FORMATS = Choices("format", _of("table", "csv", "json", "ids"))
