@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from PIL import Image
 from typer.testing import CliRunner
 
 from manitwin.commands.layout import layout
@@ -43,9 +44,13 @@ def bottles(tmp_path: Path) -> Path:
 
 def test_upright_is_what_the_scenes_are_and_who_lies_is_said(bottles: Path, tmp_path: Path) -> None:
     arguments = [str(bottles), "-o", str(tmp_path / "out"), "-n", "2", "--objects", "4..4", "--upright", "--jobs", "1"]
+    arguments.append("--sheet")
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
     assert "twins that have no upright placement and lie as they rest: 1" in done.output
+    assert f"2 of 2 scenes in {tmp_path / 'out'}/contact_sheet.webp" in done.output
+    with Image.open(tmp_path / "out" / "contact_sheet.webp") as sheet:
+        assert sheet.width > 512
     scenes = [read_scene(path) for path in sorted((tmp_path / "out").rglob(SCENE))]
     assert len(scenes) == 2
     for scene in scenes:

@@ -42,8 +42,9 @@ def layout(
     ] = False,
     robot: Annotated[str | None, choices.ROBOTS.option(help="Stay in the workspace of this robot.")] = None,
     pictures: Annotated[
-        bool, typer.Option("--pictures", help="Also draw each: colours, depth, normals, instance ids.")
+        bool, typer.Option("--pictures", help="Also draw each (colours, depth, normals, instance ids) and a sheet.")
     ] = False,
+    sheet: Annotated[bool, typer.Option("--sheet", help="Draw one picture of the first 48 scenes.")] = False,
     seed: options.Seed = None,
     config: options.Config = None,
     jobs: options.Jobs = None,
@@ -59,7 +60,8 @@ def layout(
     settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
     from manitwin.apps.layouts.run import layout_totals, make_layouts, without_upright
 
-    if pictures:
+    sheet = sheet or settings.pictures
+    if sheet:
         from manitwin.render.device import require_renderer
 
         require_renderer()
@@ -79,6 +81,11 @@ def layout(
         f"{1000 * totals.max_penetration_m:.2f} mm; {totals.cpu_seconds / max(1, ended):.2f} CPU-s each",
         markup=False,
     )
+    if sheet and totals.accepted:
+        from manitwin.apps.layouts.contact_sheet import CONTACT_SHEET, write_contact_sheet
+
+        shown = write_contact_sheet(dataset, out)
+        out_console.print(f"{shown} of {totals.accepted} scenes in {out}/{CONTACT_SHEET}", markup=False)
     if report.stopped:
         err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
     print_causes(out)

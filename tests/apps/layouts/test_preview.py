@@ -122,6 +122,23 @@ def test_files_agree_with_rays_through_the_cameras_that_are_written(written: Pat
         assert np.abs(read - normals)[same & (ids == 3)].max() < 0.01  # the twins' boxes are shaded as if round
 
 
+def test_colours_beside_the_exact_pictures_are_of_the_same_depth_and_ids(written: Path) -> None:
+    facts = json.loads((written / "pictures.json").read_text())
+    for name in facts["cameras"]:
+        ids, millimetres = (
+            cv2.imread(str(written / f"{name}_{what}.png"), cv2.IMREAD_UNCHANGED) for what in ("ids", "depth")
+        )
+        shown = np.asarray(Image.open(written / f"{name}_ids_colors.png"))
+        assert shown.shape[0] == SIZE and shown.shape[1] > SIZE  # the names are beside it
+        for thing, number in facts["ids"].items():
+            assert (shown[:, :SIZE][ids == number] == facts["colors_rgb"][thing]).all(), thing
+            assert (shown[:, SIZE:] == facts["colors_rgb"][thing]).all(-1).sum() > 10, thing  # and its colour
+        deep = np.asarray(Image.open(written / f"{name}_depth_colors.png"))[:, :SIZE].astype(int)
+        nearest, farthest = (pick(millimetres[ids > 0]) for pick in (np.min, np.max))
+        near, far = (deep[(ids > 0) & (millimetres == value)].mean(0) for value in (nearest, farthest))
+        assert near[0] > 2 * near[2] and far[2] > far[1]  # red, and blue
+
+
 def test_picture_shows_red_boxes_on_wood(written: Path) -> None:
     rgb = np.asarray(Image.open(written / "above_rgb.webp"))
     ids = cv2.imread(str(written / "above_ids.png"), cv2.IMREAD_UNCHANGED)

@@ -45,7 +45,7 @@ class PicturesStage:
     """Draw a scene from its cameras: colours, depth, normals and instance ids."""
 
     name = "pictures"
-    version = "1"
+    version = "2"
     reads: tuple[str, ...] = (SCENE,)
     writes: tuple[str, ...] = (PICTURES,)
     needs: Resource = "cpu"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import cv2
@@ -16,6 +16,7 @@ from manitwin.errors import UsageError
 from manitwin.files.glb import read_glb
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.render.cameras import Camera, look_at
+from manitwin.render.false_colors import depth_picture, id_color, ids_picture
 from manitwin.render.scene_renderer import SceneFrame, SceneRenderer
 from manitwin.scenes.scene import SceneCamera, SceneRecord
 
@@ -53,12 +54,15 @@ def write_previews(
 
     For each camera: ``NAME_rgb.webp``; ``NAME_depth.png`` (16 bits, millimetres along the viewing axis, 0: nothing);
     ``NAME_normals.png`` (world frame, 8 bits: 255 (n + 1) / 2, black: nothing); ``NAME_ids.png`` (8 bits, 16 where there are
-    more than 255 things; 0: floor and backdrop). ``pictures.json`` has the ids by name and the cameras: ``camera_to_world``
-    (OpenGL axes: x right, y up, looking along -z), the focal length in pixels, the size. Raises as ``scene_pictures`` does.
+    more than 255 things; 0: floor and backdrop); to look at, depth and ids in colours that are explained beside them:
+    ``NAME_depth_colors.png``, ``NAME_ids_colors.png``. ``pictures.json`` has the ids by name, their colours (RGB) and the
+    cameras: ``camera_to_world`` (OpenGL axes: x right, y up, looking along -z), the focal length in pixels, the size. Raises
+    as ``scene_pictures`` does.
     """
     frames, ids = scene_pictures(record, twin_folder, width_px=size_px, height_px=size_px)
     folder.mkdir(parents=True, exist_ok=True)
     facts: dict[str, object] = {"scene_id": record.scene_id, "depth_unit_m": DEPTH_UNIT_M, "ids": ids}
+    facts["colors_rgb"] = {name: id_color(number) for name, number in ids.items()}
     facts["cameras"] = {
         each.name: {
             "camera_to_world": camera.camera_to_object.tolist(),
@@ -69,7 +73,9 @@ def write_previews(
         for each in record.cameras
         for camera in [_camera(each, size_px, size_px)]
     }
-    files = [path for name, frame in frames.items() for path in _write_frame(frame, folder, name, len(ids))]
+    called = {thing.name: f"{thing.name} {thing.category}" for thing in record.objects}
+    names = {called.get(name, name): number for name, number in ids.items()}
+    files = [path for name, frame in frames.items() for path in _write_frame(frame, folder, name, names)]
     (folder / PICTURES).write_text(json.dumps(facts, indent=1) + "\n")
     return sorted([*files, folder / PICTURES])
 
@@ -79,7 +85,7 @@ def _camera(camera: SceneCamera, width_px: int, height_px: int) -> Camera:
     return Camera(pose, camera.fov_y_rad, width_px, height_px)
 
 
-def _write_frame(frame: SceneFrame, folder: Path, name: str, things: int) -> list[Path]:
+def _write_frame(frame: SceneFrame, folder: Path, name: str, ids_by_name: Mapping[str, int]) -> list[Path]:
     assert frame.depth_m is not None and frame.normals is not None and frame.ids is not None
     rgb, depth, normals, ids = (
         folder / f"{name}_{what}" for what in ("rgb.webp", "depth.png", "normals.png", "ids.png")
@@ -87,7 +93,10 @@ def _write_frame(frame: SceneFrame, folder: Path, name: str, things: int) -> lis
     Image.fromarray(frame.rgb).save(rgb, quality=WEBP_QUALITY, method=4)
     millimetres = np.minimum(np.rint(frame.depth_m / DEPTH_UNIT_M), np.iinfo(np.uint16).max).astype(np.uint16)
     shown = np.where(frame.depth_m[..., None] > 0, np.rint(127.5 * (frame.normals + 1)), 0).astype(np.uint8)
-    numbers = frame.ids if things > np.iinfo(np.uint8).max else frame.ids.astype(np.uint8)
+    numbers = frame.ids if len(ids_by_name) > np.iinfo(np.uint8).max else frame.ids.astype(np.uint8)
     for path, image in ((depth, millimetres), (normals, shown[..., ::-1]), (ids, numbers)):
         path.write_bytes(cv2.imencode(".png", image)[1].tobytes())
-    return [rgb, depth, normals, ids]
+    depth_colors, ids_colors = folder / f"{name}_depth_colors.png", folder / f"{name}_ids_colors.png"
+    depth_picture(frame.depth_m, frame.ids).save(depth_colors)
+    ids_picture(frame.ids, ids_by_name).save(ids_colors)
+    return [rgb, depth, normals, ids, depth_colors, ids_colors]

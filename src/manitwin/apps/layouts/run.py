@@ -72,6 +72,12 @@ def without_upright(dataset: str | Path) -> tuple[str, ...]:
     return tuple(twin.twin_id for twin in pool_of(_absolute(dataset)).twins if not twin.stands)
 
 
+def accepted_scenes(out: str | Path) -> list[str]:
+    """Return the ids of the accepted scenes of a run in the order of their numbers."""
+    with read_ledger(local_ledger(DatasetRoot(out))) as ledger:
+        return [row[0] for row in ledger.execute("SELECT twin_id FROM items WHERE state = 'accepted' ORDER BY number")]
+
+
 def layout_totals(out: str | Path) -> LayoutTotals:
     """Add up what the ledger and the scenes say."""
     root = DatasetRoot(out)
@@ -80,9 +86,8 @@ def layout_totals(out: str | Path) -> LayoutTotals:
             "SELECT reason, count(*) FROM items WHERE state = 'rejected' GROUP BY reason ORDER BY reason"
         )
         rejected = {str(reason): int(count) for reason, count in rows}
-        ids = [row[0] for row in ledger.execute("SELECT twin_id FROM items WHERE state = 'accepted' ORDER BY number")]
         (cpu_seconds,) = ledger.execute("SELECT coalesce(sum(cpu_seconds), 0) FROM stages").fetchone()
-    scenes = [parse_scene(root.read_bytes(f"{scene_name(each)}/{SCENE}"), each) for each in ids]
+    scenes = [parse_scene(root.read_bytes(f"{scene_name(each)}/{SCENE}"), each) for each in accepted_scenes(out)]
     return LayoutTotals(
         accepted=len(scenes),
         rejected=rejected,
