@@ -35,13 +35,30 @@ def one_line(text: str) -> str:
         (("layout", "OUT", "-o", "OUT"), "not there; give a data set"),
         (("layout", "FILE", "-o", "OUT", "--objects", "few"), "give LOW..HIGH"),
         (("trajectories", "FILE", "-o", "OUT", "-n", "0"), "-n is 0; give 1 or more"),
+        (("build", "--text", "a mug", "-o", "OUT"), "--text: the generator 'lift' makes no meshes of text ('a mug')"),
+        (("build", "--text", "a mug", "-o", "OUT"), "(command, fal, meshy, rodin, tripo), or give a photo or a mesh"),
+        (("build", "LIST", "-o", "OUT"), "list.csv:3: the generator 'lift' makes no meshes of text ('a cup')"),
+        (("build", "LIST", "-o", "OUT", "--generator", "hunyuan3d"), "list.csv:3: the generator 'hunyuan3d'"),
+        (
+            ("build", "LIST", "-o", "OUT", "--generator", "command:sh {image} {out}"),
+            "list.csv:3: the generator 'command",
+        ),
+        (
+            ("build", "PHOTO", "-o", "OUT", "--generator", "command:sh {text} {out}"),
+            "makes no meshes of a photo (dot.png)",
+        ),
+        (("run", "LIST", "-o", "OUT"), "list.csv:3: the generator 'lift' makes no meshes of text ('a cup')"),
         (("paint",), "paint"),
     ],
 )
 def test_wrong_use_is_one_line_and_exit_status_2(tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
     file = tmp_path / "cup.stl"
     file.write_bytes(b"x")
-    places = {"FILE": file, "OUT": tmp_path / "out"}
+    (tmp_path / "list.csv").write_text("file,text\ncup.stl,\n,a cup\n")
+    (tmp_path / "dot.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    places = {
+        "FILE": file, "OUT": tmp_path / "out", "LIST": tmp_path / "list.csv", "PHOTO": tmp_path / "dot.png"
+    }  # fmt: skip
     done = manitwin(*(places.get(a, a) for a in arguments))
     assert done.returncode == 2
     assert message in one_line(done.stderr)

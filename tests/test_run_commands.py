@@ -76,7 +76,7 @@ def test_wrong_use_is_one_line_and_makes_no_data_set(
     done = manitwin(*arguments, folder=tmp_path)
     assert done.returncode == 2, done.stdout
     assert message in done.stderr and done.stderr.count("\n") == 1
-    assert not (tmp_path / "data" / "twins").exists()
+    assert not (tmp_path / "data").exists()
 
 
 def test_check_names_and_repairs(tmp_path: Path, manifest: Path) -> None:

@@ -84,6 +84,7 @@ def build(
     Raises UsageError for wrong arguments; what happens to one item is in the report and never raised.
     """
     from manitwin.config import BuildConfig, load_config
+    from manitwin.generator_input import refusal
     from manitwin.manifest import collect_items
 
     settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
@@ -95,8 +96,9 @@ def build(
         raise UsageError(f"jobs is {jobs}; give 1 or more")
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
     items, notes = collect_items(
-        given, texts, name=name, units=units, up=up, license=license, attribution=attribution, strict=strict
-    )
+        given, texts, name=name, units=units, up=up, license=license, attribution=attribution, strict=strict,
+        refusal=refusal(settings),
+    )  # fmt: skip
     if not items:
         raise UsageError("nothing to build; give images, meshes, folders, manifests or texts")
     place = Path(out)

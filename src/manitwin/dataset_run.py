@@ -83,6 +83,7 @@ def run(
     that nobody knows is an error. Raises UsageError for
     wrong arguments, or where another run is at work on the data set. What becomes of an item is in the ledger.
     """
+    from manitwin.generator_input import refusal
     from manitwin.pipeline import TwinRecipe, check_names, estimate_usd  # two CPU-seconds, which `status` does without
 
     root = DatasetRoot(dataset)
@@ -96,7 +97,7 @@ def run(
 
     report = drive(
         TwinRecipe(settings),
-        iterate_items(inputs, defaults or {}, notes, texts, strict=strict),
+        iterate_items(inputs, defaults or {}, notes, texts, strict=strict, refusal=refusal(settings)),
         root,
         settings.run,
         configuration=settings.model_dump(mode="json"),
@@ -133,9 +134,8 @@ def drive(
         raise UsageError(choose_from("executor", executor, EXECUTORS))
     remarks = [] if remarks is None else remarks
     path = local_ledger(root)
-    ledger = Ledger(path)
+    ledger, given, new = _opened_with(items, path)
     try:
-        given, new = ledger.add_items(items)
         if given and given > new:
             remarks.append(f"{given - new} of {given} items were in the data set already")
         root.write_bytes(CONFIG, canonical_json(configuration).encode())
@@ -152,6 +152,22 @@ def drive(
     finally:
         ledger.close()
         _LedgerCopy(root, path).upload()
+
+
+def _opened_with(items: Iterable[Item], path: Path) -> tuple[Ledger, int, int]:
+    """Open the ledger and add items to it; returns how many were given and are new. Where that fails, a new one is removed."""
+    made_ledger, made_folder = not path.exists(), not path.parent.exists()
+    ledger = Ledger(path)
+    try:
+        return ledger, *ledger.add_items(items)
+    except BaseException:
+        ledger.close()
+        if made_ledger:
+            for file in (path, path.with_suffix(".lock")):
+                file.unlink()
+        if made_folder:
+            path.parent.rmdir()
+        raise
 
 
 def stored_config(root: DatasetRoot) -> BuildConfig:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -21,6 +21,7 @@ COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution")
 
 Units = Literal["m", "cm", "mm", "auto"]
 Up = Literal["y", "z", "auto"]
+Refusal = Callable[[Item], str | None]
 
 
 @dataclass
@@ -41,6 +42,7 @@ def collect_items(
     license: str | None = None,
     attribution: str | None = None,
     strict: bool = False,
+    refusal: Refusal = lambda item: None,
 ) -> tuple[list[Item], Notes]:
     """Turn what a user typed into items, in order, without repeats; returns them and what is to be said of the inputs.
 
@@ -48,7 +50,7 @@ def collect_items(
     """
     defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
     notes = Notes()
-    return list(dict.fromkeys(iterate_items(inputs, defaults, notes, texts, strict=strict))), notes
+    return list(dict.fromkeys(iterate_items(inputs, defaults, notes, texts, strict=strict, refusal=refusal))), notes
 
 
 def iterate_items(
@@ -58,13 +60,15 @@ def iterate_items(
     texts: Iterable[str] = (),
     *,
     strict: bool = False,
+    refusal: Refusal = lambda item: None,
 ) -> Iterator[Item]:
     """Yield the items one by one, so that a manifest may be of any length; notes are added at the end of each.
 
     ``texts`` are things to make from words alone, after the ``inputs``. ``strict``: a column that nobody knows is an error.
+    ``refusal`` says of an item why nothing can ever be made of it.
 
-    Raises UsageError for a path that is not there, a folder without inputs, a manifest that cannot be read, or an unknown
-    value.
+    Raises UsageError for a path that is not there, a folder without inputs, a manifest that cannot be read, an unknown
+    value, or an item that is refused.
     """
     defaults = {"units": "auto", "up": "auto", "name": None, "license": None, "attribution": None, **defaults}
     for given in inputs:
@@ -72,15 +76,23 @@ def iterate_items(
         if not path.exists():
             raise UsageError(f"{given}: not there; give an image, a mesh, a folder, or a .csv or .jsonl manifest")
         if path.is_dir():
-            yield from _folder_items(path, str(given), defaults, notes)
+            yield from _allowed(_folder_items(path, str(given), defaults, notes), str(given), refusal)
         elif path.suffix.lower() in MANIFEST_SUFFIXES:
-            yield from _manifest_items(path, defaults, notes, strict)
+            yield from _manifest_items(path, defaults, notes, strict, refusal)
         else:
-            yield _item({"file": str(path)}, Path.cwd(), defaults, str(path))
+            yield from _allowed([_item({"file": str(path)}, Path.cwd(), defaults, str(path))], str(given), refusal)
     for text in texts:
         if not text.strip():
             raise UsageError("an empty text; say what to make, such as 'a red mug'")
-        yield _item({"text": text}, Path.cwd(), defaults, text)
+        yield from _allowed([_item({"text": text}, Path.cwd(), defaults, text)], "--text", refusal)
+
+
+def _allowed(items: Iterable[Item], where: str, refusal: Refusal) -> Iterator[Item]:
+    for item in items:
+        why = refusal(item)
+        if why is not None:
+            raise UsageError(f"{where}: {why}")
+        yield item
 
 
 def _folder_items(folder: Path, given: str, defaults: dict[str, Any], notes: Notes) -> Iterator[Item]:
@@ -94,7 +106,9 @@ def _folder_items(folder: Path, given: str, defaults: dict[str, Any], notes: Not
     notes.remarks.extend(listing.remarks())
 
 
-def _manifest_items(path: Path, defaults: dict[str, Any], notes: Notes, strict: bool) -> Iterator[Item]:
+def _manifest_items(
+    path: Path, defaults: dict[str, Any], notes: Notes, strict: bool, refusal: Refusal
+) -> Iterator[Item]:
     unknown: dict[str, str] = {}
     line = None
     for line, row in _rows(path):
@@ -103,7 +117,8 @@ def _manifest_items(path: Path, defaults: dict[str, Any], notes: Notes, strict: 
             unknown[column] = f"{column!r} (did you mean {near[0]!r}?)" if near else repr(column)
             if strict:
                 raise UsageError(f"{path}: unknown column {unknown[column]}; valid: {', '.join(COLUMNS)}")
-        yield _item(row, path.parent, defaults, f"{path}:{line}", unknown)
+        where = f"{path}:{line}"
+        yield from _allowed([_item(row, path.parent, defaults, where, unknown)], where, refusal)
     if line is None:
         raise UsageError(
             f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"

@@ -18,14 +18,16 @@ def print_causes(place: str) -> None:
 
 def print_causes_of_build(report: BuildReport) -> None:
     """Print the most frequent causes of a build's report, with their remedies."""
-    _print(causes_of_build(report), "the same command again", "in the lines above")
+    causes = causes_of_build(report)
+    said = len(report.results) == 1  # in the one line above
+    _print(causes, "the same command again", "in the lines above", skip=1 if said else 0)
 
 
-def _print(causes: list[Cause], again: str, others: str) -> None:
+def _print(causes: list[Cause], again: str, others: str, skip: int = 0) -> None:
     from manitwin.causes import cause_lines
 
-    for line in cause_lines(causes, again=again, others=others):
-        err_console.print(line, markup=False)
+    for line in cause_lines(causes, again=again, others=others)[skip:]:
+        err_console.print(line.strip() if skip else line, markup=False)
 
 
 def causes_of_build(report: BuildReport) -> list[Cause]:

@@ -45,21 +45,26 @@ def target(kind: str, spec: str) -> str:
     return names[name]
 
 
+def factory(kind: str, spec: str) -> Any:
+    """Return the class or function that makes a backend; raises ConfigError, or Unavailable where it cannot be imported."""
+    module, _, attribute = target(kind, spec).partition(":")
+    try:
+        return getattr(import_module(module), attribute)
+    except ImportError as error:
+        raise Unavailable(
+            f"{kind} {_parts(spec)[0]!r} cannot be loaded: {error}; install what it names, or choose another"
+        ) from error
+
+
 def create(kind: str, spec: str, config: BuildConfig) -> Any:
     """Create a backend; raises ConfigError for a spec that cannot be, Unavailable where it cannot be imported."""
     name, argument = _parts(spec)
-    module, _, attribute = target(kind, spec).partition(":")
-    try:
-        factory = getattr(import_module(module), attribute)
-    except ImportError as error:
-        raise Unavailable(
-            f"{kind} {name!r} cannot be loaded: {error}; install what it names, or choose another"
-        ) from error
-    if hasattr(factory, "from_spec"):
-        return factory.from_spec(argument, config)
+    made_by = factory(kind, spec)
+    if hasattr(made_by, "from_spec"):
+        return made_by.from_spec(argument, config)
     if argument:
         raise ConfigError(f"{kind} {spec!r}: {name} takes nothing after its name")
-    return factory()
+    return made_by()
 
 
 def _parts(spec: str) -> tuple[str, str]:

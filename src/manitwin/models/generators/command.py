@@ -23,7 +23,7 @@ from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, ConfigError, InputError, Rejected, Unavailable, Unsupported, choose_from
 from manitwin.files.sniff import sniff
 from manitwin.models.generators import supervisor
-from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.service import png_of
 from manitwin.models.services.keys import redacted
 from manitwin.models.services.refusal import Gone
@@ -56,6 +56,7 @@ class CommandGenerator:
 
     name = "command"
     needs: Resource = "gpu"
+    asked_with: frozenset[Asked] = IMAGE_OR_TEXT  # by what stands in the command; so as long as none is chosen
 
     def __init__(self, command: str, config: BuildConfig):
         self.words = _words(command)
@@ -65,6 +66,9 @@ class CommandGenerator:
         self.environment = _named(config.generate.options)
         self._jobs: dict[str, _Ended] = {}
         self._takes = {name for word in self.words for name in PLACEHOLDER.findall(word)}
+        self.asked_with = frozenset(
+            {"image" if "image" in self._takes else "text"}
+        )  # beside a picture, {text} is the name
 
     @classmethod
     def from_spec(cls, argument: str, config: BuildConfig) -> CommandGenerator:

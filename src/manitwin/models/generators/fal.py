@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, ConfigError, Unsupported
-from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.service import usd_per_job
 from manitwin.models.generators.submission import checked_address, data_uri, submit_paid
 from manitwin.models.services.http import Gone, Refusal, Service, refusal_by_status
@@ -62,6 +62,7 @@ class FalGenerator:
 
     name = "fal"
     needs: Resource = "generator"
+    asked_with: frozenset[Asked] = IMAGE_OR_TEXT  # by endpoint; so as long as none is chosen
 
     def __init__(
         self,
@@ -75,6 +76,8 @@ class FalGenerator:
             raise ConfigError(f"fal: {endpoint!r} is no endpoint; give OWNER/APP such as {DEFAULT}")
         self.model: str | None = endpoint
         self.takes = ENDPOINTS.get(endpoint) or _guessed(endpoint)
+        takes: dict[Asked, bool] = {"image": self.takes.image is not None, "text": self.takes.prompt}
+        self.asked_with = frozenset(asked for asked, taken in takes.items() if taken)
         listed = self.takes.usd if base_url == VENDOR else None
         self.usd_per_job = usd_per_job(f"fal:{endpoint}", base_url, config.services, listed)
         self._options = dict(config.generate.options)

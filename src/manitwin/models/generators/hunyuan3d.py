@@ -22,7 +22,7 @@ from urllib.parse import quote
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, ConfigError, Unavailable, Unsupported, choose_from
-from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.service import png_of
 from manitwin.models.generators.submission import submit_paid
 from manitwin.models.services.http import Gone, Refusal, Service, refusal_by_status
@@ -48,6 +48,7 @@ class Hunyuan3dGenerator:
 
     name = "hunyuan3d"
     needs: Resource = "generator"
+    asked_with: frozenset[Asked] = frozenset({"image"})
 
     def __init__(self, version: str, base_url: str, config: BuildConfig, sleep: Callable[[float], None] = time.sleep):
         if version not in OPTIONS:

@@ -15,7 +15,7 @@ from urllib.parse import quote
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, Rejected
-from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.service import usd_per_job
 from manitwin.models.generators.submission import checked_address, data_uri, submit_paid
 from manitwin.models.services.http import Service
@@ -42,6 +42,7 @@ class MeshyGenerator:
 
     name = "meshy"
     needs: Resource = "generator"
+    asked_with: frozenset[Asked] = IMAGE_OR_TEXT
 
     def __init__(
         self,

@@ -10,6 +10,10 @@ import numpy as np
 
 from manitwin.config import Resource
 
+Asked = Literal["image", "text"]
+"""What a generator may be asked with."""
+IMAGE_OR_TEXT: frozenset[Asked] = frozenset({"image", "text"})
+
 
 @dataclass(frozen=True)
 class GenerationRequest:
@@ -50,6 +54,9 @@ class Generated:
 class Generator(Protocol):
     """Turn an image or a text into a mesh. ``usd_per_job`` is what a job costs, ``model`` what makes it, where that is known.
 
+    ``asked_with`` says which of the two it takes; one that does not say takes both. What it cannot take is refused before
+    anything is built.
+
     ``submit`` returns a job id that survives a restart of this process wherever the generator can keep it; ``fetch`` may be
     called once ``poll`` says done and writes below ``folder``. Raises BackendError, or Rejected where the input is at fault.
     """
@@ -58,6 +65,7 @@ class Generator(Protocol):
     model: str | None
     needs: Resource
     usd_per_job: float
+    asked_with: frozenset[Asked]
 
     def submit(self, request: GenerationRequest) -> str:
         """Start a job and return its id."""

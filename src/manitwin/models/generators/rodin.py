@@ -15,7 +15,7 @@ from typing import Any
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, ConfigError, choose_from
-from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.service import address, chosen, png_of, usd_per_job
 from manitwin.models.services.http import FormFile, Gone, Refusal, Service, refusal_by_status
 from manitwin.models.services.keys import bearer, key_from_environment, split_url
@@ -58,6 +58,7 @@ class RodinGenerator:
 
     name = "rodin"
     needs: Resource = "generator"
+    asked_with: frozenset[Asked] = IMAGE_OR_TEXT
 
     def __init__(self, tier: str, url: str, key: str | None, config: BuildConfig, **service: Any):
         if tier not in TIERS:

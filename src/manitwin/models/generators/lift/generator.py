@@ -19,7 +19,7 @@ from manitwin.files.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.generators.lift.hint import hint_from_name
 from manitwin.models.generators.lift.lifting import Lifted, lift
-from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
 
 ROUGHNESS = 0.6
 
@@ -40,6 +40,7 @@ class LiftGenerator:
     name = "lift"
     model: str | None = None
     needs: Resource = "cpu"
+    asked_with: frozenset[Asked] = frozenset({"image"})
     usd_per_job = 0.0
 
     def __init__(self) -> None:
