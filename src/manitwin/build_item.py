@@ -112,4 +112,4 @@ def _fresh(work: Path) -> Path:
 
 
 def _line(ending: Ending) -> str:
-    return f"{ending.reason}: {ending.detail}" if ending.reason else ending.detail
+    return f"{ending.reason}: {ending.told}" if ending.reason else ending.told

@@ -17,6 +17,7 @@ from manitwin.files.source_files import MESH_SUFFIXES
 from manitwin.identity import twin_id
 from manitwin.models.annotators.given import KeepsGiven
 from manitwin.models.registry import create, target, without_url
+from manitwin.name_hint import NAME_HINT, name_would_help
 from manitwin.simulate.gripper import Gripper, load_gripper
 from manitwin.stage_runner import StageCost
 from manitwin.stages.candidates import CandidatesStage
@@ -231,7 +232,7 @@ def ending_of(record: TwinRecord) -> Ending:
         detail = record.rejection.detail
     else:
         detail = f"{record.grasps.verified} of {record.grasps.simulated} grasps verified" if record.grasps else ""
-    return Ending(record.status, record.revision, reason, detail)
+    return Ending(record.status, record.revision, reason, detail, NAME_HINT if name_would_help(record) else None)
 
 
 def _claimed_kind(item: Item) -> Kind:

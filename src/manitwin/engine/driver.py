@@ -250,7 +250,7 @@ class Driver:
             flight.number, ending.status, recipe_sha256=self.recipe.sha256, reason=ending.reason, detail=ending.detail,
             revision=ending.revision,
         )  # fmt: skip
-        self._on_ended(ItemEnded(flight.number, flight.opened.item, flight.twin_id, ending.status, ending.detail))
+        self._on_ended(ItemEnded(flight.number, flight.opened.item, flight.twin_id, ending.status, ending.told))
 
     def _failed(self, flight: Flight, gate: Gate, failure: Failure) -> None:
         """Try again later, or soon, or no more: what a service or the disk does is not the item's fault."""

@@ -16,12 +16,21 @@ from manitwin.stages.stage import Draft, Item, Stage
 
 @dataclass(frozen=True)
 class Ending:
-    """How an item ended: ``reason`` is the code of a rejection; ``revision`` that of the folder that says so."""
+    """How an item ended: ``reason`` is the code of a rejection; ``revision`` that of the folder that says so.
+
+    ``hint`` says what would make more of the same input.
+    """
 
     status: Literal["accepted", "rejected"]
     revision: str
     reason: str | None
     detail: str
+    hint: str | None = None
+
+    @property
+    def told(self) -> str:
+        """The detail and the hint, in one line for a person."""
+        return "; ".join(filter(None, (self.detail, self.hint)))
 
 
 @dataclass(frozen=True)
