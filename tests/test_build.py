@@ -21,6 +21,7 @@ from sapien import physx
 import manitwin
 from manitwin.config import BuildConfig
 from manitwin.loaded_twin import Twin
+from manitwin.twin import Check
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"
 QUICK = BuildConfig(
@@ -53,6 +54,18 @@ def test_generated_twin_says_who_made_it(samples: dict[str, Twin]) -> None:
     stages = samples["image"].record.provenance.stages
     assert stages["generate"].backend == "lift"
     assert "generate" not in samples["mesh"].record.provenance.stages
+
+
+def test_lifted_twin_says_what_its_photo_does_not_show(samples: dict[str, Twin]) -> None:
+    found = {kind: [c for c in _checks(twin) if c.name == "every_side_seen"] for kind, twin in samples.items()}
+    (check,) = found["image"]
+    assert check.passed is False and check.value == pytest.approx(0.5, abs=0.15) and "a guess" in check.message
+    assert found["mesh"] == []
+
+
+def _checks(twin: Twin) -> list[Check]:
+    assert twin.record.quality is not None
+    return twin.record.quality.checks
 
 
 @pytest.mark.parametrize("kind", ["image", "mesh"])

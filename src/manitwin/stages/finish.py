@@ -25,7 +25,7 @@ class FinishStage:
     """Draw ``card.png`` and return the field ``quality``."""
 
     name: ClassVar[str] = "finish"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb",
         "solid.npz",

@@ -19,7 +19,7 @@ class GenerateStage:
     """Write ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?",)
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 
@@ -48,6 +48,7 @@ class GenerateStage:
                 "model": made.model,
                 "metric": made.metric,
                 "rests": made.rests,
+                "unseen_share": made.unseen_share,
                 "notes": made.notes,
             }
         }

@@ -32,6 +32,7 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
                 message="; ".join(matte["findings"]),
             )
         )
+    checks += _unseen(draft)
     findings = draft.field("geometry")["findings"]
     checks.append(
         Check(
@@ -45,6 +46,15 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
     for checks_of in (_physical_checks, _examined, _collision_checks, _grasp_checks, _placement_checks):
         checks += checks_of(draft)
     return [check.model_dump() for check in checks]
+
+
+def _unseen(draft: Draft) -> list[Check]:
+    """Return what the photo did not show, where the generator says how much of the surface that is."""
+    share = draft.field("generation").get("unseen_share") if "generation" in draft.fields else None
+    if share is None:
+        return []
+    message = "share of the surface that the photo does not show: its shape and colours are a guess" if share else ""
+    return [Check(name="every_side_seen", passed=not share, value=share, limit=0.0, message=message)]
 
 
 def _physical_checks(draft: Draft) -> list[Check]:

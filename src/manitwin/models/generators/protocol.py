@@ -42,6 +42,7 @@ class Generated:
     """A mesh file (GLB or USDZ, any scale) and what the generator says about how it was made.
 
     ``metric``: its units are true metres. ``rests``: it stands or lies on y = 0 as such a thing does, so that its pose is kept.
+    ``unseen_share``: how much of its surface the photo does not show and no model knows; None where the generator does not say.
     """
 
     path: Path
@@ -49,6 +50,7 @@ class Generated:
     notes: dict[str, Any] = field(default_factory=dict)
     metric: bool = False
     rests: bool = False
+    unseen_share: float | None = None
 
 
 class Generator(Protocol):

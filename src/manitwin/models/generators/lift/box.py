@@ -15,7 +15,7 @@ _INSET = 0.02
 def make_box(silhouette: Silhouette, *, depth_share: float) -> Surface:
     """Make a box with the fitted rectangle as its front; its depth is ``depth_share`` of the shorter side.
 
-    Sides continue the colours of the front's edge, the back mirrors the front.
+    Sides continue the colours of the front's edge.
     """
     corners = _ordered(silhouette.corners)
     width = float(np.linalg.norm(corners[1] - corners[0]))
@@ -45,6 +45,7 @@ def make_box(silhouette: Silhouette, *, depth_share: float) -> Surface:
         np.concatenate([front, back]),
         np.concatenate([faces, faces[:, ::-1] + count, walls]),
         np.concatenate([uv, uv]),
+        np.repeat([1.0, -1.0], count),
     )
 
 

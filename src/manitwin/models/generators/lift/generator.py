@@ -19,6 +19,8 @@ from manitwin.files.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.generators.lift.hint import hint_from_name
 from manitwin.models.generators.lift.lifting import Lifted, lift
+from manitwin.models.generators.lift.surface import unseen_share
+from manitwin.models.generators.lift.texture import beside
 from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
 
 ROUGHNESS = 0.6
@@ -28,6 +30,7 @@ ROUGHNESS = 0.6
 class _Job:
     glb: bytes
     notes: dict[str, Any]
+    unseen_share: float
 
 
 class LiftGenerator:
@@ -55,7 +58,7 @@ class LiftGenerator:
         digest = hashlib.sha256(np.ascontiguousarray(request.rgba).tobytes() + (request.name or "").encode())
         job_id = digest.hexdigest()[:16]
         lifted = lift(request.rgba, hint_from_name(request.name))
-        self._jobs[job_id] = _Job(write_glb([textured_part(lifted)], max_texture_size=1024), lifted.notes)
+        self._jobs[job_id] = _Job(write_glb([textured_part(lifted)]), lifted.notes, unseen_share(lifted.surface))
         return job_id
 
     def poll(self, job_id: str) -> JobState:
@@ -71,18 +74,31 @@ class LiftGenerator:
         job = self._jobs.pop(job_id)
         path = folder / "lift.glb"
         path.write_bytes(job.glb)
-        return Generated(path=path, model=str(job.notes["primitive"]), notes=job.notes, rests=True)
+        return Generated(
+            path=path, model=str(job.notes["primitive"]), notes=job.notes, rests=True, unseen_share=job.unseen_share
+        )
 
 
 def textured_part(lifted: Lifted) -> trimesh.Trimesh:
-    """Return the mesh in the object frame (Z up) with its texture."""
+    """Return the mesh in the object frame (Z up) with its texture: the photo, and beside it what it does not show."""
+    surface, seen = lifted.surface, lifted.surface.seen()
+    # a vertex on the border of both has a place in each
+    corners = np.where(seen[:, None], surface.faces, surface.faces + len(surface.vertices))
+    used, faces = np.unique(corners, return_inverse=True)
+    source = used % len(surface.vertices)
+    texture, uv = beside(lifted.texture, lifted.unseen, surface.uv[source], used >= len(surface.vertices))
     material = PBRMaterial(
         name="photo",
         baseColorFactor=[255, 255, 255, 255],
-        baseColorTexture=Image.fromarray(lifted.texture),
+        baseColorTexture=Image.fromarray(texture),
         metallicFactor=0.0,
         roughnessFactor=ROUGHNESS,
     )
-    vertices = lifted.surface.vertices @ GLTF_TO_OBJECT[:3, :3].T
-    visual = TextureVisuals(uv=lifted.surface.uv, material=material)
-    return trimesh.Trimesh(vertices, lifted.surface.faces, visual=visual, process=False, metadata={"name": "lift"})
+    vertices = surface.vertices[source] @ GLTF_TO_OBJECT[:3, :3].T
+    return trimesh.Trimesh(
+        vertices,
+        faces.reshape(-1, 3),
+        visual=TextureVisuals(uv=uv, material=material),
+        process=False,
+        metadata={"name": "lift"},
+    )

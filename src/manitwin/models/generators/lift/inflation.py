@@ -41,7 +41,8 @@ def inflate(mask: np.ndarray, *, depth_limit_px: float | None, rise: float, flat
     faces = np.concatenate([triangles, triangles[:, ::-1] + count, walls])
     uv = np.column_stack([(x + 0.5) / mask.shape[1], 1 - (0.5 - y) / mask.shape[0]])
     # a bridge thinner than the grid may have broken: the largest part is the object
-    return from_manifold(to_manifold(Surface(vertices, faces, np.concatenate([uv, uv]))))
+    facing = np.repeat([1.0, -1.0], count)
+    return from_manifold(to_manifold(Surface(vertices, faces, np.concatenate([uv, uv]), facing)))
 
 
 def _solve(mask: np.ndarray) -> np.ndarray:

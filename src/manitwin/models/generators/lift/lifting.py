@@ -25,6 +25,7 @@ from manitwin.models.generators.lift.revolution import profile, revolve, trim_ca
 from manitwin.models.generators.lift.silhouette import CROP_SIDE_PX, Silhouette, analyse_silhouette
 from manitwin.models.generators.lift.surface import Surface
 from manitwin.models.generators.lift.texture import crop_object
+from manitwin.models.generators.lift.unseen import paint_unseen
 
 Primitive = Literal["revolution", "box", "inflation"]
 
@@ -38,10 +39,14 @@ _RELIEF_RISE = 1.5  # a bar of radius r lies as a relief this many r high: betwe
 
 @dataclass(frozen=True)
 class Lifted:
-    """A solid in glTF's frame (Y up, front +Z, longest side 1, lowest point y = 0), its texture and how it was made."""
+    """A solid in glTF's frame (Y up, front +Z, longest side 1, lowest point y = 0), its textures and how it was made.
+
+    ``texture (H, W, 3)`` is the photo's, for what it shows; ``unseen (h, w, 3)``, of the same rectangle, is for the rest.
+    """
 
     surface: Surface
     texture: np.ndarray
+    unseen: np.ndarray
     notes: dict[str, Any]
 
 
@@ -70,7 +75,8 @@ def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
         "axis_tilt_deg": round(silhouette.axis_tilt_deg, 1),
         **rest,
     }
-    return Lifted(surface, crop.colours, notes)
+    axis = silhouette if primitive == "revolution" else None
+    return Lifted(surface, crop.colours, paint_unseen(crop, axis), notes)
 
 
 def choose_primitive(silhouette: Silhouette, hint: ShapeHint) -> Primitive:

@@ -59,23 +59,25 @@ def revolve(silhouette: Silhouette, rows: np.ndarray, radii: np.ndarray, *, wall
     """Revolve a profile about the silhouette's axis; ``wall_px`` hollows it from the top with a wall that thick.
 
     The surface has the axis along y and z = 0 through it, rows of the upright mask being -y. The photo is projected on
-    the front and mirrored on the back.
+    the front; it shows neither the back nor the inside.
     """
     rings = np.linspace(rows[0], rows[-1], _RINGS)
     outline = [(row, radius) for row, radius in zip(rings, np.interp(rings, rows, radii), strict=True)]
     least = 0.02 * radii.max()
     outline = [(row, max(radius, least)) for row, radius in outline]
     if wall_px is None:
-        loop = [(rings[0], 0.0), *outline, (rings[-1], 0.0)]
-    else:
-        inner = [(row, radius - wall_px) for row, radius in outline if row < rings[-1] - 1.5 * wall_px]
-        inner = [(row, max(radius, least)) for row, radius in inner]
-        loop = [(inner[-1][0], 0.0), *inner[::-1], *outline, (rings[-1], 0.0)]
-    return _lathe(silhouette, np.array(loop))
+        return _lathe(silhouette, np.array([(rings[0], 0.0), *outline, (rings[-1], 0.0)]), 0)
+    inner = [(row, radius - wall_px) for row, radius in outline if row < rings[-1] - 1.5 * wall_px]
+    inner = [(row, max(radius, least)) for row, radius in inner]
+    loop = [(inner[-1][0], 0.0), *inner[::-1], *outline, (rings[-1], 0.0)]
+    return _lathe(silhouette, np.array(loop), len(inner))
 
 
-def _lathe(silhouette: Silhouette, loop: np.ndarray) -> Surface:
-    """Turn a loop of (row, radius) from axis to axis into a closed surface, outside to the left of its direction."""
+def _lathe(silhouette: Silhouette, loop: np.ndarray, inside: int) -> Surface:
+    """Turn a loop of (row, radius) from axis to axis into a closed surface, outside to the left of its direction.
+
+    Its first ``inside`` rings are those of the inside.
+    """
     turns = 2 * np.pi * np.arange(SIDES) / SIDES
     middle = loop[1:-1]
     x = middle[:, 1:] * np.sin(turns)
@@ -97,7 +99,10 @@ def _lathe(silhouette: Silhouette, loop: np.ndarray) -> Surface:
     top = np.column_stack([np.full(SIDES, first), sides, (sides + 1) % SIDES])
     low = (len(middle) - 1) * SIDES
     bottom = np.column_stack([np.full(SIDES, last), low + (sides + 1) % SIDES, low + sides])
-    return Surface(vertices, np.concatenate([quads, top, bottom]), _projected(silhouette, vertices))
+    facing = np.tile(np.cos(turns), (len(middle), 1))
+    facing[:inside] = -1.0
+    facing = np.append(facing.ravel(), [-1.0, -1.0])  # a photo shows an end as a sliver at most
+    return Surface(vertices, np.concatenate([quads, top, bottom]), _projected(silhouette, vertices), facing)
 
 
 def _projected(silhouette: Silhouette, vertices: np.ndarray) -> np.ndarray:

@@ -52,6 +52,24 @@ def bled(colours: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return np.where(inner[..., None], colours, soft)
 
 
+def beside(
+    first: np.ndarray, second: np.ndarray, uv: np.ndarray, on_second: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Put a smaller picture to the right of a tall one, or below a wide one; both ``(H, W, 3) uint8``.
+
+    Returns the picture of both and the coordinates in it, of ``uv (V, 2)`` in the first or, by ``on_second (V,)``, the second.
+    """
+    (height, width), (h, w) = first.shape[:2], second.shape[:2]
+    wide = width > height
+    corner = np.array([0, height] if wide else [width, 0])
+    whole = np.array([width, height + h] if wide else [width + w, height])
+    edge = ((0, 0), (0, width - w), (0, 0)) if wide else ((0, height - h), (0, 0), (0, 0))
+    texture = np.concatenate([first, np.pad(second, edge, mode="edge")], axis=0 if wide else 1)
+    down = np.column_stack([uv[:, 0], 1 - uv[:, 1]])
+    pixels = np.where(on_second[:, None], corner + down * (w, h), down * (width, height)) / whole
+    return texture, np.column_stack([pixels[:, 0], 1 - pixels[:, 1]])
+
+
 def _scaled(rgba: np.ndarray, side_px: int) -> tuple[np.ndarray, np.ndarray]:
     """Scale down with premultiplied alpha: hidden colours do not bleed into visible ones."""
     alpha = rgba[..., 3].astype(np.float32) / 255
