@@ -20,6 +20,7 @@ from manitwin.config import RunConfig
 from manitwin.engine.rehearsal import RehearsalRecipe
 from manitwin.errors import UsageError
 from manitwin.ledger.ledger import Ledger
+from manitwin.stages.stage import Item
 
 SLOTS = 2
 UNDER_WAY = 2 * SLOTS  # of which half run, and half wait beside them
@@ -59,29 +60,32 @@ def test_a_mesh_that_crashes_native_code_costs_itself_alone(tmp_path: Path, reci
 
 
 def test_killed_workers_cost_an_attempt_of_what_they_were_at(tmp_path: Path, recipe: RehearsalRecipe) -> None:
-    texts = [f"item {n} sleep:b:0.3" for n in range(8)]
+    gate = tmp_path / "gate"
+    free, held = [f"item {n}" for n in range(6)], [f"item {n} wait:b:{gate}" for n in range(6, 8)]
+    held_ids = [recipe.identify(Item(file=None, text=text)).twin_id for text in held]
     killed: list[int] = []
 
-    def kill_one_now_and_then() -> None:
+    def kill_twice() -> None:
         while len(killed) < 2:
-            time.sleep(0.2)
-            # a worker that is at a stage, not one that only starts
-            if sum(stage == "b" for _, stage in runs(tmp_path / "log")) >= 2 * len(killed) + 1:
-                victim = children()[-1]
-                os.kill(victim, signal.SIGKILL)
-                killed.append(victim)
+            time.sleep(0.02)
+            # the two that wait hold both workers: what is killed is at a stage, and not one that only starts
+            begun = runs(tmp_path / "log")
+            if sum(begun[twin_id, "b"] for twin_id in held_ids) == 2 + len(killed):
+                killed.append(children()[-1])
+                os.kill(killed[-1], signal.SIGKILL)
+        gate.touch()
 
-    killer = threading.Thread(target=kill_one_now_and_then)
+    killer = threading.Thread(target=kill_twice, daemon=True)
     killer.start()
-    run = rehearse(tmp_path / "d", texts, recipe=recipe, settings=settings(), processes=True)
-    killer.join()
+    run = rehearse(tmp_path / "d", [*free, *held], recipe=recipe, settings=settings(), processes=True)
+    assert len(killed) == 2
     assert all_ended_once(run, tmp_path / "d", 8) and set(run.states.values()) == {"accepted"}
     assert sum(count - 1 for count in run.attempts.values()) <= 2
     assert sum(count - 1 for count in runs(tmp_path / "log").values()) <= 2
 
 
 def test_a_hang_ends_with_the_time_limit(tmp_path: Path, recipe: RehearsalRecipe) -> None:
-    limits = settings(stage_timeout_s=1.5, attempts=1)
+    limits = settings(stage_timeout_s=5, attempts=1)
     run = rehearse(tmp_path / "d", ["bad hang:b", "good"], recipe=recipe, settings=limits, processes=True)
     assert run.states == {"bad hang:b": "failed", "good": "accepted"}
     assert "stage_timeout_s" in (run.errors["bad hang:b", "b"] or "")
@@ -95,16 +99,32 @@ from manitwin.engine.rehearsal import RehearsalRecipe
 from rehearsals import rehearse
 root = Path(sys.argv[1])
 rehearse(root, recipe=RehearsalRecipe(log=Path(sys.argv[2])), settings=RunConfig(cpu=2, index_every=5), processes=True,
-         texts=[f"item {n} sleep:b:0.05" for n in range(30)])
+         texts=[f"item {n}" for n in range(29)] + [f"the last wait:b:{sys.argv[3]}"])
 """
 
 
+def wait_for_the_end_of_group(group: int) -> None:
+    """Return when no process of a process group is left but zombies."""
+    while any(_group_of(stat) == group for stat in Path("/proc").glob("[0-9]*/stat")):
+        time.sleep(0.02)
+
+
+def _group_of(stat: Path) -> int | None:
+    """Return the process group of a running process; proc(5): after the name in brackets state, parent and group."""
+    try:
+        state, _, group = stat.read_text().rpartition(")")[2].split()[:3]
+    except (OSError, ValueError):  # it has ended meanwhile
+        return None
+    return None if state == "Z" else int(group)
+
+
 def test_a_killed_driver_loses_what_was_running_and_nothing_else(tmp_path: Path, recipe: RehearsalRecipe) -> None:
-    root, log = tmp_path / "d", tmp_path / "log"
+    root, log, gate = tmp_path / "d", tmp_path / "log", tmp_path / "gate"
     environment = {**os.environ, "PYTHONPATH": f"{Path(__file__).parent}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
     killed = 0
     while killed < 3:
-        driver = subprocess.Popen([sys.executable, "-c", DRIVER, str(root), str(log)], env=environment)
+        command = [sys.executable, "-c", DRIVER, str(root), str(log), str(gate)]
+        driver = subprocess.Popen(command, env=environment, start_new_session=True)
         begun, wanted = sum(runs(log).values()), 15
         while driver.poll() is None and sum(runs(log).values()) < begun + wanted:
             time.sleep(0.02)
@@ -112,10 +132,8 @@ def test_a_killed_driver_loses_what_was_running_and_nothing_else(tmp_path: Path,
         driver.send_signal(signal.SIGKILL)
         driver.wait()
         killed += 1
-        time.sleep(0.3)
-        after = sum(runs(log).values())
-        time.sleep(0.5)
-        assert sum(runs(log).values()) == after, "its workers died with it"
+        wait_for_the_end_of_group(driver.pid)  # its workers die with it
+    gate.touch()
     run = rehearse(root, recipe=recipe, settings=settings(), processes=True)
     assert all_ended_once(run, root, 30) and set(run.states.values()) == {"accepted"}
     repeated = {key: count for key, count in runs(log).items() if count > 1}
@@ -157,14 +175,19 @@ def test_a_full_disk_stops_the_run_and_leaves_nothing_half_written(
 
 def test_items_that_wait_for_a_service_hold_no_core(tmp_path: Path, recipe: RehearsalRecipe) -> None:
     recipe = replace(recipe, plan=(("a", "cpu"), ("ask", "vlm"), ("c", "cpu")))
-    texts = [f"item {n} sleep:ask:2" for n in range(6)]
-    run = rehearse(tmp_path / "d", texts, recipe=recipe, settings=settings(), processes=True)
+    answered = tmp_path / "answered"
+    texts = [f"item {n} wait:ask:{answered}" for n in range(6)]
+
+    def answer_when_all_ask() -> None:
+        while sum(stage == "ask" for _, stage in runs(tmp_path / "log")) < 6:
+            time.sleep(0.02)
+        answered.touch()
+
+    # with two cores held by two that wait, the third would never ask, and all would fail at their limit
+    threading.Thread(target=answer_when_all_ask, daemon=True).start()
+    limits = settings(stage_timeout_s=120, attempts=1)
+    run = rehearse(tmp_path / "d", texts, recipe=recipe, settings=limits, processes=True)
     assert set(run.states.values()) == {"accepted"}
-    order = [line.split()[1] for line in (tmp_path / "log").read_text().splitlines()]
-    # with two cores held by two that wait, the third item could not have begun before the first was answered
-    assert max(n for n, stage in enumerate(order) if stage == "a") < min(
-        n for n, stage in enumerate(order) if stage == "c"
-    )
 
 
 def test_two_runs_on_one_data_set_are_one_too_many(tmp_path: Path, recipe: RehearsalRecipe) -> None:

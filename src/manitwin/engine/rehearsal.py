@@ -12,6 +12,7 @@ The text of an item is words apart by spaces, each ``what:stage`` or ``what:stag
     denied:b:/file        it raises AccessDenied while that file is there
     charge:b:0.02         a service charges so many USD, each time
     sleep:b:1.5           it takes so many seconds
+    wait:b:/file          it does not end before that file is there
 
 Every run of a stage adds a line ``<twin_id> <stage>`` to the recipe's log, so that a test can count them.
 """
@@ -92,6 +93,8 @@ class RehearsedStage:
             charge(float(more))
         if what == "sleep":
             time.sleep(float(more))
+        while what == "wait" and not Path(more).exists():
+            time.sleep(0.02)
         if what == "hang":
             _hang()
 

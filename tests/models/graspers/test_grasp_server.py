@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -59,10 +58,8 @@ def says(reply: bytes | None) -> Iterator[tuple[str, list[str]]]:
 
 def test_nothing_that_listens_is_said_at_once() -> None:
     waits: list[float] = []
-    started = time.perf_counter()
     with pytest.raises(Unavailable, match=r"nothing listens at tcp://127.0.0.1:9; start its server"):
         server_at("tcp://127.0.0.1:9", timeout_s=0.1, waits=waits).ask({"action": "health"})
-    assert time.perf_counter() - started < 2
     assert waits == [1, 2, 4]
 
 
