@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from collections.abc import Callable
@@ -11,10 +12,13 @@ from pathlib import Path
 import trimesh
 from doc_pages import ROOT
 from doc_shell import Shell
+from PIL import Image
 
 from foreign_assets import mug_urdf
 from grasped_twins import write_brick
-from scene_twins import THINGS, bowl, slab, write_thing
+from manitwin.store import RECORD, seal
+from scene_twins import bowl, can, slab, write_thing
+from twin_folders import twin_id
 
 SMALL = """\
 grasps.simulated = 20
@@ -48,10 +52,14 @@ class Folders:
     def dataset(self) -> Path:
         """A data set with an index: bricks named as pages name objects, with grasps from above that hold, and things."""
         root = self.root / "DATASET"
-        for number, category in enumerate(("mug", "kettle", "brick")):
-            write_brick(root, number, category)
-        for number, thing in enumerate((bowl(), slab("board", 0.24, 0.16, 0.015, 0.5), THINGS[-2]), 3):
-            write_thing(root, number, thing)
+        bricks, things = ("mug", "mug", "kettle"), (bowl(), slab("board", 0.24, 0.16, 0.015, 0.5), can())
+        numbers = iter(sorted(range(len(bricks) + len(things)), key=twin_id))  # few episodes go to the first ids
+        for category in bricks:
+            write_brick(root, next(numbers), category)
+        for thing in things:
+            write_thing(root, next(numbers), thing)
+        for folder in root.glob("twins/*/*"):
+            _complete(folder)
         self._manitwin("index DATASET")
         return root
 
@@ -64,7 +72,7 @@ class Folders:
 
     @cached_property
     def episodes(self) -> Path:
-        """Two attempts at episodes with the data set's twins."""
+        """Two episodes with the data set's twins."""
         assert self.dataset
         self._manitwin("trajectories DATASET -n 2 -o EPISODES --jobs 1")
         return self.root / "EPISODES"
@@ -108,6 +116,15 @@ class Folders:
         """Return the id of the mug's twin, if there is one in the folder."""
         records = sorted(folder.glob("twins/*/twin.json"))
         return records[0].parent.name if records else ""
+
+
+def _complete(twin: Path) -> None:
+    """Give a twin a picture of one colour for its card, and as many verified grasps as pages ask for."""
+    Image.new("RGB", (64, 64), (200, 20, 20)).save(twin / "card.png")
+    record = json.loads((twin / RECORD).read_bytes())
+    del record["revision"], record["files"]
+    record["grasps"]["verified"] = 24
+    seal(twin, record)
 
 
 def _copied(source: Path, target: Path) -> None:

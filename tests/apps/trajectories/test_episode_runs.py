@@ -106,6 +106,9 @@ def test_scenes_give_episodes_too(bricks: Path, tmp_path: Path) -> None:
     assert {attempt.scene_id for attempt in attempts} == {"layout_2_000000", "layout_2_000001"}
     assert all(attempt.others >= 1 for attempt in attempts)
     assert any(attempt.succeeded for attempt in attempts)
+    # those of twins alone would open the batches of scenes again, and have none
+    with pytest.raises(UsageError, match=r"its episodes are of .*scenes; give another folder for those of"):
+        make_episodes(bricks, tmp_path / "episodes", 2, CONFIG, executor="inline")
 
 
 def test_what_is_no_place_of_twins_is_said(tmp_path: Path) -> None:

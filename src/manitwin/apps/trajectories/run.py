@@ -62,6 +62,18 @@ def _check_twins(dataset: str, scenes: Path) -> None:
         source.folder(each.twin_id)
 
 
+def _check_out(out: DatasetRoot, source: Source) -> None:
+    """Raise UsageError where a folder has episodes of scenes and is to get some of twins alone, or the other way."""
+    if not out.exists(CONFIG):
+        return
+    said = json.loads(out.read_bytes(CONFIG))
+    if "scenes" in said and (said["scenes"] is None) != (source.scenes is None):
+        raise UsageError(
+            f"{out}: its episodes are of {said['scenes'] or said['dataset']}; give another folder for those of"
+            f" {source.scenes or source.dataset}"
+        )
+
+
 def make_episodes(
     place: str | Path,
     out: str | Path,
@@ -77,11 +89,13 @@ def make_episodes(
     """Attempt ``count`` episodes with the twins, or in the scenes, of a place; those that are there stay.
 
     ``twins`` names where the twins of scenes are now, None: where they were as the layouts were made.
-    Raises UsageError for a place without twins or scenes, an unknown robot, or where another run is at work at ``out``.
+    Raises UsageError for a place without twins or scenes, an unknown robot, an ``out`` that has episodes of
+    scenes where twins are given or the other way, or where another run is at work there.
     """
     if count < 1:
         raise UsageError(f"{count} episodes; ask for 1 or more")
-    robot, source = load_robot(config.robot), Source.of(place, twins)
+    robot, source, root = load_robot(config.robot), Source.of(place, twins), DatasetRoot(out)
+    _check_out(root, source)
     if source.scenes is None:
         deal = batches(
             robot.name, count, config.batch, twin_ids=[twin.twin_id for twin in pool_of(source.dataset).twins]
@@ -90,8 +104,8 @@ def make_episodes(
         deal = batches(robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)))
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
     return drive(
-        EpisodesRecipe(config, source.dataset, source.scenes), (batch.item() for batch in deal), DatasetRoot(out),
-        config.run, configuration=configuration, executor=executor, address=address, on_start=on_start, on_ended=on_ended,
+        EpisodesRecipe(config, source.dataset, source.scenes), (batch.item() for batch in deal), root, config.run,
+        configuration=configuration, executor=executor, address=address, on_start=on_start, on_ended=on_ended,
     )  # fmt: skip
 
 
