@@ -25,6 +25,7 @@ from manitwin.commands.export import export
 from manitwin.commands.fake import fake
 from manitwin.commands.import_ import import_
 from manitwin.commands.index import index
+from manitwin.commands.json_output import Json, print_document, print_failure
 from manitwin.commands.layout import layout
 from manitwin.commands.prompts import prompts
 from manitwin.commands.publish import publish
@@ -87,12 +88,18 @@ def show(
     twin: Annotated[
         Path, typer.Argument(help="A twin folder.", metavar="TWIN", callback=there("a folder that manitwin build made"))
     ],
+    json_: Json = False,
 ) -> None:
     """Print a readable summary of a twin, after checking its files."""
     from manitwin.api import load
+    from manitwin.commands.documents import show_document
     from manitwin.summary import print_summary
 
-    print_summary(load(twin, verify=True), out_console)
+    loaded = load(twin, verify=True)
+    if json_:
+        print_document(show_document(loaded))
+    else:
+        print_summary(loaded, out_console)
 
 
 @app.command()
@@ -103,7 +110,8 @@ def schema() -> None:
     sys.stdout.write(json.dumps(record_schema(), indent=1) + "\n")
 
 
-def _fail(message: str, code: int) -> NoReturn:
+def _fail(error: BaseException, message: str, code: int) -> NoReturn:
+    print_failure(error, message, code)
     err_console.print(f"{_command_path}: {' '.join(message.split())}", markup=False, style="red")
     sys.exit(code)
 
@@ -124,15 +132,15 @@ def main() -> None:
         sys.exit(status)
     except CommandLineError as error:
         message = getattr(error, "format_message", error.__str__)()
-        _fail(f"{message.removesuffix('.')}{'' if message.endswith('?') else '.'} See {_command_path} --help", 2)
-    except (KeyboardInterrupt, typer.Abort):
-        _fail("interrupted; run the same command again to go on where it stopped", 4)
+        _fail(error, f"{message.removesuffix('.')}{'' if message.endswith('?') else '.'} See {_command_path} --help", 2)
+    except (KeyboardInterrupt, typer.Abort) as error:
+        _fail(error, "interrupted; run the same command again to go on where it stopped", 4)
     except UsageError as error:
-        _fail(str(error), 2)
+        _fail(error, str(error), 2)
     except BackendError as error:
-        _fail(str(error), 4)
+        _fail(error, str(error), 4)
     except ManiTwinError as error:
-        _fail(str(error), 2)
+        _fail(error, str(error), 2)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,8 @@ import typer
 
 from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console, print_estimate
-from manitwin.commands.why import print_causes_of_build
+from manitwin.commands.json_output import Json, print_document
+from manitwin.commands.why import causes_of_build, print_causes_of_build
 
 
 def build(
@@ -40,6 +41,7 @@ def build(
     record: options.Record = None,
     require_agreement: options.RequireAgreement = False,
     quick: options.Quick = False,
+    json: Json = False,
 ) -> None:
     """Build a verified twin of every input."""
     from manitwin.errors import UsageError
@@ -89,4 +91,8 @@ def build(
     print_causes_of_build(report)
     if unfinished:
         err_console.print("run the same command again to go on where it stopped", markup=False)
+    if json:
+        from manitwin.commands.documents import build_document
+
+        print_document(build_document(report, str(out), causes_of_build(report)))
     raise typer.Exit(report.exit_code)

@@ -10,7 +10,8 @@ import typer
 
 from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console
-from manitwin.commands.why import print_causes
+from manitwin.commands.json_output import Json, print_document
+from manitwin.commands.why import causes_of, print_causes
 
 if TYPE_CHECKING:
     from manitwin.app_config import LayoutsConfig
@@ -50,6 +51,7 @@ def layout(
     jobs: options.Jobs = None,
     executor: options.Executor = "local",
     address: options.Address = None,
+    json: Json = False,
 ) -> None:
     """Sample scenes of twins at rest on a table, a shelf or a tray; run it again to go on where it stopped."""
     given = {
@@ -89,6 +91,10 @@ def layout(
     if report.stopped:
         err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
     print_causes(out)
+    if json:
+        from manitwin.commands.documents import layouts_document
+
+        print_document(layouts_document(report, out, causes_of(out), totals))
     raise typer.Exit(report.exit_code)
 
 

@@ -9,7 +9,8 @@ import typer
 
 from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console, print_estimate
-from manitwin.commands.why import print_causes
+from manitwin.commands.json_output import Json, print_document
+from manitwin.commands.why import causes_of, print_causes
 
 if TYPE_CHECKING:
     from manitwin.dataset_run import RunReport
@@ -50,6 +51,7 @@ def run(
     attribution: options.Attribution = None,
     strict: options.Strict = False,
     lines: Annotated[bool, typer.Option("--lines/--no-lines", help="Print a line for every item that ends.")] = True,
+    json: Json = False,
 ) -> None:
     """Build a data set of twins; run it again to go on where it stopped."""
     from manitwin.errors import UsageError
@@ -90,6 +92,10 @@ def run(
         on_ended=_print_item if lines else lambda event: None,
     )
     _print_report(report, dataset)
+    if json:
+        from manitwin.commands.documents import run_document
+
+        print_document(run_document(report, dataset, causes_of(dataset)))
     raise typer.Exit(report.exit_code)
 
 

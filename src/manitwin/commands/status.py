@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.commands.console import out_console
+from manitwin.commands.json_output import Json, print_document
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -27,9 +28,15 @@ def status(
         str | None,
         typer.Option(help="Explain one item: its number, twin id, or a part of its file name.", metavar="ITEM"),
     ] = None,
+    json: Json = False,
 ) -> None:
     """Say how far a data set is: by stage, how fast, what is left, what it cost, what was rejected and why."""
+    from manitwin.errors import UsageError
+
+    if json and watch:
+        raise UsageError("--json prints one document, and --watch goes on; give one of them")
     from manitwin.causes import group_causes
+    from manitwin.commands.documents import status_document, story_document
     from manitwin.dataset_root import DatasetRoot
     from manitwin.dataset_run import local_ledger
     from manitwin.ledger.ledger import is_written, read_ledger
@@ -39,7 +46,14 @@ def status(
     path = local_ledger(DatasetRoot(dataset))
     with read_ledger(path) as ledger:
         if why is not None:
-            _print_story(read_story(ledger, why))
+            story = read_story(ledger, why)
+            if json:
+                print_document(story_document(story, dataset))
+            else:
+                _print_story(story)
+        elif json:
+            progress = read_progress(ledger, is_written(path))
+            print_document(status_document(progress, dataset, group_causes(read_unaccepted(ledger))))
         elif watch:
             from rich.live import Live
 

@@ -9,7 +9,8 @@ import typer
 
 from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console
-from manitwin.commands.why import print_causes
+from manitwin.commands.json_output import Json, print_document
+from manitwin.commands.why import causes_of, print_causes
 
 
 def trajectories(
@@ -45,6 +46,7 @@ def trajectories(
     jobs: options.Jobs = None,
     executor: options.Executor = "local",
     address: options.Address = None,
+    json: Json = False,
 ) -> None:
     """Plan and execute pick-and-place episodes, and keep what succeeded; run it again to go on where it stopped."""
     from manitwin.app_config import TrajectoriesConfig, load_app_config
@@ -53,6 +55,7 @@ def trajectories(
     settings = load_app_config(TrajectoriesConfig, config, given)
     from manitwin.apps.trajectories.collect import chosen_formats, collect
     from manitwin.apps.trajectories.run import make_episodes, retire_failing
+    from manitwin.commands.documents import trajectories_document
 
     wanted = chosen_formats(formats)
     report = make_episodes(
@@ -67,12 +70,14 @@ def trajectories(
         print_causes(str(out))
         if report.open:
             err_console.print(f"manitwin status {out} says more; run the same command again to go on", markup=False)
+        if json:
+            print_document(trajectories_document(report, str(out), causes_of(str(out)), None, [], 0))
         raise typer.Exit(4)
     collected = collect(out, wanted)
+    found, fresh = retire_failing(out) if retire else ([], 0)
     for line in collected.lines:
         out_console.print(line, markup=False)
     if retire:
-        found, fresh = retire_failing(out)
         out_console.print(f"{len(found)} grasps fail end to end, {fresh} of them retired now", markup=False)
         for each in found:
             what = ", ".join(f"{n} {outcome}" for outcome, n in each.outcomes.items())
@@ -80,3 +85,5 @@ def trajectories(
                 f"  {each.twin_id} {each.grasp_id}: {each.failed} of {each.executed} ({what})", markup=False
             )
     out_console.print(f"manitwin stats {out} says more", markup=False)
+    if json:
+        print_document(trajectories_document(report, str(out), causes_of(str(out)), collected, found, fresh))

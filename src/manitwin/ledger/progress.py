@@ -73,8 +73,8 @@ def read_progress(connection: sqlite3.Connection, at_work: bool, now: float | No
         failed_by_reason=_by_reason(connection, "failed"),
         items_per_hour=rate,
         left_s=states["open"] / rate * 3600 if rate else None,
-        cost_usd=sum(stage.cost_usd for stage in stages),
-        cpu_seconds=sum(stage.mean_cpu_seconds * (stage.done + stage.rejected) for stage in stages),
+        cost_usd=sum((stage.cost_usd for stage in stages), 0.0),
+        cpu_seconds=sum((stage.mean_cpu_seconds * (stage.done + stage.rejected) for stage in stages), 0.0),
         last_run="none" if run is None else run["ended_how"] or ("at work" if at_work else "cut off"),
     )
 
@@ -83,8 +83,8 @@ def _stages(connection: sqlite3.Connection) -> list[StageProgress]:
     rows = connection.execute(
         "SELECT stage, sum(state = 'done') AS done, sum(state = 'running') AS running,"
         " sum(state = 'waiting') AS waiting, sum(state = 'rejected') AS rejected, sum(state = 'failed') AS failed,"
-        " coalesce(avg(nullif(seconds, 0)), 0) AS mean_seconds,"
-        " coalesce(avg(nullif(cpu_seconds, 0)), 0) AS mean_cpu_seconds, sum(cost_usd) AS cost_usd"
+        " coalesce(avg(nullif(seconds, 0)), 0.0) AS mean_seconds,"
+        " coalesce(avg(nullif(cpu_seconds, 0)), 0.0) AS mean_cpu_seconds, sum(cost_usd) AS cost_usd"
         " FROM stages GROUP BY stage ORDER BY count(*) DESC, min(at), stage"
     )
     # stages of another recipe stay in the order of the query: no item comes to a stage before it was at those before

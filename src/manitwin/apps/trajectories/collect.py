@@ -21,10 +21,23 @@ FORMATS = (LEROBOT, MANISKILL)
 
 
 @dataclass(frozen=True)
+class AttemptTotals:
+    """All attempts of a run; ``without_success`` are the twins that no episode succeeded with."""
+
+    attempted: int
+    planned: int
+    succeeded: int
+    kept: int
+    outcomes: dict[str, int]
+    without_success: list[str]
+
+
+@dataclass(frozen=True)
 class Collected:
-    """What a person reads at a run's end."""
+    """What a person reads at a run's end, and the numbers in it."""
 
     lines: list[str]
+    totals: AttemptTotals
 
 
 def chosen_formats(text: str) -> list[str]:
@@ -67,10 +80,10 @@ def collect(out: Path, formats: list[str]) -> Collected:
         merge_episodes([folder / EPISODES for folder in folders], out / MANISKILL)
     if LEROBOT in formats and kept:
         write_lerobot(stored_episodes(folders), out / LEROBOT)
-    return Collected(_lines(out))
+    return _collected(out)
 
 
-def _lines(out: Path) -> list[str]:
+def _collected(out: Path) -> Collected:
     outcomes, by_twin = Counter[str](), dict[str, Counter[str]]()
     planned = succeeded = 0
     names = dict[str, str]()
@@ -89,4 +102,5 @@ def _lines(out: Path) -> list[str]:
     dead = sorted(twin_id for twin_id, counts in by_twin.items() if not counts["succeeded"])
     if dead:
         lines.append("no success with: " + ", ".join(f"{each} {names[each]}" for each in dead))
-    return lines
+    totals = AttemptTotals(attempted, planned, succeeded, kept, dict(sorted(outcomes.items())), dead)
+    return Collected(lines, totals)
