@@ -1,12 +1,13 @@
-"""``manitwin publish``: a data set as shards, tables and a card that others can download."""
+"""``manitwin publish``: a data set, or episodes, with a card and licences as others can download it."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.commands import choices
+from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ def publish(
     dataset: Annotated[
         str,
         typer.Argument(
-            help="A data set: a folder or a URL.",
-            metavar="DATASET",
+            help="A data set (a folder or a URL), or a folder of episodes.",
+            metavar="DATASET|EPISODES",
             callback=choices.there("the folder or URL of a data set"),
         ),
     ],
@@ -31,15 +32,28 @@ def publish(
     ] = None,
     shard_size_mb: Annotated[int, typer.Option(help="The most that a shard may have, in 10^6 bytes.")] = SHARD_SIZE_MB,
     twins_per_shard: Annotated[int | None, typer.Option(help="The most twins of a shard; default: any number.")] = None,
+    twins: options.Twins = None,
     name: Annotated[str | None, typer.Option(help="What the card calls it; default: the name of OUT.")] = None,
 ) -> None:
-    """Write a data set as WebDataset shards, Parquet tables and a dataset card."""
+    """Write a data set as WebDataset shards, Parquet tables and a card; or episodes as a LeRobot data set with a card."""
+    from manitwin.apps.trajectories.attempts_table import ATTEMPTS
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.errors import UsageError
     from manitwin.publish.publish import publish as publish_dataset
 
+    allowed = None if license_allow is None else license_allow.split(",")
+    root = DatasetRoot(dataset)
+    if root.local is not None and root.exists(ATTEMPTS):
+        if twins_per_shard is not None or shard_size_mb != SHARD_SIZE_MB:
+            raise UsageError(f"{dataset}: holds episodes, which have no shards; leave the options of shards out")
+        _publish_episodes(root.local, out, allowed, twins, name)
+        return
+    if twins is not None:
+        raise UsageError(f"{dataset}: holds no episodes, whose twins could be elsewhere; leave --twins out")
     published = publish_dataset(
         dataset,
         out,
-        license_allow=None if license_allow is None else license_allow.split(","),
+        license_allow=allowed,
         shard_size_mb=shard_size_mb,
         twins_per_shard=twins_per_shard,
         name=name,
@@ -50,6 +64,29 @@ def publish(
     out_console.print(f"in {out}", markup=False)
 
 
+def _publish_episodes(episodes: Path, out: str, allowed: list[str] | None, twins: str | None, name: str | None) -> None:
+    from manitwin.apps.trajectories.publication.publish import publish_episodes
+
+    published = publish_episodes(episodes, out, license_allow=allowed, twins=twins, name=name)
+    lines = [
+        f"{published.episodes:,} episodes of {published.twins:,} twins, {published.frames:,} frames; "
+        f"{published.files:,} files, {published.bytes / 1e6:,.1f} MB",
+        *_held_back_lines(published.left_out, published.without_attribution),
+    ]
+    for line in (*lines, f"in {out}"):
+        out_console.print(line, markup=False)
+
+
+def _held_back_lines(left_out: dict[str, int], without_attribution: int) -> list[str]:
+    lines = []
+    if left_out:
+        by_licence = ", ".join(f"{name} {count:,}" for name, count in left_out.items())
+        lines.append(f"{sum(left_out.values()):,} left out by licence: {by_licence}")
+    if without_attribution:
+        lines.append(f"{without_attribution:,} are under a licence that asks for attribution, and have none")
+    return lines
+
+
 def outcome_lines(published: Published) -> list[str]:
     """Return what to say of a publication: what went out, and what did not and why."""
     kept = f", {published.kept_shards:,} of them there already" if published.kept_shards else ""
@@ -57,14 +94,9 @@ def outcome_lines(published: Published) -> list[str]:
         f"{published.twins:,} twins in {published.shards:,} shards{kept}; "
         f"{published.files:,} files, {published.bytes / 1e6:,.1f} MB"
     ]
-    if published.left_out:
-        by_licence = ", ".join(f"{name} {count:,}" for name, count in published.left_out.items())
-        lines.append(f"{sum(published.left_out.values()):,} left out by licence: {by_licence}")
     if published.rejected:
         lines.append(f"{published.rejected:,} rejected ones are not published")
-    if published.without_attribution:
-        lines.append(f"{published.without_attribution:,} are under a licence that asks for attribution, and have none")
-    return lines
+    return lines + _held_back_lines(published.left_out, published.without_attribution)
 
 
 def _say_shard(done: ShardDone) -> None:

@@ -26,16 +26,32 @@ class Selection:
     left_out: dict[str, int]
 
 
+@dataclass(frozen=True)
+class Allowed:
+    """Which licences may go out: those that are named, in lower case; None: all that are known."""
+
+    named: frozenset[str] | None
+
+    @classmethod
+    def of(cls, names: Iterable[str] | None) -> Allowed:
+        """Take licences by name, in any case."""
+        return cls(None if names is None else frozenset(name.strip().lower() for name in names if name.strip()))
+
+    def has(self, licence: str | None) -> bool:
+        """Tell whether a licence may go out; None is the unknown one."""
+        lower = (licence or UNKNOWN).lower()
+        return lower != UNKNOWN if self.named is None else lower in self.named
+
+
 def select(twins: Iterable[Mapping[str, Any]], allow: Iterable[str] | None) -> Selection:
     """Choose the twins whose licence is named in ``allow`` (in any case), or known at all where nothing is named.
 
     ``twins`` are rows with ``twin_id`` and ``license``. Raises UsageError where nothing may go out.
     """
-    named = None if allow is None else {name.strip().lower() for name in allow if name.strip()}
+    allowed = Allowed.of(allow)
     published, kept_back, left_out = set[str](), set[str](), Counter[str]()
     for twin in twins:
-        licence = (twin["license"] or UNKNOWN).lower()
-        if licence in named if named is not None else licence != UNKNOWN:
+        if allowed.has(twin["license"]):
             published.add(twin["twin_id"])
         else:
             kept_back.add(twin["twin_id"])
@@ -54,10 +70,17 @@ def without_attribution(twins: Iterable[Mapping[str, Any]]) -> list[str]:
     return [t["twin_id"] for t in twins if t["license"].upper().startswith("CC-BY") and not t["attribution"]]
 
 
-def licenses_page(name: str, twins: Sequence[Mapping[str, Any]]) -> str:
+OF_TWINS = (
+    "Each twin is a work made of its source (a photo, a text or a mesh, which is in the shard too) and stays under that source's "
+    "licence. Licence, attribution and the source's sha256 of every single twin are the columns `license`, `attribution` and "
+    "`source_sha256` of `index/twins-*.parquet`."
+)
+
+
+def licenses_page(name: str, twins: Sequence[Mapping[str, Any]], *, introduction: str = OF_TWINS) -> str:
     """Return LICENSES.md: every licence, whom to credit under it, and for which twins.
 
-    ``twins`` are rows with ``twin_id``, ``license``, ``attribution``, sorted by id.
+    ``twins`` are rows with ``twin_id``, ``license``, ``attribution``, sorted by id. ``introduction`` says what is under them.
     """
     by_licence: dict[str, dict[str, list[str]]] = {}
     for twin in twins:
@@ -66,9 +89,7 @@ def licenses_page(name: str, twins: Sequence[Mapping[str, Any]]) -> str:
     lines = [
         f"# Licences of {plain(name)}",
         "",
-        "Each twin is a work made of its source (a photo, a text or a mesh, which is in the shard too) and stays under that "
-        "source's licence. Licence, attribution and the source's sha256 of every single twin are the columns `license`, "
-        "`attribution` and `source_sha256` of `index/twins-*.parquet`.",
+        introduction,
         "",
         *table(
             ["licence", "twins"],

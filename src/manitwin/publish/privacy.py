@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
 
 from manitwin.dataset_root import DatasetRoot
-from manitwin.errors import TwinError
+from manitwin.errors import ManiTwinError, TwinError
 from manitwin.store import RECORD
 from manitwin.twin import TwinRecord
 
@@ -36,12 +36,28 @@ def check_part(twin_id: str, part: str, content: bytes, places: tuple[bytes, ...
 
     The source is its author's, byte for byte, and is not searched for people's folders.
     """
-    found = next((place for place in places if place in content), None)
-    if found is None and part.endswith(_TEXT) and not part.startswith("source."):
-        match = HOME_FOLDER.search(content)
-        found = match.group() if match else None
+    words = part.endswith(_TEXT) and not part.startswith("source.")
+    found = _folder_in(content, places, of_people=words)
     if found is not None:
         raise TwinError(
             f"{twin_id}/{part}: names the folder {found.decode(errors='replace')!r} of a machine; "
             "take it out of the input's name, prompt or attribution and build the twin again"
         )
+
+
+def check_words(where: str, words: str, places: tuple[bytes, ...], error: type[ManiTwinError]) -> None:
+    """Raise ``error`` where words that are to go out name a local folder of what is published, or a person's folder."""
+    found = _folder_in(words.encode(), places, of_people=True)
+    if found is not None:
+        raise error(
+            f"{where}: names the folder {found.decode(errors='replace')!r} of a machine; take it out of the name, the prompt "
+            "or the attribution that it comes from"
+        )
+
+
+def _folder_in(content: bytes, places: tuple[bytes, ...], *, of_people: bool) -> bytes | None:
+    found = next((place for place in places if place in content), None)
+    if found is None and of_people:
+        match = HOME_FOLDER.search(content)
+        found = match.group() if match else None
+    return found

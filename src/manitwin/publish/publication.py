@@ -12,6 +12,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
@@ -27,41 +28,69 @@ from manitwin.store import canonical_json, sha256_of_file
 SUMS = "SHA256SUMS"
 OPEN = ".publish"
 _STARTED = f"{OPEN}/started"
-_FOLDERS = ("data", "index", "pictures")
+_INCOMING = "incoming-"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is published: the ``folders`` that it owns besides ``.publish/``, and the ``sign`` that a finished one has."""
+
+    name: str
+    folders: tuple[str, ...]
+    sign: str
+
+
+TWINS = Kind("twins", ("data", "index", "pictures"), SHARDS_FILE)
+EPISODES = Kind("episodes", ("meta", "data", "videos"), "meta/info.json")
 
 
 class Publication:
     """Write files below one root and remember their digests.
 
-    Owns: everything below ``data/``, ``index/``, ``pictures/`` and ``.publish/`` of the root.
+    Owns: everything below the folders of its kind and ``.publish/`` of the root.
     """
 
-    def __init__(self, root: DatasetRoot):
-        self.root = root
+    def __init__(self, root: DatasetRoot, kind: Kind = TWINS):
+        self.root, self.kind = root, kind
         self.digests: dict[str, str] = {}
         self.sizes: dict[str, int] = {}
         self._receipts: dict[str, dict[str, Any]] = {}
 
-    def begin(self) -> None:
-        """Open a new publication, an interrupted one or an older one. Raises UsageError where something else is there."""
+    def refuse_others(self) -> None:
+        """Raise UsageError where something else is there than nothing, or a publication of this kind, interrupted or older."""
         root = self.root
         root.fs.invalidate_cache()
+        if root.exists(_STARTED):
+            begun = root.read_bytes(_STARTED).decode()
+            if begun != self.kind.name:
+                raise UsageError(
+                    f"{root.url}: a publication of {begun} was begun there; give a folder that is new or empty"
+                )
+        elif not self._is_finished() and self._visible_entries():
+            raise UsageError(
+                f"{root.url}: not empty, and no publication of {self.kind.name} by manitwin; give a folder that is new or"
+                " empty"
+            )
+
+    def begin(self) -> None:
+        """Open a new publication, an interrupted one or an older one. Raises UsageError where something else is there."""
+        self.refuse_others()
+        root = self.root
         if not root.exists(_STARTED):
-            if root.exists(SUMS) and root.exists(SHARDS_FILE):
+            if self.kind == TWINS and self._is_finished():
                 for row in pq.read_table(io.BytesIO(root.read_bytes(SHARDS_FILE))).to_pylist():
                     self._write_receipt(row)
-            elif self._visible_entries():
-                raise UsageError(
-                    f"{root.url}: not empty, and no publication of manitwin; give a folder that is new or empty"
-                )
-            root.write_bytes(_STARTED, b"")
+            root.write_bytes(_STARTED, self.kind.name.encode())
         root.remove(SUMS)
         for name in root.names_below(OPEN):
-            if name.endswith(".json"):
+            if name.endswith(".json") and PurePosixPath(name).parent == PurePosixPath(OPEN):
                 receipt = json.loads(root.read_bytes(name))
                 self._receipts[receipt["shard"]] = receipt
             elif name != _STARTED:
-                root.remove(name)  # half a shard
+                root.remove(name)  # half a file
+
+    def _is_finished(self) -> bool:
+        return self.root.exists(SUMS) and self.root.exists(self.kind.sign)
 
     def _visible_entries(self) -> list[str]:
         path = self.root.path
@@ -83,14 +112,14 @@ class Publication:
     def write_shard(self, shard: Shard, write: Callable[[BinaryIO], None]) -> None:
         """Write a shard to a temporary file, put it in its place and note that it is there."""
         receipt = _receipt_name(shard.name)
-        with self._incoming() as path:
+        with self._incoming() as scratch:
+            path = scratch / "shard.tar"
             with path.open("wb") as stream:
                 write(stream)
                 stream.flush()
                 os.fsync(stream.fileno())
-            self.digests[shard.name], self.sizes[shard.name] = sha256_of_file(path), path.stat().st_size
             self.root.remove(receipt)  # what it says of an older shard is true no longer
-            self._place(path, shard.name)
+            self.put(path, shard.name)
         self._write_receipt(self.row(shard))
 
     def row(self, shard: Shard) -> dict[str, Any]:
@@ -103,6 +132,11 @@ class Publication:
             "contents_sha256": shard.contents_sha256,
         }
 
+    def put(self, path: Path, name: str) -> None:
+        """Take a finished file of the root's own file system to its place."""
+        self.digests[name], self.sizes[name] = sha256_of_file(path), path.stat().st_size
+        self._place(path, name)
+
     def write(self, name: str, content: bytes) -> None:
         """Write a small file."""
         self.root.write_bytes(name, content)
@@ -111,7 +145,7 @@ class Publication:
     def finish(self) -> None:
         """Remove what an older publication had more, and write the digests of all files."""
         check_hub_limits({**self.sizes, SUMS: 0})
-        for folder in _FOLDERS:
+        for folder in self.kind.folders:
             for name in self.root.names_below(folder):
                 if name not in self.digests:
                     self.root.remove(name)
@@ -127,11 +161,21 @@ class Publication:
                 folder.rmdir()
 
     @contextmanager
+    def scratch(self) -> Iterator[Path]:
+        """Yield a temporary folder from which files can be ``put``; nothing has to be begun for it."""
+        place = None
+        if self.root.local is not None:
+            place = self.root.local if self.root.local.is_dir() else self.root.local.parent
+            place.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=f"{OPEN}-", dir=place) as scratch:
+            yield Path(scratch)
+
+    @contextmanager
     def _incoming(self) -> Iterator[Path]:
-        """Yield the path of a temporary file: on the root's own file system where that is local."""
+        """Yield a temporary folder: on the root's own file system where that is local."""
         place = None if self.root.local is None else self.root.local / OPEN
-        with tempfile.TemporaryDirectory(prefix="incoming-", dir=place) as scratch:
-            yield Path(scratch) / "shard.tar"
+        with tempfile.TemporaryDirectory(prefix=_INCOMING, dir=place) as scratch:
+            yield Path(scratch)
 
     def _place(self, path: Path, name: str) -> None:
         if self.root.local is None:
