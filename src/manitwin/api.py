@@ -18,7 +18,9 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.executors.whole_items import StageStarted
     from manitwin.files.folder_listing import FolderListing
     from manitwin.loaded_twin import Twin
+    from manitwin.manifest import Notes
     from manitwin.scenes.loaded_scene import Scene
+    from manitwin.stages.stage import Item
     from manitwin.twin import TwinRecord
 
 
@@ -84,8 +86,6 @@ def build(
     Raises UsageError for wrong arguments; what happens to one item is in the report and never raised.
     """
     from manitwin.config import BuildConfig, load_config
-    from manitwin.generator_input import refusal
-    from manitwin.manifest import collect_items
 
     settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
     settings = with_flags(
@@ -94,16 +94,18 @@ def build(
     )  # fmt: skip
     if jobs is not None and jobs < 1:
         raise UsageError(f"jobs is {jobs}; give 1 or more")
-    given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
-    items, notes = collect_items(
-        given, texts, name=name, units=units, up=up, license=license, attribution=attribution, strict=strict,
-        refusal=refusal(settings),
-    )  # fmt: skip
-    if not items:
-        raise UsageError("nothing to build; give images, meshes, folders, manifests or texts")
-    place = Path(out)
-    if place.exists() and not place.is_dir():
-        raise UsageError(f"{out}: a file; give a folder to write twins into")
+    items, notes, place = items_to_build(
+        inputs,
+        out,
+        settings,
+        texts,
+        name=name,
+        units=units,
+        up=up,
+        license=license,
+        attribution=attribution,
+        strict=strict,
+    )
     # these take two CPU-seconds to import: what was given wrongly is said before
     from manitwin.executors.whole_items import build_all
     from manitwin.pipeline import check_names, estimate_usd
@@ -117,6 +119,30 @@ def build(
         results.append(result)
         on_result(result)
     return BuildReport(results, notes.remarks, notes.folders)
+
+
+def items_to_build(
+    inputs: str | Path | Iterable[str | Path],
+    out: str | Path,
+    settings: BuildConfig,
+    texts: Iterable[str] = (),
+    **said: Any,
+) -> tuple[list[Item], Notes, Path]:
+    """Return what ``build`` is asked to make, what is to be said of the inputs, and the folder; ``said`` is as of ``build``.
+
+    Nothing is written. Raises UsageError for wrong arguments.
+    """
+    from manitwin.generator_input import refusal
+    from manitwin.manifest import collect_items
+
+    given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
+    items, notes = collect_items(given, texts, refusal=refusal(settings), **said)
+    if not items:
+        raise UsageError("nothing to build; give images, meshes, folders, manifests or texts")
+    place = Path(out)
+    if place.exists() and not place.is_dir():
+        raise UsageError(f"{out}: a file; give a folder to write twins into")
+    return items, notes, place
 
 
 def with_flags(

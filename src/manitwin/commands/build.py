@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console, print_estimate
 from manitwin.commands.json_output import Json, print_document
+from manitwin.commands.planned import DryRun, print_plan
 from manitwin.commands.why import causes_of_build, print_causes_of_build
 
 
@@ -42,12 +43,37 @@ def build(
     require_agreement: options.RequireAgreement = False,
     quick: options.Quick = False,
     json: Json = False,
+    dry_run: DryRun = False,
 ) -> None:
     """Build a verified twin of every input."""
     from manitwin.errors import UsageError
 
     if out is None:
         raise UsageError("no folder to write twins into; give one with -o")
+    said: dict[str, Any] = {
+        "name": name,
+        "units": units,
+        "up": up,
+        "license": license,
+        "attribution": attribution,
+        "strict": strict,
+    }
+    if dry_run:
+        from manitwin.api import items_to_build, with_flags
+        from manitwin.config import BuildConfig, load_config
+
+        settings = with_flags(
+            load_config(config) if config else BuildConfig(), seed=seed, grippers=gripper or None, vlm=vlm,
+            generator=generator, grasper=grasper, max_cost_usd=max_cost, record=record,
+            require_agreement=require_agreement, quick=quick,
+        )  # fmt: skip
+        items, notes, place = items_to_build(inputs or [], out, settings, text or [], **said)
+        from manitwin.dry_run import plan_build
+        from manitwin.pipeline import check_names
+
+        check_names(settings)
+        print_plan(plan_build(items, place, settings, notes.remarks), str(out), as_json=json)
+        return
     from manitwin.api import build as build_twins
     from manitwin.progress import BuildProgress
     from manitwin.render.device import require_renderer
@@ -60,12 +86,7 @@ def build(
             inputs or [],
             out,
             texts=text or [],
-            name=name,
-            units=units,
-            up=up,
-            license=license,
-            attribution=attribution,
-            strict=strict,
+            **said,
             jobs=jobs,
             seed=seed,
             config=config,

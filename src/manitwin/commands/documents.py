@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from manitwin.build_item import ItemResult
     from manitwin.causes import Cause
     from manitwin.dataset_run import RunReport
+    from manitwin.dry_run import Plan
     from manitwin.files.folder_listing import FolderListing
     from manitwin.ledger.progress import ItemStory, Progress
     from manitwin.loaded_twin import Twin
@@ -104,6 +105,33 @@ def show_document(twin: Twin) -> Document:
         "placements": [_placement(number, placement) for number, placement in ordered],
         "findings": [check.model_dump(mode="json") for check in record.quality.checks if check.passed is not True],
     }
+
+
+def plan_document(plan: Plan, place: str) -> Document:
+    """Return what a dry run says."""
+    from manitwin.dry_run import PLANNED_STATES
+
+    return {
+        "out": place,
+        "items": [
+            {
+                "file": planned.item.file, "text": planned.item.text, "name": planned.item.name, "kind": planned.kind,
+                "units": planned.item.units, "up": planned.item.up, "twin_id": planned.twin_id, "state": planned.state,
+                "detail": planned.detail,
+            }
+            for planned in plan.items
+        ],
+        "counts": {state: plan.count(state) for state in PLANNED_STATES},
+        "estimate": {
+            "cpu_seconds": plan.cpu_s,
+            "cost_usd": plan.cost_usd,
+            "each": {
+                kind: {"cpu_seconds": rate.cpu_s, "source": rate.source, "cost_usd": plan.usd_each[kind]}
+                for kind, rate in plan.rates.items()
+            },
+        },
+        "remarks": plan.remarks,
+    }  # fmt: skip
 
 
 def _item(result: ItemResult) -> Document:

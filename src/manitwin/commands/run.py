@@ -10,6 +10,7 @@ import typer
 from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console, print_estimate
 from manitwin.commands.json_output import Json, print_document
+from manitwin.commands.planned import DryRun, print_plan
 from manitwin.commands.why import causes_of, print_causes
 
 if TYPE_CHECKING:
@@ -52,6 +53,7 @@ def run(
     strict: options.Strict = False,
     lines: Annotated[bool, typer.Option("--lines/--no-lines", help="Print a line for every item that ends.")] = True,
     json: Json = False,
+    dry_run: DryRun = False,
 ) -> None:
     """Build a data set of twins; run it again to go on where it stopped."""
     from manitwin.errors import UsageError
@@ -72,6 +74,18 @@ def run(
     )  # fmt: skip
     if jobs is not None:
         settings = settings.model_copy(update={"run": settings.run.model_copy(update={"cpu": jobs})})
+    defaults: dict[str, str | None] = {"units": units, "up": up, "license": license, "attribution": attribution}
+    if dry_run:
+        from manitwin.dry_run import plan_run
+        from manitwin.generator_input import refusal
+        from manitwin.manifest import Notes, iterate_items
+        from manitwin.pipeline import check_names
+
+        check_names(settings)
+        notes = Notes()
+        items = iterate_items(inputs or [], defaults, notes, text or [], strict=strict, refusal=refusal(settings))
+        print_plan(plan_run(items, DatasetRoot(dataset), settings, notes.remarks), dataset, as_json=json)
+        return
     if executor != "ray":
         require_renderer()
 
@@ -85,7 +99,7 @@ def run(
         config=settings,
         executor=options.executor_name(executor),
         address=address,
-        defaults={"units": units, "up": up, "license": license, "attribution": attribution},
+        defaults=defaults,
         strict=strict,
         on_estimate=print_estimate,
         on_start=started,

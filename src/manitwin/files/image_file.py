@@ -64,6 +64,15 @@ def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None 
     return Photo(np.asarray(rgb), tuple(findings))
 
 
+def check_header(path: Path, *, frame: int | None = None) -> None:
+    """Raise InputError for what an image's header tells already, as ``read_image`` would: its size, and an animation."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+        with _open(path) as image:
+            _check_size(path, image)
+            _choose_frame(path, image, frame, [])
+
+
 def _open(path: Path) -> Image.Image:
     try:
         return Image.open(path)

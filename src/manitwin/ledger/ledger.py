@@ -146,6 +146,11 @@ class Ledger:
         ).fetchall()
         return [OpenItem(number, Item(**json.loads(item)), self._attempts(number)) for number, item in rows]
 
+    def item(self, number: int) -> Item:
+        """Return an item as it was given."""
+        (text,) = self.connection.execute("SELECT item FROM items WHERE number = ?", (number,)).fetchone()
+        return Item(**json.loads(text))
+
     def _attempts(self, number: int) -> dict[str, int]:
         rows = self.connection.execute(
             "SELECT stage, attempts FROM stages WHERE number = ? AND state <> 'done'", (number,)

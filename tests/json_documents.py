@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "json.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "json.md"
 SHARED = ("causes[]", "remarks[]", "folders[]")
 """What the other sections have as that of build has it."""
 
@@ -32,7 +32,7 @@ def documented(section: str) -> set[str]:
     for first, second in re.findall(r"^\| (`.*?) \| (.*?) ?\|$", found[1], re.M):
         own = re.findall(r"`([^`]+)`", first)
         keys |= {*own, *(key for key in re.findall(r"`([a-z_.{}\[\]]+)`", second) if key.startswith(within(own)))}
-    if section != "build":
+    if "dry-run" not in section and section != "build":
         keys |= {key for key in documented("build") if key.startswith(within([k for k in SHARED if k in keys]))}
     return keys
 
