@@ -15,7 +15,8 @@ import time
 from pathlib import Path
 
 from manitwin.config import RunConfig
-from manitwin.engine.driver import Driver, ItemEnded
+from manitwin.engine.driver import Driver
+from manitwin.engine.events import ItemEnded
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.rehearsal import RehearsalRecipe
 from manitwin.executors.local import LocalExecutor

@@ -128,7 +128,6 @@ WRONG_USE = """
 import io, json, sys
 from contextlib import redirect_stderr, redirect_stdout
 from manitwin.cli import app, main
-from manitwin.cli import err_console, out_console
 import typer
 
 found = {}

@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
 
     from manitwin.build_item import ItemResult
     from manitwin.config import BuildConfig
-    from manitwin.executors.whole_items import StageStarted
+    from manitwin.engine.events import OnStage
     from manitwin.files.folder_listing import FolderListing
     from manitwin.loaded_twin import Twin
     from manitwin.manifest import Notes
@@ -72,7 +72,7 @@ def build(
     quick: bool = False,
     on_estimate: Callable[[dict[str, float]], None] = lambda usd_by_kind: None,
     on_start: Callable[[int], None] = lambda total: None,
-    on_stage: Callable[[StageStarted], None] = lambda event: None,
+    on_stage: OnStage = lambda event: None,
     on_result: Callable[[ItemResult], None] = lambda result: None,
 ) -> BuildReport:
     """Build twins from images, meshes, folders, manifests and ``texts`` into the folder ``out``.
@@ -108,9 +108,10 @@ def build(
     )
     # these take two CPU-seconds to import: what was given wrongly is said before
     from manitwin.executors.whole_items import build_all
-    from manitwin.pipeline import check_names, estimate_usd
+    from manitwin.pipeline import check_names, estimate_usd, log_choices
 
     check_names(settings)
+    log_choices(settings)
     place.mkdir(parents=True, exist_ok=True)
     on_estimate(estimate_usd(settings))
     on_start(len(items))

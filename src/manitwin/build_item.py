@@ -14,6 +14,7 @@ from typing import Literal
 
 from manitwin.config import BuildConfig
 from manitwin.dataset_root import DatasetRoot
+from manitwin.engine.events import OnStage, StageEnded, StageStarted, StageState
 from manitwin.engine.recipe import Ending, Identity
 from manitwin.errors import BackendError, ManiTwinError, Rejected
 from manitwin.models.generators.job_memory import RootJobMemory
@@ -44,7 +45,7 @@ def build_item(
     item: Item,
     out: Path,
     config: BuildConfig,
-    on_stage: Callable[[str], None] = lambda name: None,
+    on_stage: OnStage = lambda event: None,
     may_spend: Callable[[float], None] = lambda usd: None,
 ) -> ItemResult:
     """Take one item through all stages; never raises for what the item or a backend does.
@@ -92,18 +93,24 @@ def _only_one(work: Path) -> Iterator[None]:
         yield
 
 
-def _build(item: Item, identity: Identity, recipe: TwinRecipe, work: Path, on_stage: Callable[[str], None]) -> Ending:
+def _build(item: Item, identity: Identity, recipe: TwinRecipe, work: Path, on_stage: OnStage) -> Ending:
     draft = Draft(identity.twin_id, item, recipe.seed, jobs=RootJobMemory(DatasetRoot(work), JOBS))
     costs: dict[str, StageCost] = {}
     rejected, last = identity.rejected, INPUT
     try:
         for stage in recipe.stages(identity.kind) if rejected is None else []:
-            on_stage(stage.name)
+            on_stage(StageStarted(item, stage.name, draft.twin_id))
             last, started, cpu_started = stage.name, time.perf_counter(), time.process_time()
-            costs[last] = run_stage(stage, draft, work).cost
+            ran = run_stage(stage, draft, work)
+            costs[last] = ran.cost
+            seconds = 0.0 if ran.reused else ran.cost.seconds
+            how: StageState = "there already" if ran.reused else "done"
+            on_stage(StageEnded(item, stage.name, how, seconds, twin_id=draft.twin_id))
     except Rejected as answer:
         rejected = answer
-        costs[last] = StageCost(time.perf_counter() - started, time.process_time() - cpu_started, lost_usd(work / last))
+        seconds = time.perf_counter() - started
+        costs[last] = StageCost(seconds, time.process_time() - cpu_started, lost_usd(work / last))
+        on_stage(StageEnded(item, last, "rejected", seconds, str(answer), draft.twin_id))
     return recipe.finish(draft, identity.kind, costs, rejected, last, _fresh(work))
 
 

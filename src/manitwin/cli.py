@@ -1,16 +1,16 @@
 """The command line: one twin or many, a data set, and what is asked of both.
 
-Exit status: 0 all accepted, 3 some rejected, 4 some unfinished and resumable, 2 wrong use or configuration.
+Exit status: 0 all accepted, 3 some rejected, 4 some unfinished and resumable, 2 wrong use or configuration,
+130 interrupted where nothing can be resumed.
 """
 
 from __future__ import annotations
 
 import json
 import os
-import signal
 import sys
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 
@@ -19,24 +19,27 @@ from manitwin.commands.build import build
 from manitwin.commands.check import check
 from manitwin.commands.choices import there
 from manitwin.commands.completion import COMPLETION_VARIABLE, PROGRAM, completion, completion_init
-from manitwin.commands.console import err_console, out_console
+from manitwin.commands.console import error_console, out_console
 from manitwin.commands.doctor import doctor
 from manitwin.commands.export import export
 from manitwin.commands.fake import fake
 from manitwin.commands.import_ import import_
 from manitwin.commands.index import index
+from manitwin.commands.interrupt import Interrupts
 from manitwin.commands.json_output import Json, print_document, print_failure
 from manitwin.commands.layout import layout
 from manitwin.commands.prompts import prompts
 from manitwin.commands.publish import publish
 from manitwin.commands.query import query
 from manitwin.commands.render import render
+from manitwin.commands.reporting import LOG, Quiet, Verbose, reported, say_as_told
 from manitwin.commands.retry import retry
 from manitwin.commands.run import run
+from manitwin.commands.run_log import end_log
 from manitwin.commands.stats import stats
 from manitwin.commands.status import status
 from manitwin.commands.trajectories import trajectories
-from manitwin.errors import BackendError, ManiTwinError, UsageError
+from manitwin.errors import BackendError, ManiTwinError
 
 TYPER_INTERRUPTED = 130
 """What typer returns where it caught a KeyboardInterrupt by itself."""
@@ -46,7 +49,7 @@ CommandLineError: type[Exception] = next(
     base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException"
 )
 
-_command_path = PROGRAM  # of the command that is at work: an error names it
+_interrupts = Interrupts()
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 
@@ -64,23 +67,21 @@ def _manitwin(
     version: Annotated[
         bool, typer.Option("--version", help="Print the version, and end.", callback=_print_version, is_eager=True)
     ] = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
 ) -> None:
     """Turn photos, texts and meshes into data-generation-ready digital twins."""
-    global _command_path
-    _command_path = f"{PROGRAM} {context.invoked_subcommand or ''}".rstrip()
+    _interrupts.command = context.invoked_subcommand or ""
+    say_as_told(verbose, quiet)
     if context.invoked_subcommand is None:
         out_console.print(context.get_help(), markup=False)
 
 
-for command in (build, run, status, retry, check, index, query, stats, publish, doctor, fake, prompts, export, audit):
-    app.command()(command)
-
-
-app.command("import")(import_)
-app.command()(layout)
-app.command()(trajectories)
-app.command()(render)
-app.command()(completion)
+for making in (build, run, index, stats, publish, export, layout, trajectories, render):
+    app.command()(reported(making))
+app.command("import")(reported(import_))
+for other in (status, retry, check, query, doctor, fake, prompts, audit, completion):
+    app.command()(other)
 
 
 @app.command()
@@ -110,37 +111,59 @@ def schema() -> None:
     sys.stdout.write(json.dumps(record_schema(), indent=1) + "\n")
 
 
-def _fail(error: BaseException, message: str, code: int) -> NoReturn:
-    print_failure(error, message, code)
-    err_console.print(f"{_command_path}: {' '.join(message.split())}", markup=False, style="red")
-    sys.exit(code)
+def _told(error: Exception) -> tuple[int, str]:
+    """Tell who asked for JSON of an error, and return its exit status and the line that a person reads."""
+    path = f"{PROGRAM} {_interrupts.command}".rstrip()
+    if isinstance(error, CommandLineError):
+        message = getattr(error, "format_message", error.__str__)()
+        message = f"{message.removesuffix('.')}{'' if message.endswith('?') else '.'} See {path} --help"
+    else:
+        message = str(error)
+    status = 4 if isinstance(error, BackendError) else 2
+    print_failure(error, message, status)
+    return status, f"{path}: {' '.join(message.split())}"
 
 
-def _interrupt(signal_number: int, frame: object) -> NoReturn:
-    raise KeyboardInterrupt
-
-
-def main() -> None:
-    """Run the command line; every error is one line."""
-    signal.signal(signal.SIGTERM, _interrupt)
-    if COMPLETION_VARIABLE in os.environ:
-        completion_init()
+def _run() -> int:
+    """Run what the command line says and return the exit status; every error is one line."""
     try:
         status = app(prog_name=PROGRAM, standalone_mode=False)
         if status == TYPER_INTERRUPTED:
             raise KeyboardInterrupt
-        sys.exit(status)
-    except CommandLineError as error:
-        message = getattr(error, "format_message", error.__str__)()
-        _fail(error, f"{message.removesuffix('.')}{'' if message.endswith('?') else '.'} See {_command_path} --help", 2)
+        return int(status or 0)
     except (KeyboardInterrupt, typer.Abort) as error:
-        _fail(error, "interrupted; run the same command again to go on where it stopped", 4)
-    except UsageError as error:
-        _fail(error, str(error), 2)
-    except BackendError as error:
-        _fail(error, str(error), 4)
-    except ManiTwinError as error:
-        _fail(error, str(error), 2)
+        LOG.warning("interrupted")
+        print_failure(error, _interrupts.message, _interrupts.status)
+        _interrupts.say()
+        return _interrupts.status
+    except (CommandLineError, ManiTwinError) as error:
+        LOG.debug("the error came from here", exc_info=error)
+        code, line = _told(error)
+        error_console.print(line, markup=False, style="red")
+        return code
+    except Exception:
+        LOG.exception("a defect in manitwin")
+        raise
+
+
+def main() -> None:
+    """Run the command line."""
+    global _interrupts
+    _interrupts = Interrupts()
+    _interrupts.listen()
+    if COMPLETION_VARIABLE in os.environ:
+        completion_init()
+    try:
+        status = _run()
+        LOG.info("ends with exit status %d", status)
+        _interrupts.ending(status)
+    except KeyboardInterrupt:  # as the first interrupt came while an error was said
+        _interrupts.say()
+        status = _interrupts.status
+        _interrupts.ending(status)
+    finally:
+        end_log()
+    sys.exit(status)
 
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ from pydantic import ValidationError
 
 from manitwin.config import BuildConfig, RunConfig
 from manitwin.dataset_root import DatasetRoot
-from manitwin.engine.driver import Driver, ItemEnded
+from manitwin.engine.driver import Driver
+from manitwin.engine.events import LOG, ItemEnded, OnStage
 from manitwin.engine.executor import Executor, InlineExecutor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.recipe import Recipe
@@ -32,6 +33,7 @@ from manitwin.stages.stage import Item
 from manitwin.store import canonical_json
 
 CONFIG = "config.json"
+RUN_LOG = "run.log"
 COPY_EVERY_S = 60.0
 ExecutorName = Literal["local", "ray", "inline"]
 EXECUTORS: tuple[ExecutorName, ...] = get_args(ExecutorName)
@@ -75,6 +77,7 @@ def run(
     strict: bool = False,
     on_estimate: Callable[[dict[str, float]], None] = lambda usd_by_kind: None,
     on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_stage: OnStage = lambda event: None,
     on_ended: Callable[[ItemEnded], None] = lambda event: None,
 ) -> RunReport:
     """Add items to a data set and work until all of it has ended; with no inputs, go on with what is there.
@@ -84,11 +87,14 @@ def run(
     wrong arguments, or where another run is at work on the data set. What becomes of an item is in the ledger.
     """
     from manitwin.generator_input import refusal
-    from manitwin.pipeline import TwinRecipe, check_names, estimate_usd  # two CPU-seconds, which `status` does without
+
+    # two CPU-seconds to import, which `status` does without
+    from manitwin.pipeline import TwinRecipe, check_names, estimate_usd, log_choices
 
     root = DatasetRoot(dataset)
     settings = config or stored_config(root)
     check_names(settings)
+    log_choices(settings)
     notes = Notes()
 
     def started(items: int, opened: int) -> None:
@@ -106,6 +112,7 @@ def run(
         max_cost_usd=settings.services.max_cost_usd,
         remarks=notes.remarks,
         on_start=started,
+        on_stage=on_stage,
         on_ended=on_ended,
     )
     return replace(report, folders=notes.folders)
@@ -123,6 +130,7 @@ def drive(
     max_cost_usd: float | None = None,
     remarks: list[str] | None = None,
     on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_stage: OnStage = lambda event: None,
     on_ended: Callable[[ItemEnded], None] = lambda event: None,
 ) -> RunReport:
     """Add items to the ledger below a root and make of each what the recipe says, until all have ended.
@@ -143,12 +151,15 @@ def drive(
         copy = _LedgerCopy(root, path)
         with _executor(executor, address, setup, settings) as engine:
             driver = Driver(
-                ledger, engine, recipe, settings, on_ended=_both(on_ended, copy), sweep=partial(sweep, root),
+                ledger, engine, recipe, settings, on_ended=_both(on_ended, copy), on_stage=on_stage, sweep=partial(sweep, root),
                 max_cost_usd=max_cost_usd,
             )  # fmt: skip
             on_start(*ledger.totals(recipe.sha256))
             result = driver.run()
-        return RunReport(ledger.counts(), result.stopped, result.left, remarks)
+        counts = ledger.counts()
+        said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
+        LOG.info("run ends: %s; %s", result.stopped or "finished", said)
+        return RunReport(counts, result.stopped, result.left, remarks)
     finally:
         ledger.close()
         _LedgerCopy(root, path).upload()
@@ -194,6 +205,12 @@ def local_ledger(root: DatasetRoot) -> Path:
     if not path.is_file() and root.exists(LEDGER):
         root.fetch_file(LEDGER, path)
     return path
+
+
+def local_log(root: DatasetRoot) -> Path:
+    """Return the path of the log of a data set's runs: beside the ledger."""
+    ledger = local_ledger(root)
+    return ledger.with_name(RUN_LOG) if root.local is not None else ledger.with_suffix(".log")
 
 
 def cache_folder(root: DatasetRoot) -> Path:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -44,6 +45,7 @@ from manitwin.store import RECORD, parse_record, sha256_of_json
 from manitwin.twin import StageProvenance, TwinRecord
 
 Kind = Literal["image", "text", "mesh"]
+LOG = logging.getLogger("manitwin.run")
 KINDS_OF_INPUT: tuple[Kind, ...] = ("image", "text", "mesh")
 
 
@@ -55,6 +57,16 @@ def check_names(config: BuildConfig) -> None:
     grippers = [gripper for gripper, _ in _grippers(config)]
     if config.second_opinion.require_agreement:
         _check_agreement(grippers, config)
+
+
+def log_choices(config: BuildConfig) -> None:
+    """Tell the log what twins are made with, and what of it is only the default."""
+    default = BuildConfig()
+    LOG.info("configuration %s, seed %d", config_sha256(config), config.seed)
+    for name in ("generator", "annotator", "grasper", "simulator", "second_simulator", "grippers"):
+        chosen = getattr(config, name)
+        why = "the default" if chosen == getattr(default, name) else "asked for"
+        LOG.info("%s: %s (%s)", name, chosen if isinstance(chosen, str) else ", ".join(chosen), why)
 
 
 def _check_agreement(grippers: list[Gripper], config: BuildConfig) -> None:

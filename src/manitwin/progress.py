@@ -1,77 +1,156 @@
-"""What a person watches while twins are built: one bar, the stages at work, one line an item."""
+"""What a person watches while items are made: how many of how many, what became of them, the stages at work, the time left."""
 
 from __future__ import annotations
 
-from pathlib import Path
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from datetime import UTC, datetime
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
 
 if TYPE_CHECKING:  # what a build needs takes two CPU-seconds to import
-    from manitwin.build_item import ItemResult
-    from manitwin.executors.whole_items import StageStarted
+    from manitwin.engine.events import ItemEnded, StageEvent
     from manitwin.stages.stage import Item
 
-STYLES = {"accepted": "green", "rejected": "yellow", "unfinished": "red"}
+LINE_EVERY_S = 30.0
+"""Between two lines where nobody looks at a terminal."""
+ENOUGH = 3
+"""Items must have ended before anything is said of the time that is left."""
+BAR_WIDTH = 24
 
 
-def title(item: Item) -> str:
-    """Return a short name of an item for a person."""
-    return Path(item.file).name if item.file else f"'{(item.text or '')[:40]}'"
+class RunProgress:
+    """The state of a run, from its events, which may come from several threads.
+
+    ``what`` names the items in the plural. ``clock`` gives seconds.
+    """
+
+    def __init__(self, what: str = "items", clock: Callable[[], float] = time.monotonic):
+        self.what, self._clock = what, clock
+        self._lock = threading.Lock()
+        self.total = self.before = 0
+        self.counts: Counter[str] = Counter()
+        self._found = 0
+        self._under_way: dict[Item, str] = {}
+        self._started_at: float | None = None
+
+    @property
+    def done(self) -> int:
+        """How many items have ended, in this run or before."""
+        return self.before + self.counts.total()
+
+    def start(self, total: int, opened: int | None = None) -> None:
+        """Begin a run of ``total`` items of which ``opened`` are to be done (None: all)."""
+        self.total, self.before = total, 0 if opened is None else total - opened
+        self._started_at = self._clock()
+
+    def stage(self, event: StageEvent) -> None:
+        """Note that a stage of an item began or ended."""
+        with self._lock:
+            if hasattr(event, "state"):
+                self._under_way.pop(event.item, None)
+            else:
+                self._under_way[event.item] = event.stage
+
+    def ended(self, item: Item, state: str, found: bool = False) -> None:
+        """Note what became of an item; one that was ``found`` finished says nothing of how long others take."""
+        with self._lock:
+            self._under_way.pop(item, None)
+            self.counts[state] += 1
+            self._found += found
+
+    def item_ended(self, event: ItemEnded) -> None:
+        """Note the event of an engine's run."""
+        self.ended(event.item, event.state, event.found)
+
+    def left_s(self) -> float | None:
+        """Return about how many seconds are left at the rate until now; None until three items were worked on."""
+        worked = self.counts.total() - self._found
+        if self._started_at is None or worked < ENOUGH:
+            return None
+        return (self._clock() - self._started_at) / worked * max(0, self.total - self.done)
+
+    def line(self) -> str:
+        """Return all of it in one line."""
+        if self._started_at is None:
+            return "preparing"
+        with self._lock:
+            counts = ", ".join(f"{number} {state}" for state, number in self.counts.items())
+            stages = ", ".join(f"{number} {stage}" for stage, number in Counter(self._under_way.values()).most_common())
+        parts = [f"{self.done} of {self.total} {self.what}", counts, f"under way: {stages}" if stages else ""]
+        left = self.left_s()
+        if left is not None and self.done < self.total:
+            parts.append(f"about {duration(left)} left")
+        return "; ".join(filter(None, parts))
 
 
-class BuildProgress:
-    """A bar on stderr where that is a terminal; a line for every finished item on stdout."""
+def duration(seconds: float) -> str:
+    """Return a time for a person: no more exact than it is worth."""
+    if seconds < 60:
+        return f"{max(1, round(seconds))} s"
+    minutes = round(seconds / 60)
+    return f"{minutes} min" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"
 
-    def __init__(self, out: Console, err: Console):
-        columns = (
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("{task.fields[working]}", markup=False),
-        )
-        self._progress = Progress(*columns, console=err, disable=not err.is_terminal)
-        # on one terminal, a line must go through the bar's console, or the two overwrite each other
-        self._lines = self._progress.console if out.is_terminal and err.is_terminal else out
-        self._task = self._progress.add_task("", total=None, working="")
-        self._counts = dict.fromkeys(STYLES, 0)
-        self._stages: dict[Item, str] = {}
 
-    def __enter__(self) -> BuildProgress:
-        self._progress.start()
+class ShownProgress:
+    """Show a run's progress on a console while the ``with`` statement lasts.
+
+    On a terminal one line is kept up to date below all that is printed; elsewhere a line with the time (UTC) is printed every
+    ``every_s`` seconds. ``out``: the console that other lines go to; on one terminal they may not overwrite each other.
+    """
+
+    def __init__(self, progress: RunProgress, out: Console, err: Console, every_s: float = LINE_EVERY_S):
+        self.progress = progress
+        self._err, self._every_s = err, every_s
+        self._live: Live | None = None
+        self._stop = threading.Event()
+        self._lines: threading.Thread | None = None
+        if err.quiet:
+            return
+        if err.is_terminal:
+            self._live = Live(
+                console=err,
+                get_renderable=self._bar,
+                transient=True,
+                redirect_stdout=out.is_terminal,
+                redirect_stderr=True,
+            )
+        else:
+            self._lines = threading.Thread(target=self._print_lines, name="manitwin-progress", daemon=True)
+
+    def __enter__(self) -> Self:
+        if self._live is not None:
+            self._live.start()
+        if self._lines is not None:
+            self._lines.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._progress.stop()
+        self._stop.set()
+        if self._live is not None:
+            self._live.stop()
+        if self._lines is not None and self._lines.is_alive():
+            self._lines.join()
 
-    def start(self, total: int) -> None:
-        """Begin a build of ``total`` items."""
-        self._progress.update(self._task, total=total)
+    def _bar(self) -> Table:
+        table = Table.grid(padding=(0, 1))
+        table.add_column(width=BAR_WIDTH)
+        table.add_column(no_wrap=True, overflow="ellipsis")
+        total = self.progress.total or None
+        table.add_row(ProgressBar(total, self.progress.done, width=BAR_WIDTH), Text(self.progress.line()))
+        return table
 
-    def stage(self, event: StageStarted) -> None:
-        """Note that an item has entered a stage."""
-        self._stages[event.item] = event.stage
-        self._show()
-
-    def result(self, result: ItemResult) -> None:
-        """Print what became of an item."""
-        self._stages.pop(result.item, None)
-        self._counts[result.status] += 1
-        where = f" -> {result.folder}" if result.folder else ""
-        again = " (already there)" if result.reused else ""
-        card = result.folder / "card.png" if result.folder else None
-        if result.status == "accepted" and card is not None:
-            where = f" -> {card}"
-        line = f"{result.status:<10} {title(result.item)}: {result.detail}{again}{where}"
-        self._lines.print(line, style=STYLES[result.status], markup=False)
-        self._progress.advance(self._task)
-        self._show()
-
-    def _show(self) -> None:
-        counts = ", ".join(f"{number} {status}" for status, number in self._counts.items() if number)
-        working = ", ".join(f"{title(item)}: {stage}" for item, stage in list(self._stages.items())[:4])
-        self._progress.update(self._task, working=" | ".join(filter(None, (counts, working))))
+    def _print_lines(self) -> None:
+        while not self._stop.wait(self._every_s):
+            now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%SZ")
+            self._err.print(f"{now} {self.progress.line()}", markup=False)

@@ -38,7 +38,7 @@ def path_with_manitwin(tmp_path_factory: pytest.TempPathFactory) -> str:
     ("typed", "offered"),
     [
         ("manitwin traj", {"trajectories"}),
-        ("manitwin build --qu", {"--quick"}),
+        ("manitwin build --qu", {"--quick", "--quiet"}),
         ("manitwin export twins --to mjcf,usd", {"mjcf,usd", "mjcf,usdz"}),
         ("manitwin run --executor ", {"local", "ray", "inline"}),
         ("manitwin build --gripper pan", {"panda"}),

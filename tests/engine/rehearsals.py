@@ -11,7 +11,8 @@ from pathlib import Path
 from manitwin.config import RunConfig
 from manitwin.dataset_root import DatasetRoot
 from manitwin.dataset_run import sweep as sweep_work
-from manitwin.engine.driver import Driver, ItemEnded, RunResult
+from manitwin.engine.driver import Driver, RunResult
+from manitwin.engine.events import ItemEnded
 from manitwin.engine.executor import InlineExecutor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.rehearsal import RehearsalRecipe

@@ -13,7 +13,8 @@ from typing import Any
 from manitwin.config import RunConfig
 from manitwin.dataset_root import DatasetRoot
 from manitwin.dataset_run import sweep as sweep_work
-from manitwin.engine.driver import Driver, ItemEnded
+from manitwin.engine.driver import Driver
+from manitwin.engine.events import ItemEnded
 from manitwin.engine.jobs import RunStage, WorkerSetup
 from manitwin.engine.rehearsal import RehearsalRecipe
 from manitwin.executors.ray_cluster import RayExecutor

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from cluster_runs import asking, executor_for, replies, replies_after, run, stage_job, times_run
 
-from manitwin.engine.driver import ItemEnded
+from manitwin.engine.events import ItemEnded
 from manitwin.engine.jobs import Failure
 from manitwin.engine.rehearsal import RehearsalRecipe
 from manitwin.errors import Unavailable, UsageError

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from cluster_runs import executor_for, replies, run, stage_job, times_run
 
-from manitwin.engine.driver import ItemEnded
+from manitwin.engine.events import ItemEnded
 from manitwin.engine.jobs import Failure
 from manitwin.engine.rehearsal import RehearsalRecipe
 

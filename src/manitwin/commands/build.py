@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from manitwin.commands import choices, options
-from manitwin.commands.console import err_console, out_console, print_estimate
+from manitwin.commands.console import err_console, error_console, out_console, print_error, print_estimate
 from manitwin.commands.json_output import Json, print_document
 from manitwin.commands.planned import DryRun, print_plan
 from manitwin.commands.why import causes_of_build, print_causes_of_build
+
+if TYPE_CHECKING:
+    from manitwin.build_item import ItemResult
+
+STYLES = {"accepted": "green", "rejected": "yellow", "unfinished": "red"}
+BUILD_LOG = "build.log"
 
 
 def build(
@@ -75,13 +81,18 @@ def build(
         print_plan(plan_build(items, place, settings, notes.remarks), str(out), as_json=json)
         return
     from manitwin.api import build as build_twins
-    from manitwin.progress import BuildProgress
+    from manitwin.commands.watched_run import WatchedRun
     from manitwin.render.device import require_renderer
     from manitwin.run_summary import grasp_lines, summarize_grasps
+    from manitwin.store import WORK
 
     require_renderer()
-    progress = BuildProgress(out_console, err_console)
-    with progress:
+
+    def ended(result: ItemResult) -> None:
+        watched.progress.ended(result.item, result.status, result.reused)
+        _print_result(result)
+
+    with WatchedRun("inputs", lambda: out / WORK / BUILD_LOG) as watched:
         report = build_twins(
             inputs or [],
             out,
@@ -99,9 +110,9 @@ def build(
             require_agreement=require_agreement,
             quick=quick,
             on_estimate=print_estimate,
-            on_start=progress.start,
-            on_stage=progress.stage,
-            on_result=progress.result,
+            on_start=watched.start,
+            on_stage=watched.progress.stage,
+            on_result=ended,
         )
     for remark in report.remarks:
         err_console.print(remark, markup=False)
@@ -111,9 +122,21 @@ def build(
         out_console.print(line, markup=False)
     print_causes_of_build(report)
     if unfinished:
-        err_console.print("run the same command again to go on where it stopped", markup=False)
+        print_error("run the same command again to go on where it stopped")
     if json:
         from manitwin.commands.documents import build_document
 
         print_document(build_document(report, str(out), causes_of_build(report)))
     raise typer.Exit(report.exit_code)
+
+
+def _print_result(result: ItemResult) -> None:
+    from manitwin.engine.events import title
+
+    again = " (already there)" if result.reused else ""
+    shown = result.folder / "card.png" if result.folder is not None and result.status == "accepted" else result.folder
+    where = f" -> {shown}" if shown is not None else ""
+    line = f"{result.status:<10} {title(result.item)}: {result.detail}{again}{where}"
+    # what has not been made is an error, though a person who looks on reads of it among the other items
+    console = error_console if out_console.quiet and result.status == "unfinished" else out_console
+    console.print(line, style=STYLES[result.status], markup=False)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.commands import choices
-from manitwin.commands.console import err_console, out_console
+from manitwin.commands.console import out_console, print_error
 
 if TYPE_CHECKING:
     from manitwin.export.content import TwinContent
@@ -104,7 +104,7 @@ def _export(
         if ids.setdefault(content.name, content.record.twin_id) != content.record.twin_id:
             raise ExportError(f"{folder}: another twin has the name {content.name} too; export it to another folder")
     except (ExportError, TwinError) as error:
-        err_console.print(str(error), markup=False)
+        print_error(str(error))
         return False
     written = []
     for name in formats:
@@ -112,7 +112,7 @@ def _export(
             export_twin(content, name, out)
             written.append(name)
         except ExportError as error:
-            err_console.print(f"{name}: {error}", markup=False)
+            print_error(f"{name}: {error}")
     out_console.print(f"{content.name}: {', '.join(written) or 'nothing'}", markup=False)
     return len(written) == len(formats)
 

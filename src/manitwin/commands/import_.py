@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from manitwin.commands import choices
-from manitwin.commands.console import err_console, out_console
+from manitwin.commands.console import out_console, print_error
 
 
 def import_(
@@ -42,7 +42,7 @@ def import_(
     for imported in import_assets(paths, out, format=format):  # type: ignore[arg-type]
         if imported.record is None or imported.folder is None:
             failed += 1
-            err_console.print(f"{imported.path}: {imported.error}", markup=False)
+            print_error(f"{imported.path}: {imported.error}")
             continue
         if imported.there_already:
             there += 1

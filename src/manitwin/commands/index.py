@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from manitwin.commands import choices, options
-from manitwin.commands.console import err_console, out_console
+from manitwin.commands.console import err_console, out_console, print_error
 
 
 def index(
@@ -45,7 +45,7 @@ def index(
             on_read=lambda twins: progress.advance(task, twins),
         )
     for line in written.unreadable:
-        err_console.print(f"left out: {line}", markup=False)
+        print_error(f"left out: {line}")
     accepted, rejected, grasps = (written.rows(table) for table in ("twins", "rejections", "grasps"))
     out_console.print(f"{accepted} accepted, {rejected} rejected, {grasps} grasps indexed in {dataset}", markup=False)
     raise typer.Exit(4 if written.unreadable else 0)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from manitwin.commands import choices, options
-from manitwin.commands.console import err_console, out_console
+from manitwin.commands.console import out_console, print_error
 from manitwin.commands.json_output import Json, print_document
 from manitwin.commands.why import causes_of, print_causes
 
@@ -61,16 +61,20 @@ def layout(
     }  # fmt: skip
     settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
     from manitwin.apps.layouts.run import layout_totals, make_layouts, without_upright
+    from manitwin.commands.watched_run import WatchedRun
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.dataset_run import local_log
 
     sheet = sheet or settings.pictures
     if sheet:
         from manitwin.render.device import require_renderer
 
         require_renderer()
-    report = make_layouts(
-        dataset, out, count, settings, executor=options.executor_name(executor), address=address,
-        on_start=lambda items, opened: out_console.print(f"{items} layouts, {opened} to do", markup=False),
-    )  # fmt: skip
+    with WatchedRun("layouts", lambda: local_log(DatasetRoot(out))) as watched:
+        report = make_layouts(
+            dataset, out, count, settings, executor=options.executor_name(executor), address=address,
+            on_start=watched.start, on_stage=watched.progress.stage, on_ended=watched.progress.item_ended,
+        )  # fmt: skip
     totals = layout_totals(out)
     if settings.layout.upright and (lying := without_upright(dataset)):
         out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}", markup=False)
@@ -89,7 +93,7 @@ def layout(
         shown = write_contact_sheet(dataset, out)
         out_console.print(f"{shown} of {totals.accepted} scenes in {out}/{CONTACT_SHEET}", markup=False)
     if report.stopped:
-        err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
+        print_error(f"stopped: {report.stopped}")
     print_causes(out)
     if json:
         from manitwin.commands.documents import layouts_document

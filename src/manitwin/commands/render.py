@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from manitwin.commands import choices, options
-from manitwin.commands.console import err_console, out_console
+from manitwin.commands.console import err_console, out_console, print_error
 from manitwin.commands.why import print_causes
 
 
@@ -38,20 +38,24 @@ def render(
     names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
     given = {"cameras": names, "size_px": size, "codec": codec, "run": options.run_settings(jobs)}
     settings = load_app_config(PicturesConfig, config, given)
-    from manitwin.apps.trajectories.render_run import draw_episodes, write_with_pictures
+    from manitwin.apps.trajectories.render_run import PICTURES, draw_episodes, write_with_pictures
     from manitwin.apps.trajectories.video import require_encoder
+    from manitwin.commands.watched_run import WatchedRun
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.dataset_run import local_log
     from manitwin.render.device import require_renderer
 
     if executor != "ray":
         require_renderer()
         require_encoder(settings.codec)
-    report = draw_episodes(
-        episodes, settings, twins=twins, executor=options.executor_name(executor), address=address,
-        on_start=lambda items, opened: out_console.print(f"{items} batches, {opened} to do", markup=False),
-    )  # fmt: skip
+    with WatchedRun("batches", lambda: local_log(DatasetRoot(episodes / PICTURES))) as watched:
+        report = draw_episodes(
+            episodes, settings, twins=twins, executor=options.executor_name(executor), address=address,
+            on_start=watched.start, on_stage=watched.progress.stage, on_ended=watched.progress.item_ended,
+        )  # fmt: skip
     if report.exit_code == 4:
         if report.stopped:
-            err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
+            print_error(f"stopped: {report.stopped}")
         print_causes(f"{episodes}/pictures")
         if report.open:
             err_console.print(

@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.commands import choices, options
-from manitwin.commands.console import err_console, out_console, print_estimate
+from manitwin.commands.console import err_console, out_console, print_error, print_estimate
 from manitwin.commands.json_output import Json, print_document
 from manitwin.commands.planned import DryRun, print_plan
 from manitwin.commands.why import causes_of, print_causes
 
 if TYPE_CHECKING:
     from manitwin.dataset_run import RunReport
-    from manitwin.engine.driver import ItemEnded
+    from manitwin.engine.events import ItemEnded
 
 STYLES = {"accepted": "green", "rejected": "yellow", "failed": "red", "duplicate": "dim"}
 
@@ -61,10 +61,11 @@ def run(
     if not dataset:
         raise UsageError("no data set; give a folder or URL with -o")
     from manitwin.api import with_flags
+    from manitwin.commands.watched_run import WatchedRun
     from manitwin.config import load_config
     from manitwin.dataset_root import DatasetRoot
+    from manitwin.dataset_run import local_log, stored_config
     from manitwin.dataset_run import run as run_dataset
-    from manitwin.dataset_run import stored_config
     from manitwin.render.device import require_renderer
 
     settings = load_config(config) if config else stored_config(DatasetRoot(dataset))
@@ -89,22 +90,26 @@ def run(
     if executor != "ray":
         require_renderer()
 
-    def started(items: int, opened: int) -> None:
-        out_console.print(f"{items} items, {opened} to do", markup=False)
+    def ended(event: ItemEnded) -> None:
+        watched.progress.item_ended(event)
+        if lines:
+            _print_item(event)
 
-    report = run_dataset(
-        inputs or [],
-        dataset,
-        texts=text or [],
-        config=settings,
-        executor=options.executor_name(executor),
-        address=address,
-        defaults=defaults,
-        strict=strict,
-        on_estimate=print_estimate,
-        on_start=started,
-        on_ended=_print_item if lines else lambda event: None,
-    )
+    with WatchedRun("items", lambda: local_log(DatasetRoot(dataset))) as watched:
+        report = run_dataset(
+            inputs or [],
+            dataset,
+            texts=text or [],
+            config=settings,
+            executor=options.executor_name(executor),
+            address=address,
+            defaults=defaults,
+            strict=strict,
+            on_estimate=print_estimate,
+            on_start=watched.start,
+            on_stage=watched.progress.stage,
+            on_ended=ended,
+        )
     _print_report(report, dataset)
     if json:
         from manitwin.commands.documents import run_document
@@ -122,14 +127,15 @@ def _print_report(report: RunReport, dataset: str) -> None:
         why = "" if report.stopped else " for a service that does not answer"
         err_console.print(f"{report.left} items wait{why}", markup=False)
     if report.stopped:
-        err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
+        print_error(f"stopped: {report.stopped}")
     print_causes(dataset)
     if report.open:
         err_console.print(f"manitwin status {dataset} says more; run the same command again to go on", markup=False)
 
 
 def _print_item(event: ItemEnded) -> None:
+    from manitwin.engine.events import title
+
     item = event.item
-    title = Path(item.file).name if item.file else f"'{(item.text or '')[:40]}'"
     style = STYLES.get(event.state, "")
-    out_console.print(f"{event.state:<10} {event.twin_id} {title}: {event.detail}", markup=False, style=style)
+    out_console.print(f"{event.state:<10} {event.twin_id} {title(item)}: {event.detail}", markup=False, style=style)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from manitwin.commands import choices, options
-from manitwin.commands.console import err_console, out_console
+from manitwin.commands.console import err_console, out_console, print_error
 from manitwin.commands.json_output import Json, print_document
 from manitwin.commands.why import causes_of, print_causes
 
@@ -56,17 +56,21 @@ def trajectories(
     from manitwin.apps.trajectories.collect import chosen_formats, collect
     from manitwin.apps.trajectories.run import make_episodes, retire_failing
     from manitwin.commands.documents import trajectories_document
+    from manitwin.commands.watched_run import WatchedRun
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.dataset_run import local_log
 
     wanted = chosen_formats(formats)
-    report = make_episodes(
-        source, out, count, settings, twins=twins, executor=options.executor_name(executor), address=address,
-        on_start=lambda items, opened: out_console.print(f"{items} batches, {opened} to do", markup=False),
-    )  # fmt: skip
+    with WatchedRun("batches", lambda: local_log(DatasetRoot(out))) as watched:
+        report = make_episodes(
+            source, out, count, settings, twins=twins, executor=options.executor_name(executor), address=address,
+            on_start=watched.start, on_stage=watched.progress.stage, on_ended=watched.progress.item_ended,
+        )  # fmt: skip
     for remark in report.remarks:
         err_console.print(remark, markup=False)
     if report.exit_code == 4:
         if report.stopped:
-            err_console.print(f"stopped: {report.stopped}", markup=False, style="red")
+            print_error(f"stopped: {report.stopped}")
         print_causes(str(out))
         if report.open:
             err_console.print(f"manitwin status {out} says more; run the same command again to go on", markup=False)

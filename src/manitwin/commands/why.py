@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from manitwin.commands.console import err_console
+from manitwin.commands.console import print_error
 
 if TYPE_CHECKING:
     from manitwin.api import BuildReport
@@ -27,14 +27,14 @@ def _print(causes: list[Cause], again: str, others: str, skip: int = 0) -> None:
     from manitwin.causes import cause_lines
 
     for line in cause_lines(causes, again=again, others=others)[skip:]:
-        err_console.print(line.strip() if skip else line, markup=False)
+        print_error(line.strip() if skip else line)
 
 
 def causes_of_build(report: BuildReport) -> list[Cause]:
     """Return why inputs of a build were not accepted, the most frequent cause first."""
     from manitwin.causes import group_causes
+    from manitwin.engine.events import title
     from manitwin.ledger.unaccepted import Unaccepted
-    from manitwin.progress import title
 
     return group_causes(
         Unaccepted(title(result.item), result.status, result.reason, result.detail)

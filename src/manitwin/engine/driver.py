@@ -15,31 +15,20 @@ from typing import get_args
 
 from manitwin.config import Resource, RunConfig
 from manitwin.engine.budget import Budget
+from manitwin.engine.events import LOG, ItemEnded, OnStage, StageEnded, StageStarted, StageState, log_item, log_stage
 from manitwin.engine.executor import Executor
 from manitwin.engine.flight import Flight, PlannedStage
 from manitwin.engine.gate import Gate
 from manitwin.engine.jobs import MAKE_ROOM, Failure, Job, Reply, StageRejected, Surveyed, WriteTables
 from manitwin.engine.recipe import Ending, Recipe
 from manitwin.engine.table_writer import TableWriter
-from manitwin.ledger.ledger import ItemState, Ledger, LedgerFull
+from manitwin.ledger.ledger import Ledger, LedgerFull
 from manitwin.stage_runner import StageRun
-from manitwin.stages.stage import Item
 from manitwin.stages.stage_order import ASSEMBLE, INPUT
 
 RESOURCES: tuple[Resource, ...] = get_args(Resource)
 LONGEST_WAIT_S = 0.5
 FAILED_AS = {"died": "crashed", "timeout": "timeout"}
-
-
-@dataclass(frozen=True)
-class ItemEnded:
-    """What became of one item."""
-
-    number: int
-    item: Item
-    twin_id: str
-    state: ItemState
-    detail: str
 
 
 @dataclass
@@ -63,9 +52,10 @@ class Driver:
         sweep: Callable[[str], None] = lambda twin_id: None,
         clock: Callable[[], float] = time.monotonic,
         max_cost_usd: float | None = None,
+        on_stage: OnStage = lambda event: None,
     ):
         self.ledger, self.executor, self.recipe, self.settings = ledger, executor, recipe, settings
-        self._on_ended, self._sweep, self._clock = on_ended, sweep, clock
+        self._on_ended, self._on_stage, self._sweep, self._clock = on_ended, on_stage, sweep, clock
         self._gates = {
             needs: Gate(settings.vlm_per_minute if needs == "vlm" else None, settings.patience_s, clock)
             for needs in RESOURCES
@@ -85,6 +75,7 @@ class Driver:
     def run(self) -> RunResult:
         """Work until every open item has ended, waits for a service that was given up, or something stops the run."""
         run = self.ledger.begin_run(self.recipe.sha256)
+        LOG.info("run %d begins: recipe %s, seed %d", run, self.recipe.sha256[:16], self.recipe.seed)
         how = "interrupted"
         try:
             while self._step():
@@ -161,6 +152,7 @@ class Driver:
                 flight = heappop(queue)[1]
                 gate.begin()
                 self.ledger.stage_started(flight.number, flight.stage, flight.attempt(flight.stage))
+                self._tell_stage(StageStarted(flight.opened.item, flight.stage, flight.twin_id))
                 self._give(flight.job(), flight)
         self._give_tables(self._tables.due())
 
@@ -205,10 +197,12 @@ class Driver:
                 flight.number, flight.stage, "rejected", attempts=flight.attempt(flight.stage), ran=True, error=str(reply.answer),
                 seconds=cost.seconds, cpu_seconds=cost.cpu_seconds, cost_usd=cost.cost_usd,
             )  # fmt: skip
+            self._stage_told(flight, flight.stage, "rejected", cost.seconds, str(reply.answer))
             flight.last, flight.rejected = flight.stage, reply
             self._queue(flight)
         elif isinstance(reply, Ending):
             self.ledger.stage_ended(flight.number, ASSEMBLE, "done", attempts=flight.attempt(ASSEMBLE), ran=True)
+            self._stage_told(flight, ASSEMBLE, "done")
             self._ended(flight, reply)
 
     def _surveyed(self, flight: Flight, reply: Surveyed) -> None:
@@ -217,11 +211,12 @@ class Driver:
             flight.number, INPUT, "done" if answer is None else "rejected", attempts=flight.attempt(INPUT), ran=True,
             error=answer,
         )  # fmt: skip
+        self._stage_told(flight, INPUT, "done" if answer is None else "rejected", detail=answer or "")
         other = self.ledger.identify(flight.number, reply.twin_id, reply.kind)
         if other is not None:
             self._flights -= 1
             detail = f"the same input as item {other}"
-            self._on_ended(ItemEnded(flight.number, flight.opened.item, reply.twin_id, "duplicate", detail))
+            self._tell(ItemEnded(flight.number, flight.opened.item, reply.twin_id, "duplicate", detail))
             return
         flight.twin_id, flight.kind, flight.rejected = reply.twin_id, reply.kind, reply.rejected
         if reply.kind not in self._plans:
@@ -233,24 +228,28 @@ class Driver:
             self._queue(flight)
             return
         self.ledger.stage_ended(flight.number, ASSEMBLE, "done", attempts=1)
-        self._ended(flight, reply.ending)
+        self._ended(flight, reply.ending, found=True)
 
     def _stage_done(self, flight: Flight, stage: str, ran: StageRun) -> None:
         self.ledger.stage_ended(
             flight.number, stage, "done", attempts=flight.attempt(stage), key=ran.key,
             ran=not ran.reused, seconds=ran.cost.seconds, cpu_seconds=ran.cost.cpu_seconds, cost_usd=ran.cost.cost_usd,
         )  # fmt: skip
+        self._stage_told(
+            flight, stage, "there already" if ran.reused else "done", 0.0 if ran.reused else ran.cost.seconds
+        )
         flight.done.append((stage, ran.key))
         flight.last = stage
 
-    def _ended(self, flight: Flight, ending: Ending) -> None:
+    def _ended(self, flight: Flight, ending: Ending, found: bool = False) -> None:
         self._flights -= 1
         self._tables.item_ended()
         self.ledger.item_ended(
             flight.number, ending.status, recipe_sha256=self.recipe.sha256, reason=ending.reason, detail=ending.detail,
             revision=ending.revision,
         )  # fmt: skip
-        self._on_ended(ItemEnded(flight.number, flight.opened.item, flight.twin_id, ending.status, ending.told))
+        item, detail = flight.opened.item, ending.told
+        self._tell(ItemEnded(flight.number, item, flight.twin_id, ending.status, detail, found))
 
     def _failed(self, flight: Flight, gate: Gate, failure: Failure) -> None:
         """Try again later, or soon, or no more: what a service or the disk does is not the item's fault."""
@@ -260,6 +259,7 @@ class Driver:
             counted = attempts - 1 if patient else attempts
             flight.opened.attempts[stage] = counted
             self.ledger.stage_ended(number, stage, "waiting", attempts=counted, error=failure.message)
+            self._stage_told(flight, stage, "waiting", 0.0, failure.message, failure.trace)
             if failure.kind == "unavailable":
                 gate.down()
             elif failure.kind == "rate_limited":
@@ -274,8 +274,22 @@ class Driver:
         if flight.twin_id:
             self._sweep(flight.twin_id)
         self.ledger.stage_ended(number, stage, "failed", attempts=attempts, error=failure.message)
+        self._stage_told(flight, stage, "failed", 0.0, failure.message, failure.trace)
         detail = f"{stage} failed {attempts} times: {failure.message}"
         self.ledger.item_ended(
             number, "failed", recipe_sha256=self.recipe.sha256, reason=FAILED_AS.get(failure.kind, "error"), detail=detail
         )  # fmt: skip
-        self._on_ended(ItemEnded(number, flight.opened.item, flight.twin_id, "failed", detail))
+        self._tell(ItemEnded(number, flight.opened.item, flight.twin_id, "failed", detail))
+
+    def _stage_told(
+        self, flight: Flight, stage: str, state: StageState, seconds: float = 0.0, detail: str = "", trace: str = ""
+    ) -> None:
+        self._tell_stage(StageEnded(flight.opened.item, stage, state, seconds, detail, flight.twin_id, trace))
+
+    def _tell_stage(self, event: StageStarted | StageEnded) -> None:
+        log_stage(event)
+        self._on_stage(event)
+
+    def _tell(self, event: ItemEnded) -> None:
+        log_item(event)
+        self._on_ended(event)

@@ -97,13 +97,14 @@ class WriteTables:
 class Failure:
     """Why a job has no answer: in one line, with the native stack where a worker died and left one.
 
-    ``charged_usd`` is what services charged all the same.
+    ``charged_usd`` is what services charged all the same; ``trace`` is the traceback of an error that nobody expected.
     """
 
     kind: FailureKind
     message: str
     retry_after_s: float | None = None
     charged_usd: float = 0.0
+    trace: str = ""
 
 
 Job = Survey | RunStage | Finish | WriteTables

@@ -67,7 +67,8 @@ class Worker:
             return Failure(kind, _line(error))  # type: ignore[arg-type]
         except Exception as error:
             where = traceback.extract_tb(error.__traceback__)[-1]
-            return Failure("error", f"{_line(error)} ({where.filename.rsplit('/', 1)[-1]}:{where.lineno})")
+            said = f"{_line(error)} ({where.filename.rsplit('/', 1)[-1]}:{where.lineno})"
+            return Failure("error", said, trace=traceback.format_exc())
 
     def _do(self, job: Job) -> Reply:
         if isinstance(job, Survey):

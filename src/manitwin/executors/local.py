@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import faulthandler
 import multiprocessing
 import os
@@ -20,11 +19,11 @@ from pebble import ProcessExpired, ProcessPool
 from manitwin.config import Resource, RunConfig
 from manitwin.engine.jobs import Failure, Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
+from manitwin.executors.child_processes import die_with, spared_from_interrupts
 from manitwin.executors.one_thread import one_thread_each
 from manitwin.main_module import hidden_main_module
 
 JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
-PR_SET_PDEATHSIG = 1  # prctl(2)
 STACK_LINES = 12
 
 
@@ -60,7 +59,8 @@ class LocalExecutor:
 
     def submit(self, ticket: int, job: Job) -> None:
         """Give a job to the pool of what it needs."""
-        future = self._pool(job.needs).schedule(_do, args=(job,), timeout=self._settings.stage_timeout_s)
+        with spared_from_interrupts():
+            future = self._pool(job.needs).schedule(_do, args=(job,), timeout=self._settings.stage_timeout_s)
         future.add_done_callback(partial(self._hand_over, ticket))
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
@@ -131,20 +131,10 @@ _stack_file: TextIO | None = None
 def _start(setup: WorkerSetup, stacks: str, driver: int) -> None:
     global _worker, _stack_file
     one_thread_each()
-    _die_with(driver)
+    die_with(driver)
     _stack_file = (Path(stacks) / f"{os.getpid()}.txt").open("w")
     faulthandler.enable(_stack_file)
     _worker = Worker(setup)
-
-
-def _die_with(driver: int) -> None:
-    """Have this process killed when the driver is: an orphan would work on beside the next run."""
-    try:
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    except (OSError, AttributeError):  # not Linux: an orphan ends after its job, whose result is found by its key
-        return
-    if os.getppid() != driver:
-        os._exit(1)
 
 
 def _do(job: Job) -> Reply:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import queue
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import CancelledError, TimeoutError
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,9 @@ from pebble import ProcessExpired, ProcessPool
 from manitwin.build_item import ItemResult, build_item
 from manitwin.charges import counted
 from manitwin.config import BuildConfig
+from manitwin.engine.events import OnStage, log_stage
 from manitwin.errors import Unavailable
+from manitwin.executors.child_processes import die_with, spared_from_interrupts
 from manitwin.executors.one_thread import one_thread_each
 from manitwin.identity import twin_id
 from manitwin.main_module import hidden_main_module
@@ -26,22 +28,15 @@ from manitwin.stages.stage import Item
 POLL_S = 0.2
 
 
-@dataclass(frozen=True)
-class StageStarted:
-    """A worker has begun a stage of an item."""
-
-    item: Item
-    stage: str
-
-
 _events: Any = None
 _spent_usd: Any = None
 
 
-def _start_worker(events: Any, spent_usd: Any) -> None:
+def _start_worker(events: Any, spent_usd: Any, driver: int) -> None:
     global _events, _spent_usd
     _events, _spent_usd = events, spent_usd
     one_thread_each()
+    die_with(driver)
 
 
 def _build_in_worker(item: Item, out: Path, config: BuildConfig) -> ItemResult:
@@ -60,7 +55,7 @@ def _build_in_worker(item: Item, out: Path, config: BuildConfig) -> ItemResult:
             reserved_usd = usd
 
     with counted() as bill:
-        result = build_item(item, out, config, lambda stage: _events.put(StageStarted(item, stage)), may_spend)
+        result = build_item(item, out, config, _events.put, may_spend)
     with _spent_usd.get_lock():
         _spent_usd.value += bill.usd - reserved_usd
     return result
@@ -72,7 +67,7 @@ def build_all(
     config: BuildConfig,
     *,
     jobs: int,
-    on_stage: Callable[[StageStarted], None] = lambda event: None,
+    on_stage: OnStage = lambda event: None,
 ) -> Iterator[ItemResult]:
     """Build the items in ``jobs`` processes and yield results as they end.
 
@@ -83,20 +78,19 @@ def build_all(
         yield from _build_all(items, out, config, jobs, on_stage)
 
 
-def _build_all(
-    items: list[Item], out: Path, config: BuildConfig, jobs: int, on_stage: Callable[[StageStarted], None]
-) -> Iterator[ItemResult]:
+def _build_all(items: list[Item], out: Path, config: BuildConfig, jobs: int, on_stage: OnStage) -> Iterator[ItemResult]:
     context = multiprocessing.get_context("spawn")
     events = context.Queue()
     done: queue.Queue[ItemResult] = queue.Queue()
     stop = threading.Event()
     listener = threading.Thread(target=_listen, args=(events, on_stage, stop), daemon=True)
     listener.start()
-    shared = (events, context.Value("d", 0.0))
+    shared = (events, context.Value("d", 0.0), os.getpid())
     pool = ProcessPool(max_workers=jobs, context=context, initializer=_start_worker, initargs=shared)
     try:
         for item in items:
-            future = pool.schedule(_build_in_worker, args=(item, out, config), timeout=config.item_timeout_s)
+            with spared_from_interrupts():
+                future = pool.schedule(_build_in_worker, args=(item, out, config), timeout=config.item_timeout_s)
             future.add_done_callback(partial(_hand_over, item, config, done))
         for _ in items:
             yield done.get()
@@ -127,11 +121,13 @@ def _result(future: Any, item: Item, config: BuildConfig) -> ItemResult:
     return ItemResult(item, twin_id(item), "unfinished", cause, None)
 
 
-def _listen(events: Any, on_stage: Callable[[StageStarted], None], stop: threading.Event) -> None:
+def _listen(events: Any, on_stage: OnStage, stop: threading.Event) -> None:
     while not stop.is_set():
         try:
-            on_stage(events.get(timeout=POLL_S))
+            event = events.get(timeout=POLL_S)
         except queue.Empty:
             continue
         except (EOFError, OSError):
             return
+        log_stage(event)
+        on_stage(event)

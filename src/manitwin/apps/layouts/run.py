@@ -11,7 +11,7 @@ from manitwin.apps.layouts.pool import pool_of
 from manitwin.apps.layouts.recipe import LayoutsRecipe
 from manitwin.dataset_root import DatasetRoot
 from manitwin.dataset_run import ExecutorName, RunReport, drive, local_ledger
-from manitwin.engine.driver import ItemEnded
+from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.errors import UsageError
 from manitwin.ledger.ledger import read_ledger
 from manitwin.scenes.scene import SCENE
@@ -47,6 +47,7 @@ def make_layouts(
     executor: ExecutorName = "local",
     address: str | None = None,
     on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_stage: OnStage = lambda event: None,
     on_ended: Callable[[ItemEnded], None] = lambda event: None,
 ) -> RunReport:
     """Sample the layouts number 0 to ``count - 1`` of a data set's twins below ``out``; those that are there stay.
@@ -63,7 +64,8 @@ def make_layouts(
     configuration = {"kind": "layouts", "dataset": place, **config.model_dump(mode="json")}
     return drive(
         recipe, recipe.items(count), DatasetRoot(out), config.run, configuration=configuration, executor=executor,
-        address=address, on_start=on_start, on_ended=on_ended,
+        address=address, on_start=on_start, on_stage=on_stage,
+        on_ended=on_ended,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from manitwin.apps.trajectories.lerobot.write import Written, write_lerobot
 from manitwin.apps.trajectories.pictures_recipe import PicturesRecipe, batch_name, read_pictures
 from manitwin.dataset_root import DatasetRoot
 from manitwin.dataset_run import CONFIG, ExecutorName, RunReport, drive
-from manitwin.engine.driver import ItemEnded
+from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.errors import EpisodesError
 from manitwin.robots.load import load_robot
 from manitwin.scenes.twin_source import TwinSource
@@ -31,6 +31,7 @@ def draw_episodes(
     executor: ExecutorName = "local",
     address: str | None = None,
     on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_stage: OnStage = lambda event: None,
     on_ended: Callable[[ItemEnded], None] = lambda event: None,
 ) -> RunReport:
     """Draw the kept episodes of a finished run below ``out/pictures``; what is there already stays.
@@ -53,6 +54,7 @@ def draw_episodes(
         executor=executor,
         address=address,
         on_start=on_start,
+        on_stage=on_stage,
         on_ended=on_ended,
     )
 

@@ -15,7 +15,7 @@ from manitwin.apps.trajectories.recipe import EpisodesRecipe
 from manitwin.apps.trajectories.retirement import Retirement, find_retirements, retire
 from manitwin.dataset_root import DatasetRoot
 from manitwin.dataset_run import CONFIG, ExecutorName, RunReport, drive
-from manitwin.engine.driver import ItemEnded
+from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.errors import UsageError
 from manitwin.robots.load import load_robot
 from manitwin.scenes.scene_file import read_scene
@@ -84,6 +84,7 @@ def make_episodes(
     executor: ExecutorName = "local",
     address: str | None = None,
     on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_stage: OnStage = lambda event: None,
     on_ended: Callable[[ItemEnded], None] = lambda event: None,
 ) -> RunReport:
     """Attempt ``count`` episodes with the twins, or in the scenes, of a place; those that are there stay.
@@ -105,7 +106,8 @@ def make_episodes(
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
     return drive(
         EpisodesRecipe(config, source.dataset, source.scenes), (batch.item() for batch in deal), root, config.run,
-        configuration=configuration, executor=executor, address=address, on_start=on_start, on_ended=on_ended,
+        configuration=configuration, executor=executor, address=address, on_start=on_start, on_stage=on_stage,
+        on_ended=on_ended,
     )  # fmt: skip
 
 

@@ -1,0 +1,82 @@
+"""What happens in a run, as it happens: for whoever watches it, and for the log."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from manitwin.ledger.ledger import ItemState
+from manitwin.stages.stage import Item
+
+LOG = logging.getLogger("manitwin.run")
+"""Where every event of a run is told: an item that ends and a stage that ends as INFO, a stage that begins as DEBUG."""
+
+logging.getLogger("manitwin").addHandler(logging.NullHandler())  # else Python prints warnings where nobody listens
+
+StageState = Literal["done", "there already", "rejected", "waiting", "failed"]
+
+
+@dataclass(frozen=True)
+class StageStarted:
+    """A stage of an item was given to a worker."""
+
+    item: Item
+    stage: str
+    twin_id: str = ""
+
+
+@dataclass(frozen=True)
+class StageEnded:
+    """A stage of an item has ended, or waits to be tried again; ``trace`` is the traceback of what went wrong, if any."""
+
+    item: Item
+    stage: str
+    state: StageState
+    seconds: float = 0.0
+    detail: str = ""
+    twin_id: str = ""
+    trace: str = ""
+
+
+@dataclass(frozen=True)
+class ItemEnded:
+    """What became of one item; ``found`` where its folder was there already."""
+
+    number: int
+    item: Item
+    twin_id: str
+    state: ItemState
+    detail: str
+    found: bool = False
+
+
+StageEvent = StageStarted | StageEnded
+OnStage = Callable[[StageEvent], None]
+
+
+def title(item: Item) -> str:
+    """Return a short name of an item for a person."""
+    return Path(item.file).name if item.file else f"'{(item.text or '')[:40]}'"
+
+
+def log_stage(event: StageEvent) -> None:
+    """Tell the log of a stage that began or ended."""
+    of = f"{event.stage} of {title(event.item)}" + (f" ({event.twin_id})" if event.twin_id else "")
+    if isinstance(event, StageStarted):
+        LOG.debug("%s begins", of)
+        return
+    took = f" in {event.seconds:.2f} s" if event.seconds else ""
+    why = f": {event.detail}" if event.detail else ""
+    level = logging.WARNING if event.state in ("waiting", "failed") else logging.INFO
+    LOG.log(level, "%s %s%s%s", of, event.state, took, why)
+    if event.trace:
+        LOG.debug("%s", event.trace.rstrip())
+
+
+def log_item(event: ItemEnded) -> None:
+    """Tell the log what became of an item."""
+    found = " (there already)" if event.found else ""
+    LOG.info("item %d %s %s %s%s: %s", event.number, title(event.item), event.twin_id, event.state, found, event.detail)

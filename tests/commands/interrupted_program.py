@@ -1,0 +1,51 @@
+"""A command that a test interrupts: ``python interrupted_program.py NAME FOLDER MODE``, registered in the command line.
+
+It notes in FOLDER that it is at work (``started``) and that it is ending (``ending``). MODE ``busy`` computes until it is
+interrupted; ``slow`` then takes for ever over its end; ``run`` has two workers asleep in a stage.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import manitwin.cli as cli
+from manitwin.commands.reporting import reported
+from manitwin.commands.watched_run import WatchedRun
+
+NAME, FOLDER, MODE = sys.argv[1], Path(sys.argv[2]), sys.argv[3]
+
+
+def work() -> None:
+    try:
+        if MODE == "run":
+            rehearse()
+        (FOLDER / "started").touch()
+        while True:
+            sum(range(1000))
+    finally:
+        (FOLDER / "ending").touch()
+        while MODE == "slow":
+            time.sleep(0.01)
+
+
+def rehearse() -> None:
+    from manitwin.config import RunConfig
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.dataset_run import drive, local_log
+    from manitwin.engine.rehearsal import RehearsalRecipe
+    from manitwin.stages.stage import Item
+
+    root = DatasetRoot(FOLDER / "data")
+    recipe = RehearsalRecipe(log=FOLDER / "started")  # which a worker writes as it begins a stage
+    items = [Item(file=None, text=f"{n} sleep:a:600") for n in range(4)]
+    with WatchedRun("items", lambda: local_log(root)) as watched:
+        drive(recipe, items, root, RunConfig(cpu=2), configuration={}, on_start=watched.start)
+
+
+if __name__ == "__main__":
+    cli.app.registered_commands = [each for each in cli.app.registered_commands if each.callback.__name__ != NAME]
+    cli.app.command(NAME)(reported(work))
+    sys.argv = ["manitwin", NAME]
+    cli.main()
