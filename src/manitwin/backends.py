@@ -26,7 +26,7 @@ from manitwin.models.annotators.protocol import (
     SelectedPoints,
     Subject,
 )
-from manitwin.models.generators.protocol import Generated, GenerationRequest, Generator, JobState
+from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, Generator, JobState
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest
 from manitwin.simulate.gripper import Gripper
 from manitwin.simulate.rigid_body import RigidBody
@@ -34,8 +34,10 @@ from manitwin.simulate.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.twin import Estimate, FunctionalPoint, GraspPoint, Language
 
 __all__ = [
+    "IMAGE_OR_TEXT",
     "AccessDenied",
     "Annotator",
+    "Asked",
     "BackendError",
     "BadReply",
     "BuildConfig",

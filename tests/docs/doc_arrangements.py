@@ -66,13 +66,17 @@ GRASP_SERVERS = {
     r"^git clone https://github\.com/NVlabs/GraspGenX ": FOREIGN,
     r"python client-server/graspgenx_server\.py": FOREIGN,
 }
+WHEEL = dict.fromkeys(
+    (r"^python3 -m pip wheel", r"^pip install"),
+    "fetches from the network; tests/test_wheel.py does it with what is here",
+)
 TRIPOSR = {r'"command:python docs/examples/triposr\.py .*"': '"command:python generator.py {image} {out} {seed}"'}
 """The program of the page wants weights; ``generator.py`` makes a cylinder."""
 
 PAGES: dict[str, Arrangement] = {
     "README.md": Arrangement(
         rewritten={r"^make demo": "make -o setup demo"},  # set-up is tried on a bare machine
-        not_run={r"^make test": "it is what runs this"},
+        not_run={r"^make test": "it is what runs this"} | WHEEL,
         slow=(r"^make",),
     ),
     "docs/audit.md": Arrangement(
@@ -92,6 +96,7 @@ PAGES: dict[str, Arrangement] = {
         not_run=HUNYUAN | {r"^git clone https://github\.com/VAST-AI-Research/TripoSR": NO_NETWORK},
     ),
     "docs/layouts.md": Arrangement(rewritten={"layout_1_000017": "layout_1_000001"}),
+    "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}),
     "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),
     "docs/publish.md": Arrangement(slow=(r"\bOUT\b",), blocks={"^OUT/": "tree OUT"}),
     "docs/robots.md": Arrangement(blocks={"my_arm": "robot my_arm/my_arm.toml"}),
