@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from manitwin.api import BuildReport, build, export_twin, load, load_scene, schema, statistics_connection
     from manitwin.apps.trajectories.hdf5_file import EpisodeFile
     from manitwin.apps.trajectories.lerobot.read import LeRobotSet, read_lerobot
+    from manitwin.apps.trajectories.publication.publish import PublishedEpisodes, publish_episodes
     from manitwin.audit.run import Audited
     from manitwin.audit.run import audit as audit_assets
     from manitwin.config import BuildConfig, load_config
@@ -45,6 +46,7 @@ __all__ = [
     "ManiTwinError",
     "NearDuplicates",
     "Published",
+    "PublishedEpisodes",
     "Rejected",
     "Robot",
     "SapienRobot",
@@ -64,6 +66,7 @@ __all__ = [
     "load_scene",
     "near_duplicates",
     "publish_dataset",
+    "publish_episodes",
     "read_lerobot",
     "schema",
     "statistics_connection",
@@ -74,6 +77,7 @@ _DEFINED_IN = {
     "manitwin.api": ("BuildReport", "build", "export_twin", "load", "load_scene", "schema", "statistics_connection"),
     "manitwin.apps.trajectories.hdf5_file": ("EpisodeFile",),
     "manitwin.apps.trajectories.lerobot.read": ("LeRobotSet", "read_lerobot"),
+    "manitwin.apps.trajectories.publication.publish": ("PublishedEpisodes", "publish_episodes"),
     "manitwin.audit.run": ("Audited", "audit_assets"),
     "manitwin.config": ("BuildConfig", "load_config"),
     "manitwin.errors": ("BackendError", "ManiTwinError", "Rejected", "TwinError", "UsageError"),

@@ -62,7 +62,7 @@ class PublishedEpisodes:
 
 
 def publish_episodes(
-    episodes: Path,
+    episodes: str | Path,
     out: str | Path,
     *,
     license_allow: Iterable[str] | None = None,
@@ -76,6 +76,7 @@ def publish_episodes(
     the episodes were made. The same episodes give the same bytes. Raises UsageError for wrong arguments and twins that are
     gone, EpisodesError for episodes that cannot be read or name a folder of this machine.
     """
+    episodes = Path(episodes)
     said = _configuration(episodes)
     source = TwinSource(said["dataset"] if twins is None else twins)
     batches, title = batch_folders(episodes), name or Path(str(out).rstrip("/")).name
