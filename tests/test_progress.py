@@ -8,9 +8,10 @@ import threading
 
 from rich.console import Console
 
-from manitwin.engine.events import ItemEnded, StageEnded, StageStarted
+from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageStarted
 from manitwin.progress import RunProgress, ShownProgress, duration
 from manitwin.stages.stage import Item
+from manitwin.stages.stage_parts import StagePart
 
 
 class Clock:
@@ -50,7 +51,23 @@ def test_time_left_is_that_of_the_rate_and_said_only_after_three_items() -> None
         clock.now_s += 100.0
         progress.item_ended(ended(number))
     assert progress.left_s() == 7 * 100.0
-    assert progress.line() == "3 of 10 items; 3 accepted; about 12 min left"
+    assert progress.line() == "3 of 10 items; about 12 min left; 3 accepted"
+
+
+def test_long_stages_count_by_what_they_have_done() -> None:
+    clock = Clock()
+    progress = RunProgress("batches", clock)
+    progress.start(4)
+    progress.stage(StageStarted(item(0), "films"))
+    clock.now_s = 60.0
+    progress.stage(StageAdvanced(item(0), "films", StagePart(200, 800, "frames")))
+    assert progress.left_s() is None, "a quarter of one item is too little to go by"
+    clock.now_s = 120.0
+    progress.stage(StageAdvanced(item(0), "films", StagePart(400, 800, "frames")))
+    assert progress.left_s() == 120.0 / 0.5 * 3.5
+    assert progress.line() == "0 of 4 batches; about 14 min left; under way: 1 films (400 of 800 frames)"
+    progress.item_ended(ended(0))
+    assert "frames" not in progress.line()
 
 
 def test_items_that_were_there_already_do_not_make_the_others_quicker() -> None:

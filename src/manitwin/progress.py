@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable
 from datetime import UTC, datetime
 from types import TracebackType
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from rich.console import Console
 from rich.live import Live
@@ -16,14 +16,14 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-if TYPE_CHECKING:  # what a build needs takes two CPU-seconds to import
-    from manitwin.engine.events import ItemEnded, StageEvent
-    from manitwin.stages.stage import Item
+from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageEvent, StageStarted
+from manitwin.stages.stage import Item
+from manitwin.stages.stage_parts import StagePart
 
 LINE_EVERY_S = 30.0
 """Between two lines where nobody looks at a terminal."""
-ENOUGH = 3
-"""Items must have ended before anything is said of the time that is left."""
+ENOUGH, ENOUGH_OF_PARTS = 3, 0.5
+"""Items must have ended before anything is said of the time that is left; long ones that say what they have done count by it."""
 BAR_WIDTH = 24
 
 
@@ -40,6 +40,7 @@ class RunProgress:
         self.counts: Counter[str] = Counter()
         self._found = 0
         self._under_way: dict[Item, str] = {}
+        self._parts: dict[Item, StagePart] = {}
         self._started_at: float | None = None
 
     @property
@@ -55,15 +56,17 @@ class RunProgress:
     def stage(self, event: StageEvent) -> None:
         """Note that a stage of an item began or ended."""
         with self._lock:
-            if hasattr(event, "state"):
-                self._under_way.pop(event.item, None)
-            else:
+            if isinstance(event, StageStarted):
                 self._under_way[event.item] = event.stage
+            elif isinstance(event, StageAdvanced):
+                self._parts[event.item] = event.part
+            elif isinstance(event, StageEnded):
+                self._forget(event.item)
 
     def ended(self, item: Item, state: str, found: bool = False) -> None:
         """Note what became of an item; one that was ``found`` finished says nothing of how long others take."""
         with self._lock:
-            self._under_way.pop(item, None)
+            self._forget(item)
             self.counts[state] += 1
             self._found += found
 
@@ -72,11 +75,31 @@ class RunProgress:
         self.ended(event.item, event.state, event.found)
 
     def left_s(self) -> float | None:
-        """Return about how many seconds are left at the rate until now; None until three items were worked on."""
-        worked = self.counts.total() - self._found
-        if self._started_at is None or worked < ENOUGH:
+        """Return about how many seconds are left at the rate until now; None until three items were worked on.
+
+        Half an item is enough where items say what part of them is done.
+        """
+        with self._lock:
+            parts = sum(part.done / part.total for part in self._parts.values() if part.total)
+        worked = self.counts.total() - self._found + parts
+        if self._started_at is None or worked < (ENOUGH_OF_PARTS if parts else ENOUGH):
             return None
-        return (self._clock() - self._started_at) / worked * max(0, self.total - self.done)
+        return (self._clock() - self._started_at) / worked * max(0.0, self.total - self.done - parts)
+
+    def _forget(self, item: Item) -> None:
+        self._under_way.pop(item, None)
+        self._parts.pop(item, None)
+
+    def _stages(self) -> str:
+        stages = Counter(self._under_way.values())
+        said = ", ".join(f"{number} {stage}" for stage, number in stages.most_common())
+        done: Counter[str] = Counter()
+        total: Counter[str] = Counter()
+        for part in self._parts.values():
+            done[part.unit] += part.done
+            total[part.unit] += part.total
+        parts = ", ".join(f"{done[unit]} of {total[unit]} {unit}" for unit in total)
+        return f"under way: {said}" + (f" ({parts})" if parts else "") if said else ""
 
     def line(self) -> str:
         """Return all of it in one line."""
@@ -84,11 +107,10 @@ class RunProgress:
             return "preparing"
         with self._lock:
             counts = ", ".join(f"{number} {state}" for state, number in self.counts.items())
-            stages = ", ".join(f"{number} {stage}" for stage, number in Counter(self._under_way.values()).most_common())
-        parts = [f"{self.done} of {self.total} {self.what}", counts, f"under way: {stages}" if stages else ""]
-        left = self.left_s()
-        if left is not None and self.done < self.total:
-            parts.append(f"about {duration(left)} left")
+            stages = self._stages()
+        left_s = self.left_s()
+        left = f"about {duration(left_s)} left" if left_s is not None and self.done < self.total else ""
+        parts = (f"{self.done} of {self.total} {self.what}", left, counts, stages)
         return "; ".join(filter(None, parts))
 
 

@@ -15,7 +15,17 @@ from typing import get_args
 
 from manitwin.config import Resource, RunConfig
 from manitwin.engine.budget import Budget
-from manitwin.engine.events import LOG, ItemEnded, OnStage, StageEnded, StageStarted, StageState, log_item, log_stage
+from manitwin.engine.events import (
+    LOG,
+    ItemEnded,
+    OnStage,
+    StageAdvanced,
+    StageEnded,
+    StageStarted,
+    StageState,
+    log_item,
+    log_stage,
+)
 from manitwin.engine.executor import Executor
 from manitwin.engine.flight import Flight, PlannedStage
 from manitwin.engine.gate import Gate
@@ -100,6 +110,7 @@ class Driver:
         if not self._running and (self.result.stopped is not None or not (any(self._queues.values()) or self._more)):
             return self.result.stopped is None and self._give_tables(self._tables.due_at_the_end())
         ended = [(ticket, reply, *self._running.pop(ticket)) for ticket, reply in self.executor.ended(self._wait_s())]
+        self._tell_parts()
         for ticket, reply, flight, needs in ended:
             self._outstanding[needs] -= 1
             self._budget.end(
@@ -289,6 +300,11 @@ class Driver:
     def _tell_stage(self, event: StageStarted | StageEnded) -> None:
         log_stage(event)
         self._on_stage(event)
+
+    def _tell_parts(self) -> None:
+        if parts := self.executor.parts():
+            for flight in [flight for flight, _ in self._running.values() if flight and flight.number in parts]:
+                self._on_stage(StageAdvanced(flight.opened.item, flight.stage, parts[flight.number]))
 
     def _tell(self, event: ItemEnded) -> None:
         log_item(event)

@@ -10,6 +10,7 @@ from typing import Literal
 
 from manitwin.ledger.ledger import ItemState
 from manitwin.stages.stage import Item
+from manitwin.stages.stage_parts import StagePart
 
 LOG = logging.getLogger("manitwin.run")
 """Where every event of a run is told: an item that ends and a stage that ends as INFO, a stage that begins as DEBUG."""
@@ -26,6 +27,15 @@ class StageStarted:
     item: Item
     stage: str
     twin_id: str = ""
+
+
+@dataclass(frozen=True)
+class StageAdvanced:
+    """A long stage of an item has done a part of what it does."""
+
+    item: Item
+    stage: str
+    part: StagePart
 
 
 @dataclass(frozen=True)
@@ -53,8 +63,9 @@ class ItemEnded:
     found: bool = False
 
 
-StageEvent = StageStarted | StageEnded
+StageEvent = StageStarted | StageAdvanced | StageEnded
 OnStage = Callable[[StageEvent], None]
+"""Hears of stages: one that begins, has done a part, or has ended."""
 
 
 def title(item: Item) -> str:
@@ -62,7 +73,7 @@ def title(item: Item) -> str:
     return Path(item.file).name if item.file else f"'{(item.text or '')[:40]}'"
 
 
-def log_stage(event: StageEvent) -> None:
+def log_stage(event: StageStarted | StageEnded) -> None:
     """Tell the log of a stage that began or ended."""
     of = f"{event.stage} of {title(event.item)}" + (f" ({event.twin_id})" if event.twin_id else "")
     if isinstance(event, StageStarted):

@@ -8,6 +8,7 @@ from typing import Protocol
 from manitwin.config import Resource
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
+from manitwin.stages.stage_parts import StagePart
 
 
 class Executor(Protocol):
@@ -23,6 +24,10 @@ class Executor(Protocol):
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
         """Wait until a job has ended, or the time is up; returns all that have ended."""
+        ...
+
+    def parts(self) -> dict[int, StagePart]:
+        """Return how much the stages that run have done, by item number, where they say so and it is time to look."""
         ...
 
     def close(self) -> None:
@@ -51,6 +56,10 @@ class InlineExecutor:
             time.sleep(timeout_s)
         ended, self._ended = self._ended, []
         return ended
+
+    def parts(self) -> dict[int, StagePart]:
+        """Return nothing: while a stage runs in this process, nobody asks."""
+        return {}
 
     def close(self) -> None:
         """Nothing is open."""

@@ -12,6 +12,7 @@ The text of an item is words apart by spaces, each ``what:stage`` or ``what:stag
     denied:b:/file        it raises AccessDenied while that file is there
     charge:b:0.02         a service charges so many USD, each time
     sleep:b:1.5           it takes so many seconds
+    parts:b:/file         it says that one of two things is done, and waits until that file is there
     wait:b:/file          it does not end before that file is there
 
 Every run of a stage adds a line ``<twin_id> <stage>`` to the recipe's log, so that a test can count them.
@@ -37,6 +38,7 @@ from manitwin.engine.recipe import Ending, Identity
 from manitwin.errors import AccessDenied, RateLimited, Rejected, Unavailable
 from manitwin.stage_runner import StageCost
 from manitwin.stages.stage import Draft, Item, Stage
+from manitwin.stages.stage_parts import tell_part
 from manitwin.store import RECORD, RUN, canonical_json, seal, sha256_of_json, write_bytes_atomically
 from manitwin.twin import SCHEMA_VERSION
 
@@ -93,7 +95,9 @@ class RehearsedStage:
             charge(float(more))
         if what == "sleep":
             time.sleep(float(more))
-        while what == "wait" and not Path(more).exists():
+        if what == "parts":
+            tell_part(1, 2, "things")
+        while what in ("wait", "parts") and not Path(more).exists():
             time.sleep(0.02)
         if what == "hang":
             _hang()

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import faulthandler
+import json
 import multiprocessing
 import os
 import queue
 import signal
 import tempfile
+import time
 from concurrent.futures import CancelledError, TimeoutError
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -17,14 +20,18 @@ from typing import Any, TextIO
 from pebble import ProcessExpired, ProcessPool
 
 from manitwin.config import Resource, RunConfig
-from manitwin.engine.jobs import Failure, Job, Reply, WorkerSetup
+from manitwin.engine.jobs import Failure, Job, Reply, RunStage, WorkerSetup
 from manitwin.engine.worker import Worker
 from manitwin.executors.child_processes import die_with, spared_from_interrupts
 from manitwin.executors.one_thread import one_thread_each
 from manitwin.main_module import hidden_main_module
+from manitwin.stages.stage_parts import StagePart, heard_by
+from manitwin.store import write_bytes_atomically
 
 JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
 STACK_LINES = 12
+PART = ".part"
+PARTS_EVERY_S = 1.0
 
 
 class LocalExecutor:
@@ -42,6 +49,7 @@ class LocalExecutor:
         self._pools: dict[Resource, ProcessPool] = {}
         self._ended: queue.SimpleQueue[tuple[int, Reply]] = queue.SimpleQueue()
         self._stacks = tempfile.TemporaryDirectory(prefix="manitwin-")
+        self._looked_at = 0.0
         self._main = hidden_main_module()
         self._main.__enter__()
 
@@ -73,6 +81,18 @@ class LocalExecutor:
         except queue.Empty:
             return ended
 
+    def parts(self) -> dict[int, StagePart]:
+        """Return what the workers have left beside their stacks: a file outlives a worker that crashes, a queue may not."""
+        if time.monotonic() - self._looked_at < PARTS_EVERY_S:
+            return {}
+        self._looked_at = time.monotonic()
+        found = {}
+        for path in Path(self._stacks.name).glob(f"*{PART}"):
+            with suppress(FileNotFoundError):  # its stage has ended meanwhile
+                number, *part = json.loads(path.read_bytes())
+                found[number] = StagePart(*part)
+        return found
+
     def close(self) -> None:
         """Stop all processes at once."""
         for pool in self._pools.values():
@@ -101,6 +121,7 @@ class LocalExecutor:
             reply: Reply = future.result()
             return reply
         except ProcessExpired as error:
+            (Path(self._stacks.name) / f"{error.pid}{PART}").unlink(missing_ok=True)
             return Failure("died", f"the worker process died ({_how(error.exitcode)}){self._stack(error.pid)}")
         except TimeoutError:
             limit = self._settings.stage_timeout_s
@@ -138,5 +159,25 @@ def _start(setup: WorkerSetup, stacks: str, driver: int) -> None:
 
 
 def _do(job: Job) -> Reply:
-    assert _worker is not None
-    return _worker.do(job)
+    assert _worker is not None and _stack_file is not None
+    if not isinstance(job, RunStage):
+        return _worker.do(job)
+    part_file = Path(_stack_file.name).with_suffix(PART)
+    with heard_by(_NotedParts(part_file, job.number)):
+        try:
+            return _worker.do(job)
+        finally:
+            part_file.unlink(missing_ok=True)
+
+
+class _NotedParts:
+    """Write down what a stage says of itself, once a second at most."""
+
+    def __init__(self, path: Path, number: int):
+        self._path, self._number, self._at = path, number, 0.0
+
+    def __call__(self, part: StagePart) -> None:
+        if time.monotonic() - self._at >= PARTS_EVERY_S:
+            self._at = time.monotonic()
+            said = [self._number, part.done, part.total, part.unit]
+            write_bytes_atomically(self._path, json.dumps(said).encode())

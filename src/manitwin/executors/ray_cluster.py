@@ -20,6 +20,7 @@ from manitwin.errors import UsageError
 from manitwin.executors.ray_head import Head, reachable
 from manitwin.executors.ray_pool import Actor, RayPool, Running
 from manitwin.executors.ray_worker import RayWorker
+from manitwin.stages.stage_parts import StagePart
 
 OVERDUE_EVERY_S = 1.0
 NODES_LOST = 3  # a job under which so many nodes died is taken for the cause
@@ -108,6 +109,10 @@ class RayExecutor:
                 pool.dispatch(1 if alone else self.slots(needs))
             if ended or time.monotonic() >= until:
                 return ended
+
+    def parts(self) -> dict[int, StagePart]:
+        """Return nothing: what a worker would say on the way is not worth a message to every machine."""
+        return {}
 
     def close(self) -> None:
         """Stop the workers and disconnect; a cluster that was started here ends."""

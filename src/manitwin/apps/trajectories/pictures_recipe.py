@@ -32,6 +32,7 @@ from manitwin.scenes.scene import Furniture, Light
 from manitwin.scenes.twin_source import TwinSource
 from manitwin.stage_runner import StageCost
 from manitwin.stages.stage import Draft, Item, Stage
+from manitwin.stages.stage_parts import tell_part
 from manitwin.store import canonical_json, sha256_of_file, sha256_of_json, write_bytes_atomically
 
 PICTURES_RECORD = "pictures.json"
@@ -65,6 +66,7 @@ class PicturesStage:
         """Take the settings, and where the episodes and their twins are."""
         self.settings, self._episodes, self._robot_name = settings, Path(episodes), robot
         self._source = TwinSource(dataset)
+        self._drawn = self._to_draw = 0
 
     @cached_property
     def _robot(self) -> Robot:
@@ -77,6 +79,7 @@ class PicturesStage:
         (folder / FILMS).mkdir()
         with ExitStack() as stack, EpisodeFile(self._episodes / batch_name(draft.twin_id) / EPISODES) as file:
             films = [stack.enter_context(self._film(folder / FILMS, camera)) for camera in cameras if len(file)]
+            self._drawn, self._to_draw = 0, sum(episode.recording.steps for episode in file)
             for episode in file:
                 pictures = self._frames(episode, cameras)
                 spans = [film.add(shown) for film, shown in zip(films, pictures, strict=True)]
@@ -102,6 +105,8 @@ class PicturesStage:
             for frames in islice(states, episode.recording.steps):
                 for shown, frame in zip(pictures, frames, strict=True):
                     shown.append(frame.rgb)
+                self._drawn += 1
+                tell_part(self._drawn, self._to_draw, "frames")
         return pictures
 
 
