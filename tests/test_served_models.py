@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
@@ -15,7 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
+from PIL import Image
+from rich.console import Console
 
 from manitwin import load
 from manitwin.api import with_flags
@@ -28,7 +32,10 @@ from manitwin.fakes.graspgen import FakeGraspGen
 from manitwin.fakes.openai_chat import FakeOpenAi
 from manitwin.fakes.rodin import FakeRodin
 from manitwin.fakes.server import FakeServer
+from manitwin.loaded_twin import Twin
+from manitwin.render.card import RED
 from manitwin.store import RUN
+from manitwin.summary import print_summary
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "bottle.jpg"
 KEYS = {"MANITWIN_VLM_KEY": "key-of-the-vlm-3141", "RODIN_API_KEY": "key-of-the-generator-2718"}
@@ -124,7 +131,8 @@ def run_here(folder: Path, served: Servers, *texts: str, **services: Any) -> Run
     flags = dict(zip(("vlm", "generator", "grasper"), served.flags[1::2], strict=True))
     settings = with_flags(BuildConfig.model_validate(tomllib.loads(SETTINGS)), **flags)
     update = {
-        "services": settings.services.model_copy(update=services),
+        # no server is silent in these runs: only a loaded machine would answer late
+        "services": settings.services.model_copy(update={"timeout_s": 60.0, **services}),
         "run": settings.run.model_copy(update={"patience_s": 0}),
     }
     settings = settings.model_copy(update=update)
@@ -150,6 +158,19 @@ def wait_until(condition: Callable[[], bool], process: subprocess.Popen[str], se
         time.sleep(0.05)
 
 
+def assert_shown_as_a_rehearsal(twin: Twin, stages: set[str]) -> None:
+    """Provenance, the findings, the card and ``show`` all say which stages a rehearsal server answered for."""
+    record = twin.record
+    assert {name for name, stage in record.provenance.stages.items() if stage.rehearsal} == stages
+    (check,) = [check for check in record.quality.checks if check.name == "rehearsal"]
+    assert check.passed is False and all(stage in check.message for stage in stages)
+    card = np.asarray(Image.open(twin.folder / "card.png").convert("RGB"))
+    assert (card == RED).all(2).sum() > 2000, "REHEARSAL is stamped on the pictures"
+    page = io.StringIO()
+    print_summary(twin, Console(width=200, file=page))
+    assert page.getvalue().splitlines()[1].startswith("REHEARSAL: a rehearsal server (manitwin fake), not a model")
+
+
 def test_a_photo_and_a_text_become_twins_while_every_server_fails(tmp_path: Path) -> None:
     vlm = Faults(dict.fromkeys(("rate_limited", "server_error", "disconnects", "not_json", "wrong_schema"), 1))
     faults = ("rate_limited", "server_error", "truncated_mesh", "expired_link", "job_fails")
@@ -165,7 +186,9 @@ def test_a_photo_and_a_text_become_twins_while_every_server_fails(tmp_path: Path
         again, _ = finished(tmp_path, "run", "-o", "data", *served.flags)
         jobs, questions = served.jobs(), served.questions()
         assert again == 0 and (served.jobs(), served.questions()) == (jobs, questions), "nothing is asked twice"
+    assert said.count("grasps verified; a rehearsal") == 2
     for twin in made:
+        assert_shown_as_a_rehearsal(twin, {"generate", "gate", "physical", "caption", "points", "grasps"})
         stages = twin.record.provenance.stages
         assert stages["generate"].backend == "rodin" and stages["grasps"].backend == "graspgen"
         assert {stages[name].backend for name in ("gate", "physical", "caption", "points")} == {"openai"}
@@ -207,6 +230,7 @@ def test_a_build_killed_at_the_generator_finds_its_job_again(tmp_path: Path) -> 
         assert (status, served.jobs()) == (0, 1), said
     (twin,) = (path.parent for path in (tmp_path / "made").glob("*/twin.json"))
     assert cost_usd(twin, "generate") == pytest.approx(USD_PER_JOB), "paid before the crash, and part of its cost"
+    assert load(twin).record.provenance.stages["generate"].rehearsal, "also a job that an earlier process submitted"
 
 
 @pytest.mark.parametrize("fault", ["unauthorized", "out_of_credit"])
@@ -225,6 +249,10 @@ def test_an_answer_that_cannot_be_used_is_never_accepted(tmp_path: Path, fault: 
     assert report.counts.get("accepted", 0) == 0
     ended = {"implausible": "rejected"}.get(fault, "failed")
     assert report.counts.get(ended) == 1
+    for twin in twins(tmp_path):
+        record = load(twin).record
+        assert {"generate", "gate", "physical"} <= set(record.provenance.rehearsed)
+        assert [check.passed for check in record.quality.checks if check.name == "rehearsal"] == [False]
 
 
 @pytest.mark.slow
@@ -237,6 +265,7 @@ def test_recorded_answers_repeat_a_run_without_a_server(tmp_path: Path) -> None:
         assert served.questions() == questions
     one, two = twins(tmp_path / "first")[0], twins(tmp_path / "second")[0]
     before, after = load(one).record, load(two).record
+    assert before.provenance.rehearsed == after.provenance.rehearsed, "a replayed answer of a rehearsal stays one"
     differs = {"revision", "provenance", "files"}
     assert before.model_dump(exclude=differs) == after.model_dump(exclude=differs)
     assert before.files["grasps.parquet"] == after.files["grasps.parquet"]

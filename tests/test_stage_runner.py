@@ -4,7 +4,7 @@ from typing import Any, ClassVar
 import pytest
 from pydantic import BaseModel
 
-from manitwin.charges import charge, counted
+from manitwin.charges import charge, counted, note_rehearsal
 from manitwin.errors import ManiTwinError, Rejected, Unavailable
 from manitwin.stage_runner import lost_usd, run_stage, stage_key
 from manitwin.stages.stage import Draft, Item, Stage
@@ -122,3 +122,34 @@ def test_stage_that_does_not_write_what_it_declares_is_a_defect(tmp_path: Path) 
 def test_artifact_that_no_stage_wrote_is_named() -> None:
     with pytest.raises(ManiTwinError, match=r"nothing\.npz"):
         draft().path("nothing.npz")
+
+
+class Rehearsed(Counting):
+    """A stage whose backend is a rehearsal server."""
+
+    name: ClassVar[str] = "rehearsed"
+    writes: ClassVar[tuple[str, ...]] = ("count", "data.bin", "pictures/")
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        note_rehearsal()
+        return super().run(draft, folder)
+
+
+def test_a_rehearsed_result_is_one_when_it_is_taken_up_again_and_marks_what_is_made_of_it(tmp_path: Path) -> None:
+    first, second = draft(), draft()
+    run_stage(Rehearsed(), first, tmp_path)
+    run_stage(Counting(), first, tmp_path)
+    assert first.rehearsed == {"rehearsed"}
+    # a worker that is given the later result alone knows of the earlier stage
+    run_stage(Counting(), second, tmp_path)
+    assert second.rehearsed == {"rehearsed"}
+    plain = draft()
+    run_stage(Counting(), plain, tmp_path / "other")
+    assert plain.rehearsed == set()
+
+
+def test_a_rehearsals_rejection_is_marked(tmp_path: Path) -> None:
+    made = draft()
+    with pytest.raises(Rejected):
+        run_stage(Rehearsed(fail=Rejected("none_held", "no")), made, tmp_path)
+    assert made.rehearsed == {"rehearsed"}

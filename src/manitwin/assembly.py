@@ -14,6 +14,7 @@ from manitwin.errors import Rejected
 from manitwin.files.source_files import pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.stage_runner import StageCost
+from manitwin.stages.quality import rehearsal_checks
 from manitwin.stages.stage import Draft, Stage
 from manitwin.store import RUN, canonical_json, seal, write_bytes_atomically
 from manitwin.twin import REJECTION_REASONS, Rejection, TwinRecord
@@ -49,9 +50,9 @@ def assemble(
             "manitwin_version": installed_version(),
             "config_sha256": config_sha256,
             "seed": draft.seed,
-            "stages": {s.name: {"version": s.version, "backend": s.backend, "model": _model(s, draft)} for s in stages},
+            "stages": {s.name: _provenance(s, draft) for s in stages},
         },
-        "quality": {"checks": draft.fields.get("gate", {}).get("checks", [])},
+        "quality": {"checks": _checks_so_far(draft)},
     }
     if rejected is None:
         _write_accepted(draft, fresh)
@@ -62,6 +63,20 @@ def assemble(
     }
     write_bytes_atomically(fresh / RUN, canonical_json(run).encode())
     return seal(fresh, record)
+
+
+def _provenance(stage: Stage, draft: Draft) -> dict[str, Any]:
+    return {
+        "version": stage.version,
+        "backend": stage.backend,
+        "model": _model(stage, draft),
+        "rehearsal": stage.name in draft.rehearsed,
+    }
+
+
+def _checks_so_far(draft: Draft) -> list[dict[str, Any]]:
+    """Return the checks of a twin that was rejected; those of an accepted one take their place."""
+    return [*(check.model_dump() for check in rehearsal_checks(draft)), *draft.fields.get("gate", {}).get("checks", [])]
 
 
 def _model(stage: Stage, draft: Draft) -> str | None:

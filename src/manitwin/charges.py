@@ -1,4 +1,4 @@
-"""What services charge for the work that is being done: clients add, whoever runs the work counts."""
+"""What services charge for the work that is being done, and whether they only rehearse it: clients say, who runs it counts."""
 
 from __future__ import annotations
 
@@ -7,12 +7,16 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 
+REHEARSAL_MARK = "x-manitwin-rehearsal"
+"""The header, or the field of a message, that every answer of a rehearsal server has, and that of no other."""
+
 
 @dataclass
 class Bill:
-    """What has been charged so far."""
+    """What has been charged so far; ``rehearsed``: a rehearsal server (``manitwin fake``) answered, not a model."""
 
     usd: float = 0.0
+    rehearsed: bool = False
 
 
 _current: ContextVar[Bill | None] = ContextVar("bill", default=None)
@@ -23,6 +27,13 @@ def charge(usd: float) -> None:
     bill = _current.get()
     if bill is not None:
         bill.usd += usd
+
+
+def note_rehearsal() -> None:
+    """Say that what answered was a rehearsal server: what is made of it is no model's work."""
+    bill = _current.get()
+    if bill is not None:
+        bill.rehearsed = True
 
 
 @contextmanager
@@ -36,3 +47,4 @@ def counted() -> Iterator[Bill]:
         _current.reset(token)
         if outer is not None:
             outer.usd += bill.usd
+            outer.rehearsed = outer.rehearsed or bill.rehearsed

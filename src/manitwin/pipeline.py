@@ -244,6 +244,8 @@ def ending_of(record: TwinRecord) -> Ending:
         detail = record.rejection.detail
     else:
         detail = f"{record.grasps.verified} of {record.grasps.simulated} grasps verified" if record.grasps else ""
+    if record.provenance.rehearsed:
+        detail += "; a rehearsal"
     return Ending(record.status, record.revision, reason, detail, NAME_HINT if name_would_help(record) else None)
 
 

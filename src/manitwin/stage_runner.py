@@ -1,6 +1,7 @@
 """Run one stage, or take its result up again: results live in ``.work/<twin_id>/<stage>/<key>``, by what decided them.
 
-``result.json`` beside a stage's files holds its fields, the digests of all that it wrote, and what it cost.
+``result.json`` beside a stage's files holds its fields, the digests of all that it wrote, what it cost, and, where its backend or
+that of a stage before it was a rehearsal server, the names of these stages.
 """
 
 from __future__ import annotations
@@ -106,6 +107,7 @@ def take_up(place: Path, names: Iterable[str], draft: Draft) -> StageCost:
         else:
             draft.paths[name] = place / name
         draft.digests[name] = result["digests"][name]
+    draft.rehearsed.update(result.get("rehearsed", ()))  # results of earlier versions do not say
     return StageCost(**result["cost"])
 
 
@@ -139,7 +141,10 @@ def _run_into(stage: Stage, draft: Draft, place: Path) -> None:
     try:
         started, cpu_started = time.perf_counter(), _cpu_seconds()
         with _kept_bill(place.parent) as bill:
-            fields = stage.run(draft, fresh)
+            try:
+                fields = stage.run(draft, fresh)
+            finally:
+                draft.rehearsed.update([stage.name] if bill.rehearsed else [])
         cost = {"seconds": time.perf_counter() - started, "cpu_seconds": _cpu_seconds() - cpu_started}
         _check_writes(stage, fields, fresh)
         digests = {
@@ -150,6 +155,7 @@ def _run_into(stage: Stage, draft: Draft, place: Path) -> None:
             "fields": fields,
             "digests": digests,
             "cost": {**cost, "cost_usd": bill.usd + lost_usd(place.parent)},
+            "rehearsed": sorted(draft.rehearsed),
         }
         write_bytes_atomically(fresh / RESULT, canonical_json(content).encode())
         shutil.rmtree(place, ignore_errors=True)

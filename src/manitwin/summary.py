@@ -10,6 +10,7 @@ from rich.text import Text
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.geometry.resting import rest_of, side_down, tilt_deg
 from manitwin.loaded_twin import Twin
+from manitwin.stages.quality import rehearsed_words
 from manitwin.twin import Estimate, GraspSummary, OtherGripper, Placement, SecondOpinion, TwinRecord
 
 
@@ -23,6 +24,8 @@ def print_summary(twin: Twin, console: Console) -> None:
     record = twin.record
     head = record.language.caption if record.language else record.name or "unnamed"
     console.print(f"{record.twin_id}  {record.status}  {head}", style="bold", markup=False)
+    if record.provenance.rehearsed:
+        console.print(f"REHEARSAL: {rehearsed_words(record.provenance.rehearsed)}", style="bold red", markup=False)
     if record.rejection is not None:
         console.print(f"{record.rejection.stage}: {record.rejection.reason}: {record.rejection.detail}", markup=False)
     table = Table(show_header=False, box=None, pad_edge=False)

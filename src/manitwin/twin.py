@@ -102,11 +102,12 @@ class Source(Record):
 
 
 class StageProvenance(Record):
-    """Which code and which backend did a stage."""
+    """Which code and which backend did a stage; ``rehearsal``: a rehearsal server (``manitwin fake``) answered in its place."""
 
     version: str
     backend: str
     model: str | None = None
+    rehearsal: bool = False
 
 
 class Provenance(Record):
@@ -116,6 +117,11 @@ class Provenance(Record):
     config_sha256: str
     seed: int
     stages: dict[str, StageProvenance]
+
+    @property
+    def rehearsed(self) -> tuple[str, ...]:
+        """The stages whose backend was a rehearsal server, sorted."""
+        return tuple(sorted(name for name, stage in self.stages.items() if stage.rehearsal))
 
 
 class Hulls(Record):

@@ -61,7 +61,9 @@ def said(capsys: pytest.CaptureFixture[str], what: str | None = None, **options:
 def test_a_served_model_that_answers(capsys: pytest.CaptureFixture[str]) -> None:
     with FakeGraspGen() as fake:
         line, status = said(capsys, "grasper", grasper=f"graspgen:@{fake.url}")
-    works = re.escape(f"ok      graspgen:@{fake.url}: serves franka_panda (diffusion-discriminator)")
+    works = re.escape(
+        f"ok      graspgen:@{fake.url}: serves franka_panda (diffusion-discriminator); it is a rehearsal server, not a model"
+    )
     assert re.fullmatch(works + r" \(0\.0000 USD, \d+\.\d s\)", line)
     assert status == 0
 

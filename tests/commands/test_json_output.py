@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from json_documents import check_keys
 from typer.testing import CliRunner
 
+from json_documents import check_keys
 from manitwin.cli import app
 from manitwin.dataset_root import twin_name
 from manitwin.store import read_record

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import zmq
 
+from manitwin.charges import REHEARSAL_MARK
 from manitwin.errors import UsageError
 from manitwin.fakes.faults import Faults
 from manitwin.fakes.graspgen import FakeGraspGen
@@ -46,7 +47,9 @@ def connected(server: MessageServer) -> Iterator[Any]:
 
         def ask(message: Any) -> Any:
             socket.send(msgpack_numpy.packb(message, use_bin_type=True))
-            return msgpack_numpy.unpackb(socket.recv(), raw=False)
+            answer = msgpack_numpy.unpackb(socket.recv(), raw=False)
+            assert answer.pop(REHEARSAL_MARK) is True, "every answer says that it is a rehearsal's"
+            return answer
 
         yield ask
         socket.close()

@@ -76,6 +76,7 @@ def make_twin(
     held: int = 3,
     prompt: str | None = None,
     source_bytes: int = 100,
+    failed_checks: tuple[str, ...] = (),
 ) -> Path:
     """Write a finished twin into a data set, of bytes that follow from its id; returns its folder."""
     folder = root / twin_name(twin_id)
@@ -101,7 +102,9 @@ def make_twin(
         "kind": "mesh", "file": "source.zip", "sha256": hashlib.sha256(content).hexdigest(), "prompt": prompt,
         "license": license, "attribution": attribution,
     }  # fmt: skip
-    seal(folder, accepted_record(twin_id, category, source, count, held))
+    record = accepted_record(twin_id, category, source, count, held)
+    checks = [{"name": name, "passed": False} for name in failed_checks]
+    seal(folder, {**record, "quality": {"checks": checks}})
     return folder
 
 

@@ -35,6 +35,17 @@ def test_missing_attribution_is_said(tmp_path: Path) -> None:
     assert "1 are under a licence that asks for attribution, and have none" in done.output
 
 
+def test_rehearsals_are_left_out_with_their_count_unless_asked_for(tmp_path: Path) -> None:
+    make_twin(tmp_path / "set", "a0")
+    make_twin(tmp_path / "set", "b1", failed_checks=("rehearsal",))
+    index(tmp_path / "set")
+    arguments = [str(tmp_path / "set"), "-o", str(tmp_path / "out")]
+    done = CliRunner().invoke(app, arguments)
+    assert "1 twins in 1 shards" in done.output and "1 rehearsals left out" in done.output
+    asked = CliRunner().invoke(app, [*arguments, "--with-rehearsals"])
+    assert "2 twins in" in asked.output and "left out" not in asked.output
+
+
 def test_wrong_licence_is_a_usage_error(tmp_path: Path) -> None:
     make_dataset(tmp_path / "set")
     done = CliRunner().invoke(app, [str(tmp_path / "set"), "-o", str(tmp_path / "out"), "--license-allow", "MIT"])

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -9,12 +10,14 @@ from manitwin.publish.hub_license import hub_license
 from manitwin.publish.licences import licenses_page, select, without_attribution
 from manitwin.publish.publish import publish
 
-ROWS = [
+ROWS: list[dict[str, Any]] = [
     {"twin_id": "a", "license": "CC-BY-4.0", "attribution": "Ada"},
     {"twin_id": "b", "license": "CC-BY-4.0", "attribution": None},
     {"twin_id": "c", "license": "CC0-1.0", "attribution": None},
     {"twin_id": "d", "license": "unknown", "attribution": None},
 ]
+for row in ROWS:
+    row["failed_checks"] = ["category_known"]
 
 
 @pytest.mark.parametrize(
@@ -31,6 +34,16 @@ def test_only_what_is_named_goes_out_and_unknown_never_by_itself(
     selection = select(ROWS, allow)
     assert "".join(sorted(selection.published)) == out and selection.left_out == left
     assert selection.published | selection.kept_back == set("abcd") and not selection.published & selection.kept_back
+
+
+def test_rehearsals_stay_unless_they_are_asked_for_and_are_counted() -> None:
+    rows = [*ROWS, {"twin_id": "e", "license": "CC0-1.0", "attribution": None, "failed_checks": ["rehearsal"]}]
+    selection = select(rows, None)
+    assert "".join(sorted(selection.published)) == "abc" and selection.rehearsals == 1 and "e" in selection.kept_back
+    asked = select(rows, None, with_rehearsals=True)
+    assert "".join(sorted(asked.published)) == "abce" and asked.rehearsals == 0
+    with pytest.raises(UsageError, match=r"1 are rehearsals, made by manitwin fake .*--with-rehearsals"):
+        select(rows[4:], None)
 
 
 @pytest.mark.parametrize("allow", [["MIT"], [""], []])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import trimesh
 from PIL import Image
 
 from manitwin.geometry.poses import transform
-from manitwin.render.card import HEIGHT, PANEL, WIDTH, CardText, make_card
+from manitwin.render.card import HEIGHT, PANEL, RED, WIDTH, CardText, make_card
 from manitwin.render.card_panels import GRASP, CardGrasp, CardPoint, diverse, input_panel
 from manitwin.render.renderer import BACKDROP
 from manitwin.render.surfaces import plain_part
@@ -74,3 +75,13 @@ def test_diverse_grasps_come_from_all_clusters() -> None:
     poses[:, :3, 3] = rng.normal(0, 0.002, (90, 3)) + np.repeat(np.eye(3) * 0.2, 30, axis=0)
     chosen = diverse(poses, 3)
     assert sorted(chosen // 30) == [0, 1, 2]
+
+
+def test_a_stamp_is_seen_on_every_picture_of_what_was_made() -> None:
+    plain, stamped = (
+        np.asarray(Image.open(io.BytesIO(card(text=replace(TEXT, stamp=word))))) for word in (None, "REHEARSAL")
+    )
+    for column in range(1, 4):
+        left = 24 + column * (PANEL + 16)
+        red = [(image[96 : 96 + PANEL, left : left + PANEL] == RED).all(2).sum() for image in (plain, stamped)]
+        assert red[0] == 0 and red[1] > 500

@@ -81,4 +81,5 @@ def asked(kind: str, spec: str, settings: BuildConfig) -> Finding:
         except ManiTwinError as error:
             works, ok = str(error), False
     seconds = time.perf_counter() - started
+    works += "; it is a rehearsal server, not a model" if bill.rehearsed else ""
     return Finding(spec, ok, f"{' '.join(works.split())} ({bill.usd:.4f} USD, {seconds:.1f} s)")

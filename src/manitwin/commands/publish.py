@@ -11,6 +11,7 @@ from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console
 
 if TYPE_CHECKING:
+    from manitwin.apps.trajectories.publication.publish import PublishedEpisodes
     from manitwin.publish.publish import Published, ShardDone
 
 SHARD_SIZE_MB = 1000  # as in publish/publish.py, which is imported when it is needed
@@ -30,6 +31,10 @@ def publish(
         str | None,
         typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: all but 'unknown'."),
     ] = None,
+    with_rehearsals: Annotated[
+        bool,
+        typer.Option("--with-rehearsals", help="Also twins that a rehearsal server (manitwin fake) had a part in."),
+    ] = False,
     shard_size_mb: Annotated[int, typer.Option(help="The most that a shard may have, in 10^6 bytes.")] = SHARD_SIZE_MB,
     twins_per_shard: Annotated[int | None, typer.Option(help="The most twins of a shard; default: any number.")] = None,
     twins: options.Twins = None,
@@ -46,7 +51,7 @@ def publish(
     if root.local is not None and root.exists(ATTEMPTS):
         if twins_per_shard is not None or shard_size_mb != SHARD_SIZE_MB:
             raise UsageError(f"{dataset}: holds episodes, which have no shards; leave the options of shards out")
-        _publish_episodes(root.local, out, allowed, twins, name)
+        _publish_episodes(root.local, out, allowed, twins, name, with_rehearsals)
         return
     if twins is not None:
         raise UsageError(f"{dataset}: holds no episodes, whose twins could be elsewhere; leave --twins out")
@@ -54,6 +59,7 @@ def publish(
         dataset,
         out,
         license_allow=allowed,
+        with_rehearsals=with_rehearsals,
         shard_size_mb=shard_size_mb,
         twins_per_shard=twins_per_shard,
         name=name,
@@ -64,26 +70,32 @@ def publish(
     out_console.print(f"in {out}", markup=False)
 
 
-def _publish_episodes(episodes: Path, out: str, allowed: list[str] | None, twins: str | None, name: str | None) -> None:
+def _publish_episodes(
+    episodes: Path, out: str, allowed: list[str] | None, twins: str | None, name: str | None, rehearsals: bool
+) -> None:
     from manitwin.apps.trajectories.publication.publish import publish_episodes
 
-    published = publish_episodes(episodes, out, license_allow=allowed, twins=twins, name=name)
+    published = publish_episodes(
+        episodes, out, license_allow=allowed, with_rehearsals=rehearsals, twins=twins, name=name
+    )
     lines = [
         f"{published.episodes:,} episodes of {published.twins:,} twins, {published.frames:,} frames; "
         f"{published.files:,} files, {published.bytes / 1e6:,.1f} MB",
-        *_held_back_lines(published.left_out, published.without_attribution),
+        *_held_back_lines(published),
     ]
     for line in (*lines, f"in {out}"):
         out_console.print(line, markup=False)
 
 
-def _held_back_lines(left_out: dict[str, int], without_attribution: int) -> list[str]:
+def _held_back_lines(published: Published | PublishedEpisodes) -> list[str]:
     lines = []
-    if left_out:
-        by_licence = ", ".join(f"{name} {count:,}" for name, count in left_out.items())
-        lines.append(f"{sum(left_out.values()):,} left out by licence: {by_licence}")
-    if without_attribution:
-        lines.append(f"{without_attribution:,} are under a licence that asks for attribution, and have none")
+    if published.left_out:
+        by_licence = ", ".join(f"{name} {count:,}" for name, count in published.left_out.items())
+        lines.append(f"{sum(published.left_out.values()):,} left out by licence: {by_licence}")
+    if published.rehearsals:
+        lines.append(f"{published.rehearsals:,} rehearsals left out: manitwin fake, not a model, had a part in them")
+    if published.without_attribution:
+        lines.append(f"{published.without_attribution:,} are under a licence that asks for attribution, and have none")
     return lines
 
 
@@ -96,7 +108,7 @@ def outcome_lines(published: Published) -> list[str]:
     ]
     if published.rejected:
         lines.append(f"{published.rejected:,} rejected ones are not published")
-    return lines + _held_back_lines(published.left_out, published.without_attribution)
+    return lines + _held_back_lines(published)
 
 
 def _say_shard(done: ShardDone) -> None:

@@ -64,11 +64,12 @@ class RunStage:
 
 @dataclass(frozen=True)
 class StageRejected:
-    """A stage's answer that nothing is to be made of the item; it cost as well."""
+    """A stage's answer that nothing is to be made of the item; it cost as well. ``rehearsed``: a rehearsal server's answer."""
 
     answer: Rejected
     cost: StageCost
     charged_usd: float = 0.0
+    rehearsed: bool = False
 
 
 @dataclass(frozen=True)

@@ -119,7 +119,8 @@ class Worker:
             return work.run(stage, draft)
         except Rejected as answer:
             seconds, cpu_seconds = time.perf_counter() - started, time.process_time() - cpu_started
-            return StageRejected(answer, StageCost(seconds, cpu_seconds, lost_usd(work.place / stage.name)))
+            cost = StageCost(seconds, cpu_seconds, lost_usd(work.place / stage.name))
+            return StageRejected(answer, cost, rehearsed=stage.name in draft.rehearsed)
 
     def _finish(self, job: Finish) -> Ending:
         stages, work = {s.name: s for s in self.stages(job.kind)}, self._work(job.twin_id)
@@ -128,6 +129,7 @@ class Worker:
         answer = None if job.rejected is None else job.rejected.answer
         if job.rejected is not None and job.stage != INPUT:
             costs[job.stage] = job.rejected.cost
+            draft.rehearsed.update([job.stage] if job.rejected.rehearsed else [])
         try:
             ending = self.setup.recipe.finish(draft, job.kind, costs, answer, job.stage, work.fresh)
             self.root.put_folder(work.fresh, self.setup.recipe.folder_of(job.twin_id), self.setup.recipe.record)

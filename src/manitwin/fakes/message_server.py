@@ -13,6 +13,7 @@ import msgpack
 import msgpack_numpy
 import zmq
 
+from manitwin.charges import REHEARSAL_MARK
 from manitwin.errors import UsageError
 from manitwin.fakes.faults import Faults
 
@@ -122,7 +123,7 @@ class MessageServer:
 
 
 def _packed(answer: dict[str, Any]) -> bytes:
-    return msgpack.packb(answer, default=msgpack_numpy.encode, use_bin_type=True)
+    return msgpack.packb({**answer, REHEARSAL_MARK: True}, default=msgpack_numpy.encode, use_bin_type=True)
 
 
 def _without_pickles(item: dict[Any, Any]) -> Any:

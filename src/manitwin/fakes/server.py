@@ -1,4 +1,4 @@
-"""A local HTTP server in a thread, around something that answers requests."""
+"""A local HTTP server in a thread, around something that answers requests; each answer says that it is a rehearsal's."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from email.policy import HTTP
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any, Protocol
 from urllib.parse import parse_qsl, urlsplit
+
+from manitwin.charges import REHEARSAL_MARK
 
 MAX_BODY_BYTES = 256 << 20
 
@@ -119,6 +121,7 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_response(response.status)
         for name, value in headers.items():
             self.send_header(name, value)
+        self.send_header(REHEARSAL_MARK, "1")
         self.send_header("Content-Length", str(len(content)))
         self.end_headers()
         if response.cut_after is not None:

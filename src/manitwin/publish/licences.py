@@ -9,6 +9,7 @@ from typing import Any
 
 from manitwin.errors import UsageError
 from manitwin.publish.markdown import plain, table
+from manitwin.stages.quality import REHEARSAL
 
 UNKNOWN = "unknown"
 LICENSES_MD = "LICENSES.md"
@@ -19,11 +20,15 @@ _IDS_SHOWN = 50
 
 @dataclass(frozen=True)
 class Selection:
-    """The ids of the twins that go out and of those that stay here, and how many of these there are by licence."""
+    """The ids of the twins that go out and of those that stay here, and how many of these there are by licence.
+
+    ``rehearsals`` are those that stay although their licence lets them go: a rehearsal server made part of them.
+    """
 
     published: frozenset[str]
     kept_back: frozenset[str]
     left_out: dict[str, int]
+    rehearsals: int = 0
 
 
 @dataclass(frozen=True)
@@ -43,26 +48,37 @@ class Allowed:
         return lower != UNKNOWN if self.named is None else lower in self.named
 
 
-def select(twins: Iterable[Mapping[str, Any]], allow: Iterable[str] | None) -> Selection:
+def select(
+    twins: Iterable[Mapping[str, Any]], allow: Iterable[str] | None, *, with_rehearsals: bool = False
+) -> Selection:
     """Choose the twins whose licence is named in ``allow`` (in any case), or known at all where nothing is named.
 
-    ``twins`` are rows with ``twin_id`` and ``license``. Raises UsageError where nothing may go out.
+    Those that a rehearsal server had a part in stay here unless ``with_rehearsals``. ``twins`` are rows with ``twin_id``,
+    ``license`` and ``failed_checks``. Raises UsageError where nothing may go out.
     """
     allowed = Allowed.of(allow)
-    published, kept_back, left_out = set[str](), set[str](), Counter[str]()
+    published, kept_back, left_out, rehearsals = set[str](), set[str](), Counter[str](), 0
     for twin in twins:
-        if allowed.has(twin["license"]):
+        if not with_rehearsals and REHEARSAL in twin["failed_checks"] and allowed.has(twin["license"]):
+            kept_back.add(twin["twin_id"])
+            rehearsals += 1
+        elif allowed.has(twin["license"]):
             published.add(twin["twin_id"])
         else:
             kept_back.add(twin["twin_id"])
             left_out[twin["license"] or UNKNOWN] += 1
+    if not published and rehearsals:
+        raise UsageError(
+            f"no twin may go out: {rehearsals:,} are rehearsals, made by manitwin fake and not by models; build them again"
+            " with models into a new folder, or ask for them with --with-rehearsals"
+        )
     if not published:
         there = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items())) or "none"
         raise UsageError(
             f"no twin may go out; licences of the accepted twins: {there}; "
             f"name those that may in --license-allow, {UNKNOWN!r} too if you know that you may"
         )
-    return Selection(frozenset(published), frozenset(kept_back), dict(sorted(left_out.items())))
+    return Selection(frozenset(published), frozenset(kept_back), dict(sorted(left_out.items())), rehearsals)
 
 
 def without_attribution(twins: Iterable[Mapping[str, Any]]) -> list[str]:

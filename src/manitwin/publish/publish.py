@@ -53,7 +53,8 @@ class ShardDone:
 class Published:
     """What went out and what did not.
 
-    ``left_out`` counts accepted twins by licence; ``without_attribution`` those published whose licence asks for it.
+    ``left_out`` counts accepted twins by licence; ``without_attribution`` those published whose licence asks for it,
+    ``rehearsals`` those left out because a rehearsal server had a part in them.
     ``rows`` are those of the published tables.
     """
 
@@ -66,6 +67,7 @@ class Published:
     files: int
     bytes: int
     rows: dict[str, int] = field(default_factory=dict)
+    rehearsals: int = 0
 
 
 def publish(
@@ -73,6 +75,7 @@ def publish(
     out: str | Path,
     *,
     license_allow: Iterable[str] | None = None,
+    with_rehearsals: bool = False,
     shard_size_mb: int = SHARD_SIZE_MB,
     twins_per_shard: int | None = None,
     name: str | None = None,
@@ -81,7 +84,8 @@ def publish(
     """Write WebDataset shards, Parquet tables, the dataset card, licences and digests of a data set to ``out``.
 
     ``dataset`` and ``out`` are folders or URLs; the index of the data set must be up to date. ``license_allow`` names the
-    licences that may go out; by default all but ``unknown``. Shards hold at most ``shard_size_mb`` (10^6 bytes), or one
+    licences that may go out; by default all but ``unknown``. Twins that a rehearsal server (``manitwin fake``) had a part in
+    stay here unless ``with_rehearsals``. Shards hold at most ``shard_size_mb`` (10^6 bytes), or one
     twin that is larger, and at most ``twins_per_shard`` twins. The same data set gives the same bytes. Interrupted, it can
     be called again, and finished shards stay. Raises UsageError for wrong arguments, TwinError for a twin that is altered,
     incomplete or names a folder of this machine.
@@ -91,8 +95,9 @@ def publish(
     tar_bytes = tar_bytes_of_twins(source)
     parts = parts_of_index(source, set(tar_bytes))
     columns = ["twin_id", "revision", "license", "attribution", "category", "seconds", "cpu_seconds", "cost_usd"]
+    columns.append("failed_checks")
     rows = rows_of_table(source, parts, "twins", columns)
-    selection = select(rows, license_allow)
+    selection = select(rows, license_allow, with_rehearsals=with_rehearsals)
     shards = plan_shards(
         _shard_twins(rows, tar_bytes, selection), max_bytes=shard_size_mb * MEGABYTE, max_twins=twins_per_shard
     )
@@ -116,6 +121,7 @@ def publish(
         files=len(publication.sizes) + 1,
         bytes=sum(publication.sizes.values()),
         rows=counts,
+        rehearsals=selection.rehearsals,
     )
 
 

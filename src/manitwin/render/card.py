@@ -39,16 +39,21 @@ PANEL = (WIDTH - 2 * MARGIN - 3 * GAP) // 4
 TOP = 96
 FOV_Y_DEG = 24.0
 INK, GREY, PALE = (24, 28, 36), (112, 120, 132), (214, 218, 224)
+RED = (200, 24, 32)
 
 
 @dataclass(frozen=True)
 class CardText:
-    """What is written on a card: a title, a sentence, facts as (name, value) from left to right, and a footer."""
+    """What is written on a card: a title, a sentence, facts as (name, value) from left to right, and a footer.
+
+    ``stamp`` is a word across all pictures but the input.
+    """
 
     title: str
     sentence: str
     facts: Sequence[tuple[str, str]]
     footer: str
+    stamp: str | None = None
 
 
 def make_card(
@@ -91,11 +96,25 @@ def make_card(
         left = MARGIN + index * (PANEL + GAP)
         card.paste(Image.fromarray(picture), (left, TOP), _rounded_mask())
         draw.text((left + 2, TOP + PANEL + 18), caption, fill=INK, font=_font(15), anchor="lm")
+        if text.stamp is not None and index > 0:  # the input is the input
+            _stamp(card, text.stamp, left, TOP)
     _legend(draw)
     draw.text((MARGIN + 2, HEIGHT - 16), _shortened(text.footer, 1400, 12), fill=GREY, font=_font(12), anchor="lm")
     stream = io.BytesIO()
     card.save(stream, "PNG", compress_level=5)
     return stream.getvalue()
+
+
+def _stamp(card: Image.Image, word: str, left: int, top: int) -> None:
+    """Put a word in a frame aslant over a panel; what is under it shows through."""
+    font = _font(46)
+    width, height = round(font.getlength(word)) + 36, 74
+    stamp = Image.new("RGBA", (width, height), (255, 255, 255, 150))
+    draw = ImageDraw.Draw(stamp)
+    draw.rectangle((2, 2, width - 3, height - 3), outline=(*RED, 255), width=4)
+    draw.text((width / 2, height / 2), word, fill=(*RED, 255), font=font, anchor="mm")
+    turned = stamp.rotate(18, expand=True, resample=Image.Resampling.BICUBIC)
+    card.paste(turned, (left + (PANEL - turned.width) // 2, top + (PANEL - turned.height) // 2), turned)
 
 
 def _header(draw: ImageDraw.ImageDraw, text: CardText) -> None:

@@ -106,7 +106,8 @@ def card_text(draft: Draft) -> CardText:
     )
     made_by = f"made by {draft.field('generation')['generator']}" if "generation" in draft.fields else "mesh given"
     footer = f"{draft.twin_id}   {made_by}   mass: {mass['source']}   friction: {friction['source']}"
-    return CardText(language["category"], language["caption"], facts, footer)
+    stamp = "REHEARSAL" if draft.rehearsed else None
+    return CardText(language["category"], language["caption"], facts, footer, stamp)
 
 
 def _mass(kilograms: float) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from manitwin.stages.stage import Draft
@@ -16,12 +17,15 @@ CAVITY_LIMIT = 0.8
 CENTER_OF_MASS_LIMIT = 0.1
 """Of the longest side: an uncertainty beyond it decides whether a grasp holds."""
 
+REHEARSAL = "rehearsal"
+"""The check that only fails, and is only there, where a rehearsal server stood in for a model."""
+
 ESTIMATES = ("mass_kg", "friction_static", "friction_dynamic", "restitution")
 
 
 def quality_checks(draft: Draft) -> list[dict[str, Any]]:
     """Collect the gate's checks and the findings of the later stages, in the order of the stages."""
-    checks = [Check(**check) for check in draft.field("gate")["checks"]]
+    checks = [*rehearsal_checks(draft), *(Check(**check) for check in draft.field("gate")["checks"])]
     if "matte" in draft.fields:
         matte = draft.field("matte")
         checks.append(
@@ -55,6 +59,19 @@ def _unseen(draft: Draft) -> list[Check]:
         return []
     message = "share of the surface that the photo does not show: its shape and colours are a guess" if share else ""
     return [Check(name="every_side_seen", passed=not share, value=share, limit=0.0, message=message)]
+
+
+def rehearsal_checks(draft: Draft) -> list[Check]:
+    """Return the failed check of a twin that a rehearsal server had a part in; none for all others."""
+    if not draft.rehearsed:
+        return []
+    message = f"{rehearsed_words(draft.rehearsed)}; nothing of this twin is to be believed"
+    return [Check(name=REHEARSAL, passed=False, value=float(len(draft.rehearsed)), limit=0.0, message=message)]
+
+
+def rehearsed_words(stages: Iterable[str]) -> str:
+    """Say which stages a rehearsal server answered for."""
+    return f"a rehearsal server (manitwin fake), not a model, answered for {', '.join(sorted(stages))}"
 
 
 def _physical_checks(draft: Draft) -> list[Check]:

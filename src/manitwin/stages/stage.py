@@ -46,7 +46,8 @@ class Item:
 class Draft:
     """A twin in the making: fields and paths with their digests, by artifact name. Cheap to send to another process.
 
-    ``jobs`` remembers what was asked of services that are paid by the job.
+    ``jobs`` remembers what was asked of services that are paid by the job. ``rehearsed`` are the stages, among those whose
+    results are here and those that these were made of, whose backend was a rehearsal server (``manitwin fake``).
     """
 
     twin_id: str
@@ -56,6 +57,7 @@ class Draft:
     paths: dict[str, Path] = dataclass_field(default_factory=dict)
     digests: dict[str, str] = dataclass_field(default_factory=dict)
     jobs: JobMemory = dataclass_field(default_factory=NoMemory)
+    rehearsed: set[str] = dataclass_field(default_factory=set)
 
     def names(self) -> set[str]:
         """Return the names of all artifacts that are there."""

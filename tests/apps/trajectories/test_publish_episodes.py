@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -230,6 +231,28 @@ def test_same_episodes_give_the_same_bytes_and_an_older_publication_is_replaced(
         digest, name = line.split("  ")
         assert hashlib.sha256((out / name).read_bytes()).hexdigest() == digest
     assert {path.name for path in out.iterdir() if path.is_dir()} == {"meta", "data", "videos"}
+
+
+def test_episodes_of_a_rehearsals_twin_stay_unless_they_are_asked_for(run: Path, twins: Path, tmp_path: Path) -> None:
+    place = tmp_path / "twins"
+    shutil.copytree(twins, place)
+    folder = place / twin_name(BOWL)
+    record = json.loads((folder / RECORD).read_bytes())
+    record["provenance"]["stages"]["points"]["rehearsal"] = True
+    del record["revision"], record["files"]
+    seal(folder, record)
+    arguments = [str(run), "-o", str(tmp_path / "out"), "--twins", str(place), "--license-allow"]
+    done = CliRunner().invoke(app, [*arguments, ",".join(LICENCES.values())])
+    assert done.exit_code == 0, done.output
+    with_the_bowl = sum(BOWL in ids for ids in OBJECTS)
+    assert f"{6 - with_the_bowl} episodes of" in done.output and f"{with_the_bowl} rehearsals left out" in done.output
+    assert BOWL not in "".join(path.read_text() for path in (tmp_path / "out").glob("*.md"))
+    with pytest.raises(UsageError, match=r"3 show twins of a rehearsal.*--with-rehearsals"):
+        publish_episodes(run, tmp_path / "none", twins=place, license_allow=["CC0-1.0", "CC-BY-4.0"])
+    asked = publish_episodes(
+        run, tmp_path / "all", twins=place, license_allow=["CC0-1.0", "CC-BY-4.0"], with_rehearsals=True
+    )
+    assert (asked.episodes, asked.rehearsals) == (3, 0)
 
 
 def test_what_cannot_be_published_leaves_nothing(run: Path, twins: Path, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 import zmq
 from test_array_messages import hostile
 
+from manitwin.charges import counted
 from manitwin.config import ServicesConfig
 from manitwin.errors import BadReply, ConfigError, Unavailable
 from manitwin.fakes.faults import Faults
@@ -136,3 +137,12 @@ def test_addresses(argument: str, url: str) -> None:
 def test_what_is_no_address_is_a_configuration_error(argument: str) -> None:
     with pytest.raises(ConfigError):
         server_url(argument, "graspgen")
+
+
+def test_a_rehearsal_says_that_it_is_one_and_a_server_does_not() -> None:
+    with FakeGraspGen() as server, counted() as rehearsal:
+        answer = server_at(server.url).ask({"action": "metadata"})
+    assert rehearsal.rehearsed and not [name for name in answer if "rehearsal" in str(name)]
+    with says(msgpack.packb({"gripper_name": "x"})) as (url, _), counted() as real:
+        server_at(url).ask({"action": "metadata"})
+    assert not real.rehearsed

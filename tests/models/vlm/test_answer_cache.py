@@ -113,3 +113,18 @@ def test_folder_is_where_caches_of_the_user_are(monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setenv("XDG_CACHE_HOME", "relative")  # the specification ignores those
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     assert default_folder() == tmp_path / "home" / ".cache" / "manitwin" / "vlm"
+
+
+def test_a_kept_answer_of_a_rehearsal_stays_one(tmp_path: Path) -> None:
+    with FakeServer(FakeOpenAi(None, KEY, answer_mug)) as server, counted() as asked_of_it:
+        cached_chat(server.url, tmp_path).ask(question())
+    with counted() as kept:
+        cached_chat(server.url, tmp_path).ask(question())
+    assert asked_of_it.rehearsed and kept.rehearsed
+
+
+def test_a_models_answer_is_no_rehearsal(tmp_path: Path) -> None:
+    for _ in range(2):
+        with counted() as bill:
+            Cached(Scripted(["a"]), tmp_path).ask(question())
+        assert not bill.rehearsed

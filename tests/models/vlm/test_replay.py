@@ -100,3 +100,17 @@ def test_neither_key_nor_address_is_recorded(tmp_path: Path) -> None:
         Recorded(chat, path).ask(question())
     content = path.read_text()
     assert KEY not in content and "127.0.0.1" not in content
+
+
+def test_what_a_rehearsal_answered_is_one_when_it_is_replayed(tmp_path: Path) -> None:
+    path = tmp_path / "answers.jsonl"
+    with FakeServer(FakeOpenAi(None, KEY, answer_mug)) as server:
+        chat = OpenAiChat("tiny-vl", f"{server.url}/v1", KEY, VlmConfig(), services(), Waits())
+        Recorded(chat, path).ask(question())
+    with counted() as replayed:
+        Replay(path).ask(question())
+    assert replayed.rehearsed
+    Recorded(Scripted(["x"]), tmp_path / "models.jsonl").ask(question())
+    with counted() as of_a_model:
+        Replay(tmp_path / "models.jsonl").ask(question())
+    assert not of_a_model.rehearsed

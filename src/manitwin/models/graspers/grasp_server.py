@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 
 import zmq
 
+from manitwin.charges import REHEARSAL_MARK, note_rehearsal
 from manitwin.config import ServicesConfig
 from manitwin.errors import BadReply, ConfigError, Unavailable
 from manitwin.models.graspers.array_messages import pack, unpack
@@ -102,6 +103,8 @@ class GraspServer:
             answer = unpack(reply)
         except ValueError as error:
             raise BadReply(f"{self.what}: the answer of {self.url} is {redacted(str(error), None)}") from error
+        if answer.pop(REHEARSAL_MARK, None):
+            note_rehearsal()
         if "error" in answer:
             detail = redacted(str(answer["error"]), None)
             raise ServerError(f"{self.what}: the server at {self.url} says: {detail}", detail)

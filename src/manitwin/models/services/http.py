@@ -17,6 +17,7 @@ import httpx2
 
 from manitwin.config import ServicesConfig
 from manitwin.errors import BadReply, ConfigError, ManiTwinError, RateLimited
+from manitwin.models.services import rehearsed
 from manitwin.models.services.download import MAX_FILE_BYTES, Gone, download_file
 from manitwin.models.services.keys import is_local, redacted
 from manitwin.models.services.refusal import Refusal, Unanswered, error_for, refusal_by_status, retry_after_s
@@ -233,7 +234,10 @@ class Service:
         # nobody knows whether it was taken
         timeout = httpx2.Timeout(self._services.timeout_s, connect=min(self._services.timeout_s, MAX_CONNECT_S))
         trust_env = not is_local(self.base_url)
-        return httpx2.Client(timeout=timeout, verify=_tls(), follow_redirects=False, trust_env=trust_env)
+        hooks = {"response": [rehearsed.hear]}
+        return httpx2.Client(
+            timeout=timeout, verify=_tls(), follow_redirects=False, trust_env=trust_env, event_hooks=hooks
+        )
 
     def _silent(self, error: httpx2.RequestError, pays: bool) -> ManiTwinError:
         cause = self.said(str(error)) or type(error).__name__

@@ -8,6 +8,7 @@ import tempfile
 from hashlib import sha256
 from pathlib import Path
 
+from manitwin.charges import counted, note_rehearsal
 from manitwin.models.vlm.client import Around, ChatClient
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
 from manitwin.models.vlm.question_digest import question_digest
@@ -23,8 +24,8 @@ class Cached(Around):
     """A chat model that is asked each question once.
 
     An answer is kept under the question, its turns and what else ``decides`` it: server, model and settings. Several
-    processes may use one folder: files appear whole, and the last of equal ones stays. A kept answer charges nothing; a file
-    that cannot be read is asked for again and replaced.
+    processes may use one folder: files appear whole, and the last of equal ones stays. A kept answer charges nothing, and one
+    of a rehearsal says so again; a file that cannot be read is asked for again and replaced.
     """
 
     def __init__(self, inner: ChatClient, folder: Path):
@@ -39,9 +40,14 @@ class Cached(Around):
         path = self._path(question, turns)
         kept = _read(path)
         if kept is None:
-            kept = self.inner.ask(question, turns)
-            _write(path, kept)
-        return kept
+            with counted() as bill:
+                reply = self.inner.ask(question, turns)
+            _write(path, reply, bill.rehearsed)
+            return reply
+        reply, rehearsed = kept
+        if rehearsed:
+            note_rehearsal()
+        return reply
 
     def forget(self, question: Question, turns: tuple[Turn, ...] = ()) -> None:
         """Drop the answer to a question: it will be asked again."""
@@ -53,21 +59,23 @@ class Cached(Around):
         return self.folder / digest[:2] / f"{digest}.json"
 
 
-def _read(path: Path) -> Reply | None:
+def _read(path: Path) -> tuple[Reply, bool] | None:
     try:
         kept = json.loads(path.read_bytes())
         text, model, (read, written) = kept["text"], kept["model"], kept["tokens"]
+        rehearsed = bool(kept.get("rehearsal"))
     except FileNotFoundError:
         return None
     except (ValueError, LookupError, TypeError):  # cut by a crash of the machine: as good as none
         return None
-    return Reply(text, Usage(read, written), model)
+    return Reply(text, Usage(read, written), model), rehearsed
 
 
-def _write(path: Path, reply: Reply) -> None:
+def _write(path: Path, reply: Reply, rehearsed: bool) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     kept = {"text": reply.text, "model": reply.model, "tokens": [reply.usage.input_tokens, reply.usage.output_tokens]}
+    marked = {**kept, "rehearsal": True} if rehearsed else kept
     handle, part = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
     with os.fdopen(handle, "w", encoding="utf-8") as stream:
-        json.dump(kept, stream)
+        json.dump(marked, stream)
     os.replace(part, path)

@@ -11,6 +11,7 @@ import openai
 
 from manitwin.config import ServicesConfig, VlmConfig
 from manitwin.errors import ConfigError, ManiTwinError, RateLimited
+from manitwin.models.services import rehearsed
 from manitwin.models.services.keys import is_local, redacted
 from manitwin.models.services.refusal import Refusal, error_for, retry_after_s
 from manitwin.models.vlm.completion import Completion
@@ -164,5 +165,5 @@ class OpenAiChat:
             timeout=timeout,
             follow_redirects=False,
             trust_env=not is_local(self.base_url),
-            event_hooks={"request": [only_ours]},
+            event_hooks={"request": [only_ours], "response": [rehearsed.hear]},
         )

@@ -1,7 +1,8 @@
 """Recording what a model answers, and answering from such a record: a run repeated without a server or a key.
 
 A record is JSON Lines: ``{"question", "key", "model", "text", "answered_by", "tokens": [read, written]}``. ``key`` is the
-digest of all that was asked, ``model`` the same in all lines. Of two lines with one key the later one counts.
+digest of all that was asked, ``model`` the same in all lines. Of two lines with one key the later one counts. What a
+rehearsal answered has ``"rehearsal": true`` as well, and is a rehearsal whenever it is replayed.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from manitwin.charges import counted, note_rehearsal
 from manitwin.errors import BadReply, ConfigError
 from manitwin.models.vlm.client import Around, ChatClient, Forgetful
 from manitwin.models.vlm.prices import FREE, TokenPrice
@@ -31,13 +33,14 @@ class Replay:
     price: TokenPrice = FREE
 
     def __init__(self, path: Path):
-        self.path, self._replies = path, dict[str, Reply]()
+        self.path, self._replies, self._rehearsed = path, dict[str, Reply](), dict[str, bool]()
         models = set[str]()
         try:
             with path.open("rb") as stream:
                 for line in _lines(stream, path):
                     models.add(line["model"])
                     self._replies[line["key"]] = Reply(line["text"], Usage(*line["tokens"]), line["answered_by"])
+                    self._rehearsed[line["key"]] = bool(line.get("rehearsal"))
         except OSError as error:
             raise ConfigError(
                 f"{path}: the record cannot be read ({error.strerror}); give a file that was recorded"
@@ -59,13 +62,16 @@ class Replay:
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Return the answer that was recorded."""
-        reply = self._replies.get(question_digest(question, turns))
+        key = question_digest(question, turns)
+        reply = self._replies.get(key)
         if reply is None:
             after = f" after {len(turns)} turns" if turns else ""
             raise BadReply(
                 f"{self.path}: no answer to {question.name!r} (vote {question.vote}){after} is recorded: the object, its"
                 " pictures, the prompt or the settings differ from those of the recording; record it again"
             )
+        if self._rehearsed[key]:
+            note_rehearsal()
         return reply
 
 
@@ -87,8 +93,9 @@ class Recorded(Around):
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Answer a question, and record the answer."""
-        reply = self.inner.ask(question, turns)
-        self._record(question, question_digest(question, turns), reply)
+        with counted() as bill:
+            reply = self.inner.ask(question, turns)
+        self._record(question, question_digest(question, turns), reply, bill.rehearsed)
         return reply
 
     def forget(self, question: Question, turns: tuple[Turn, ...] = ()) -> None:
@@ -96,14 +103,15 @@ class Recorded(Around):
         if isinstance(self.inner, Forgetful):
             self.inner.forget(question, turns)
 
-    def _record(self, question: Question, key: str, reply: Reply) -> None:
-        line = {
+    def _record(self, question: Question, key: str, reply: Reply, rehearsed: bool) -> None:
+        line: dict[str, Any] = {
             "question": question.name,
             "key": key,
             "model": self.model,
             "text": reply.text,
             "answered_by": reply.model,
             "tokens": [reply.usage.input_tokens, reply.usage.output_tokens],
+            **({"rehearsal": True} if rehearsed else {}),
         }
         with _locked(self.path) as stream:
             self._read_on(stream)

@@ -50,7 +50,10 @@ TWINS_SCHEMA = pa.schema(
 
 @dataclass(frozen=True)
 class PublishedEpisodes:
-    """What went out and what did not; ``left_out`` counts kept episodes by the licences that keep them here."""
+    """What went out and what did not; ``left_out`` counts kept episodes by the licences that keep them here.
+
+    ``rehearsals`` are those left out because a rehearsal server had a part in one of their twins.
+    """
 
     episodes: int
     frames: int
@@ -59,6 +62,7 @@ class PublishedEpisodes:
     without_attribution: int
     files: int
     bytes: int
+    rehearsals: int = 0
 
 
 def publish_episodes(
@@ -66,21 +70,25 @@ def publish_episodes(
     out: str | Path,
     *,
     license_allow: Iterable[str] | None = None,
+    with_rehearsals: bool = False,
     twins: str | Path | None = None,
     name: str | None = None,
 ) -> PublishedEpisodes:
     """Write a LeRobotDataset v3.0 with a card, licences, attempts and digests to ``out``, a folder or URL.
 
-    An episode goes out where the licences of all its objects may: those of ``license_allow``, or all that are known. Of the
-    others no row, no picture and no statistic is written. ``twins`` names where the twins are now, None: where they were as
-    the episodes were made. The same episodes give the same bytes. Raises UsageError for wrong arguments and twins that are
-    gone, EpisodesError for episodes that cannot be read or name a folder of this machine.
+    An episode goes out where the licences of all its objects may: those of ``license_allow``, or all that are known; one
+    of a twin that a rehearsal server (``manitwin fake``) had a part in only ``with_rehearsals``. Of the others no row, no
+    picture and no statistic is written. ``twins`` names where the twins are now, None: where they were as the episodes
+    were made. The same episodes give the same bytes. Raises UsageError for wrong arguments and twins that are gone,
+    EpisodesError for episodes that cannot be read or name a folder of this machine.
     """
     episodes = Path(episodes)
     said = _configuration(episodes)
     source = TwinSource(said["dataset"] if twins is None else twins)
     batches, title = batch_folders(episodes), name or Path(str(out).rstrip("/")).name
-    chosen = choose_episodes(batches, read_attempts(episodes / ATTEMPTS), source, license_allow)
+    chosen = choose_episodes(
+        batches, read_attempts(episodes / ATTEMPTS), source, license_allow, with_rehearsals=with_rehearsals
+    )
     publication = Publication(DatasetRoot(out), EPISODES)
     publication.refuse_others()
     try:
@@ -111,6 +119,7 @@ def publish_episodes(
         without_attribution=len(without_attribution([asdict(twin) for twin in chosen.twins])),
         files=len(publication.sizes) + 1,
         bytes=sum(publication.sizes.values()),
+        rehearsals=chosen.rehearsals,
     )
 
 
