@@ -1,7 +1,7 @@
 """What stands in for the documents' placeholders, what is made smaller, and what cannot run here and why: all of it.
 
 A command that a page shows and that is not named here runs as it is written. ``test_pages_run.py`` fails for an entry that
-no page uses.
+no page uses. Of a page that is not named all is done by the slow test, if any of it is slow.
 """
 
 from __future__ import annotations
@@ -91,10 +91,12 @@ PAGES: dict[str, Arrangement] = {
     "docs/episodes.md": Arrangement(
         not_run={r"^from lerobot": "LeRobot has an environment of its own: make lerobot-real reads such a set with it"},
     ),
+    "docs/export.md": Arrangement(),
     "docs/generators.md": Arrangement(
         rewritten=TRIPOSR,
         not_run=HUNYUAN | {r"^git clone https://github\.com/VAST-AI-Research/TripoSR": NO_NETWORK},
     ),
+    "docs/imports.md": Arrangement(),
     "docs/layouts.md": Arrangement(rewritten={"layout_1_000017": "layout_1_000001"}),
     "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}),
     "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),

@@ -40,14 +40,16 @@ def read_by(step: Step) -> str:
 
 
 def slow_steps(page: str) -> set[Step]:
-    """Return the steps that only the slow test does: what is dear, and Python after it, which may go on with it."""
+    """Return the steps that only the slow test does: what is dear, and what may go on with it.
+
+    That is Python after it, or of a page that the table does not name, all of it.
+    """
     slow = set[Step]()
     for step in steps(page):
-        said = rewritten(step) if step.language in PROGRAMS else read_by(step)
-        dear = any(re.search(each, said) for each in (*SLOW, *arranged(page).slow))
+        dear = any(re.search(each, does(step)) for each in (*SLOW, *arranged(page).slow))
         if dear or (step.language == "python" and any(each.language == "python" for each in slow)):
             slow.add(step)
-    return slow
+    return slow if page in PAGES or not slow else set(steps(page))
 
 
 def rewritten(step: Step) -> str:
@@ -58,6 +60,11 @@ def rewritten(step: Step) -> str:
     for found, instead in EVERYWHERE.items() if step.language == "sh" else ():
         text = re.sub(found, instead, text)
     return text
+
+
+def does(step: Step) -> str:
+    """Return what a step does, in the words that say what is dear and which folders it wants: without its comments."""
+    return re.sub(r"(^|\s)#.*", "", rewritten(step)) if step.language in PROGRAMS else read_by(step)
 
 
 SLOW_PAGES = [page for page in WITH_STEPS if any(not reason_not_run(step) for step in slow_steps(page))]
@@ -78,9 +85,7 @@ class Reader:
     """Somebody who does what a page says, from its top to its end."""
 
     def __init__(self, folder: Path, folders: Folders, todo: list[Step], environment: dict[str, str]):
-        folders.prepare(
-            folder, "\n".join(rewritten(step) if step.language in PROGRAMS else read_by(step) for step in todo)
-        )
+        folders.prepare(folder, "\n".join(map(does, todo)))
         self.shell = Shell(folder, **environment, TWIN=folders.twin_id(folder))
         self.folder, self.names = folder, {"__name__": "__main__"}
 
