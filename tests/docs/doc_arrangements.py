@@ -97,10 +97,13 @@ PAGES: dict[str, Arrangement] = {
         not_run=HUNYUAN | {r"^git clone https://github\.com/VAST-AI-Research/TripoSR": NO_NETWORK},
     ),
     "docs/imports.md": Arrangement(),
+    "docs/json.md": Arrangement(blocks={"nothing_here": "answer manitwin build nothing_here.png -o out --json"}),
     "docs/layouts.md": Arrangement(rewritten={"layout_1_000017": "layout_1_000001"}),
     "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}),
     "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),
-    "docs/publish.md": Arrangement(slow=(r"\bOUT\b",), blocks={"^OUT/": "tree OUT"}),
+    "docs/publish.md": Arrangement(
+        slow=(r"\bOUT(_EPISODES)?\b",), blocks={"^OUT/": "tree OUT", "^OUT_EPISODES/": "tree OUT_EPISODES"}
+    ),
     "docs/robots.md": Arrangement(blocks={"my_arm": "robot my_arm/my_arm.toml"}),
     "docs/runs.md": Arrangement(
         rewritten={r" --watch": "", "mug_0042.glb": "mug.glb"},  # watching ends with the watcher

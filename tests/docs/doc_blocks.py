@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from collections.abc import Callable
+from fnmatch import fnmatchcase
 from importlib.metadata import EntryPoint
 from itertools import pairwise
 from pathlib import Path
 
+from doc_shell import Shell
 from PIL import Image
 
 from manitwin.config import BuildConfig, load_config
@@ -72,8 +75,9 @@ def _tree(text: str, folder: Path, pattern: str) -> None:
     root = next(folder.glob(pattern), None)
     assert root is not None, f"nothing is at {pattern}"
     for line in text.splitlines()[1:]:
-        name = re.split(r"\s{2,}", line.strip())[0].removesuffix(" ...")
-        assert list(root.glob(re.sub(r"<[^>]*>", "*", name.rstrip("/")))), f"{name} is not in {pattern}"
+        names = re.sub(r"<[^>]*>", "*", re.split(r"\s{2,}", line.strip())[0]).removesuffix(" ...")
+        missing = [name for name in names.split() if not list(root.glob(name.rstrip("/")))]
+        assert not missing, f"{missing} is not in {pattern}"
 
 
 def _manifest(text: str, folder: Path, argument: str) -> None:
@@ -93,6 +97,13 @@ def _account(text: str, folder: Path, name: str) -> None:
     assert collect_items([name])[1].remarks == text.splitlines()
 
 
+def _answer(text: str, folder: Path, command: str) -> None:
+    """The JSON that a command prints which ends with an error; three dots stand for anything."""
+    documented = json.loads(text)
+    said = json.loads(Shell(folder).run(f"{command} 2>/dev/null", exits=documented["error"]["exit_status"]))
+    assert fnmatchcase(json.dumps(said), json.dumps(documented).replace("[", "[[]").replace("...", "*"))
+
+
 READERS: dict[str, Callable[[str, Path, str], None]] = {
     "settings": _settings,
     "prior": _prior_of_a_category,
@@ -101,4 +112,5 @@ READERS: dict[str, Callable[[str, Path, str], None]] = {
     "tree": _tree,
     "manifest": _manifest,
     "account": _account,
+    "answer": _answer,
 }

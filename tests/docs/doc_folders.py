@@ -72,9 +72,10 @@ class Folders:
 
     @cached_property
     def episodes(self) -> Path:
-        """Two episodes with the data set's twins."""
+        """Two episodes, with films, with the data set's twins."""
         assert self.dataset
         self._manitwin("trajectories DATASET -n 2 -o EPISODES --jobs 1")
+        self._manitwin("render EPISODES --cameras front --size 64 --jobs 1")
         return self.root / "EPISODES"
 
     @cached_property

@@ -28,6 +28,8 @@ class Shell:
             "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
             "PYTHONPATH": ":".join(map(str, paths)),
             "COLUMNS": "200",
+            "PIP_NO_INDEX": "1",
+            "PIP_TARGET": str(folder / ".installed"),  # what a page installs never gets into what runs the tests
             **{f"XDG_{kind.upper()}_HOME": str(folder / f".{kind}") for kind in ("cache", "state")},
             **variables,
         }

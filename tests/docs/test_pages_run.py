@@ -18,7 +18,7 @@ from doc_services import services
 from doc_shell import Shell
 
 PROGRAMS = {"sh", "python"}
-LANGUAGES = PROGRAMS | {"toml", "text"}
+LANGUAGES = PROGRAMS | {"toml", "json", "text"}
 SERVED = re.compile(r"--(vlm|generator|grasper)\b")
 NONE = Arrangement()
 
