@@ -60,8 +60,8 @@ def test_long_stages_count_by_what_they_have_done() -> None:
     progress.start(4)
     progress.stage(StageStarted(item(0), "films"))
     clock.now_s = 60.0
-    progress.stage(StageAdvanced(item(0), "films", StagePart(200, 800, "frames")))
-    assert progress.left_s() is None, "a quarter of one item is too little to go by"
+    progress.stage(StageAdvanced(item(0), "films", StagePart(40, 800, "frames")))
+    assert progress.left_s() is None, "a twentieth of one item is too little to go by"
     clock.now_s = 120.0
     progress.stage(StageAdvanced(item(0), "films", StagePart(400, 800, "frames")))
     assert progress.left_s() == 120.0 / 0.5 * 3.5

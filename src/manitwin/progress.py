@@ -22,7 +22,7 @@ from manitwin.stages.stage_parts import StagePart
 
 LINE_EVERY_S = 30.0
 """Between two lines where nobody looks at a terminal."""
-ENOUGH, ENOUGH_OF_PARTS = 3, 0.5
+ENOUGH, ENOUGH_OF_PARTS = 3, 0.1
 """Items must have ended before anything is said of the time that is left; long ones that say what they have done count by it."""
 BAR_WIDTH = 24
 
@@ -47,6 +47,12 @@ class RunProgress:
     def done(self) -> int:
         """How many items have ended, in this run or before."""
         return self.before + self.counts.total()
+
+    @property
+    def parts_done(self) -> float:
+        """How many items are done in parts: two at a half are one."""
+        with self._lock:
+            return sum(part.done / part.total for part in self._parts.values() if part.total)
 
     def start(self, total: int, opened: int | None = None) -> None:
         """Begin a run of ``total`` items of which ``opened`` are to be done (None: all)."""
@@ -77,10 +83,9 @@ class RunProgress:
     def left_s(self) -> float | None:
         """Return about how many seconds are left at the rate until now; None until three items were worked on.
 
-        Half an item is enough where items say what part of them is done.
+        A tenth of an item is enough where items say what part of them is done.
         """
-        with self._lock:
-            parts = sum(part.done / part.total for part in self._parts.values() if part.total)
+        parts = self.parts_done
         worked = self.counts.total() - self._found + parts
         if self._started_at is None or worked < (ENOUGH_OF_PARTS if parts else ENOUGH):
             return None
@@ -169,7 +174,10 @@ class ShownProgress:
         table.add_column(width=BAR_WIDTH)
         table.add_column(no_wrap=True, overflow="ellipsis")
         total = self.progress.total or None
-        table.add_row(ProgressBar(total, self.progress.done, width=BAR_WIDTH), Text(self.progress.line()))
+        table.add_row(
+            ProgressBar(total, self.progress.done + self.progress.parts_done, width=BAR_WIDTH),
+            Text(self.progress.line()),
+        )
         return table
 
     def _print_lines(self) -> None:
