@@ -14,6 +14,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from picture_file import of_episode, of_scene, save_picture
 from PIL import Image
 
 from manitwin.app_config import LayoutsConfig, LayoutSettings, TrajectoriesConfig
@@ -49,9 +50,9 @@ def sheet(rows: list[list[np.ndarray]]) -> Image.Image:
     return page
 
 
-def layouts(twins: Path, work: Path) -> Image.Image:
-    """Draw a layout on a table, a tray and a shelf: colours, depth, normals, ids."""
-    rows = []
+def layouts(twins: Path, work: Path) -> tuple[Image.Image, dict[str, str]]:
+    """Draw a layout on a table, a tray and a shelf: colours, depth, normals, ids; returns it and the scenes' digests."""
+    rows, shown = [], {}
     source = TwinSource(twins)
     for surface in ("table", "tray", "shelf"):
         config = LayoutsConfig(seed=SEED, layout=LayoutSettings(objects=(4, 6), surface=surface, clutter="dense"))
@@ -66,7 +67,8 @@ def layouts(twins: Path, work: Path) -> Image.Image:
         depth = np.repeat(np.nan_to_num(grey).astype(np.uint8)[..., None], 3, axis=2)
         normals = (127.5 * (oblique.normals + 1) * (oblique.depth_m > 0)[..., None]).astype(np.uint8)
         rows.append([front.rgb, oblique.rgb, depth, normals, hues[oblique.ids]])
-    return sheet(rows)
+        shown[surface] = of_scene(scene)
+    return sheet(rows), shown
 
 
 def pictures(episode: StoredEpisode, twins: Path, size_px: int) -> list[list[np.ndarray]]:
@@ -79,21 +81,29 @@ def pictures(episode: StoredEpisode, twins: Path, size_px: int) -> list[list[np.
         return [[frame.rgb for frame in each] for each in frames]
 
 
+def an_episode(twins: Path, work: Path) -> StoredEpisode:
+    """Record a few episodes and return the first."""
+    make_episodes(twins, work, 4, TrajectoriesConfig(seed=SEED, others=2, batch=2), executor="inline")
+    return next(stored_episodes(batch_folders(work)))
+
+
+def episode_picture(episode: StoredEpisode, twins: Path) -> Image.Image:
+    """Draw moments of an episode, a row for each camera."""
+    frames = pictures(episode, twins, TILE_PX)
+    moments = np.linspace(10, len(frames) - 1, MOMENTS).astype(int)
+    return sheet([[frames[m][camera] for m in moments] for camera in range(len(CAMERAS))])
+
+
 def main() -> None:
     """Make the pictures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("twins", type=Path, help="what `manitwin build samples/samples.csv` wrote")
     twins = parser.parse_args().twins
     with tempfile.TemporaryDirectory() as folder:
-        layouts(twins, Path(folder)).save(DOCS / "layouts.png", optimize=True)
-        out = Path(folder) / "episodes"
-        make_episodes(twins, out, 4, TrajectoriesConfig(seed=SEED, others=2, batch=2), executor="inline")
-        episode = next(stored_episodes(batch_folders(out)))
-    frames = pictures(episode, twins, TILE_PX)
-    moments = np.linspace(10, len(frames) - 1, MOMENTS).astype(int)
-    sheet([[frames[m][camera] for m in moments] for camera in range(len(CAMERAS))]).save(
-        DOCS / "episode.png", optimize=True
-    )
+        picture, shown = layouts(twins, Path(folder))
+        save_picture(picture, DOCS / "layouts.png", shown)
+        episode = an_episode(twins, Path(folder) / "episodes")
+    save_picture(episode_picture(episode, twins), DOCS / "episode.png", {"episode": of_episode(episode)})
     small = pictures(episode, twins, ANIMATION_PX)
     write_animation((np.hstack([each[0], each[2]]) for each in small[::2]), DOCS / "episode.webp", quality=55)
 

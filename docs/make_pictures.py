@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from picture_file import of_twin, save_picture
 from PIL import Image, ImageDraw, ImageFont
 
 import manitwin
@@ -254,17 +255,26 @@ def _held_in_hand(
     return [merged(some) for some in fingers]
 
 
-def cards_picture() -> Image.Image:
-    """Build the project's own samples and put their cards under one another."""
-    with tempfile.TemporaryDirectory() as folder:
-        report = manitwin.build(DOCS.parent / "samples" / "samples.csv", folder)
-        cards = [Image.open(r.folder / "card.png").convert("RGB") for r in report.results if r.folder is not None]
-        cards.sort(key=lambda card: card.tobytes())
+def cards_picture(twins: list[manitwin.Twin]) -> Image.Image:
+    """Put the cards of twins under one another."""
+    cards = [Image.open(twin.folder / "card.png").convert("RGB") for twin in twins]
     width, height = cards[0].size
     picture = Image.new("RGB", (width, height * len(cards)), "white")
     for index, card in enumerate(cards):
         picture.paste(card, (0, index * height))
     return picture
+
+
+def sample_twins(folder: Path) -> list[manitwin.Twin]:
+    """Build the project's own samples; returns them by name."""
+    report = manitwin.build(DOCS.parent / "samples" / "samples.csv", folder)
+    twins = [manitwin.load(result.folder) for result in report.results if result.folder is not None]
+    return sorted(twins, key=lambda twin: twin.record.name or "")
+
+
+def made_of_twins(twins: list[manitwin.Twin]) -> dict[str, str]:
+    """Return the digests of twins' records by their names."""
+    return {twin.record.name or twin.record.twin_id: of_twin(twin.record) for twin in twins}
 
 
 def questions_picture() -> Image.Image:
@@ -289,5 +299,7 @@ def questions_picture() -> Image.Image:
 if __name__ == "__main__":
     frames_picture().save(DOCS / "frames.png", optimize=True)
     grippers_picture().save(DOCS / "grippers.png", optimize=True)
-    cards_picture().save(DOCS / "cards.png", optimize=True)
+    with tempfile.TemporaryDirectory() as folder:
+        samples = sample_twins(Path(folder))
+        save_picture(cards_picture(samples), DOCS / "cards.png", made_of_twins(samples))
     questions_picture().save(DOCS / "questions.png", optimize=True)

@@ -1,0 +1,54 @@
+"""Pictures of the documentation that say what they show: a text of the PNG holds digests, which a test holds against the code."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from PIL.PngImagePlugin import PngInfo
+
+from manitwin.apps.trajectories.stored_episode import StoredEpisode
+from manitwin.scenes.scene import SceneRecord
+from manitwin.store import sha256_of_json
+from manitwin.twin import TwinRecord
+
+KEY = "made_of"
+DECIMALS = 6
+
+
+def save_picture(picture: Image.Image, path: Path, made_of: dict[str, str]) -> None:
+    """Write a PNG with what it shows, by name, and the digest of each."""
+    text = PngInfo()
+    text.add_text(KEY, json.dumps(made_of, sort_keys=True))
+    picture.save(path, optimize=True, pnginfo=text)
+
+
+def made_of(path: Path) -> dict[str, str]:
+    """Return what a picture was made of; empty where it does not say."""
+    with Image.open(path) as picture:
+        found: dict[str, str] = json.loads(picture.info.get(KEY, "{}"))
+    return found
+
+
+def of_twin(record: TwinRecord) -> str:
+    """Digest what a twin's record says, without the digests of its files: these depend on the renderer too."""
+    said = record.model_dump(mode="json", exclude={"files", "revision"})
+    return sha256_of_json(said)[:16]
+
+
+def of_scene(scene: SceneRecord) -> str:
+    """Digest which twins stand where."""
+    placed = [[each.twin_id, _rounded([*each.position_m, *each.quaternion_wxyz])] for each in scene.objects]
+    return sha256_of_json(placed)[:16]
+
+
+def of_episode(episode: StoredEpisode) -> str:
+    """Digest which twins the arm met and how it moved."""
+    moved = _rounded(episode.recording.joint_positions_rad)
+    return sha256_of_json([[each.twin_id for each in episode.objects], moved])[:16]
+
+
+def _rounded(values: object) -> list[float]:
+    return (np.asarray(values, float).ravel().round(DECIMALS) + 0.0).tolist()

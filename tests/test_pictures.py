@@ -1,0 +1,102 @@
+"""The pictures of README and docs are those of the code: made again, they are of the same twins, scenes and episode."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import manitwin
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+PICTURES = sorted(path for path in DOCS.rglob("*") if path.suffix in (".png", ".webp"))
+MADE_OF = {"cards.png": {"mug", "bottle"}, "layouts.png": {"table", "tray", "shelf"}, "episode.png": {"episode"}}
+MEAN_DIFFERENCE = 1.5
+"""Of 255. Another Vulkan driver draws edges otherwise; another gripper, label or colour is more than that."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def programs_of_the_docs() -> Iterator[None]:
+    sys.path.insert(0, str(DOCS))
+    yield
+    sys.path.remove(str(DOCS))
+
+
+@pytest.fixture(scope="module")
+def make_pictures() -> ModuleType:
+    import make_pictures
+
+    return make_pictures
+
+
+@pytest.fixture(scope="module")
+def make_data_pictures() -> ModuleType:
+    import make_data_pictures
+
+    return make_data_pictures
+
+
+@pytest.fixture(scope="module")
+def twins(make_pictures: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> list[manitwin.Twin]:
+    made: list[manitwin.Twin] = make_pictures.sample_twins(tmp_path_factory.mktemp("samples"))
+    return made
+
+
+def assert_same(made: Image.Image, name: str) -> None:
+    shown = np.asarray(Image.open(DOCS / name).convert("RGB"), float)
+    again = np.asarray(made.convert("RGB"), float)
+    assert shown.shape == again.shape, f"docs/{name} is of an older code: make it again"
+    assert np.abs(shown - again).mean() < MEAN_DIFFERENCE, f"docs/{name} is of an older code: make it again"
+
+
+def made_of(name: str) -> dict[str, str]:
+    from picture_file import made_of
+
+    found: dict[str, str] = made_of(DOCS / name)
+    return found
+
+
+@pytest.mark.parametrize("picture", PICTURES, ids=lambda path: path.name)
+def test_pictures_are_small(picture: Path) -> None:
+    assert picture.stat().st_size < 1_000_000
+
+
+@pytest.mark.parametrize("name", MADE_OF)
+def test_pictures_of_twins_say_what_they_show(name: str) -> None:
+    assert set(made_of(name)) == MADE_OF[name]
+    assert all(len(digest) == 16 for digest in made_of(name).values())
+
+
+@pytest.mark.slow
+def test_cards_are_those_of_the_samples(make_pictures: ModuleType, twins: list[manitwin.Twin]) -> None:
+    assert made_of("cards.png") == make_pictures.made_of_twins(twins)
+    assert_same(make_pictures.cards_picture(twins), "cards.png")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["frames", "grippers", "questions"])
+def test_drawings_are_those_of_the_code(make_pictures: ModuleType, name: str) -> None:
+    assert_same(getattr(make_pictures, f"{name}_picture")(), f"{name}.png")
+
+
+@pytest.mark.slow
+def test_layouts_are_those_of_the_code(
+    make_data_pictures: ModuleType, twins: list[manitwin.Twin], tmp_path: Path
+) -> None:
+    picture, scenes = make_data_pictures.layouts(twins[0].folder.parent, tmp_path)
+    assert made_of("layouts.png") == scenes
+    assert_same(picture, "layouts.png")
+
+
+@pytest.mark.slow
+def test_episode_is_that_of_the_code(
+    make_data_pictures: ModuleType, twins: list[manitwin.Twin], tmp_path: Path
+) -> None:
+    episode = make_data_pictures.an_episode(twins[0].folder.parent, tmp_path)
+    assert made_of("episode.png") == {"episode": make_data_pictures.of_episode(episode)}
+    assert_same(make_data_pictures.episode_picture(episode, twins[0].folder.parent), "episode.png")
