@@ -75,7 +75,7 @@ def page() -> str:
     text = [INTRODUCTION, *_settings(BuildConfig, "## General\n")]
     for command, model in APPLICATIONS.items():
         words = " ".join((model.__doc__ or "").split()).replace("``", "`")
-        text += _settings(model, f"# Settings of `manitwin {command}`\n\n{words}\n")
+        text += _settings(model, f"## Settings of `manitwin {command}`\n\n{words}\n")
     return "\n".join(text)
 
 
@@ -96,7 +96,8 @@ def _settings(kind: type[BaseModel], title: str) -> list[str]:
     for name, section in sections.items():
         model = cast(type[BaseModel], section)
         table = rows(model)
-        text += [f"## [{name}]\n", " ".join((model.__doc__ or "").split()).replace("``", "`"), ""]
+        level = "##" if kind is BuildConfig else "###"
+        text += [f"{level} [{name}]\n", " ".join((model.__doc__ or "").split()).replace("``", "`"), ""]
         if table:
             text += ["| setting | default | range |", "|---|---|---|", *table, ""]
     return text
