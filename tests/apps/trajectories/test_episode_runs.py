@@ -22,6 +22,7 @@ from manitwin.apps.trajectories.statistics.report import episode_statistics
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.planning.problem import Phase
+from manitwin.stages.stage_parts import StagePart, heard_by
 
 CONFIG = TrajectoriesConfig(seed=5, batch=2)
 
@@ -69,8 +70,13 @@ def test_a_recording_tells_a_pick_and_place_in_order(episodes: Path) -> None:
     assert not recording.unplanned_contact.any()
 
 
-def test_the_same_seed_gives_the_same_bytes(bricks: Path, episodes: Path, tmp_path: Path) -> None:
-    make_episodes(bricks, tmp_path, 6, CONFIG, executor="inline")
+def test_the_same_seed_gives_the_same_bytes_and_each_attempt_is_told(
+    bricks: Path, episodes: Path, tmp_path: Path
+) -> None:
+    told: list[StagePart] = []
+    with heard_by(told.append):
+        make_episodes(bricks, tmp_path, 6, CONFIG, executor="inline")
+    assert told == [StagePart(done, 2, "episodes") for _ in range(3) for done in (1, 2)]
     names = [folder.name for folder in batch_folders(episodes)]
     assert [folder.name for folder in batch_folders(tmp_path)] == names
     for one, other in zip(batch_folders(episodes), batch_folders(tmp_path), strict=True):

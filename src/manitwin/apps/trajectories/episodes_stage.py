@@ -36,6 +36,7 @@ from manitwin.scenes.scene import Furniture, Light
 from manitwin.scenes.scene_folders import scene_name
 from manitwin.scenes.twin_source import TwinSource
 from manitwin.stages.stage import Draft
+from manitwin.stages.stage_parts import tell_part
 
 EPISODES = "episodes.h5"
 KEPT_TWINS = 256
@@ -131,6 +132,7 @@ class EpisodesStage:
             setting = self._setting(batch, np.random.default_rng(words))
             stored = self._attempt(batch, number, int(words[0]), setting)
             attempts.append(stored.attempt if isinstance(stored, StoredEpisode) else stored)
+            tell_part(len(attempts), batch.count, "episodes")
             if setting is not None:
                 twins.update({o.twin_id: self._twin(o.twin_id).record.revision for o in setting.task.objects})
             if isinstance(stored, StoredEpisode):
