@@ -33,8 +33,8 @@ def made_of(path: Path) -> dict[str, str]:
 
 
 def of_twin(record: TwinRecord) -> str:
-    """Digest what a twin's record says, without the digests of its files: these depend on the renderer too."""
-    said = record.model_dump(mode="json", exclude={"files", "revision"})
+    """Digest what a card shows of a twin: who made it, when and with which checks is not on it."""
+    said = record.model_dump(mode="json", include={"twin_id", "mesh", "physical", "language", "points", "grasps"})
     return sha256_of_json(said)[:16]
 
 
