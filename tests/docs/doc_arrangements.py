@@ -111,6 +111,10 @@ PAGES: dict[str, Arrangement] = {
         blocks={"^DATASET/": "tree DATASET"},
     ),
     "docs/served_grasps.md": Arrangement(not_run=GRASP_SERVERS),
+    "docs/tutorial.md": Arrangement(
+        rewritten={r" -n 150 ": " -n12 "},  # of two, as elsewhere, one may fail: there is nothing to train on then
+        slow=(r".",),
+    ),
     "docs/twin.md": Arrangement(blocks={"^<twin_id>/": "tree twins/*"}),
     "docs/vlm.md": Arrangement(not_run=MODEL_SERVERS, blocks={"services": "settings run.toml"}),
 }
