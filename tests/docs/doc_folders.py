@@ -31,7 +31,7 @@ robustness.enabled = false
 GENERATOR = """\
 import sys, trimesh
 _, image, out, seed = sys.argv
-trimesh.creation.cylinder(radius=0.3, height=1.0).export(out)
+trimesh.creation.cylinder(radius=0.12, height=1.0).export(out)
 """
 
 

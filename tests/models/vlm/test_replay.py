@@ -64,6 +64,12 @@ def test_file_that_is_no_record_is_refused(tmp_path: Path, content: str) -> None
         Replay(path)
 
 
+def test_record_of_nothing_says_why_nothing_was_asked(tmp_path: Path) -> None:
+    (tmp_path / "empty.jsonl").touch()
+    with pytest.raises(ConfigError, match=r"no answer is in it.*record into a new folder"):
+        Replay(tmp_path / "empty.jsonl")
+
+
 def test_missing_file_is_said(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="cannot be read"):
         Replay(tmp_path / "gone.jsonl")

@@ -45,8 +45,12 @@ class Replay:
             raise ConfigError(
                 f"{path}: the record cannot be read ({error.strerror}); give a file that was recorded"
             ) from None
+        if not models:
+            raise ConfigError(
+                f"{path}: no answer is in it; what is built already is not asked again: record into a new folder"
+            )
         if len(models) != 1:
-            found = ", ".join(sorted(models)) or "none"
+            found = ", ".join(sorted(models))
             raise ConfigError(
                 f"{path}: a record is of one model, this one of {found}; record each to a file of its own"
             )
