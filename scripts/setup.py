@@ -14,9 +14,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-from shared_libraries import missing_libraries, package_by_contents, package_by_policy
-
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "src"))  # nothing is installed yet
+
+from manitwin.shared_libraries import missing_libraries, package_by_contents, package_by_policy  # noqa: E402
+
 VENV = ROOT / ".venv"
 STAMP = VENV / "manitwin-setup.sha256"
 LIBRARIES_STAMP = VENV / "manitwin-libraries.sha256"

@@ -39,7 +39,8 @@ from manitwin.commands.run_log import end_log
 from manitwin.commands.stats import stats
 from manitwin.commands.status import status
 from manitwin.commands.trajectories import trajectories
-from manitwin.errors import BackendError, ManiTwinError
+from manitwin.errors import BackendError, ManiTwinError, Unavailable
+from manitwin.shared_libraries import import_remedy, names_shared_library
 
 TYPER_INTERRUPTED = 130
 """What typer returns where it caught a KeyboardInterrupt by itself."""
@@ -139,6 +140,14 @@ def _run() -> int:
     except (CommandLineError, ManiTwinError) as error:
         LOG.debug("the error came from here", exc_info=error)
         code, line = _told(error)
+        error_console.print(line, markup=False, style="red")
+        return code
+    except ImportError as error:
+        if not names_shared_library(error):
+            LOG.exception("a defect in manitwin")
+            raise
+        LOG.debug("the error came from here", exc_info=error)
+        code, line = _told(Unavailable(f"{error}: {import_remedy(error, '')}"))
         error_console.print(line, markup=False, style="red")
         return code
     except Exception:

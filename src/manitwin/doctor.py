@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import shutil
 import sys
+import sysconfig
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from manitwin.errors import ManiTwinError
+from manitwin.shared_libraries import missing_libraries, package_by_policy
 
 PACKAGES = (
     "sapien",
@@ -37,10 +39,11 @@ class Finding:
 
 
 def examine() -> list[Finding]:
-    """Look at Python, the packages, physics, the renderer, the backends and the disk."""
+    """Look at Python, the packages, what they want of the system, physics, the renderer, the backends and the disk."""
     looks: tuple[tuple[str, Callable[[], str]], ...] = (
         ("python", _python),
         ("packages", _packages),
+        ("shared libraries", _shared_libraries),
         ("physics", _physics),
         ("second engine", _second_engine),
         ("grippers", _grippers),
@@ -73,6 +76,18 @@ def _packages() -> str:
     if missing:
         raise ImportError(f"{', '.join(missing)} not installed; run: make setup")
     return ", ".join(found)
+
+
+def _shared_libraries() -> str:
+    places = sorted({sysconfig.get_path("platlib"), sysconfig.get_path("purelib")})
+    missing = sorted({library for place in places for library in missing_libraries(Path(place))})
+    if missing:
+        packages = " ".join(sorted({package_by_policy(library) for library in missing}))
+        raise ImportError(
+            f"{', '.join(missing)} not found by the loader; on Debian and Ubuntu they are in packages of such names: {packages}"
+            " (apt-file search finds others)"
+        )
+    return "the loader finds all that the installed packages want"
 
 
 def _physics() -> str:

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 from manitwin.errors import Unavailable
+from manitwin.shared_libraries import import_remedy
 
 REMEDY = "pip install 'manitwin[robots]'"
 
@@ -16,7 +17,7 @@ try:
     import eigenpy  # type: ignore[import-untyped]
     import pinocchio as pin
 except ImportError as error:
-    raise Unavailable(f"planning needs pin ({error}): {REMEDY}") from error
+    raise Unavailable(f"planning needs pin ({error}): {import_remedy(error, REMEDY)}") from error
 
 __all__ = ["coal", "eigenpy", "pin", "toppra_library"]
 
@@ -31,6 +32,6 @@ def toppra_library() -> Any:
             import toppra.algorithm
             import toppra.constraint
     except ImportError as error:
-        raise Unavailable(f"planning needs toppra ({error}): {REMEDY}") from error
+        raise Unavailable(f"planning needs toppra ({error}): {import_remedy(error, REMEDY)}") from error
     logging.getLogger("toppra").setLevel(logging.ERROR)  # tells of every path that cannot be timed
     return toppra

@@ -17,6 +17,7 @@ from manitwin.errors import Unavailable, UsageError
 from manitwin.robots.definition import RobotDefinition
 from manitwin.robots.links import links_of_urdf
 from manitwin.robots.urdf_tree import UrdfTree, child_of, parent_of, parse_xml
+from manitwin.shared_libraries import import_remedy
 from manitwin.simulate.hands.urdf import LinkShape
 
 STATES = 300
@@ -87,7 +88,8 @@ def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, s
         import coal
         import pinocchio as pin
     except ImportError as error:
-        raise Unavailable("robots without an SRDF want pin and coal: pip install 'manitwin[robots]'") from error
+        remedy = import_remedy(error, "pip install 'manitwin[robots]'")
+        raise Unavailable(f"robots without an SRDF want pin and coal ({error}): {remedy}") from error
     urdf = tree.text()
     model, geometry = pin.buildModelFromXML(urdf), pin.GeometryModel()
     owners: list[str] = []

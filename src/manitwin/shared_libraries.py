@@ -1,7 +1,7 @@
 """Which shared libraries of the system the installed wheels want and lack, and which Debian packages have them.
 
-The loader itself is asked (``ldd``) for every shared object and program below a folder, so that no list is kept by hand. Runs
-on the system's Python alone.
+The loader itself is asked (``ldd``) for every shared object and program below a folder, so that no list is kept by hand. The
+set-up script imports this before anything is installed: it wants nothing but Python.
 """
 
 from __future__ import annotations
@@ -29,6 +29,16 @@ def missing_libraries(folder: Path) -> list[str]:
         said = subprocess.run(["ldd", *map(str, objects[start : start + AT_A_TIME])], capture_output=True, text=True)
         wanted |= set(re.findall(r"^\s*(\S+) => not found$", said.stdout, re.MULTILINE))
     return sorted(wanted - bundled)
+
+
+def names_shared_library(error: ImportError) -> bool:
+    """Tell whether an import failed for want of a shared library, in the loader's words (dlerror(3) of glibc)."""
+    return "cannot open shared object file" in str(error)
+
+
+def import_remedy(error: ImportError, otherwise: str) -> str:
+    """Return the remedy of a failed import: the doctor where a shared library is missing, else what the caller knows."""
+    return "manitwin doctor says which of this system's packages have it" if names_shared_library(error) else otherwise
 
 
 def elf_files(folder: Path) -> Iterator[Path]:
