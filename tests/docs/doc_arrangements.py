@@ -29,7 +29,7 @@ class Arrangement:
 
 
 SLOW = (
-    r"\bmanitwin (build|run|layout|trajectories|render|publish|prompts)\b",
+    r"\bmanitwin (build|run|layout|trajectories|render|stats|publish|prompts)\b",
     r"\bmanitwin\.build\(",
     r"\b(twins|SCENES|EPISODES)\b",
 )
@@ -101,6 +101,11 @@ PAGES: dict[str, Arrangement] = {
     "docs/layouts.md": Arrangement(rewritten={"layout_1_000017": "layout_1_000001"}),
     "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}),
     "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),
+    "docs/programs.md": Arrangement(
+        not_run={
+            r"^\.venv/bin/python examples/": "tests/examples runs the four in this order, and checks what they print"
+        },
+    ),
     "docs/publish.md": Arrangement(
         slow=(r"\bOUT(_EPISODES)?\b",), blocks={"^OUT/": "tree OUT", "^OUT_EPISODES/": "tree OUT_EPISODES"}
     ),
