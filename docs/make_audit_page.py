@@ -22,8 +22,8 @@ manitwin audit ASSETS --fix --jobs 2
 manitwin audit --explain INE004
 ```
 
-reads every asset at or below the paths (twins, URDF, MJCF, USD, and folders of RoboTwin, ManiTwin-100K, EmbodiedGen and Google
-Scanned Objects), holds the rules below against it, and prints what it found: no GPU, no model, nothing is downloaded. Exit
+reads every asset at or below the paths (twins, URDF, MJCF, SDF, USD, and folders of RoboTwin, ManiTwin-100K, EmbodiedGen and
+Google Scanned Objects), holds the rules below against it, and prints what it found: no GPU, no model, nothing is downloaded. Exit
 status: 0 no errors, 1 errors, 2 wrong use.
 
 - **error**: what the asset says is wrong, and simulation with it too. **warning**: something that a simulator needs is not said,

@@ -130,7 +130,7 @@ def test_line_every_thirty_seconds_is_what_users_get() -> None:
 
 def test_on_a_terminal_one_line_is_kept_up_to_date_and_taken_away_at_the_end() -> None:
     stream, progress = io.StringIO(), RunProgress("items")
-    err = Console(file=stream, force_terminal=True, width=100)
+    err = Console(file=stream, force_terminal=True, width=100, _environ={"TERM": "xterm"})
     with ShownProgress(progress, Console(file=io.StringIO()), err) as shown:
         progress.start(4)
         progress.item_ended(ended(1, "rejected"))
@@ -140,6 +140,12 @@ def test_on_a_terminal_one_line_is_kept_up_to_date_and_taken_away_at_the_end() -
     text = stream.getvalue()
     assert "1 of 4 items; 1 rejected" in text and "a remark" in text
     assert text.rstrip().endswith("\x1b[2K") or "\x1b[1A\x1b[2K" in text, "the line is erased"
+
+
+def test_a_terminal_that_cannot_take_a_line_back_gets_plain_lines() -> None:
+    err = Console(file=io.StringIO(), force_terminal=True, _environ={"TERM": "dumb"})
+    with ShownProgress(RunProgress(), Console(file=io.StringIO()), err) as shown:
+        assert shown._live is None and shown._lines is not None
 
 
 def test_nothing_is_shown_on_a_quiet_console() -> None:

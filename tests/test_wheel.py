@@ -80,7 +80,7 @@ def test_source_archive_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> Non
     _run([sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", str(tmp_path)], cwd=ROOT)
     (archive,) = tmp_path.glob("*.tar.gz")
     with tarfile.open(archive) as content:
-        content.extractall(tmp_path, filter="data")
+        content.extractall(tmp_path, **({"filter": "data"} if hasattr(tarfile, "data_filter") else {}))
     (tree,) = (path for path in tmp_path.iterdir() if path.is_dir())
     for name in ("LICENSE", "README.md", "requirements.lock", "Makefile", "samples/samples.csv", "docs/twin.md"):
         assert (tree / name).read_bytes() == (ROOT / name).read_bytes()

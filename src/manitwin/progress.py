@@ -142,7 +142,7 @@ class ShownProgress:
         self._lines: threading.Thread | None = None
         if err.quiet:
             return
-        if err.is_terminal:
+        if err.is_terminal and not err.is_dumb_terminal:  # a dumb one cannot take a line back
             self._live = Live(
                 console=err,
                 get_renderable=self._bar,
