@@ -109,6 +109,7 @@ PAGES: dict[str, Arrangement] = {
     "docs/publish.md": Arrangement(
         slow=(r"\bOUT(_EPISODES)?\b",), blocks={"^OUT/": "tree OUT", "^OUT_EPISODES/": "tree OUT_EPISODES"}
     ),
+    "docs/python.md": Arrangement(rewritten={r'name="mug"\)': 'name="mug", quick=True)'}),
     "docs/robots.md": Arrangement(blocks={"my_arm": "robot my_arm/my_arm.toml"}),
     "docs/runs.md": Arrangement(
         rewritten={r" --watch": "", "mug_0042.glb": "mug.glb"},  # watching ends with the watcher
