@@ -9,8 +9,12 @@ from pathlib import Path
 import pytest
 
 import manitwin
+from manitwin.api import BuildReport
+from manitwin.build_item import ItemResult
 from manitwin.causes import REMEDIES, cause_lines, group_causes
+from manitwin.commands.why import causes_of_build
 from manitwin.ledger.unaccepted import Unaccepted
+from manitwin.stages.stage import Item
 from manitwin.twin import REJECTION_REASONS
 
 
@@ -50,6 +54,48 @@ def test_causes_are_equal_but_for_ids_paths_names_and_numbers() -> None:
 def test_what_varies_from_item_to_item_is_no_other_cause(one: str, other: str) -> None:
     assert len(group_causes([failed(1, one), failed(2, other)])) == 1
     assert len(group_causes([failed(1, one), failed(2, f"{other}, and more")])) == 2
+
+
+@pytest.mark.parametrize(
+    ("said", "message", "remedy"),
+    [
+        ("ValueError: bad header 'a; b' in row", "ValueError: bad header 'a; b' in row", None),
+        ("ValueError: bad header a; b in row", "ValueError: bad header a; b in row", None),
+        ("UsageError: no column 'a; b' there", "no column 'a; b' there", None),
+        ("UsageError: the set's 'a; b' is gone; don't move it", "the set's 'a; b' is gone", "don't move it"),
+        ("BadReply: x says: later; nothing; ask again", "x says: later; nothing", "ask again"),
+        (f"UsageError: {'x' * 600}; leave it out", f"{'x' * 500} ...", "leave it out"),
+        ("the worker process died (signal 11); stack: a; b", "the worker process died (signal 11); stack: a; b", None),
+    ],
+)
+def test_only_a_message_of_our_own_errors_ends_with_its_remedy(said: str, message: str, remedy: str | None) -> None:
+    (cause,) = group_causes([failed(1, said)])
+    assert (cause.message, cause.remedy) == (message, remedy)
+
+
+def test_a_rejection_without_a_known_remedy_has_none() -> None:
+    assert "quiet" not in REMEDIES
+    (cause,) = group_causes([Unaccepted("1", "rejected", "quiet", "quiet: nothing said; a rehearsal")])
+    assert (cause.message, cause.remedy) == ("nothing said; a rehearsal", None)
+
+
+def test_a_remedy_is_said_once() -> None:
+    said = f"empty: a.png: the file has zero bytes; {REMEDIES['empty']}"
+    (cause,) = group_causes([Unaccepted("1", "rejected", "empty", said)])
+    assert (cause.message, cause.remedy) == ("a.png: the file has zero bytes", REMEDIES["empty"])
+
+
+def test_a_build_tells_a_remedy_of_our_own_errors_and_none_of_a_defect() -> None:
+    mug = Item(file="/photos/mug.png")
+    results = [
+        ItemResult(mug, "1", "unfinished", "x does not answer; start it", None, error="Unavailable"),
+        ItemResult(mug, "2", "unfinished", "a defect in manitwin: KeyError: 'a'; the traceback is in e.txt", None),
+    ]
+    causes = causes_of_build(BuildReport(results))
+    assert [(cause.message, cause.remedy) for cause in causes] == [
+        ("x does not answer", "start it"),
+        ("a defect in manitwin: KeyError: 'a'; the traceback is in e.txt", None),
+    ]
 
 
 def test_rejections_are_grouped_by_their_reason_and_apart_from_failures() -> None:

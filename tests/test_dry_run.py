@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,15 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from json_documents import check_keys
+from manitwin.api import with_flags
 from manitwin.cli import app
 from manitwin.config import BuildConfig
+from manitwin.dataset_root import DatasetRoot
+from manitwin.dataset_run import ledger_path
 from manitwin.dry_run import CHAIN_CPU_S, ROBUSTNESS_CPU_S, SECOND_ENGINE_CPU_S, TRIALS_CPU_S, measured_rate, own_rate
-from manitwin.ledger.ledger import Ledger
+from manitwin.errors import UsageError
+from manitwin.ledger.ledger import LEDGER, ItemState, Ledger
+from manitwin.pipeline import TwinRecipe
 from manitwin.stages.stage import Item
 
 
@@ -95,6 +101,70 @@ def test_what_is_there_is_not_built_again_and_stays_as_it_is(command: str, input
         assert tree(tmp_path) == before
 
 
+def ended(ledger: Ledger, number: int, state: ItemState, recipe: str, twin: str | None = None) -> None:
+    if twin is not None:
+        ledger.identify(number, twin, "mesh")
+    ledger.item_ended(number, state, recipe_sha256=recipe, reason="timeout", detail="verify failed 3 times: no answer")
+
+
+def planned(place: object) -> list[tuple[str | None, str]]:
+    document: dict[str, Any] = json.loads(manitwin("run", "-o", place, "--dry-run", "--quick", "--json"))
+    check_keys(document, "build --dry-run")
+    return [(item["kind"], item["state"]) for item in document["items"]]
+
+
+def quick_recipe() -> str:
+    return TwinRecipe(with_flags(BuildConfig(), quick=True)).sha256
+
+
+def test_what_failed_is_not_said_to_be_built_until_it_is_opened_again(inputs: Path, tmp_path: Path) -> None:
+    data, folder = tmp_path / "data", tmp_path / "inputs"
+    ledger = Ledger(data / "ledger.sqlite")
+    ledger.add_items(Item(file=str(folder / name)) for name in ("box.stl", "photo.png", "empty.png"))
+    ended(ledger, 1, "failed", quick_recipe(), "5feceb66ffc86f38")
+    ended(ledger, 2, "failed", "another recipe", "6b86b273ff34fce1")
+    ended(ledger, 3, "failed", quick_recipe())  # before its bytes were read
+    ledger.close()
+    before = tree(tmp_path)
+    assert planned(data) == [("mesh", "failed"), ("image", "to_build"), (None, "failed")]
+    said = manitwin("run", "-o", data, "--dry-run", "--quick")
+    assert "1 to build, 2 failed" in said and f"manitwin retry {data}" in said and "no answer" in said
+    assert tree(tmp_path) == before
+
+    manitwin("retry", data)
+    assert [state for _, state in planned(data)] == ["to_build", "to_build", "would_be_rejected"]
+
+
+def test_a_dry_run_sees_what_a_run_at_work_has_just_written(inputs: Path, tmp_path: Path) -> None:
+    ledger = Ledger(tmp_path / "data/ledger.sqlite")
+    ledger.add_items([Item(file=str(tmp_path / "inputs/box.stl"))])
+    ended(ledger, 1, "failed", quick_recipe(), "5feceb66ffc86f38")
+    ledger.commit()
+    try:
+        assert planned(tmp_path / "data") == [("mesh", "failed")], "it is in the write-ahead log alone"
+    finally:
+        ledger.close()
+
+
+def test_of_a_url_the_ledger_of_this_machine_counts_and_its_copy_only_without_one(
+    inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    root = DatasetRoot("memory://dry-run")
+    box, recipe = Item(file=str(tmp_path / "inputs/box.stl")), quick_recipe()
+    for place, state in ((tmp_path / "copy.sqlite", "open"), (ledger_path(root), "failed")):
+        ledger = Ledger(place)
+        ledger.add_items([box])
+        if state == "failed":
+            root.put_file(tmp_path / "copy.sqlite", LEDGER)
+            ended(ledger, 1, "failed", recipe, "5feceb66ffc86f38")
+        ledger.close()
+    assert planned(root.url) == [("mesh", "failed")]
+    shutil.rmtree(tmp_path / "state")
+    assert planned(root.url) == [("mesh", "to_build")]
+    assert not (tmp_path / "state").exists(), "nothing is written"
+
+
 def test_what_services_charge_is_counted_for_what_would_be_built(inputs: Path, tmp_path: Path) -> None:
     (tmp_path / "paid.toml").write_text('generator = "hunyuan3d@http://localhost:1"\n[services]\nusd_per_job = 0.25\n')
     document = json.loads(
@@ -105,7 +175,9 @@ def test_what_services_charge_is_counted_for_what_would_be_built(inputs: Path, t
 
 
 def test_wrong_use_is_wrong_use(tmp_path: Path) -> None:
-    manitwin("build", "--text", "a mug", "-o", tmp_path / "out", "--dry-run", exit_status=1)  # raised: main() says it
+    arguments = ["build", "--text", "a mug", "-o", str(tmp_path / "out"), "--dry-run"]
+    with pytest.raises(UsageError, match="makes no meshes of text"):
+        CliRunner().invoke(app, arguments, catch_exceptions=False)
     assert not (tmp_path / "out").exists()
 
 

@@ -78,7 +78,7 @@ def test_other_reasons_that_a_name_has_a_say_in(tmp_path: Path) -> None:
 
 def test_the_result_line_says_it(tmp_path: Path) -> None:
     weak = ending_of(accepted(tmp_path, None, UNKNOWN))
-    assert weak.told == f"{weak.detail}; {NAME_HINT}" and "--name (mug, fork, ...)" in NAME_HINT
-    assert ending_of(rejected(tmp_path, "too_wide")).told == f"so; {NAME_HINT}"
+    assert weak.detail_and_hint == f"{weak.detail}; {NAME_HINT}" and "--name (mug, fork, ...)" in NAME_HINT
+    assert ending_of(rejected(tmp_path, "too_wide")).detail_and_hint == f"so; {NAME_HINT}"
     named = ending_of(accepted(tmp_path, "mug", UNKNOWN))
-    assert named.told == named.detail and "--name" not in named.told
+    assert named.detail_and_hint == named.detail and "--name" not in named.detail_and_hint

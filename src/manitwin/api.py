@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -85,32 +85,25 @@ def build(
     ``require_agreement`` verifies only what a second engine holds too; ``quick`` leaves out second engine and robustness.
     Raises UsageError for wrong arguments; what happens to one item is in the report and never raised.
     """
-    from manitwin.config import BuildConfig, load_config
-
-    settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
-    settings = with_flags(
-        settings, seed=seed, grippers=grippers, vlm=vlm, generator=generator, grasper=grasper,
-        max_cost_usd=max_cost_usd, record=record, require_agreement=require_agreement, quick=quick,
-    )  # fmt: skip
     if jobs is not None and jobs < 1:
         raise UsageError(f"jobs is {jobs}; give 1 or more")
-    items, notes, place = items_to_build(
+    request = request_build(
         inputs,
         out,
-        settings,
         texts,
-        name=name,
-        units=units,
-        up=up,
-        license=license,
-        attribution=attribution,
-        strict=strict,
-    )
-    # these take two CPU-seconds to import: what was given wrongly is said before
+        config,
+        defaults={
+            "name": name, "units": units, "up": up, "license": license, "attribution": attribution, "strict": strict,
+        },
+        flags={
+            "seed": seed, "grippers": grippers, "vlm": vlm, "generator": generator, "grasper": grasper,
+            "max_cost_usd": max_cost_usd, "record": record, "require_agreement": require_agreement, "quick": quick,
+        },
+    )  # fmt: skip
     from manitwin.executors.whole_items import build_all
-    from manitwin.pipeline import check_names, estimate_usd, log_choices
+    from manitwin.pipeline import estimate_usd, log_choices
 
-    check_names(settings)
+    settings, items, place = request.settings, request.items, request.place
     log_choices(settings)
     place.mkdir(parents=True, exist_ok=True)
     on_estimate(estimate_usd(settings))
@@ -119,31 +112,50 @@ def build(
     for result in build_all(items, place.resolve(), settings, jobs=jobs or os.cpu_count() or 1, on_stage=on_stage):
         results.append(result)
         on_result(result)
-    return BuildReport(results, notes.remarks, notes.folders)
+    return BuildReport(results, request.notes.remarks, request.notes.folders)
 
 
-def items_to_build(
+@dataclass(frozen=True)
+class BuildRequest:
+    """What ``build`` is asked for, checked: nothing is written yet."""
+
+    settings: BuildConfig
+    items: list[Item]
+    notes: Notes
+    place: Path
+
+
+def request_build(
     inputs: str | Path | Iterable[str | Path],
     out: str | Path,
-    settings: BuildConfig,
-    texts: Iterable[str] = (),
-    **said: Any,
-) -> tuple[list[Item], Notes, Path]:
-    """Return what ``build`` is asked to make, what is to be said of the inputs, and the folder; ``said`` is as of ``build``.
+    texts: Iterable[str],
+    config: BuildConfig | str | Path | None,
+    *,
+    defaults: Mapping[str, Any],
+    flags: Mapping[str, Any],
+) -> BuildRequest:
+    """Read what ``build`` is asked for; ``defaults`` are its arguments of ``collect_items``, ``flags`` those of ``with_flags``.
 
-    Nothing is written. Raises UsageError for wrong arguments.
+    Raises UsageError for wrong arguments.
     """
+    from manitwin.config import BuildConfig, load_config
     from manitwin.generator_input import refusal
     from manitwin.manifest import collect_items
 
+    settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
+    settings = with_flags(settings, **flags)
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
-    items, notes = collect_items(given, texts, refusal=refusal(settings), **said)
+    items, notes = collect_items(given, texts, refusal=refusal(settings), **defaults)
     if not items:
         raise UsageError("nothing to build; give images, meshes, folders, manifests or texts")
     place = Path(out)
     if place.exists() and not place.is_dir():
         raise UsageError(f"{out}: a file; give a folder to write twins into")
-    return items, notes, place
+    # this takes two CPU-seconds to import: what was given wrongly is said before
+    from manitwin.pipeline import check_names
+
+    check_names(settings)
+    return BuildRequest(settings, items, notes, place)
 
 
 def with_flags(

@@ -16,7 +16,7 @@ from manitwin.config import BuildConfig
 from manitwin.dataset_root import DatasetRoot
 from manitwin.engine.events import OnStage, StageEnded, StageStarted, StageState
 from manitwin.engine.recipe import Ending, Identity
-from manitwin.errors import BackendError, ManiTwinError, Rejected
+from manitwin.errors import ManiTwinError, Rejected
 from manitwin.models.generators.job_memory import RootJobMemory
 from manitwin.pipeline import TwinRecipe, expected_usd
 from manitwin.stage_runner import JOBS, StageCost, lost_usd, run_stage
@@ -30,7 +30,10 @@ Status = Literal["accepted", "rejected", "unfinished"]
 
 @dataclass(frozen=True)
 class ItemResult:
-    """What became of one item: its folder where it has one, one line that says why, and the code of a rejection."""
+    """What became of one item: its folder where it has one, one line that says why, and the code of a rejection.
+
+    ``error`` is the class of the error of this package that left it unfinished.
+    """
 
     item: Item
     twin_id: str
@@ -39,6 +42,7 @@ class ItemResult:
     folder: Path | None
     reused: bool = False
     reason: str | None = None
+    error: str | None = None
 
 
 def build_item(
@@ -67,10 +71,10 @@ def build_item(
         with _only_one(work):
             ending = _build(item, identity, recipe, work, on_stage)
             replace_folder(_fresh(work), place)
-    except (BackendError, BlockingIOError) as error:
-        return ItemResult(item, identity.twin_id, "unfinished", str(error), None)
     except ManiTwinError as error:
-        return ItemResult(item, identity.twin_id, "unfinished", f"{type(error).__name__}: {error}", None)
+        return ItemResult(item, identity.twin_id, "unfinished", str(error), None, error=type(error).__name__)
+    except BlockingIOError as error:
+        return ItemResult(item, identity.twin_id, "unfinished", str(error), None)
     except Exception as error:
         report = work / REPORT
         report.write_text(traceback.format_exc())
@@ -119,4 +123,4 @@ def _fresh(work: Path) -> Path:
 
 
 def _line(ending: Ending) -> str:
-    return f"{ending.reason}: {ending.told}" if ending.reason else ending.told
+    return f"{ending.reason}: {ending.detail_and_hint}" if ending.reason else ending.detail_and_hint

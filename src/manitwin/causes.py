@@ -48,8 +48,10 @@ _OWN_ERRORS = "|".join(
 _TRIES = re.compile(r"^\S+ failed \d+ times: ")
 _OWN_ERROR = re.compile(rf"^(?:{_OWN_ERRORS}): ")
 _LINE_OF_CODE = re.compile(r" \(\w+\.py:\d+\)$")
+_QUOTED = r"(?<!\w)(?:'[^']*'|\"[^\"]*\")(?!\w)"  # an apostrophe begins no quotation
+_SEMICOLON = re.compile(rf"{_QUOTED}|; ")
 _VARIES = (
-    (re.compile(r"'[^']*'|\"[^\"]*\""), "'...'"),
+    (re.compile(_QUOTED), "'...'"),
     (re.compile(r"(?:[a-z0-9]+://|\.{0,2}/)\S*[^\s:;,.)]"), "PATH"),
     (re.compile(r"\b[\w.-]+\.(?:[A-Za-z]\w{1,4})\b"), "FILE"),
     (re.compile(r"\b(?=[0-9a-f]*\d)[0-9a-f]{8,64}\b"), "ID"),
@@ -106,24 +108,37 @@ def _reason(cause: Cause) -> str:
 
 
 def _cause(first: Unaccepted, count: int) -> Cause:
-    message = plain(first.message)
-    if first.reason and message.startswith(f"{first.reason}: "):
+    message, remedy = without_prefixes(first.message), REMEDIES.get(first.reason or "")
+    if first.reason:
         message = message.removeprefix(f"{first.reason}: ")
-    remedy = REMEDIES.get(first.reason or "")
-    what, semicolon, said = message.rpartition("; ")
-    if remedy is None and semicolon:  # a message of our own ends with its remedy
-        message, remedy = what, said
-    return Cause(first.state, first.reason, count, first.which, message, remedy)
+    if remedy is None and _is_own(first.message):
+        message, remedy = _without_remedy(message)
+    elif remedy is not None:
+        message = message.removesuffix(f"; {remedy}")  # some messages end with the same words
+    return Cause(first.state, first.reason, count, first.which, _shortened(message), remedy)
 
 
-def plain(message: str) -> str:
+def without_prefixes(message: str) -> str:
     """Return what was said without the stage and the attempts, the class of our own errors and the line of code."""
-    said = _LINE_OF_CODE.sub("", _OWN_ERROR.sub("", _TRIES.sub("", message)))
-    return said if len(said) <= LONGEST_MESSAGE else f"{said[:LONGEST_MESSAGE]} ..."
+    return _LINE_OF_CODE.sub("", _OWN_ERROR.sub("", _TRIES.sub("", message)))
+
+
+def _is_own(message: str) -> bool:
+    return _OWN_ERROR.match(_TRIES.sub("", message)) is not None
+
+
+def _without_remedy(message: str) -> tuple[str, str | None]:
+    """Split a message of our own errors, which ends with its remedy where it has one; a semicolon in quotes is none."""
+    ends = [found.start() for found in _SEMICOLON.finditer(message) if found[0] == "; "]
+    return (message[: ends[-1]], message[ends[-1] + 2 :]) if ends else (message, None)
+
+
+def _shortened(message: str) -> str:
+    return message if len(message) <= LONGEST_MESSAGE else f"{message[:LONGEST_MESSAGE]} ..."
 
 
 def _without_what_varies(message: str) -> str:
-    told = plain(message)
+    told = _shortened(without_prefixes(message))
     for pattern, stand_in in _VARIES:
         told = pattern.sub(stand_in, told)
     return told

@@ -17,7 +17,7 @@ import typer
 from manitwin.commands.audit import audit
 from manitwin.commands.build import build
 from manitwin.commands.check import check
-from manitwin.commands.choices import there
+from manitwin.commands.choices import must_exist
 from manitwin.commands.completion import COMPLETION_VARIABLE, PROGRAM, completion, completion_init
 from manitwin.commands.console import error_console, out_console
 from manitwin.commands.doctor import doctor
@@ -88,7 +88,8 @@ for other in (status, retry, check, query, doctor, fake, prompts, audit, complet
 @app.command()
 def show(
     twin: Annotated[
-        Path, typer.Argument(help="A twin folder.", metavar="TWIN", callback=there("a folder that manitwin build made"))
+        Path,
+        typer.Argument(help="A twin folder.", metavar="TWIN", callback=must_exist("a folder that manitwin build made")),
     ],
     json_: Json = False,
 ) -> None:

@@ -27,7 +27,7 @@ from manitwin.engine.recipe import Recipe
 from manitwin.engine.work import WorkFolder
 from manitwin.errors import UsageError, choose_from
 from manitwin.files.folder_listing import FolderListing
-from manitwin.ledger.ledger import LEDGER, Ledger
+from manitwin.ledger.ledger import LEDGER, Ledger, read_ledger
 from manitwin.manifest import Notes, iterate_items
 from manitwin.stages.stage import Item
 from manitwin.store import canonical_json
@@ -196,15 +196,30 @@ def stored_config(root: DatasetRoot) -> BuildConfig:
         ) from error
 
 
-def local_ledger(root: DatasetRoot) -> Path:
-    """Return the path of the ledger: in the data set, or of a URL in the user's state folder, made from its copy there."""
+def ledger_path(root: DatasetRoot) -> Path:
+    """Return where the ledger lies on this machine: in the data set, or of a URL in the user's state folder."""
     if root.local is not None:
         return root.local / LEDGER
     state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "manitwin"
-    path = state / f"{_digest(root.url)}.sqlite"
-    if not path.is_file() and root.exists(LEDGER):
+    return state / f"{_digest(root.url)}.sqlite"
+
+
+def local_ledger(root: DatasetRoot) -> Path:
+    """Return the path of the ledger; of a URL it is made from the copy there where this machine has none."""
+    path = ledger_path(root)
+    if root.local is None and not path.is_file() and root.exists(LEDGER):
         root.fetch_file(LEDGER, path)
     return path
+
+
+def copy_ledger(root: DatasetRoot, copy: Path) -> None:
+    """Copy the ledger that a run would take up, also while one writes it; there is no copy where there is no ledger."""
+    path = ledger_path(root)
+    if path.is_file():
+        with read_ledger(path) as source, closing(sqlite3.connect(copy)) as target:
+            source.backup(target)
+    elif root.local is None and root.exists(LEDGER):
+        root.fetch_file(LEDGER, copy)
 
 
 def local_log(root: DatasetRoot) -> Path:

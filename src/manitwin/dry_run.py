@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, get_args
 
 from manitwin.config import BuildConfig
 from manitwin.dataset_root import DatasetRoot
+from manitwin.dataset_run import copy_ledger
 from manitwin.engine.recipe import Recipe
 from manitwin.errors import Rejected
 from manitwin.files.image_file import check_header
@@ -32,17 +31,21 @@ ENOUGH_ITEMS = 3
 MEASURED = "docs/measured.md, the median of 25 meshes"
 
 RecordOf = Callable[[str], bytes | None]
-PlannedState = Literal["to_build", "accepted", "rejected", "would_be_rejected", "duplicate"]
+PlannedState = Literal["to_build", "accepted", "rejected", "failed", "would_be_rejected", "duplicate"]
 PLANNED_STATES: tuple[PlannedState, ...] = get_args(PlannedState)
 
 
 @dataclass(frozen=True)
 class PlannedItem:
-    """One input: ``accepted`` and ``rejected`` are there already; ``would_be_rejected`` as it is read."""
+    """One input: ``accepted`` and ``rejected`` are there already, ``failed`` waits for ``manitwin retry``.
+
+    ``would_be_rejected`` is what it would be as it is read. ``twin_id`` and ``kind`` are None where it failed before they were
+    known.
+    """
 
     item: Item
-    twin_id: str
-    kind: str
+    twin_id: str | None
+    kind: str | None
     state: PlannedState
     detail: str = ""
 
@@ -70,17 +73,17 @@ class Plan:
 
     @property
     def to_build(self) -> Counter[str]:
-        """How many items would be built, by the kind of their input."""
-        return Counter(planned.kind for planned in self.items if planned.state == "to_build")
+        """Return how many items would be built, by the kind of their input."""
+        return Counter(planned.kind for planned in self.items if planned.state == "to_build" and planned.kind)
 
     @property
     def cpu_s(self) -> float:
-        """About how much CPU time that takes."""
+        """Estimate the CPU time (s) of what would be built."""
         return sum((number * self.rates[kind].cpu_s for kind, number in self.to_build.items()), 0.0)
 
     @property
     def cost_usd(self) -> float:
-        """About what services would charge."""
+        """Estimate what services would charge for it (USD)."""
         return sum((number * self.usd_each[kind] for kind, number in self.to_build.items()), 0.0)
 
 
@@ -92,7 +95,8 @@ def plan_build(items: Iterable[Item], out: Path, config: BuildConfig, remarks: l
         path = out / twin_id / RECORD
         return path.read_bytes() if path.is_file() else None
 
-    planned = list(_planned(items, recipe, config, record_of))
+    planner = _Planner(recipe, config, record_of)
+    planned = [planner.plan(item) for item in items]
     return Plan(planned, dict.fromkeys(usd, measured_rate(config)), usd, remarks)
 
 
@@ -108,15 +112,33 @@ def plan_run(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, rema
         return root.read_bytes(name) if root.exists(name) else None
 
     with tempfile.TemporaryDirectory(prefix="manitwin-dry-run-") as scratch:
-        ledger = Ledger(_copied_ledger(root, Path(scratch)))
+        copy = Path(scratch) / LEDGER
+        copy_ledger(root, copy)
+        ledger = Ledger(copy)
         try:
             ledger.add_items(items)
             rates = {kind: own_rate(ledger, kind, recipe.sha256) or measured_rate(config) for kind in usd}
-            rows = ledger.connection.execute("SELECT number FROM items ORDER BY number").fetchall()
-            every = (ledger.item(number) for (number,) in rows)
-            return Plan(list(_planned(every, recipe, config, record_of)), rates, usd, remarks)
+            ledger.begin_run(recipe.sha256)  # opens again what a run would open again
+            return Plan(_planned_by(ledger, _Planner(recipe, config, record_of)), rates, usd, remarks)
         finally:
             ledger.close()
+
+
+def _planned_by(ledger: Ledger, planner: _Planner) -> list[PlannedItem]:
+    """Plan what is open; what has ended is as the ledger says, since a run does not look at it again."""
+    rows = ledger.connection.execute(
+        "SELECT number, twin_id, kind, state, reason, detail FROM items ORDER BY number"
+    ).fetchall()
+    planner.seen.update(twin_id for _, twin_id, _, state, _, _ in rows if twin_id is not None and state != "open")
+    planned = []
+    for number, twin_id, kind, state, reason, detail in rows:
+        item = ledger.item(number)
+        if state == "open":
+            planned.append(planner.plan(item))
+            continue
+        said = f"{reason}: {detail}" if state == "rejected" else detail
+        planned.append(PlannedItem(item, twin_id, kind, state, said or ""))
+    return planned
 
 
 def measured_rate(config: BuildConfig) -> Rate:
@@ -138,24 +160,27 @@ def own_rate(ledger: Ledger, kind: str, recipe_sha256: str) -> Rate | None:
     return Rate(total / number, f"the mean of {number} accepted items of this data set")
 
 
-def _planned(items: Iterable[Item], recipe: Recipe, config: BuildConfig, record_of: RecordOf) -> Iterator[PlannedItem]:
-    seen: set[str] = set()
-    for item in items:
-        identity = recipe.identify(item)
+class _Planner:
+    """Says of one input after the other what would be made of it; ``seen`` are the ids of twins that have their item."""
+
+    def __init__(self, recipe: Recipe, config: BuildConfig, record_of: RecordOf):
+        self._recipe, self._config, self._record_of = recipe, config, record_of
+        self.seen: set[str] = set()
+
+    def plan(self, item: Item) -> PlannedItem:
+        identity = self._recipe.identify(item)
         twin_id, kind = identity.twin_id, identity.kind
-        if twin_id in seen:
-            yield PlannedItem(item, twin_id, kind, "duplicate", "the same input as one before it")
-            continue
-        seen.add(twin_id)
-        record = record_of(twin_id)
-        ending = None if record is None else recipe.ending_of(record)
+        if twin_id in self.seen:
+            return PlannedItem(item, twin_id, kind, "duplicate", "the same input as another one")
+        self.seen.add(twin_id)
+        record = self._record_of(twin_id)
+        ending = None if record is None else self._recipe.ending_of(record)
         if ending is not None:
             detail = f"{ending.reason}: {ending.detail}" if ending.reason else ending.detail
-            yield PlannedItem(item, twin_id, kind, ending.status, detail)
-            continue
-        refused = identity.rejected or _refused_by_header(item, kind, config)
+            return PlannedItem(item, twin_id, kind, ending.status, detail)
+        refused = identity.rejected or _refused_by_header(item, kind, self._config)
         state: PlannedState = "to_build" if refused is None else "would_be_rejected"
-        yield PlannedItem(item, twin_id, kind, state, "" if refused is None else str(refused))
+        return PlannedItem(item, twin_id, kind, state, "" if refused is None else str(refused))
 
 
 def _refused_by_header(item: Item, kind: str, config: BuildConfig) -> Rejected | None:
@@ -165,15 +190,3 @@ def _refused_by_header(item: Item, kind: str, config: BuildConfig) -> Rejected |
         except Rejected as answer:
             return answer
     return None
-
-
-def _copied_ledger(root: DatasetRoot, scratch: Path) -> Path:
-    """Copy a data set's ledger, if it has one, with what SQLite has not yet written into it."""
-    copy = scratch / LEDGER
-    with suppress(FileNotFoundError):
-        if root.local is None:
-            root.fetch_file(LEDGER, copy)
-        else:
-            for suffix in ("", "-wal"):
-                shutil.copyfile(f"{root.local / LEDGER}{suffix}", f"{copy}{suffix}")
-    return copy

@@ -26,7 +26,7 @@ Refusal = Callable[[Item], str | None]
 
 @dataclass
 class Notes:
-    """What is to be said of the inputs: lines for the user, and what became of every file of each folder."""
+    """Collect what a user should be told of the inputs: ``remarks`` are lines, ``folders`` say what became of each file."""
 
     remarks: list[str] = field(default_factory=list)
     folders: list[FolderListing] = field(default_factory=list)

@@ -7,11 +7,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from manitwin.geometry.poses import rotation_from_quaternion_wxyz
-from manitwin.geometry.resting import rest_of, side_down, tilt_deg
+from manitwin.geometry.resting import RestingPose, resting_poses
 from manitwin.loaded_twin import Twin
 from manitwin.stages.quality import rehearsed_words
-from manitwin.twin import Estimate, GraspSummary, OtherGripper, Placement, SecondOpinion, TwinRecord
+from manitwin.twin import Estimate, GraspSummary, OtherGripper, SecondOpinion, TwinRecord
 
 
 def estimate_text(estimate: Estimate, unit: str = "") -> str:
@@ -67,20 +66,15 @@ def _rows(record: TwinRecord) -> list[tuple[str, str]]:
         rows += [(f"point {p.id}", f"{p.type}: {p.scenario}") for p in record.points.grasp]
     if record.grasps is not None:
         rows += _grasp_rows(record.grasps)
-    return rows + placement_rows(record.placements or [])
+    poses = resting_poses(record.placements or [])
+    return rows + [("rests" if pose.placement.settled else "did not settle", _resting(pose)) for pose in poses]
 
 
-def placement_rows(placements: list[Placement]) -> list[tuple[str, str]]:
-    """Write the poses as a person reads them: those that stayed in simulation, then the others, likely ones first."""
-    ordered = sorted(placements, key=lambda placement: (not placement.settled, -placement.probability))
-    return [("rests" if p.settled else "did not settle", _placement(p)) for p in ordered]
-
-
-def _placement(placement: Placement) -> str:
-    rotation = rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz))
-    way: str = rest_of(rotation).replace("_", " ")
-    if way == "lying":
-        way = f"lying on its {side_down(rotation)} side, {tilt_deg(rotation):.0f} degrees from upright"
+def _resting(pose: RestingPose) -> str:
+    way: str = pose.rest.replace("_", " ")
+    if pose.side_down is not None:
+        way = f"lying on its {pose.side_down} side, {pose.tilt_deg:.0f} degrees from upright"
+    placement = pose.placement
     return f"{way}, probability {placement.probability:.2f}, radius {100 * placement.collision_radius_m:.1f} cm"
 
 

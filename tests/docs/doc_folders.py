@@ -36,7 +36,7 @@ trimesh.creation.cylinder(radius=0.12, height=1.0).export(out)
 
 
 class Folders:
-    """Dear folders, each made at its first use and copied to every page that names it."""
+    """Folders that take long to make, each made at its first use and copied to every page that names it."""
 
     def __init__(self, root: Path):
         self.root = root

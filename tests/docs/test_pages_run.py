@@ -40,14 +40,14 @@ def read_by(step: Step) -> str:
 
 
 def slow_steps(page: str) -> set[Step]:
-    """Return the steps that only the slow test does: what is dear, and what may go on with it.
+    """Return the steps that only the slow test does: what is expensive, and what may go on with it.
 
     That is Python after it, or of a page that the table does not name, all of it.
     """
     slow = set[Step]()
     for step in steps(page):
-        dear = any(re.search(each, does(step)) for each in (*SLOW, *arranged(page).slow))
-        if dear or (step.language == "python" and any(each.language == "python" for each in slow)):
+        expensive = any(re.search(each, does(step)) for each in (*SLOW, *arranged(page).slow))
+        if expensive or (step.language == "python" and any(each.language == "python" for each in slow)):
             slow.add(step)
     return slow if page in PAGES or not slow else set(steps(page))
 
@@ -63,7 +63,7 @@ def rewritten(step: Step) -> str:
 
 
 def does(step: Step) -> str:
-    """Return what a step does, in the words that say what is dear and which folders it wants: without its comments."""
+    """Return what a step does, in the words that say what is expensive and which folders it wants: without its comments."""
     return re.sub(r"(^|\s)#.*", "", rewritten(step)) if step.language in PROGRAMS else read_by(step)
 
 

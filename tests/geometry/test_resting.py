@@ -2,7 +2,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from manitwin.geometry.resting import UPRIGHT_DEG, rest_of, side_down, tilt_deg
+from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.geometry.resting import UPRIGHT_DEG, rest_of, resting_poses, side_down, tilt_deg
+from manitwin.twin import Placement
 
 
 def turned(axis: str, degrees: float) -> np.ndarray:
@@ -33,3 +35,21 @@ def test_a_lying_object_lies_on_the_side_whose_points_come_lowest(side: str) -> 
     turns = [turned(axis, degrees) for axis in "xy" for degrees in (90, -90)]
     down = [turn for turn in turns if (turn @ point)[2] < -0.99]
     assert [side_down(turn) for turn in down] == [side]
+
+
+def test_poses_that_stayed_come_first_and_likely_ones_before_unlikely_with_their_numbers() -> None:
+    def placement(axis: str, degrees: float, probability: float, settled: bool) -> Placement:
+        rotation = turned(axis, degrees)
+        return Placement(
+            position_m=(0.0, 0.0, 0.0), quaternion_wxyz=tuple(quaternion_wxyz(rotation)), probability=probability,
+            upright=bool(rotation[2, 2] > 0.99), settled=settled, collision_radius_m=0.05,
+        )  # fmt: skip
+
+    poses = resting_poses(
+        [placement("z", 30, 0.3, False), placement("x", 180, 0.1, True), placement("y", 90, 0.2, True)]
+    )
+    assert [(pose.number, pose.rest, pose.side_down) for pose in poses] == [
+        (2, "lying", "+x"), (1, "upside_down", None), (0, "upright", None),
+    ]  # fmt: skip
+    assert [pose.tilt_deg for pose in poses] == pytest.approx([90, 180, 0])
+    assert [pose.placement.probability for pose in poses] == [0.2, 0.1, 0.3]

@@ -168,3 +168,16 @@ def test_stages_of_another_recipe_stand_between_reading_and_putting_together(pat
     with read_ledger(path) as connection:
         told = [stage.stage for stage in read_progress(connection, at_work=False).stages]
     assert told == ["input", "layout", "pictures", "assemble"]
+
+
+def test_a_reader_leaves_nothing_beside_a_ledger_that_no_run_writes(tmp_path: Path) -> None:
+    path = tmp_path / "a b%20c?.sqlite"
+    ledger = Ledger(path)
+    ledger.add_items([Item(file="/mug.obj")])
+    with read_ledger(path) as connection:
+        assert connection.execute("SELECT count(*) FROM items").fetchone()[0] == 1, "what is only in the log so far"
+    ledger.close()
+    before = sorted(tmp_path.iterdir())
+    with read_ledger(path) as connection:
+        assert connection.execute("SELECT count(*) FROM items").fetchone()[0] == 1
+    assert sorted(tmp_path.iterdir()) == before

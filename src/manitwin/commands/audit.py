@@ -24,7 +24,7 @@ def audit(
         typer.Argument(
             help="Assets, or folders of assets.",
             metavar="PATH...",
-            callback=choices.there("an asset, or a folder of them"),
+            callback=choices.must_exist("an asset, or a folder of them"),
         ),
     ] = None,
     select: Annotated[

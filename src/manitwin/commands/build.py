@@ -14,6 +14,7 @@ from manitwin.commands.planned import DryRun, print_plan
 from manitwin.commands.why import causes_of_build, print_causes_of_build
 
 if TYPE_CHECKING:
+    from manitwin.api import BuildReport
     from manitwin.build_item import ItemResult
 
 STYLES = {"accepted": "green", "rejected": "yellow", "unfinished": "red"}
@@ -26,7 +27,7 @@ def build(
         typer.Argument(
             help="Images, meshes, folders, or .csv/.jsonl manifests.",
             metavar="INPUT...",
-            callback=choices.there("an image, a mesh, a folder, or a .csv or .jsonl manifest"),
+            callback=choices.must_exist("an image, a mesh, a folder, or a .csv or .jsonl manifest"),
         ),
     ] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="The folder to write twins into.")] = None,
@@ -56,34 +57,35 @@ def build(
 
     if out is None:
         raise UsageError("no folder to write twins into; give one with -o")
-    said: dict[str, Any] = {
-        "name": name,
-        "units": units,
-        "up": up,
-        "license": license,
-        "attribution": attribution,
-        "strict": strict,
-    }
+    defaults = {
+        "name": name, "units": units, "up": up, "license": license, "attribution": attribution, "strict": strict,
+    }  # fmt: skip
+    flags = {
+        "seed": seed, "grippers": gripper or None, "vlm": vlm, "generator": generator, "grasper": grasper,
+        "max_cost_usd": max_cost, "record": record, "require_agreement": require_agreement, "quick": quick,
+    }  # fmt: skip
     if dry_run:
-        from manitwin.api import items_to_build, with_flags
-        from manitwin.config import BuildConfig, load_config
-
-        settings = with_flags(
-            load_config(config) if config else BuildConfig(), seed=seed, grippers=gripper or None, vlm=vlm,
-            generator=generator, grasper=grasper, max_cost_usd=max_cost, record=record,
-            require_agreement=require_agreement, quick=quick,
-        )  # fmt: skip
-        items, notes, place = items_to_build(inputs or [], out, settings, text or [], **said)
+        from manitwin.api import request_build
         from manitwin.dry_run import plan_build
-        from manitwin.pipeline import check_names
 
-        check_names(settings)
-        print_plan(plan_build(items, place, settings, notes.remarks), str(out), as_json=json)
+        request = request_build(inputs or [], out, text or [], config, defaults=defaults, flags=flags)
+        plan = plan_build(request.items, request.place, request.settings, request.notes.remarks)
+        print_plan(plan, str(out), as_json=json)
         return
+    report = _build(inputs or [], out, texts=text or [], jobs=jobs, config=config, **defaults, **flags)
+    _print_report(report, out)
+    if json:
+        from manitwin.commands.documents import build_document
+
+        print_document(build_document(report, str(out), causes_of_build(report)))
+    raise typer.Exit(report.exit_code)
+
+
+def _build(inputs: list[Path], out: Path, **arguments: Any) -> BuildReport:
+    """Build while a person watches; ``arguments`` are those of ``api.build``."""
     from manitwin.api import build as build_twins
     from manitwin.commands.watched_run import WatchedRun
     from manitwin.render.device import require_renderer
-    from manitwin.run_summary import grasp_lines, summarize_grasps
     from manitwin.store import WORK
 
     require_renderer()
@@ -93,27 +95,15 @@ def build(
         _print_result(result)
 
     with WatchedRun("inputs", lambda: out / WORK / BUILD_LOG) as watched:
-        report = build_twins(
-            inputs or [],
-            out,
-            texts=text or [],
-            **said,
-            jobs=jobs,
-            seed=seed,
-            config=config,
-            grippers=gripper or None,
-            vlm=vlm,
-            generator=generator,
-            grasper=grasper,
-            max_cost_usd=max_cost,
-            record=record,
-            require_agreement=require_agreement,
-            quick=quick,
-            on_estimate=print_estimate,
-            on_start=watched.start,
-            on_stage=watched.progress.stage,
-            on_result=ended,
-        )
+        return build_twins(
+            inputs, out, **arguments, on_estimate=print_estimate, on_start=watched.start,
+            on_stage=watched.progress.stage, on_result=ended,
+        )  # fmt: skip
+
+
+def _print_report(report: BuildReport, out: Path) -> None:
+    from manitwin.run_summary import grasp_lines, summarize_grasps
+
     for remark in report.remarks:
         err_console.print(remark, markup=False)
     accepted, rejected, unfinished = (report.count(s) for s in ("accepted", "rejected", "unfinished"))
@@ -123,11 +113,6 @@ def build(
     print_causes_of_build(report)
     if unfinished:
         print_error("run the same command again to go on where it stopped")
-    if json:
-        from manitwin.commands.documents import build_document
-
-        print_document(build_document(report, str(out), causes_of_build(report)))
-    raise typer.Exit(report.exit_code)
 
 
 def _print_result(result: ItemResult) -> None:

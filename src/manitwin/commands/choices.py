@@ -135,7 +135,7 @@ def settings_file(value: Path | None) -> Path | None:
     return value
 
 
-def there(remedy: str) -> Callable[[Any], Any]:
+def must_exist(remedy: str) -> Callable[[Any], Any]:
     """Return the callback of places that must be there: files and folders, or URLs, which are not asked."""
 
     def check(value: Any) -> Any:

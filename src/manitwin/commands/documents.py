@@ -5,11 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from manitwin.geometry.poses import rotation_from_quaternion_wxyz
-from manitwin.geometry.resting import rest_of, side_down, tilt_deg
-
 if TYPE_CHECKING:
     from manitwin.api import BuildReport
     from manitwin.apps.layouts.run import LayoutTotals
@@ -20,9 +15,9 @@ if TYPE_CHECKING:
     from manitwin.dataset_run import RunReport
     from manitwin.dry_run import Plan
     from manitwin.files.folder_listing import FolderListing
+    from manitwin.geometry.resting import RestingPose
     from manitwin.ledger.progress import ItemStory, Progress
     from manitwin.loaded_twin import Twin
-    from manitwin.twin import Placement
 
 Document = dict[str, Any]
 
@@ -96,13 +91,13 @@ def story_document(story: ItemStory, place: str) -> Document:
 
 def show_document(twin: Twin) -> Document:
     """Return a twin's record, how it rests in words, and what was found about it."""
+    from manitwin.geometry.resting import resting_poses
+
     record = twin.record
-    placements = enumerate(record.placements or [])
-    ordered = sorted(placements, key=lambda each: (not each[1].settled, -each[1].probability))
     return {
         "folder": str(twin.folder),
         "record": record.model_dump(mode="json"),
-        "placements": [_placement(number, placement) for number, placement in ordered],
+        "placements": [_resting(pose) for pose in resting_poses(record.placements or [])],
         "findings": [check.model_dump(mode="json") for check in record.quality.checks if check.passed is not True],
     }
 
@@ -149,16 +144,14 @@ def _item(result: ItemResult) -> Document:
     }
 
 
-def _placement(number: int, placement: Placement) -> Document:
-    rotation = rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz))
-    rest = rest_of(rotation)
+def _resting(pose: RestingPose) -> Document:
     return {
-        "number": number,
-        "rest": rest,
-        "side_down": side_down(rotation) if rest == "lying" else None,
-        "tilt_deg": tilt_deg(rotation),
-        "settled": placement.settled,
-        "probability": placement.probability,
+        "number": pose.number,
+        "rest": pose.rest,
+        "side_down": pose.side_down,
+        "tilt_deg": pose.tilt_deg,
+        "settled": pose.placement.settled,
+        "probability": pose.placement.probability,
     }
 
 

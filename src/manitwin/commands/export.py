@@ -23,7 +23,7 @@ def export(
         typer.Argument(
             help="Twin folders, folders of twins, data sets (a folder or URL); or scenes of `manitwin layout`.",
             metavar="TWIN|SCENE",
-            callback=choices.there("a folder that manitwin has built"),
+            callback=choices.must_exist("a folder that manitwin has built"),
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write OUT/<twin>/<format>/ into.")],

@@ -17,7 +17,7 @@ def import_(
         typer.Argument(
             help="Assets: files, folders, or folders of them.",
             metavar="PATH...",
-            callback=choices.there("an asset's file or folder, or a folder of assets"),
+            callback=choices.must_exist("an asset's file or folder, or a folder of assets"),
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write imported assets into.")],

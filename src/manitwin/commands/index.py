@@ -16,7 +16,7 @@ def index(
         typer.Argument(
             help="A data set: a folder or URL.",
             metavar="DATASET",
-            callback=choices.there("the folder or URL of a data set"),
+            callback=choices.must_exist("the folder or URL of a data set"),
         ),
     ],
     jobs: options.Jobs = None,

@@ -15,6 +15,7 @@ from manitwin.commands.why import causes_of, print_causes
 
 if TYPE_CHECKING:
     from manitwin.app_config import LayoutsConfig
+    from manitwin.apps.layouts.run import LayoutTotals
 
 
 def layout(
@@ -23,7 +24,7 @@ def layout(
         typer.Argument(
             help="A data set, or a folder of twins.",
             metavar="DATASET",
-            callback=choices.there("a data set, or the folder that manitwin build wrote"),
+            callback=choices.must_exist("a data set, or the folder that manitwin build wrote"),
         ),
     ],
     out: Annotated[str, typer.Option("--out", "-o", help="The folder to write scenes into.")],
@@ -78,15 +79,7 @@ def layout(
     totals = layout_totals(out)
     if settings.layout.upright and (lying := without_upright(dataset)):
         out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}", markup=False)
-    ended = totals.accepted + sum(totals.rejected.values())
-    why = "".join(f", {n} {reason}" for reason, n in totals.rejected.items())
-    out_console.print(f"{totals.accepted} of {ended} layouts accepted ({totals.acceptance:.1%}){why}", markup=False)
-    out_console.print(
-        f"{totals.objects} objects; {totals.repaired} layouts were repaired; as they settled, objects moved at most "
-        f"{1000 * totals.max_moved_m:.1f} mm and turned {degrees(totals.max_turned_rad):.1f} degrees; they overlap by at most "
-        f"{1000 * totals.max_penetration_m:.2f} mm; {totals.cpu_seconds / max(1, ended):.2f} CPU-s each",
-        markup=False,
-    )
+    _print_totals(totals)
     if sheet and totals.accepted:
         from manitwin.apps.layouts.contact_sheet import CONTACT_SHEET, write_contact_sheet
 
@@ -100,6 +93,18 @@ def layout(
 
         print_document(layouts_document(report, out, causes_of(out), totals))
     raise typer.Exit(report.exit_code)
+
+
+def _print_totals(totals: LayoutTotals) -> None:
+    ended = totals.accepted + sum(totals.rejected.values())
+    why = "".join(f", {n} {reason}" for reason, n in totals.rejected.items())
+    out_console.print(f"{totals.accepted} of {ended} layouts accepted ({totals.acceptance:.1%}){why}", markup=False)
+    out_console.print(
+        f"{totals.objects} objects; {totals.repaired} layouts were repaired; as they settled, objects moved at most "
+        f"{1000 * totals.max_moved_m:.1f} mm and turned {degrees(totals.max_turned_rad):.1f} degrees; they overlap by at most "
+        f"{1000 * totals.max_penetration_m:.2f} mm; {totals.cpu_seconds / max(1, ended):.2f} CPU-s each",
+        markup=False,
+    )
 
 
 def _range(text: str) -> tuple[int, int]:

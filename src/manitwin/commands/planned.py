@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from datetime import timedelta
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -24,6 +23,7 @@ WORDS = {
     "to_build": "to build",
     "accepted": "accepted already",
     "rejected": "rejected already",
+    "failed": "failed already",
     "would_be_rejected": "would be rejected",
     "duplicate": "the same again",
 }
@@ -45,6 +45,8 @@ def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:
     counts: Counter[str] = Counter(planned.state for planned in plan.items)
     told = ", ".join(f"{counts[state]} {words}" for state, words in WORDS.items() if counts[state])
     out_console.print(f"dry run, nothing is written: {told or 'nothing to do'}", markup=False)
+    if counts["failed"]:
+        out_console.print(f"what failed is not tried again by itself: manitwin retry {place}", markup=False)
     each = "; ".join(
         f"{number} {kind} of {plan.rates[kind].cpu_s:.1f} CPU-s ({plan.rates[kind].source})"
         for kind, number in plan.to_build.items()
@@ -56,13 +58,14 @@ def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:
 
 
 def _line(planned: PlannedItem) -> str:
+    from manitwin.engine.events import title
+
     item = planned.item
-    what = f"'{(item.text or '')[:40]}'" if item.file is None else Path(item.file).name
     given = _given(item, planned.kind)
     detail = f": {planned.detail}" if planned.detail else ""
-    return f"{WORDS[planned.state]:<17} {planned.kind:<5} {what}{f' ({given})' if given else ''}{detail}"
+    return f"{WORDS[planned.state]:<17} {planned.kind or '?':<5} {title(item)}{f' ({given})' if given else ''}{detail}"
 
 
-def _given(item: Item, kind: str) -> str:
+def _given(item: Item, kind: str | None) -> str:
     units = f"units {item.units}" if kind == "mesh" else ""
     return ", ".join(filter(None, (item.name or "no name", units)))

@@ -18,7 +18,7 @@ def prompts(
     twin: Annotated[
         Path,
         typer.Argument(
-            help="A twin folder.", metavar="TWIN", callback=choices.there("a folder that manitwin build made")
+            help="A twin folder.", metavar="TWIN", callback=choices.must_exist("a folder that manitwin build made")
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write the questions into.")],

@@ -23,7 +23,7 @@ def publish(
         typer.Argument(
             help="A data set (a folder or a URL), or a folder of episodes.",
             metavar="DATASET|EPISODES",
-            callback=choices.there("the folder or URL of a data set"),
+            callback=choices.must_exist("the folder or URL of a data set"),
         ),
     ],
     out: Annotated[str, typer.Option("--out", "-o", help="A new folder or URL, or an older publication.")],

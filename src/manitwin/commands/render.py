@@ -18,7 +18,7 @@ def render(
         typer.Argument(
             help="What `manitwin trajectories` wrote.",
             metavar="EPISODES",
-            callback=choices.there("the folder that manitwin trajectories wrote"),
+            callback=choices.must_exist("the folder that manitwin trajectories wrote"),
         ),
     ],
     cameras: Annotated[str | None, choices.CAMERAS.option(help="By commas: front, side, top, wrist.")] = None,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -14,7 +14,8 @@ from manitwin.commands.planned import DryRun, print_plan
 from manitwin.commands.why import causes_of, print_causes
 
 if TYPE_CHECKING:
-    from manitwin.dataset_run import RunReport
+    from manitwin.config import BuildConfig
+    from manitwin.dataset_run import ExecutorName, RunReport
     from manitwin.engine.events import ItemEnded
 
 STYLES = {"accepted": "green", "rejected": "yellow", "failed": "red", "duplicate": "dim"}
@@ -26,7 +27,7 @@ def run(
         typer.Argument(
             help="A .csv or .jsonl manifest, folders, files; none: go on with what is there.",
             metavar="MANIFEST",
-            callback=choices.there("an image, a mesh, a folder, or a .csv or .jsonl manifest"),
+            callback=choices.must_exist("an image, a mesh, a folder, or a .csv or .jsonl manifest"),
         ),
     ] = None,
     dataset: Annotated[
@@ -61,12 +62,9 @@ def run(
     if not dataset:
         raise UsageError("no data set; give a folder or URL with -o")
     from manitwin.api import with_flags
-    from manitwin.commands.watched_run import WatchedRun
     from manitwin.config import load_config
     from manitwin.dataset_root import DatasetRoot
-    from manitwin.dataset_run import local_log, stored_config
-    from manitwin.dataset_run import run as run_dataset
-    from manitwin.render.device import require_renderer
+    from manitwin.dataset_run import stored_config
 
     settings = load_config(config) if config else stored_config(DatasetRoot(dataset))
     settings = with_flags(
@@ -76,17 +74,45 @@ def run(
     if jobs is not None:
         settings = settings.model_copy(update={"run": settings.run.model_copy(update={"cpu": jobs})})
     defaults: dict[str, str | None] = {"units": units, "up": up, "license": license, "attribution": attribution}
+    given: dict[str, Any] = {"texts": text or [], "defaults": defaults, "strict": strict}
     if dry_run:
-        from manitwin.dry_run import plan_run
-        from manitwin.generator_input import refusal
-        from manitwin.manifest import Notes, iterate_items
-        from manitwin.pipeline import check_names
-
-        check_names(settings)
-        notes = Notes()
-        items = iterate_items(inputs or [], defaults, notes, text or [], strict=strict, refusal=refusal(settings))
-        print_plan(plan_run(items, DatasetRoot(dataset), settings, notes.remarks), dataset, as_json=json)
+        _print_dry_run(inputs or [], dataset, settings, given, as_json=json)
         return
+    report = _run(
+        inputs or [], dataset, lines=lines, executor=options.executor_name(executor), address=address, config=settings,
+        **given,
+    )  # fmt: skip
+    _print_report(report, dataset)
+    if json:
+        from manitwin.commands.documents import run_document
+
+        print_document(run_document(report, dataset, causes_of(dataset)))
+    raise typer.Exit(report.exit_code)
+
+
+def _print_dry_run(
+    inputs: list[Path], dataset: str, settings: BuildConfig, given: dict[str, Any], *, as_json: bool
+) -> None:
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.dry_run import plan_run
+    from manitwin.generator_input import refusal
+    from manitwin.manifest import Notes, iterate_items
+    from manitwin.pipeline import check_names
+
+    check_names(settings)
+    notes = Notes()
+    items = iterate_items(inputs, notes=notes, refusal=refusal(settings), **given)
+    print_plan(plan_run(items, DatasetRoot(dataset), settings, notes.remarks), dataset, as_json=as_json)
+
+
+def _run(inputs: list[Path], dataset: str, *, lines: bool, executor: ExecutorName, **arguments: Any) -> RunReport:
+    """Run while a person watches; ``arguments`` are those of ``dataset_run.run``."""
+    from manitwin.commands.watched_run import WatchedRun
+    from manitwin.dataset_root import DatasetRoot
+    from manitwin.dataset_run import local_log
+    from manitwin.dataset_run import run as run_dataset
+    from manitwin.render.device import require_renderer
+
     if executor != "ray":
         require_renderer()
 
@@ -96,26 +122,10 @@ def run(
             _print_item(event)
 
     with WatchedRun("items", lambda: local_log(DatasetRoot(dataset))) as watched:
-        report = run_dataset(
-            inputs or [],
-            dataset,
-            texts=text or [],
-            config=settings,
-            executor=options.executor_name(executor),
-            address=address,
-            defaults=defaults,
-            strict=strict,
-            on_estimate=print_estimate,
-            on_start=watched.start,
-            on_stage=watched.progress.stage,
-            on_ended=ended,
-        )
-    _print_report(report, dataset)
-    if json:
-        from manitwin.commands.documents import run_document
-
-        print_document(run_document(report, dataset, causes_of(dataset)))
-    raise typer.Exit(report.exit_code)
+        return run_dataset(
+            inputs, dataset, executor=executor, **arguments, on_estimate=print_estimate, on_start=watched.start,
+            on_stage=watched.progress.stage, on_ended=ended,
+        )  # fmt: skip
 
 
 def _print_report(report: RunReport, dataset: str) -> None:

@@ -17,7 +17,7 @@ def stats(
         typer.Argument(
             help="A data set (a folder or URL), or a folder of episodes.",
             metavar="DATASET|EPISODES",
-            callback=choices.there("the folder or URL of a data set"),
+            callback=choices.must_exist("the folder or URL of a data set"),
         ),
     ],
     out: Annotated[

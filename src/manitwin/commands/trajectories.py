@@ -19,7 +19,7 @@ def trajectories(
         typer.Argument(
             help="A data set, a folder of twins, or scenes of `manitwin layout`.",
             metavar="DATASET|SCENES",
-            callback=choices.there("a data set, a folder of twins, or what manitwin layout wrote"),
+            callback=choices.must_exist("a data set, a folder of twins, or what manitwin layout wrote"),
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write episodes into.")],

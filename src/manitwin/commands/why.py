@@ -37,7 +37,12 @@ def causes_of_build(report: BuildReport) -> list[Cause]:
     from manitwin.ledger.unaccepted import Unaccepted
 
     return group_causes(
-        Unaccepted(title(result.item), result.status, result.reason, result.detail)
+        Unaccepted(
+            title(result.item),
+            result.status,
+            result.reason,
+            f"{result.error}: {result.detail}" if result.error else result.detail,
+        )
         for result in report.results
         if result.status != "accepted"
     )

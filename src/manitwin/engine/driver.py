@@ -208,12 +208,12 @@ class Driver:
                 flight.number, flight.stage, "rejected", attempts=flight.attempt(flight.stage), ran=True, error=str(reply.answer),
                 seconds=cost.seconds, cpu_seconds=cost.cpu_seconds, cost_usd=cost.cost_usd,
             )  # fmt: skip
-            self._stage_told(flight, flight.stage, "rejected", cost.seconds, str(reply.answer))
+            self._tell_stage_ended(flight, flight.stage, "rejected", cost.seconds, str(reply.answer))
             flight.last, flight.rejected = flight.stage, reply
             self._queue(flight)
         elif isinstance(reply, Ending):
             self.ledger.stage_ended(flight.number, ASSEMBLE, "done", attempts=flight.attempt(ASSEMBLE), ran=True)
-            self._stage_told(flight, ASSEMBLE, "done")
+            self._tell_stage_ended(flight, ASSEMBLE, "done")
             self._ended(flight, reply)
 
     def _surveyed(self, flight: Flight, reply: Surveyed) -> None:
@@ -222,7 +222,7 @@ class Driver:
             flight.number, INPUT, "done" if answer is None else "rejected", attempts=flight.attempt(INPUT), ran=True,
             error=answer,
         )  # fmt: skip
-        self._stage_told(flight, INPUT, "done" if answer is None else "rejected", detail=answer or "")
+        self._tell_stage_ended(flight, INPUT, "done" if answer is None else "rejected", detail=answer or "")
         other = self.ledger.identify(flight.number, reply.twin_id, reply.kind)
         if other is not None:
             self._flights -= 1
@@ -246,7 +246,7 @@ class Driver:
             flight.number, stage, "done", attempts=flight.attempt(stage), key=ran.key,
             ran=not ran.reused, seconds=ran.cost.seconds, cpu_seconds=ran.cost.cpu_seconds, cost_usd=ran.cost.cost_usd,
         )  # fmt: skip
-        self._stage_told(
+        self._tell_stage_ended(
             flight, stage, "there already" if ran.reused else "done", 0.0 if ran.reused else ran.cost.seconds
         )
         flight.done.append((stage, ran.key))
@@ -259,7 +259,7 @@ class Driver:
             flight.number, ending.status, recipe_sha256=self.recipe.sha256, reason=ending.reason, detail=ending.detail,
             revision=ending.revision,
         )  # fmt: skip
-        item, detail = flight.opened.item, ending.told
+        item, detail = flight.opened.item, ending.detail_and_hint
         self._tell(ItemEnded(flight.number, item, flight.twin_id, ending.status, detail, found))
 
     def _failed(self, flight: Flight, gate: Gate, failure: Failure) -> None:
@@ -270,7 +270,7 @@ class Driver:
             counted = attempts - 1 if patient else attempts
             flight.opened.attempts[stage] = counted
             self.ledger.stage_ended(number, stage, "waiting", attempts=counted, error=failure.message)
-            self._stage_told(flight, stage, "waiting", 0.0, failure.message, failure.trace)
+            self._tell_stage_ended(flight, stage, "waiting", 0.0, failure.message, failure.trace)
             if failure.kind == "unavailable":
                 gate.down()
             elif failure.kind == "rate_limited":
@@ -285,14 +285,14 @@ class Driver:
         if flight.twin_id:
             self._sweep(flight.twin_id)
         self.ledger.stage_ended(number, stage, "failed", attempts=attempts, error=failure.message)
-        self._stage_told(flight, stage, "failed", 0.0, failure.message, failure.trace)
+        self._tell_stage_ended(flight, stage, "failed", 0.0, failure.message, failure.trace)
         detail = f"{stage} failed {attempts} times: {failure.message}"
         self.ledger.item_ended(
             number, "failed", recipe_sha256=self.recipe.sha256, reason=FAILED_AS.get(failure.kind, "error"), detail=detail
         )  # fmt: skip
         self._tell(ItemEnded(number, flight.opened.item, flight.twin_id, "failed", detail))
 
-    def _stage_told(
+    def _tell_stage_ended(
         self, flight: Flight, stage: str, state: StageState, seconds: float = 0.0, detail: str = "", trace: str = ""
     ) -> None:
         self._tell_stage(StageEnded(flight.opened.item, stage, state, seconds, detail, flight.twin_id, trace))

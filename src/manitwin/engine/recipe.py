@@ -28,7 +28,7 @@ class Ending:
     hint: str | None = None
 
     @property
-    def told(self) -> str:
+    def detail_and_hint(self) -> str:
         """The detail and the hint, in one line for a person."""
         return "; ".join(filter(None, (self.detail, self.hint)))
 

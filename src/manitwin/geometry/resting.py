@@ -2,14 +2,42 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.twin import Placement
 
 UPRIGHT_DEG = 10.0
 """A pose whose +Z axis is within this of the vertical is upright, or upside down where +Z points down."""
 
 Rest = Literal["upright", "upside_down", "lying"]
+
+
+@dataclass(frozen=True)
+class RestingPose:
+    """A placement with its number in the record, and how an object rests in it; ``side_down`` is None unless it lies."""
+
+    number: int
+    placement: Placement
+    rest: Rest
+    side_down: str | None
+    tilt_deg: float
+
+
+def resting_poses(placements: Sequence[Placement]) -> list[RestingPose]:
+    """Say how an object rests in each placement: first those that stayed in simulation, likely ones before unlikely ones."""
+    order = sorted(enumerate(placements), key=lambda each: (not each[1].settled, -each[1].probability))
+    return [_resting_pose(number, placement) for number, placement in order]
+
+
+def _resting_pose(number: int, placement: Placement) -> RestingPose:
+    rotation = rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz))
+    rest = rest_of(rotation)
+    return RestingPose(number, placement, rest, side_down(rotation) if rest == "lying" else None, tilt_deg(rotation))
 
 
 def rest_of(object_to_plane: np.ndarray) -> Rest:

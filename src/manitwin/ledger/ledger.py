@@ -270,10 +270,16 @@ def _fields(item: Item) -> dict[str, Any]:
 
 @contextmanager
 def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
-    """Open a ledger for reading, also while a run writes it; raises UsageError where there is none."""
+    """Open a ledger for reading, also while a run writes it; raises UsageError where there is none.
+
+    Nothing is left beside one that no run writes: SQLite's reader of a write-ahead log makes files there and does not remove
+    them, so where that log holds nothing it is told to leave it alone (https://sqlite.org/uri.html, ``immutable``).
+    """
     if not path.is_file():
         raise UsageError(f"{path}: no ledger; `manitwin run MANIFEST -o DATASET` makes one")
-    connection = sqlite3.connect(f"file:{path}?mode=ro", uri=True)
+    log = path.with_name(f"{path.name}-wal")
+    complete = not log.is_file() or log.stat().st_size == 0
+    connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro{'&immutable=1' if complete else ''}", uri=True)
     connection.row_factory = sqlite3.Row
     try:
         yield connection

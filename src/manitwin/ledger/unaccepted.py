@@ -14,6 +14,8 @@ UnacceptedState = Literal["rejected", "failed", "waiting", "unfinished"]
 class Unaccepted:
     """One item: ``which`` names it to a person, ``reason`` is a code, ``message`` says in words what happened.
 
+    The message of an error begins with its class, behind the stage and the attempts where these are told.
+
     ``waiting`` is open and had to wait for a service as the run ended; ``unfinished`` is what ``build`` calls an item that has
     not ended.
     """

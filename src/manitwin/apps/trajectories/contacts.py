@@ -51,7 +51,7 @@ class ContactReader:
             self._roles[component], self._names[component] = role, name
 
     def read(self) -> Sequence[physx.PhysxContact]:
-        """Return the contacts of the last step, of which the others tell; dear where many hulls stand on a table."""
+        """Return the contacts of the last step, of which the others tell; expensive where many hulls stand on a table."""
         contacts: Sequence[physx.PhysxContact] = self._system.get_contacts()
         return contacts
 
