@@ -27,6 +27,7 @@ from manitwin.apps.trajectories.replay_pictures import Replay, twin_drawable
 from manitwin.apps.trajectories.run import make_episodes
 from manitwin.apps.trajectories.stored_episode import StoredEpisode
 from manitwin.apps.trajectories.video import write_animation
+from manitwin.render.false_colors import depth_in_colors, depth_range_m, ids_in_colors
 from manitwin.robots.load import load_robot
 from manitwin.scenes.scene import Furniture, Light
 from manitwin.scenes.scene_file import read_scene
@@ -58,15 +59,13 @@ def layouts(twins: Path, work: Path) -> tuple[Image.Image, dict[str, str]]:
         config = LayoutsConfig(seed=SEED, layout=LayoutSettings(objects=(4, 6), surface=surface, clutter="dense"))
         make_layouts(twins, work / surface, 1, config, executor="inline")
         scene = read_scene(work / surface / scene_name(f"layout_{SEED}_000000"))
-        frames, ids = scene_pictures(scene, source.folder, width_px=TILE_PX, height_px=TILE_PX)
+        frames, _ = scene_pictures(scene, source.folder, width_px=TILE_PX, height_px=TILE_PX)
         front, oblique = frames["front"], frames["oblique"]
-        hues = np.random.default_rng(0).integers(60, 255, (max(ids.values()) + 1, 3), np.uint8)
-        hues[0] = 0
-        near = np.where(oblique.depth_m > 0, oblique.depth_m, np.nan)
-        grey = 255 * (1 - (near - np.nanmin(near)) / (np.nanmax(near) - np.nanmin(near)))
-        depth = np.repeat(np.nan_to_num(grey).astype(np.uint8)[..., None], 3, axis=2)
+        range_m = depth_range_m(oblique.depth_m, oblique.ids)
+        assert range_m is not None, "a layout has objects"
+        depth = depth_in_colors(oblique.depth_m, range_m)
         normals = (127.5 * (oblique.normals + 1) * (oblique.depth_m > 0)[..., None]).astype(np.uint8)
-        rows.append([front.rgb, oblique.rgb, depth, normals, hues[oblique.ids]])
+        rows.append([front.rgb, oblique.rgb, depth, normals, ids_in_colors(oblique.ids)])
         shown[surface] = of_scene(scene)
     return sheet(rows), shown
 

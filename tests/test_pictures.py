@@ -12,6 +12,7 @@ import pytest
 from PIL import Image
 
 import manitwin
+from manitwin.render.false_colors import NOTHING_RGB, depth_in_colors, id_color
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PICTURES = sorted(path for path in DOCS.rglob("*") if path.suffix in (".png", ".webp"))
@@ -70,6 +71,20 @@ def test_pictures_are_small(picture: Path) -> None:
 def test_pictures_of_twins_say_what_they_show(name: str) -> None:
     assert set(made_of(name)) == MADE_OF[name]
     assert all(len(digest) == 16 for digest in made_of(name).values())
+
+
+def test_layouts_show_depth_and_ids_in_the_colours_of_previews(make_data_pictures: ModuleType) -> None:
+    shown, size = np.asarray(Image.open(DOCS / "layouts.png").convert("RGB")), make_data_pictures.TILE_PX
+    ramp = np.linspace(0.0, 1.0, 4096)[None] + 1e-6
+    colors = {
+        2: {NOTHING_RGB, *map(tuple, depth_in_colors(ramp, (0.0, 1.0))[0].tolist())},
+        4: {id_color(number) for number in range(32)},
+    }
+    for column, allowed in colors.items():
+        left = column * (size + 4)
+        for top in range(0, len(shown), size + 4):
+            tile = shown[top : top + size, left : left + size].reshape(-1, 3)
+            assert {*map(tuple, np.unique(tile, axis=0).tolist())} <= allowed
 
 
 @pytest.mark.slow
