@@ -58,3 +58,9 @@ def test_it_goes_to_another_process(root: DatasetRoot) -> None:
 def test_an_unknown_protocol_is_refused() -> None:
     with pytest.raises(UsageError, match="nowhere://x"):
         DatasetRoot("nowhere://x")
+
+
+def test_absolute_of_a_folder_is_a_path_and_of_a_url_the_url(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert DatasetRoot("some/set").absolute() == str(tmp_path.resolve() / "some" / "set")
+    assert DatasetRoot("memory://bucket/set").absolute() == "memory://bucket/set"

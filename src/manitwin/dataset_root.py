@@ -46,6 +46,10 @@ class DatasetRoot:
     def __reduce__(self) -> tuple[type, tuple[str]]:
         return type(self), (self.path if self.local else self.url,)
 
+    def absolute(self) -> str:
+        """Return a folder's absolute path, for workers that run elsewhere; a URL stays as it is."""
+        return self.url if self.local is None else str(self.local.resolve())
+
     def full(self, name: str) -> str:
         """Return the name as the file system knows it. Raises UsageError for one that leaves the root."""
         if name.startswith("/") or ".." in PurePosixPath(name).parts:

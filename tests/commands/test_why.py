@@ -11,6 +11,7 @@ from typer.testing import CliRunner, Result
 from manitwin.cli import app
 from manitwin.dataset_root import twin_name
 from manitwin.scenes.scene_file import read_scene
+from manitwin.store import RECORD
 from scene_twins import THINGS, write_things
 
 
@@ -31,31 +32,31 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-def without(scenes: Path, place: Path, *, twins_of_first: bool) -> Path:
-    """A copy whose scenes' twins are gone: those of the first scene, or all others. Returns the copy's scenes."""
+def copied(scenes: Path, place: Path) -> tuple[Path, set[str]]:
+    """A copy of scenes and their data; returns its scenes, and the twins that are in none but later ones than the first."""
     shutil.copytree(scenes, place, dirs_exist_ok=True)
     config = place / "scenes" / "config.json"
     config.write_text(config.read_text().replace(str(scenes), str(place)))
     folders = sorted((place / "scenes/scenes").glob("*/*"))
     first = {each.twin_id for each in read_scene(folders[0]).objects}
-    every = {each.twin_id for folder in folders for each in read_scene(folder).objects}
-    assert every - first, "the layouts must be of both twins"
-    for twin_id in first if twins_of_first else every - first:
-        shutil.rmtree(place / "data" / twin_name(twin_id))
-    return place / "scenes"
+    later = {each.twin_id for folder in folders for each in read_scene(folder).objects} - first
+    assert later, "the layouts must be of both twins"
+    return place / "scenes", later
 
 
 def test_trajectories_tell_the_most_frequent_cause_and_its_remedy(scenes: Path, tmp_path: Path) -> None:
-    place, out = without(scenes, tmp_path, twins_of_first=False), tmp_path / "episodes"
+    (place, later), out = copied(scenes, tmp_path), tmp_path / "episodes"
+    for twin_id in later:
+        (tmp_path / "data" / twin_name(twin_id) / RECORD).write_text("{}")
     done = manitwin("trajectories", place, "-o", out, "-n", 6, "--executor", "inline")
     assert done.exit_code == 4
     lines = done.stderr.splitlines()
-    assert lines[0].startswith("why failed: ") and f"{tmp_path / 'data'}: no twin " in lines[0]
-    assert "remedy: put it back, or name the data set where the twins are now (--twins)" in lines[1]
+    assert lines[0].startswith("why failed: ") and "twin.json: schema version None" in lines[0]
+    assert "remedy: build the twin again" in lines[1]
     assert f"manitwin retry {out} and the same command again" in lines[1]
     assert "run the same command again" not in done.output, "by itself it would try nothing again"
     told = manitwin("status", out)
-    assert "no twin" in told.stdout and "--why" in told.stdout
+    assert "schema version None" in told.stdout and "--why" in told.stdout
 
     for step in (
         ("retry", out),
@@ -67,10 +68,25 @@ def test_trajectories_tell_the_most_frequent_cause_and_its_remedy(scenes: Path, 
 
 
 def test_scenes_whose_twins_are_gone_are_refused_before_any_work(scenes: Path, tmp_path: Path) -> None:
-    place, out = without(scenes, tmp_path, twins_of_first=True), tmp_path / "episodes"
+    (place, later), out = copied(scenes, tmp_path), tmp_path / "episodes"
+    for twin_id in later:
+        shutil.rmtree(tmp_path / "data" / twin_name(twin_id))
     done = manitwin("trajectories", place, "-o", out, "-n", 6)
     assert done.exit_code != 0 and "name the data set where the twins are now (--twins)" in str(done.exception)
+    assert "(1 of 2 are missing)" in str(done.exception)
     assert not out.exists()
+
+
+@pytest.mark.parametrize("command", ["trajectories", "render"])
+def test_twins_at_a_url_are_refused_by_their_url(command: str, scenes: Path, tmp_path: Path) -> None:
+    episodes = tmp_path / "episodes"
+    episodes.mkdir()
+    (episodes / "config.json").write_text('{"robot": "panda", "dataset": "gone"}')
+    url = "memory://bucket/set"
+    of = [scenes / "scenes", "-o", tmp_path / "out"] if command == "trajectories" else [episodes]
+    done = manitwin(command, *of, "--twins", url)
+    assert done.exit_code != 0 and str(done.exception).startswith(f"{url}: a data set at a URL needs a local folder")
+    assert not (tmp_path / "out").exists()
 
 
 def test_twins_elsewhere_are_for_scenes_alone(scenes: Path, tmp_path: Path) -> None:

@@ -47,3 +47,11 @@ def test_twins_of_a_url_are_copied_once(tmp_path: Path) -> None:
 def test_a_place_that_is_not_there_says_so(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no such folder"):
         TwinSource(tmp_path / "nowhere")
+
+
+def test_missing_twins_are_counted_before_any_is_read(tmp_path: Path) -> None:
+    ids = write_set(tmp_path / "set", accepted=2, rejected=0)
+    source = TwinSource(tmp_path / "set")
+    source.check(set(ids))
+    with pytest.raises(UsageError, match=r"no twin ffff there \(2 of 4 are missing\).*--twins"):
+        source.check({*ids, "gggg", "ffff"})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from manitwin.dataset_root import TWINS, DatasetRoot, twin_name
@@ -45,6 +45,12 @@ class TwinSource:
         except FileNotFoundError as error:
             raise UsageError(self._missing(twin_id)) from error
 
+    def check(self, twin_ids: Collection[str]) -> None:
+        """Raise UsageError where twins are not there, with how many of them; only whether they are there is looked at."""
+        gone = sorted(each for each in twin_ids if not self.root.exists(f"{self._name(each)}/{RECORD}"))
+        if gone:
+            raise UsageError(self._missing(gone[0], f" ({len(gone):,} of {len(twin_ids):,} are missing)"))
+
     def folder(self, twin_id: str) -> Path:
         """Return a local folder with a twin's files; raises UsageError where there is no such twin."""
         name = self._name(twin_id)
@@ -65,8 +71,11 @@ class TwinSource:
     def _name(self, twin_id: str) -> str:
         return twin_id if self.flat else twin_name(twin_id)
 
-    def _missing(self, twin_id: str) -> str:
-        return f"{self.root.url}: no twin {twin_id} there; put it back, or name the data set where the twins are now (--twins)"
+    def _missing(self, twin_id: str, count: str = "") -> str:
+        return (
+            f"{self.root.url}: no twin {twin_id} there{count}; put it back, or name the data set where the twins are now"
+            " (--twins)"
+        )
 
     def _flat_ids(self) -> Iterator[str]:
         assert self.root.local is not None

@@ -56,7 +56,7 @@ def make_layouts(
     """
     if count < 1:
         raise UsageError(f"{count} layouts; ask for 1 or more")
-    place = _absolute(dataset)
+    place = DatasetRoot(dataset).absolute()
     pool = pool_of(place)
     for category in config.layout.include:
         pool.of_category(category)
@@ -71,7 +71,7 @@ def make_layouts(
 
 def without_upright(dataset: str | Path) -> tuple[str, ...]:
     """Return the ids of a data set's twins that ``upright`` layouts hold as they rest: none of their placements is upright."""
-    return tuple(twin.twin_id for twin in pool_of(_absolute(dataset)).twins if not twin.stands)
+    return tuple(twin.twin_id for twin in pool_of(DatasetRoot(dataset).absolute()).twins if not twin.stands)
 
 
 def accepted_scenes(out: str | Path) -> list[str]:
@@ -100,9 +100,3 @@ def layout_totals(out: str | Path) -> LayoutTotals:
         max_penetration_m=max((scene.measures.max_penetration_m for scene in scenes), default=0.0),
         cpu_seconds=float(cpu_seconds),
     )
-
-
-def _absolute(place: str | Path) -> str:
-    """Return a folder's absolute path: workers may run elsewhere; a URL stays as it is."""
-    root = DatasetRoot(place)
-    return root.url if root.local is None else str(root.local.resolve())

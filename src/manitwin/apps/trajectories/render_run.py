@@ -41,7 +41,7 @@ def draw_episodes(
     """
     said = _said(out)
     named_cameras(config.cameras, load_robot(said["robot"]))
-    dataset = said["dataset"] if twins is None else str(Path(twins).resolve())
+    dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
     TwinSource(dataset)
     items = (Item(file=None, text=folder.name) for folder in batch_folders(out))
     recipe = PicturesRecipe(config, str(out.resolve()), dataset, said["robot"])

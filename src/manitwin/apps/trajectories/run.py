@@ -39,14 +39,14 @@ class Source:
         ``twins`` names where those of the scenes are now, None: where they were as the layouts were made.
         """
         root = DatasetRoot(place)
-        path = root.url if root.local is None else str(root.local.resolve())
+        path = root.absolute()
         if root.exists(SCENES) and root.exists(CONFIG):
             said = json.loads(root.read_bytes(CONFIG))
             if "dataset" not in said:
                 raise UsageError(
                     f"{place}/{CONFIG}: does not say whose twins these scenes are of; make the layouts again"
                 )
-            dataset = said["dataset"] if twins is None else str(Path(twins).resolve())
+            dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
             _check_twins(dataset, Path(path))
             return cls(dataset, path)
         if twins is not None:
@@ -55,11 +55,12 @@ class Source:
 
 
 def _check_twins(dataset: str, scenes: Path) -> None:
-    """Raise UsageError where the twins of the first scene are not there: every batch would fail for it."""
+    """Raise UsageError where twins of the scenes are not there: every batch with one of them would fail."""
     source = TwinSource(dataset)
-    first = read_scene(scenes / scene_name(scene_ids(scenes)[0]))
-    for each in first.objects:
-        source.folder(each.twin_id)
+    named = {
+        each.twin_id for scene_id in scene_ids(scenes) for each in read_scene(scenes / scene_name(scene_id)).objects
+    }
+    source.check(named)
 
 
 def _check_out(out: DatasetRoot, source: Source) -> None:
