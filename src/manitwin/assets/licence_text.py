@@ -28,10 +28,10 @@ def stated_licence(texts: Iterable[str]) -> tuple[str | None, str | None]:
                 licence = licence or _without_marks(value)
             else:
                 attribution = attribution or value
-    return said(licence), said(attribution)
+    return stated_or_none(licence), stated_or_none(attribution)
 
 
-def said(text: str | None) -> str | None:
+def stated_or_none(text: str | None) -> str | None:
     """Return what stands where a licence or an author should, or None for words that say nothing."""
     return None if text is None or text.strip().lower() in _UNSAID else text.strip()
 

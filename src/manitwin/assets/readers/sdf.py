@@ -11,7 +11,7 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets.asset import Asset, Contact, Inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.detect import only_file
-from manitwin.assets.licence_text import said, stated_licence
+from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.sdf_poses import ModelFrames, pose_of
 from manitwin.assets.sdf_shapes import SdfShapes
 from manitwin.assets.urdf_inertial import combined
@@ -184,6 +184,6 @@ def _licence(opened: SdfModel) -> tuple[str | None, str | None]:
     comments = [*comments_before(opened.root), *(comments_before(opened.config) if opened.config is not None else ())]
     licence, attribution = stated_licence(comments)
     if opened.config is not None:
-        licence = said(text_of(opened.config, "license")) or licence
-        attribution = said(text_of(opened.config, "author/name")) or attribution
+        licence = stated_or_none(text_of(opened.config, "license")) or licence
+        attribution = stated_or_none(text_of(opened.config, "author/name")) or attribution
     return licence, attribution

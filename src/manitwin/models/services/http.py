@@ -234,7 +234,7 @@ class Service:
         # nobody knows whether it was taken
         timeout = httpx2.Timeout(self._services.timeout_s, connect=min(self._services.timeout_s, MAX_CONNECT_S))
         trust_env = not is_local(self.base_url)
-        hooks = {"response": [rehearsed.hear]}
+        hooks = {"response": [rehearsed.note_rehearsal_answer]}
         return httpx2.Client(
             timeout=timeout, verify=_tls(), follow_redirects=False, trust_env=trust_env, event_hooks=hooks
         )

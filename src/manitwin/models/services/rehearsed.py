@@ -1,4 +1,4 @@
-"""Hear from an answer whether a rehearsal server (``manitwin fake``) gave it."""
+"""Note whether a rehearsal server (``manitwin fake``) gave an answer."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import httpx2
 from manitwin.charges import REHEARSAL_MARK, note_rehearsal
 
 
-def hear(response: httpx2.Response) -> None:
+def note_rehearsal_answer(response: httpx2.Response) -> None:
     """Note a rehearsal's answer by its header: an event hook of HTTP clients."""
     if REHEARSAL_MARK in response.headers:
         note_rehearsal()

@@ -165,5 +165,5 @@ class OpenAiChat:
             timeout=timeout,
             follow_redirects=False,
             trust_env=not is_local(self.base_url),
-            event_hooks={"request": [only_ours], "response": [rehearsed.hear]},
+            event_hooks={"request": [only_ours], "response": [rehearsed.note_rehearsal_answer]},
         )
