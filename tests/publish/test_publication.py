@@ -11,7 +11,9 @@ import pytest
 from made_twins import index, make_twin
 
 import manitwin.publish.publish as module
+from manitwin.dataset_root import DatasetRoot
 from manitwin.errors import UsageError
+from manitwin.publish.publication import EPISODES, Publication
 from manitwin.publish.publish import ShardDone, publish
 
 
@@ -43,6 +45,17 @@ def test_interrupted_publication_goes_on_where_it_stopped(dataset: Path, publish
         dataset, out, twins_per_shard=2, on_shard=lambda shard: kept.append(shard.name) if shard.kept else None
     )
     assert done.kept_shards == 2 and kept == ["data/mug/mug-000000.tar", "data/mug/mug-000001.tar"]
+    assert files_below(out) == files_below(published)
+
+
+def test_one_that_an_older_version_began_goes_on(dataset: Path, published: Path, tmp_path: Path) -> None:
+    out = tmp_path / "small-set"
+    with pytest.raises(KeyboardInterrupt):
+        publish(dataset, out, twins_per_shard=2, on_shard=stop_after(1))
+    (out / ".publish" / "started").write_bytes(b"")  # as it was when there were twins alone
+    with pytest.raises(UsageError, match="a publication of twins was begun there"):
+        Publication(DatasetRoot(out), EPISODES).begin()
+    assert publish(dataset, out, twins_per_shard=2).kept_shards == 1
     assert files_below(out) == files_below(published)
 
 

@@ -52,6 +52,12 @@ def test_nothing_to_publish_says_which_licences_are_there(allow: list[str]) -> N
         select(ROWS, allow)
 
 
+def test_nothing_there_is_not_called_a_matter_of_licences() -> None:
+    with pytest.raises(UsageError, match="no accepted twin is there") as raised:
+        select([], None)
+    assert "licence" not in str(raised.value)
+
+
 def test_unknown_alone_is_refused_by_default() -> None:
     with pytest.raises(UsageError, match="unknown"):
         select(ROWS[3:], None)

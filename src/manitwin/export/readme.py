@@ -8,19 +8,18 @@ from manitwin.export.content import TwinContent
 from manitwin.export.exporter import Exported
 from manitwin.export.format_notes import QUANTITIES, UNTOLD, FormatNotes
 from manitwin.export.inertial import inertial_of
-from manitwin.export.licenses import LICENSE_FILE, license_of, one_line
+from manitwin.export.licenses import LICENSE_FILE, license_of
+from manitwin.markdown import markdown_escaped
 from manitwin.twin import Estimate
 
 README_FILE = "README.md"
-
-_MARKUP = str.maketrans({c: f"\\{c}" for c in "\\`*_{}[]<>#|!"})
 
 
 def readme(twin: TwinContent, format_name: str, exported: Exported) -> str:
     """Return the README of a twin in one format. Raises ExportError as ``inertial_of``."""
     notes = exported.notes or FormatNotes.of(format_name)
     record = twin.record
-    caption = plain(record.language.caption) if record.language is not None else plain(record.name or "An object.")
+    caption = markdown_escaped(record.name or "An object." if record.language is None else record.language.caption)
     lines = [
         f"# {twin.name} for {notes.title}",
         "",
@@ -35,7 +34,8 @@ def readme(twin: TwinContent, format_name: str, exported: Exported) -> str:
         *_how_to_load(twin, notes, exported),
         "## Licence",
         "",
-        f"{plain(license_of(record))}; attribution: {plain(record.source.attribution or '') or 'none known'}. "
+        f"{markdown_escaped(license_of(record))}; "
+        f"attribution: {markdown_escaped(record.source.attribution or '') or 'none known'}. "
         f"See [{LICENSE_FILE}]({LICENSE_FILE}); it goes wherever these files go.",
     ]
     return "\n".join(lines) + "\n"
@@ -44,11 +44,6 @@ def readme(twin: TwinContent, format_name: str, exported: Exported) -> str:
 def _nothing_left_out(notes: FormatNotes) -> str:
     told = UNTOLD not in notes.says.values()
     return "nothing that the twin knows of its physics." if told else f"{UNTOLD}."
-
-
-def plain(text: str) -> str:
-    """Return words of an outsider as Markdown that shows them and does nothing else."""
-    return one_line(text).translate(_MARKUP)
 
 
 def _what_is_said(twin: TwinContent, notes: FormatNotes) -> list[str]:
@@ -69,7 +64,7 @@ def _what_is_said(twin: TwinContent, notes: FormatNotes) -> list[str]:
 
 
 def _estimate(estimate: Estimate) -> str:
-    return f"{estimate.value:.4g} ({estimate.low:.4g} to {estimate.high:.4g}, {plain(estimate.source)})"
+    return f"{estimate.value:.4g} ({estimate.low:.4g} to {estimate.high:.4g}, {markdown_escaped(estimate.source)})"
 
 
 def _how_to_load(twin: TwinContent, notes: FormatNotes, exported: Exported) -> list[str]:

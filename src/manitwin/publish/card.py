@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from manitwin.markdown import markdown_escaped, table
 from manitwin.publish.card_statistics import category_lines, licence_lines, total_lines
 from manitwin.publish.card_usage import usage_text
 from manitwin.publish.hub_license import hub_license
 from manitwin.publish.licences import LICENSES_MD, without_attribution
-from manitwin.publish.markdown import plain, table
 from manitwin.publish.tables import PUBLISHED, columns_of
 from manitwin.version import installed_version
 
@@ -51,7 +51,7 @@ def dataset_card(facts: CardFacts) -> str:
         *_front_matter(facts),
         "---",
         "",
-        f"# {plain(facts.name)}",
+        f"# {markdown_escaped(facts.name)}",
         "",
         f"{len(facts.twins):,} simulation-ready objects for robot manipulation: each with a textured mesh, convex collision "
         "hulls, mass, friction and inertia with their sources, words, functional points, stable poses, and "

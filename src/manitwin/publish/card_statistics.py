@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.publish.markdown import plain, table
+from manitwin.markdown import markdown_escaped, table
 
 CATEGORIES_SHOWN = 40
 
@@ -70,7 +70,7 @@ def category_lines(twins: Rows) -> list[str]:
     for twin in twins:
         verified[twin["category"]] += twin["verified"]
     order = sorted(count, key=lambda name: (-count[name], name))
-    rows = [[plain(name), f"{count[name]:,}", f"{verified[name]:,}"] for name in order[:CATEGORIES_SHOWN]]
+    rows = [[markdown_escaped(name), f"{count[name]:,}", f"{verified[name]:,}"] for name in order[:CATEGORIES_SHOWN]]
     lines = table(["category", "twins", "verified grasps"], rows)
     rest = order[CATEGORIES_SHOWN:]
     if rest:
@@ -83,19 +83,19 @@ def licence_lines(twins: Rows) -> list[str]:
     """Return a table of the licences."""
     count = Counter(twin["license"] for twin in twins)
     named = Counter(twin["license"] for twin in twins if twin["attribution"])
-    rows = [[plain(name), f"{count[name]:,}", f"{named[name]:,}"] for name in sorted(count)]
+    rows = [[markdown_escaped(name), f"{count[name]:,}", f"{named[name]:,}"] for name in sorted(count)]
     return table(["licence", "twins", "with attribution"], rows)
 
 
 def _counted(twins: Rows, column: str) -> str:
     count = Counter(str(twin[column]) for twin in twins)
-    return ", ".join(f"{plain(name)} {number:,}" for name, number in sorted(count.items()))
+    return ", ".join(f"{markdown_escaped(name)} {number:,}" for name, number in sorted(count.items()))
 
 
 def _mass_sources(twins: Rows) -> str:
     """Count masses by who said so: ``prior:mug`` and ``prior:bowl`` are both ``prior``."""
     count = Counter(twin["mass_source"].partition(":")[0] for twin in twins)
-    return ", ".join(f"{plain(name)} {number:,}" for name, number in sorted(count.items()))
+    return ", ".join(f"{markdown_escaped(name)} {number:,}" for name, number in sorted(count.items()))
 
 
 def _share(part: int, whole: int) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from manitwin.errors import UsageError
-from manitwin.publish.markdown import plain, table
+from manitwin.markdown import markdown_escaped, table
 from manitwin.stages.quality import REHEARSAL
 
 UNKNOWN = "unknown"
@@ -67,18 +67,26 @@ def select(
         else:
             kept_back.add(twin["twin_id"])
             left_out[twin["license"] or UNKNOWN] += 1
-    if not published and rehearsals:
-        raise UsageError(
-            f"no twin may go out: {rehearsals:,} are rehearsals, made by manitwin fake and not by models; build them again"
-            " with models into a new folder, or ask for them with --with-rehearsals"
-        )
-    if not published:
-        there = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items())) or "none"
-        raise UsageError(
-            f"no twin may go out; licences of the accepted twins: {there}; "
-            f"name those that may in --license-allow, {UNKNOWN!r} too if you know that you may"
-        )
+    check_some_go_out("accepted twin", len(published), left_out, rehearsals)
     return Selection(frozenset(published), frozenset(kept_back), dict(sorted(left_out.items())), rehearsals)
+
+
+def check_some_go_out(noun: str, count: int, left_out: Mapping[str, int], rehearsals: int) -> None:
+    """Raise UsageError where the ``count`` of what goes out is 0; others stay by licence, or because they are rehearsals."""
+    if count:
+        return
+    if rehearsals:
+        raise UsageError(
+            f"no {noun} may go out: {rehearsals:,} are rehearsals, made by manitwin fake and not by models; build the"
+            " twins again with models into a new folder, or ask for them with --with-rehearsals"
+        )
+    if not left_out:
+        raise UsageError(f"no {noun} is there, so nothing can go out; make some first")
+    there = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items()))
+    raise UsageError(
+        f"no {noun} may go out; licences that keep them here: {there}; name those that may in --license-allow,"
+        f" {UNKNOWN!r} too if you know that you may"
+    )
 
 
 def without_attribution(twins: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -103,7 +111,7 @@ def licenses_page(name: str, twins: Sequence[Mapping[str, Any]], *, introduction
         authors = by_licence.setdefault(twin["license"], {})
         authors.setdefault(twin["attribution"] or "", []).append(twin["twin_id"])
     lines = [
-        f"# Licences of {plain(name)}",
+        f"# Licences of {markdown_escaped(name)}",
         "",
         introduction,
         "",
@@ -116,14 +124,18 @@ def licenses_page(name: str, twins: Sequence[Mapping[str, Any]], *, introduction
     if missing:
         lines += ["", f"**{len(missing):,} twins are under a licence that asks for attribution, and none is known.**"]
     for licence, authors in sorted(by_licence.items()):
-        lines += ["", f"## {plain(licence)}", ""]
+        lines += ["", f"## {markdown_escaped(licence)}", ""]
         for author, ids in sorted(authors.items()):
             shown = ", ".join(ids[:_IDS_SHOWN])
             more = f" and {len(ids) - _IDS_SHOWN:,} more" if len(ids) > _IDS_SHOWN else ""
-            lines.append(f"- {plain(author) or 'no attribution known'}: {shown}{more}")
+            lines.append(f"- {markdown_escaped(author) or 'no attribution known'}: {shown}{more}")
     return "\n".join(lines) + "\n"
 
 
 def _linked(licence: str) -> str:
     spdx = licence != UNKNOWN and not licence.startswith("LicenseRef-") and " " not in licence
-    return f"[{plain(licence)}](https://spdx.org/licenses/{licence}.html)" if spdx else plain(licence)
+    return (
+        f"[{markdown_escaped(licence)}](https://spdx.org/licenses/{licence}.html)"
+        if spdx
+        else markdown_escaped(licence)
+    )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import shutil
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -28,7 +29,7 @@ from manitwin.store import canonical_json, sha256_of_file
 SUMS = "SHA256SUMS"
 OPEN = ".publish"
 _STARTED = f"{OPEN}/started"
-_INCOMING = "incoming-"
+_INCOMING, _SCRATCH = "incoming-", "scratch-"
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class Publication:
         root = self.root
         root.fs.invalidate_cache()
         if root.exists(_STARTED):
-            begun = root.read_bytes(_STARTED).decode()
+            begun = root.read_bytes(_STARTED).decode() or TWINS.name  # an older version wrote it empty, for twins
             if begun != self.kind.name:
                 raise UsageError(
                     f"{root.url}: a publication of {begun} was begun there; give a folder that is new or empty"
@@ -86,7 +87,7 @@ class Publication:
             if name.endswith(".json") and PurePosixPath(name).parent == PurePosixPath(OPEN):
                 receipt = json.loads(root.read_bytes(name))
                 self._receipts[receipt["shard"]] = receipt
-            elif name != _STARTED:
+            elif name != _STARTED and not name.startswith(f"{OPEN}/{_SCRATCH}"):
                 root.remove(name)  # half a file
 
     def _is_finished(self) -> bool:
@@ -162,13 +163,27 @@ class Publication:
 
     @contextmanager
     def scratch(self) -> Iterator[Path]:
-        """Yield a temporary folder from which files can be ``put``; nothing has to be begun for it."""
-        place = None
-        if self.root.local is not None:
-            place = self.root.local if self.root.local.is_dir() else self.root.local.parent
-            place.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=f"{OPEN}-", dir=place) as scratch:
-            yield Path(scratch)
+        """Yield a temporary folder from which files can be ``put``; nothing has to be begun for it.
+
+        Of a local root it is below ``.publish/``: what one that was killed left there goes. A root that was not there
+        before and has nothing in it afterwards goes too.
+        """
+        if self.root.local is None:
+            with tempfile.TemporaryDirectory() as scratch:
+                yield Path(scratch)
+            return
+        opened = self.root.local / OPEN
+        fresh = [each for each in opened.parents if not each.exists()]
+        opened.mkdir(parents=True, exist_ok=True)
+        for left in opened.glob(f"{_SCRATCH}*"):
+            shutil.rmtree(left)
+        try:
+            with tempfile.TemporaryDirectory(prefix=_SCRATCH, dir=opened) as scratch:
+                yield Path(scratch)
+        finally:
+            for folder in (opened, *fresh):
+                if folder.is_dir() and not any(folder.iterdir()):
+                    folder.rmdir()
 
     @contextmanager
     def _incoming(self) -> Iterator[Path]:

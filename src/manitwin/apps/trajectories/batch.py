@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from pathlib import Path
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, ValidationError
 
+from manitwin.errors import EpisodesError
 from manitwin.stages.stage import Item
 from manitwin.store import sha256_of_json
 
@@ -62,7 +64,10 @@ def batches(
 
 
 class BatchRecord(BaseModel):
-    """``batch.json``: what the batch was, what became of its attempts, and the digests of its files."""
+    """``batch.json``: what the batch was, what became of its attempts, and the digests of its files.
+
+    ``twins`` has the ids of all twins that were set up in it, with the revisions that they had then.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -76,3 +81,16 @@ class BatchRecord(BaseModel):
     succeeded: int
     kept: int
     files: dict[str, str]
+
+
+def read_batch(folder: Path) -> BatchRecord:
+    """Read the record of a finished batch; raises EpisodesError where it cannot be read."""
+    path = folder / BATCH_RECORD
+    try:
+        return BatchRecord.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "the whole"
+        raise EpisodesError(f"{path}: {where}: {first['msg']}; run manitwin trajectories again") from error
+    except OSError as error:
+        raise EpisodesError(f"{path}: cannot be read ({error}); run manitwin trajectories again") from error

@@ -9,11 +9,11 @@ from typing import Any
 
 from manitwin.apps.trajectories.publication.choose import TwinInEpisodes
 from manitwin.apps.trajectories.publication.success import Success, Tally
+from manitwin.markdown import markdown_escaped, table
 from manitwin.publish.card import size_category
 from manitwin.publish.card_statistics import licence_lines
 from manitwin.publish.hub_license import hub_license
 from manitwin.publish.licences import LICENSES_MD, without_attribution
-from manitwin.publish.markdown import plain, table
 
 TAGS = ("LeRobot", "robotics", "manipulation", "pick-and-place", "simulation", "synthetic")
 ATTEMPTS_FILE, TWINS_FILE = "attempts.parquet", "twins.parquet"
@@ -41,16 +41,31 @@ class EpisodesCard:
 
 def episodes_card(facts: EpisodesCard) -> str:
     """Return README.md."""
-    info = facts.info
-    hours = info["total_frames"] / info["fps"] / 3600
     lines = [
-        "---",
         *_front_matter(facts),
-        "---",
         "",
-        f"# {plain(facts.name)}",
+        *_introduction(facts),
         "",
-        f"{info['total_episodes']:,} simulated pick-and-place episodes of the robot {plain(info['robot_type'])}, as a "
+        *_contents(facts),
+        *_left_out(facts),
+        "",
+        *_success(facts.success),
+        "",
+        *_licences(facts),
+        "",
+        "## How it was made",
+        "",
+        *table(["", ""], [[what, markdown_escaped(value)] for what, value in facts.made_of.items()], align="ll"),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _introduction(facts: EpisodesCard) -> list[str]:
+    info = facts.info
+    return [
+        f"# {markdown_escaped(facts.name)}",
+        "",
+        f"{info['total_episodes']:,} simulated pick-and-place episodes of the robot {markdown_escaped(info['robot_type'])}, as a "
         "[LeRobotDataset v3.0](https://huggingface.co/docs/lerobot/lerobot-dataset-v3). Each was planned from a grasp that was "
         "verified in physics, executed in SAPIEN, and kept where the object ended at its goal and nothing else was "
         "touched.",
@@ -60,20 +75,24 @@ def episodes_card(facts: EpisodesCard) -> str:
         "",
         'dataset = LeRobotDataset("local/episodes", root="FOLDER")  # where this repository was downloaded to',
         "```",
-        "",
+    ]
+
+
+def _contents(facts: EpisodesCard) -> list[str]:
+    info = facts.info
+    hours = info["total_frames"] / info["fps"] / 3600
+    rows = [
+        ["robot", markdown_escaped(info["robot_type"])],
+        ["episodes", f"{info['total_episodes']:,}"],
+        ["frames", f"{info['total_frames']:,} at {info['fps']} a second ({hours:.2f} hours)"],
+        ["tasks (phrasings)", f"{info['total_tasks']:,}"],
+        ["objects in them", f"{sum(bool(twin.episodes) for twin in facts.twins):,}"],
+        ["cameras", _cameras(info)],
+    ]
+    return [
         "## What is here",
         "",
-        *table(
-            ["", "all"],
-            [
-                ["robot", plain(info["robot_type"])],
-                ["episodes", f"{info['total_episodes']:,}"],
-                ["frames", f"{info['total_frames']:,} at {info['fps']} a second ({hours:.2f} hours)"],
-                ["tasks (phrasings)", f"{info['total_tasks']:,}"],
-                ["objects in them", f"{sum(bool(twin.episodes) for twin in facts.twins):,}"],
-                ["cameras", _cameras(info)],
-            ],
-        ),
+        *table(["", "all"], rows),
         "",
         *table(["feature", "type", "shape"], _features(info), align="lll"),
         "",
@@ -81,33 +100,30 @@ def episodes_card(facts: EpisodesCard) -> str:
         "",
         f"`{ATTEMPTS_FILE}` has {facts.attempt_rows:,} attempts, kept or not, with the reason; `{TWINS_FILE}` the objects. "
         "`sha256sum -c SHA256SUMS` checks every file.",
-        *_left_out(facts),
-        "",
-        *_success(facts.success),
-        "",
+    ]
+
+
+def _licences(facts: EpisodesCard) -> list[str]:
+    return [
         "## Licences and attribution",
         "",
         *licence_lines([asdict(twin) for twin in facts.twins]),
         "",
         f"An episode stays under the licences of all objects in it; whom to credit is in [{LICENSES_MD}]({LICENSES_MD}).",
         *_missing_attribution(facts),
-        "",
-        "## How it was made",
-        "",
-        *table(["", ""], [[what, plain(value)] for what, value in facts.made_of.items()], align="ll"),
     ]
-    return "\n".join(lines) + "\n"
 
 
 def _front_matter(facts: EpisodesCard) -> list[str]:
     licence = hub_license(twin.license for twin in facts.twins)
-    lines = [f"{key}: {json.dumps(value)}" for key, value in {"pretty_name": facts.name, **licence}.items()]
+    fields = {"pretty_name": facts.name, **licence}
+    lines = ["---", *(f"{key}: {json.dumps(value)}" for key, value in fields.items())]
     lines += ["size_categories:", f"- {json.dumps(size_category(facts.info['total_frames']))}"]
     lines += ["task_categories:", "- robotics", "tags:", *[f"- {each}" for each in TAGS], "configs:"]
     for name, path in CONFIGS.items():
         lines += [f"- config_name: {name}", *(["  default: true"] if name == "default" else [])]
         lines += ["  data_files:", "  - split: train", f"    path: {path}"]
-    return lines
+    return [*lines, "---"]
 
 
 def _features(info: Mapping[str, Any]) -> list[list[str]]:
@@ -130,15 +146,15 @@ def _cameras(info: Mapping[str, Any]) -> str:
 def _success(success: Success) -> list[str]:
     head = ["category", "attempted", "executed", "succeeded", "of executed", "kept"]
     order = sorted(success.by_category, key=lambda name: (-success.by_category[name].attempted, name))
-    rows = [_row(plain(name) or "not told", success.by_category[name]) for name in order[:CATEGORIES_SHOWN]]
+    rows = [_row(markdown_escaped(name) or "not told", success.by_category[name]) for name in order[:CATEGORIES_SHOWN]]
     lines = ["## Success", "", *table(head, [_row("all", success.total), *rows])]
     if order[CATEGORIES_SHOWN:]:
         lines += ["", f"and {len(order) - CATEGORIES_SHOWN:,} more categories."]
-    outcomes = ", ".join(f"{plain(name)} {count:,}" for name, count in success.outcomes.items())
+    outcomes = ", ".join(f"{markdown_escaped(name)} {count:,}" for name, count in success.outcomes.items())
     lines += ["", f"Outcomes: {outcomes}.", ""]
     if not success.never:
         return [*lines, "Every object that was tried succeeded at least once."]
-    shown = ", ".join(f"{plain(category)} `{twin_id}`" for twin_id, category in success.never[:NEVER_SHOWN])
+    shown = ", ".join(f"{markdown_escaped(category)} `{twin_id}`" for twin_id, category in success.never[:NEVER_SHOWN])
     rest = len(success.never) - NEVER_SHOWN
     more = f", and {rest:,} more (see `{ATTEMPTS_FILE}`)" if rest > 0 else ""
     return [
@@ -155,7 +171,7 @@ def _row(name: str, tally: Tally) -> list[str]:
 def _left_out(facts: EpisodesCard) -> list[str]:
     if not facts.left_out:
         return []
-    why = ", ".join(f"{plain(name)} {count:,}" for name, count in facts.left_out.items())
+    why = ", ".join(f"{markdown_escaped(name)} {count:,}" for name, count in facts.left_out.items())
     return [
         "",
         f"Left out for the licence of an object in them, with their pictures: {sum(facts.left_out.values()):,} kept episodes "

@@ -4,30 +4,33 @@ from __future__ import annotations
 
 import json
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from manitwin.apps.trajectories.attempt import Attempt
+from manitwin.apps.trajectories.batch import read_batch
 from manitwin.apps.trajectories.episodes_stage import EPISODES
 from manitwin.apps.trajectories.hdf5_file import EpisodeFile
-from manitwin.errors import UsageError
-from manitwin.publish.licences import UNKNOWN, Allowed
+from manitwin.publish.licences import UNKNOWN, Allowed, check_some_go_out
 from manitwin.scenes.twin_source import TwinSource
 
 
 @dataclass(frozen=True)
 class TwinInEpisodes:
-    """What is to be known of a twin that episodes show: whom to credit, and the numbers of the published episodes."""
+    """What is to be known of a twin that episodes show: whom to credit, and the numbers of the published episodes.
+
+    ``revisions`` are those that it had when the batches were made: what it is today may be another (``--retire`` amends it).
+    """
 
     twin_id: str
-    revision: str
     category: str
     license: str
     attribution: str | None
     source_sha256: str
     rehearsal: bool
+    revisions: tuple[str, ...] = ()
     episodes: tuple[int, ...] = ()
 
 
@@ -56,7 +59,7 @@ class Chosen:
 
 
 def choose_episodes(
-    batches: Iterable[Path],
+    batches: Sequence[Path],
     attempts: Iterable[Attempt],
     source: TwinSource,
     license_allow: Iterable[str] | None,
@@ -67,54 +70,64 @@ def choose_episodes(
 
     An episode is left out under the licences that keep it here: ``CC-BY-NC-4.0``, or ``CC-BY-NC-4.0 + unknown``. One
     with a twin that a rehearsal server had a part in is left out unless ``with_rehearsals``. Raises
-    UsageError where a twin is gone, and where no episode may go out.
+    UsageError where a twin is gone, and where no episode may go out; EpisodesError for a batch that cannot be read.
     """
-    allowed, known = Allowed.of(license_allow), dict[str, TwinInEpisodes]()
-
-    def twin(twin_id: str) -> TwinInEpisodes:
-        if twin_id not in known:
-            known[twin_id] = _read(source, twin_id)
-        return known[twin_id]
-
-    def rehearsed(twin_id: str) -> bool:
-        return not with_rehearsals and twin(twin_id).rehearsal
-
+    twins = _Twins(source, Allowed.of(license_allow), with_rehearsals)
     index_of, held_back, rehearsals = dict[str, int](), set[str](), 0
     seen, left_out = defaultdict[str, list[int]](list), Counter[str]()
     for episode_id, twin_ids in objects_of_episodes(batches):
-        forbidden = sorted({name for each in twin_ids if not allowed.has(name := twin(each).license)})
-        if forbidden:
-            held_back.add(episode_id)
-            left_out[" + ".join(forbidden)] += 1
-        elif any(map(rehearsed, twin_ids)):
-            held_back.add(episode_id)
-            rehearsals += 1
-        else:
+        forbidden = twins.forbidding_licences(twin_ids)
+        if not forbidden and not any(map(twins.held_as_rehearsal, twin_ids)):
             for each in twin_ids:
                 seen[each].append(len(index_of))
             index_of[episode_id] = len(index_of)
-    if not index_of and rehearsals:
-        raise UsageError(
-            f"no episode may go out: {rehearsals:,} show twins of a rehearsal, made by manitwin fake and not by models; build"
-            " these with models, or ask for them with --with-rehearsals"
-        )
-    if not index_of:
-        there = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items())) or "no episode was kept"
-        raise UsageError(
-            f"no episode may go out; licences that keep them: {there}; name those that may in --license-allow,"
-            f" {UNKNOWN!r} too if you know that you may"
-        )
-    targets = {attempt.twin_id for attempt in attempts if attempt.twin_id}
-    allowed_targets = {each for each in targets if allowed.has(twin(each).license) and not rehearsed(each)}
-    shown = sorted(set(seen) | allowed_targets)
-    return Chosen(
-        index_of,
-        frozenset(held_back),
-        tuple(replace(known[each], episodes=tuple(seen[each])) for each in shown),
-        dict(sorted(left_out.items())),
-        frozenset(allowed_targets),
-        rehearsals,
+            continue
+        held_back.add(episode_id)
+        if forbidden:
+            left_out[" + ".join(forbidden)] += 1
+        else:
+            rehearsals += 1
+    check_some_go_out("kept episode", len(index_of), left_out, rehearsals)
+    targets = twins.allowed({attempt.twin_id for attempt in attempts if attempt.twin_id})
+    revisions = revisions_of_twins(batches)
+    shown = (
+        replace(twins[each], revisions=revisions.get(each, ()), episodes=tuple(seen[each]))
+        for each in sorted(set(seen) | targets)
     )
+    return Chosen(index_of, frozenset(held_back), tuple(shown), dict(sorted(left_out.items())), targets, rehearsals)
+
+
+class _Twins:
+    """The twins of episodes, each read once, and what keeps those from going out that may not."""
+
+    def __init__(self, source: TwinSource, licences: Allowed, with_rehearsals: bool):
+        self._source, self._licences, self._with_rehearsals = source, licences, with_rehearsals
+        self._known: dict[str, TwinInEpisodes] = {}
+
+    def __getitem__(self, twin_id: str) -> TwinInEpisodes:
+        if twin_id not in self._known:
+            self._known[twin_id] = _read(self._source, twin_id)
+        return self._known[twin_id]
+
+    def forbidding_licences(self, twin_ids: Iterable[str]) -> list[str]:
+        return sorted({name for each in twin_ids if not self._licences.has(name := self[each].license)})
+
+    def held_as_rehearsal(self, twin_id: str) -> bool:
+        return not self._with_rehearsals and self[twin_id].rehearsal
+
+    def allowed(self, twin_ids: Iterable[str]) -> frozenset[str]:
+        return frozenset(
+            each for each in twin_ids if not self.forbidding_licences([each]) and not self.held_as_rehearsal(each)
+        )
+
+
+def revisions_of_twins(batches: Iterable[Path]) -> dict[str, tuple[str, ...]]:
+    """Return the revisions, sorted, that each twin had in batches: one that was amended between two of them had several."""
+    found = defaultdict[str, set[str]](set)
+    for folder in batches:
+        for twin_id, revision in read_batch(folder).twins.items():
+            found[twin_id].add(revision)
+    return {twin_id: tuple(sorted(each)) for twin_id, each in found.items()}
 
 
 def objects_of_episodes(batches: Iterable[Path]) -> Iterator[tuple[str, frozenset[str]]]:
@@ -130,7 +143,6 @@ def _read(source: TwinSource, twin_id: str) -> TwinInEpisodes:
     record: dict[str, Any] = json.loads(source.record_bytes(twin_id))
     return TwinInEpisodes(
         twin_id,
-        record["revision"],
         record["language"]["category"],
         record["source"]["license"] or UNKNOWN,
         record["source"]["attribution"],

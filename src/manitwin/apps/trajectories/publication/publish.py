@@ -39,10 +39,8 @@ from manitwin.version import installed_version
 README = "README.md"
 TWINS_SCHEMA = pa.schema(
     [
-        *(
-            (name, pa.string())
-            for name in ("twin_id", "revision", "category", "license", "attribution", "source_sha256")
-        ),
+        *((name, pa.string()) for name in ("twin_id", "category", "license", "attribution", "source_sha256")),
+        ("revisions", pa.list_(pa.string())),
         ("episodes", pa.list_(pa.int64())),
     ]
 )
@@ -167,7 +165,8 @@ def _pages(
         "seed": str(said["seed"]),
         "kept where the object ended within": f"{1000 * said['episode']['max_placed_m']:g} mm and "
         f"{said['episode']['max_tilt_deg']:g} degrees of its goal",
-        "versions": f"manitwin {installed_version()}; the revision of each twin in {TWINS_FILE}",
+        "twins": f"in the revisions that {TWINS_FILE} names",
+        "published with": f"manitwin {installed_version()}",
     }
     facts = EpisodesCard(title, checked.info, chosen.twins, success_of(attempts), chosen.left_out, rows, made_of)
     licences = licenses_page(title, [asdict(twin) for twin in chosen.twins], introduction=OF_EPISODES)

@@ -7,10 +7,10 @@ import re
 from collections.abc import Sequence
 
 
-def plain(text: str) -> str:
-    """Return text as one line that Markdown and HTML show as it is."""
-    one_line = html.escape(" ".join(text.split()), quote=False)
-    return re.sub(r"([\\`*_\[\]|#])", r"\\\1", one_line)
+def markdown_escaped(text: str) -> str:
+    """Return words of an outsider as one line that Markdown and HTML show as it is; what is not printable becomes a space."""
+    printable = "".join(letter if letter.isprintable() else " " for letter in text)
+    return re.sub(r"([\\`*_\[\]|#])", r"\\\1", html.escape(" ".join(printable.split()), quote=False))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> list[str]:
