@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,10 @@ from manitwin.commands import choices, options
 from manitwin.commands.console import err_console, out_console, print_error
 from manitwin.commands.json_output import Json, print_document
 from manitwin.commands.why import causes_of, print_causes
+
+if TYPE_CHECKING:
+    from manitwin.apps.trajectories.retirement import Retirement
+    from manitwin.dataset_run import RunReport
 
 
 def trajectories(
@@ -69,11 +73,7 @@ def trajectories(
     for remark in report.remarks:
         err_console.print(remark, markup=False)
     if report.exit_code == 4:
-        if report.stopped:
-            print_error(f"stopped: {report.stopped}")
-        print_causes(str(out))
-        if report.open:
-            err_console.print(f"manitwin status {out} says more; run the same command again to go on", markup=False)
+        _print_unfinished(report, out)
         if json:
             print_document(trajectories_document(report, str(out), causes_of(str(out)), None, [], 0))
         raise typer.Exit(4)
@@ -82,12 +82,22 @@ def trajectories(
     for line in collected.lines:
         out_console.print(line, markup=False)
     if retire:
-        out_console.print(f"{len(found)} grasps fail end to end, {fresh} of them retired now", markup=False)
-        for each in found:
-            what = ", ".join(f"{n} {outcome}" for outcome, n in each.outcomes.items())
-            out_console.print(
-                f"  {each.twin_id} {each.grasp_id}: {each.failed} of {each.executed} ({what})", markup=False
-            )
+        _print_retired(found, fresh)
     out_console.print(f"manitwin stats {out} says more", markup=False)
     if json:
         print_document(trajectories_document(report, str(out), causes_of(str(out)), collected, found, fresh))
+
+
+def _print_unfinished(report: RunReport, out: Path) -> None:
+    if report.stopped:
+        print_error(f"stopped: {report.stopped}")
+    print_causes(str(out))
+    if report.open:
+        err_console.print(f"manitwin status {out} says more; run the same command again to go on", markup=False)
+
+
+def _print_retired(found: list[Retirement], fresh: int) -> None:
+    out_console.print(f"{len(found)} grasps fail end to end, {fresh} of them retired now", markup=False)
+    for each in found:
+        what = ", ".join(f"{n} {outcome}" for outcome, n in each.outcomes.items())
+        out_console.print(f"  {each.twin_id} {each.grasp_id}: {each.failed} of {each.executed} ({what})", markup=False)
