@@ -70,6 +70,18 @@ def test_long_stages_count_by_what_they_have_done() -> None:
     assert "frames" not in progress.line()
 
 
+def test_what_is_heard_of_an_item_after_its_end_is_ignored() -> None:
+    progress = RunProgress("items", Clock())
+    progress.start(2)
+    progress.stage(StageStarted(item(0), "views"))
+    progress.item_ended(ended(0, "failed"))
+    progress.stage(StageStarted(item(0), "views"))
+    progress.stage(StageAdvanced(item(0), "views", StagePart(1, 2, "pictures")))
+    assert progress.line() == "1 of 2 items; 1 failed" and progress.parts_done == 0
+    progress.stage(StageStarted(item(1), "views"))
+    assert progress.line() == "1 of 2 items; 1 failed; under way: 1 views"
+
+
 def test_items_that_were_there_already_do_not_make_the_others_quicker() -> None:
     clock = Clock()
     progress = RunProgress("items", clock)

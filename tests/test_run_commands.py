@@ -5,13 +5,17 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from manitwin.ledger.ledger import Ledger
+from manitwin import dataset_run
+from manitwin.errors import UsageError
+from manitwin.ledger.ledger import Ledger, read_ledger
+from manitwin.stages.stage import Item
 
 
 def manitwin(*arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:
@@ -76,6 +80,39 @@ def test_wrong_use_is_one_line_and_makes_no_data_set(
     done = manitwin(*arguments, folder=tmp_path)
     assert done.returncode == 2, done.stdout
     assert message in done.stderr and done.stderr.count("\n") == 1
+    assert not (tmp_path / "data").exists()
+
+
+def test_a_bad_manifest_removes_no_ledger_that_another_run_made_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "data" / "ledger.sqlite"
+
+    class LateLedger(Ledger):
+        def __init__(self, path: Path):
+            other = Ledger(path)  # makes, fills and closes it before the lock is taken here
+            other.add_items([Item(file=None, text="a mug")])
+            other.close()
+            super().__init__(path)
+
+    def bad_rows() -> Iterator[Item]:
+        yield Item(file=None, text="a cup")
+        raise UsageError("a bad row")
+
+    monkeypatch.setattr(dataset_run, "Ledger", LateLedger)
+    with pytest.raises(UsageError, match="a bad row"):
+        dataset_run._opened_with(bad_rows(), path)
+    with read_ledger(path) as kept:
+        assert "a mug" in kept.execute("SELECT item FROM items").fetchone()[0]
+
+
+def test_a_bad_manifest_leaves_no_new_ledger_and_no_folder(tmp_path: Path) -> None:
+    def bad_rows() -> Iterator[Item]:
+        yield Item(file=None, text="a cup")
+        raise UsageError("a bad row")
+
+    with pytest.raises(UsageError, match="a bad row"):
+        dataset_run._opened_with(bad_rows(), tmp_path / "data" / "ledger.sqlite")
     assert not (tmp_path / "data").exists()
 
 

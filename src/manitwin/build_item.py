@@ -16,7 +16,8 @@ from manitwin.config import BuildConfig
 from manitwin.dataset_root import DatasetRoot
 from manitwin.engine.events import OnStage, StageEnded, StageStarted, StageState
 from manitwin.engine.recipe import Ending, Identity
-from manitwin.errors import ManiTwinError, Rejected
+from manitwin.engine.worker import NO_SPACE
+from manitwin.errors import AccessDenied, ManiTwinError, RateLimited, Rejected, Unavailable
 from manitwin.models.generators.job_memory import RootJobMemory
 from manitwin.pipeline import TwinRecipe, expected_usd
 from manitwin.stage_runner import JOBS, StageCost, lost_usd, run_stage
@@ -101,21 +102,33 @@ def _build(item: Item, identity: Identity, recipe: TwinRecipe, work: Path, on_st
     draft = Draft(identity.twin_id, item, recipe.seed, jobs=RootJobMemory(DatasetRoot(work), JOBS))
     costs: dict[str, StageCost] = {}
     rejected, last = identity.rejected, INPUT
-    try:
-        for stage in recipe.stages(identity.kind) if rejected is None else []:
-            on_stage(StageStarted(item, stage.name, draft.twin_id))
-            last, started, cpu_started = stage.name, time.perf_counter(), time.process_time()
+    for stage in recipe.stages(identity.kind) if rejected is None else []:
+        on_stage(StageStarted(item, stage.name, draft.twin_id))
+        last, started, cpu_started = stage.name, time.perf_counter(), time.process_time()
+        try:
             ran = run_stage(stage, draft, work)
-            costs[last] = ran.cost
-            seconds = 0.0 if ran.reused else ran.cost.seconds
-            how: StageState = "there already" if ran.reused else "done"
-            on_stage(StageEnded(item, stage.name, how, seconds, twin_id=draft.twin_id))
-    except Rejected as answer:
-        rejected = answer
-        seconds = time.perf_counter() - started
-        costs[last] = StageCost(seconds, time.process_time() - cpu_started, lost_usd(work / last))
-        on_stage(StageEnded(item, last, "rejected", seconds, str(answer), draft.twin_id))
+        except Rejected as answer:
+            rejected = answer
+            seconds = time.perf_counter() - started
+            costs[last] = StageCost(seconds, time.process_time() - cpu_started, lost_usd(work / last))
+            on_stage(StageEnded(item, last, "rejected", seconds, str(answer), draft.twin_id))
+            break
+        except Exception as error:
+            on_stage(_failed(item, last, draft.twin_id, time.perf_counter() - started, error))
+            raise
+        costs[last] = ran.cost
+        seconds = 0.0 if ran.reused else ran.cost.seconds
+        how: StageState = "there already" if ran.reused else "done"
+        on_stage(StageEnded(item, last, how, seconds, twin_id=draft.twin_id))
     return recipe.finish(draft, identity.kind, costs, rejected, last, _fresh(work))
+
+
+def _failed(item: Item, stage: str, twin_id: str, seconds: float, error: Exception) -> StageEnded:
+    """Return that a stage failed, or waits where a service or room on the disk is missing: the item is not to blame."""
+    missing = isinstance(error, Unavailable | RateLimited | AccessDenied) or getattr(error, "errno", None) in NO_SPACE
+    detail = " ".join(f"{type(error).__name__}: {error}".split())
+    trace = "" if isinstance(error, ManiTwinError) else traceback.format_exc()
+    return StageEnded(item, stage, "waiting" if missing else "failed", seconds, detail, twin_id, trace)
 
 
 def _fresh(work: Path) -> Path:

@@ -9,7 +9,7 @@ import sqlite3
 import tempfile
 import time
 from collections.abc import Callable, Iterable
-from contextlib import AbstractContextManager, closing
+from contextlib import AbstractContextManager, closing, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -20,7 +20,7 @@ from pydantic import ValidationError
 from manitwin.config import BuildConfig, RunConfig
 from manitwin.dataset_root import DatasetRoot
 from manitwin.engine.driver import Driver
-from manitwin.engine.events import LOG, ItemEnded, OnStage
+from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.executor import Executor, InlineExecutor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.recipe import Recipe
@@ -28,6 +28,7 @@ from manitwin.engine.work import WorkFolder
 from manitwin.errors import UsageError, choose_from
 from manitwin.files.folder_listing import FolderListing
 from manitwin.ledger.ledger import LEDGER, Ledger, read_ledger
+from manitwin.loggers import RUN
 from manitwin.manifest import Notes, iterate_items
 from manitwin.stages.stage import Item
 from manitwin.store import canonical_json
@@ -158,7 +159,7 @@ def drive(
             result = driver.run()
         counts = ledger.counts()
         said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
-        LOG.info("run ends: %s; %s", result.stopped or "finished", said)
+        RUN.info("run ends: %s; %s", result.stopped or "finished", said)
         return RunReport(counts, result.stopped, result.left, remarks)
     finally:
         ledger.close()
@@ -167,17 +168,15 @@ def drive(
 
 def _opened_with(items: Iterable[Item], path: Path) -> tuple[Ledger, int, int]:
     """Open the ledger and add items to it; returns how many were given and are new. Where that fails, a new one is removed."""
-    made_ledger, made_folder = not path.exists(), not path.parent.exists()
+    made_folder = not path.parent.exists()
     ledger = Ledger(path)
     try:
         return ledger, *ledger.add_items(items)
     except BaseException:
-        ledger.close()
-        if made_ledger:
-            for file in (path, path.with_suffix(".lock")):
-                file.unlink()
+        ledger.close(remove_new=True)
         if made_folder:
-            path.parent.rmdir()
+            with suppress(OSError):  # not empty: another run has begun there
+                path.parent.rmdir()
         raise
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +15,7 @@ from manitwin.errors import Rejected, TwinError, UsageError
 from manitwin.files.sniff import sniff
 from manitwin.files.source_files import MESH_SUFFIXES
 from manitwin.identity import twin_id
+from manitwin.loggers import RUN
 from manitwin.models.annotators.given import KeepsGiven
 from manitwin.models.registry import create, target, without_url
 from manitwin.name_hint import NAME_HINT, name_would_help
@@ -45,7 +45,6 @@ from manitwin.store import RECORD, parse_record, sha256_of_json
 from manitwin.twin import StageProvenance, TwinRecord
 
 Kind = Literal["image", "text", "mesh"]
-LOG = logging.getLogger("manitwin.run")
 KINDS_OF_INPUT: tuple[Kind, ...] = ("image", "text", "mesh")
 
 
@@ -62,11 +61,11 @@ def check_names(config: BuildConfig) -> None:
 def log_choices(config: BuildConfig) -> None:
     """Tell the log what twins are made with, and what of it is only the default."""
     default = BuildConfig()
-    LOG.info("configuration %s, seed %d", config_sha256(config), config.seed)
+    RUN.info("configuration %s, seed %d", config_sha256(config), config.seed)
     for name in ("generator", "annotator", "grasper", "simulator", "second_simulator", "grippers"):
         chosen = getattr(config, name)
         why = "the default" if chosen == getattr(default, name) else "asked for"
-        LOG.info("%s: %s (%s)", name, chosen if isinstance(chosen, str) else ", ".join(chosen), why)
+        RUN.info("%s: %s (%s)", name, chosen if isinstance(chosen, str) else ", ".join(chosen), why)
 
 
 def _check_agreement(grippers: list[Gripper], config: BuildConfig) -> None:

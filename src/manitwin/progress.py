@@ -40,6 +40,7 @@ class RunProgress:
         self.counts: Counter[str] = Counter()
         self._found = 0
         self._under_way: dict[Item, str] = {}
+        self._ended: set[int] = set()  # hashes of the items: 100,000 items would take ten times the memory
         self._parts: dict[Item, StagePart] = {}
         self._started_at: float | None = None
 
@@ -60,8 +61,10 @@ class RunProgress:
         self._started_at = self._clock()
 
     def stage(self, event: StageEvent) -> None:
-        """Note that a stage of an item began or ended."""
+        """Note that a stage of an item began or ended; of one that has ended, a worker's word may come late."""
         with self._lock:
+            if hash(event.item) in self._ended:
+                return
             if isinstance(event, StageStarted):
                 self._under_way[event.item] = event.stage
             elif isinstance(event, StageAdvanced):
@@ -73,6 +76,7 @@ class RunProgress:
         """Note what became of an item; one that was ``found`` finished says nothing of how long others take."""
         with self._lock:
             self._forget(item)
+            self._ended.add(hash(item))
             self.counts[state] += 1
             self._found += found
 

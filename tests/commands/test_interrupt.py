@@ -10,6 +10,11 @@ import time
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
+
+import manitwin.commands.status as status_module
+from manitwin.cli import app
+from manitwin.ledger.ledger import Ledger
 
 PROGRAM = Path(__file__).with_name("interrupted_program.py")
 PATIENCE_S = 120.0
@@ -96,3 +101,11 @@ def test_interrupts_of_a_run_leave_no_worker_and_no_traceback(tmp_path: Path, ti
     assert [line for line in lines if "interrupted" in line] == [f"manitwin run: interrupted{AGAIN}"]
     assert len(lines) == 1, lines
     assert not list((tmp_path / "data" / "twins").glob("*/*")), "nothing is half-made"
+
+
+def test_an_interrupt_is_how_a_watch_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Ledger(tmp_path / "ledger.sqlite").close()
+    monkeypatch.setattr(status_module.time, "sleep", lambda seconds: signal.raise_signal(signal.SIGINT))
+    done = CliRunner().invoke(app, ["status", str(tmp_path), "--watch"])
+    assert done.exit_code == 0 and "0 of 0 items ended" in done.stdout
+    assert "interrupted" not in done.output.lower() and "aborted" not in done.output.lower()

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from manitwin.errors import UsageError
-from manitwin.ledger.ledger import Ledger, is_written, read_ledger
+from manitwin.ledger.ledger import Ledger, read_ledger
+from manitwin.ledger.lock import is_written
 from manitwin.ledger.migrations import MIGRATIONS
 from manitwin.ledger.progress import read_progress, read_story
 from manitwin.stages.stage import Item

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from contextlib import suppress
 from datetime import timedelta
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,7 +40,8 @@ def status(
     from manitwin.commands.documents import status_document, story_document
     from manitwin.dataset_root import DatasetRoot
     from manitwin.dataset_run import local_ledger
-    from manitwin.ledger.ledger import is_written, read_ledger
+    from manitwin.ledger.ledger import read_ledger
+    from manitwin.ledger.lock import is_written
     from manitwin.ledger.progress import read_progress, read_story
     from manitwin.ledger.unaccepted import read_unaccepted
 
@@ -57,7 +59,10 @@ def status(
         elif watch:
             from rich.live import Live
 
-            with Live(_view(read_progress(ledger, is_written(path))), console=out_console, auto_refresh=False) as live:
+            with (
+                suppress(KeyboardInterrupt),  # how a watch is meant to end
+                Live(_view(read_progress(ledger, is_written(path))), console=out_console, auto_refresh=False) as live,
+            ):
                 while True:
                     time.sleep(REFRESH_S)
                     live.update(_view(read_progress(ledger, is_written(path))), refresh=True)

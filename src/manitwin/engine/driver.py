@@ -14,18 +14,9 @@ from heapq import heappop, heappush
 from typing import get_args
 
 from manitwin.config import Resource, RunConfig
+from manitwin.engine.announcer import Announcer
 from manitwin.engine.budget import Budget
-from manitwin.engine.events import (
-    LOG,
-    ItemEnded,
-    OnStage,
-    StageAdvanced,
-    StageEnded,
-    StageStarted,
-    StageState,
-    log_item,
-    log_stage,
-)
+from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.executor import Executor
 from manitwin.engine.flight import Flight, PlannedStage
 from manitwin.engine.gate import Gate
@@ -33,6 +24,7 @@ from manitwin.engine.jobs import MAKE_ROOM, Failure, Job, Reply, StageRejected, 
 from manitwin.engine.recipe import Ending, Recipe
 from manitwin.engine.table_writer import TableWriter
 from manitwin.ledger.ledger import Ledger, LedgerFull
+from manitwin.loggers import RUN
 from manitwin.stage_runner import StageRun
 from manitwin.stages.stage_order import ASSEMBLE, INPUT
 
@@ -65,7 +57,7 @@ class Driver:
         on_stage: OnStage = lambda event: None,
     ):
         self.ledger, self.executor, self.recipe, self.settings = ledger, executor, recipe, settings
-        self._on_ended, self._on_stage, self._sweep, self._clock = on_ended, on_stage, sweep, clock
+        self._announcer, self._sweep, self._clock = Announcer(on_stage, on_ended), sweep, clock
         self._gates = {
             needs: Gate(settings.vlm_per_minute if needs == "vlm" else None, settings.patience_s, clock)
             for needs in RESOURCES
@@ -85,7 +77,7 @@ class Driver:
     def run(self) -> RunResult:
         """Work until every open item has ended, waits for a service that was given up, or something stops the run."""
         run = self.ledger.begin_run(self.recipe.sha256)
-        LOG.info("run %d begins: recipe %s, seed %d", run, self.recipe.sha256[:16], self.recipe.seed)
+        RUN.info("run %d begins: recipe %s, seed %d", run, self.recipe.sha256[:16], self.recipe.seed)
         how = "interrupted"
         try:
             while self._step():
@@ -110,7 +102,9 @@ class Driver:
         if not self._running and (self.result.stopped is not None or not (any(self._queues.values()) or self._more)):
             return self.result.stopped is None and self._give_tables(self._tables.due_at_the_end())
         ended = [(ticket, reply, *self._running.pop(ticket)) for ticket, reply in self.executor.ended(self._wait_s())]
-        self._tell_parts()
+        self._announcer.stages_advanced(
+            self.executor.parts(), {ticket: flight for ticket, (flight, _) in self._running.items()}
+        )
         for ticket, reply, flight, needs in ended:
             self._outstanding[needs] -= 1
             self._budget.end(
@@ -163,7 +157,7 @@ class Driver:
                 flight = heappop(queue)[1]
                 gate.begin()
                 self.ledger.stage_started(flight.number, flight.stage, flight.attempt(flight.stage))
-                self._tell_stage(StageStarted(flight.opened.item, flight.stage, flight.twin_id))
+                self._announcer.stage_started(flight)
                 self._give(flight.job(), flight)
         self._give_tables(self._tables.due())
 
@@ -208,12 +202,12 @@ class Driver:
                 flight.number, flight.stage, "rejected", attempts=flight.attempt(flight.stage), ran=True, error=str(reply.answer),
                 seconds=cost.seconds, cpu_seconds=cost.cpu_seconds, cost_usd=cost.cost_usd,
             )  # fmt: skip
-            self._tell_stage_ended(flight, flight.stage, "rejected", cost.seconds, str(reply.answer))
+            self._announcer.stage_ended(flight, flight.stage, "rejected", cost.seconds, str(reply.answer))
             flight.last, flight.rejected = flight.stage, reply
             self._queue(flight)
         elif isinstance(reply, Ending):
             self.ledger.stage_ended(flight.number, ASSEMBLE, "done", attempts=flight.attempt(ASSEMBLE), ran=True)
-            self._tell_stage_ended(flight, ASSEMBLE, "done")
+            self._announcer.stage_ended(flight, ASSEMBLE, "done")
             self._ended(flight, reply)
 
     def _surveyed(self, flight: Flight, reply: Surveyed) -> None:
@@ -222,12 +216,12 @@ class Driver:
             flight.number, INPUT, "done" if answer is None else "rejected", attempts=flight.attempt(INPUT), ran=True,
             error=answer,
         )  # fmt: skip
-        self._tell_stage_ended(flight, INPUT, "done" if answer is None else "rejected", detail=answer or "")
+        self._announcer.stage_ended(flight, INPUT, "done" if answer is None else "rejected", detail=answer or "")
         other = self.ledger.identify(flight.number, reply.twin_id, reply.kind)
         if other is not None:
             self._flights -= 1
             detail = f"the same input as item {other}"
-            self._tell(ItemEnded(flight.number, flight.opened.item, reply.twin_id, "duplicate", detail))
+            self._announcer.item_ended(flight, reply.twin_id, "duplicate", detail)
             return
         flight.twin_id, flight.kind, flight.rejected = reply.twin_id, reply.kind, reply.rejected
         if reply.kind not in self._plans:
@@ -246,7 +240,7 @@ class Driver:
             flight.number, stage, "done", attempts=flight.attempt(stage), key=ran.key,
             ran=not ran.reused, seconds=ran.cost.seconds, cpu_seconds=ran.cost.cpu_seconds, cost_usd=ran.cost.cost_usd,
         )  # fmt: skip
-        self._tell_stage_ended(
+        self._announcer.stage_ended(
             flight, stage, "there already" if ran.reused else "done", 0.0 if ran.reused else ran.cost.seconds
         )
         flight.done.append((stage, ran.key))
@@ -259,8 +253,7 @@ class Driver:
             flight.number, ending.status, recipe_sha256=self.recipe.sha256, reason=ending.reason, detail=ending.detail,
             revision=ending.revision,
         )  # fmt: skip
-        item, detail = flight.opened.item, ending.detail_and_hint
-        self._tell(ItemEnded(flight.number, item, flight.twin_id, ending.status, detail, found))
+        self._announcer.item_ended(flight, flight.twin_id, ending.status, ending.detail_and_hint, found)
 
     def _failed(self, flight: Flight, gate: Gate, failure: Failure) -> None:
         """Try again later, or soon, or no more: what a service or the disk does is not the item's fault."""
@@ -270,7 +263,7 @@ class Driver:
             counted = attempts - 1 if patient else attempts
             flight.opened.attempts[stage] = counted
             self.ledger.stage_ended(number, stage, "waiting", attempts=counted, error=failure.message)
-            self._tell_stage_ended(flight, stage, "waiting", 0.0, failure.message, failure.trace)
+            self._announcer.stage_ended(flight, stage, "waiting", 0.0, failure.message, failure.trace)
             if failure.kind == "unavailable":
                 gate.down()
             elif failure.kind == "rate_limited":
@@ -285,27 +278,9 @@ class Driver:
         if flight.twin_id:
             self._sweep(flight.twin_id)
         self.ledger.stage_ended(number, stage, "failed", attempts=attempts, error=failure.message)
-        self._tell_stage_ended(flight, stage, "failed", 0.0, failure.message, failure.trace)
+        self._announcer.stage_ended(flight, stage, "failed", 0.0, failure.message, failure.trace)
         detail = f"{stage} failed {attempts} times: {failure.message}"
         self.ledger.item_ended(
             number, "failed", recipe_sha256=self.recipe.sha256, reason=FAILED_AS.get(failure.kind, "error"), detail=detail
         )  # fmt: skip
-        self._tell(ItemEnded(number, flight.opened.item, flight.twin_id, "failed", detail))
-
-    def _tell_stage_ended(
-        self, flight: Flight, stage: str, state: StageState, seconds: float = 0.0, detail: str = "", trace: str = ""
-    ) -> None:
-        self._tell_stage(StageEnded(flight.opened.item, stage, state, seconds, detail, flight.twin_id, trace))
-
-    def _tell_stage(self, event: StageStarted | StageEnded) -> None:
-        log_stage(event)
-        self._on_stage(event)
-
-    def _tell_parts(self) -> None:
-        if parts := self.executor.parts():
-            for flight in [flight for flight, _ in self._running.values() if flight and flight.number in parts]:
-                self._on_stage(StageAdvanced(flight.opened.item, flight.stage, parts[flight.number]))
-
-    def _tell(self, event: ItemEnded) -> None:
-        log_item(event)
-        self._on_ended(event)
+        self._announcer.item_ended(flight, flight.twin_id, "failed", detail)

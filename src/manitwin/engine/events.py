@@ -9,13 +9,9 @@ from pathlib import Path
 from typing import Literal
 
 from manitwin.ledger.ledger import ItemState
+from manitwin.loggers import RUN
 from manitwin.stages.stage import Item
 from manitwin.stages.stage_parts import StagePart
-
-LOG = logging.getLogger("manitwin.run")
-"""Where every event of a run is told: an item that ends and a stage that ends as INFO, a stage that begins as DEBUG."""
-
-logging.getLogger("manitwin").addHandler(logging.NullHandler())  # else Python prints warnings where nobody listens
 
 StageState = Literal["done", "there already", "rejected", "waiting", "failed"]
 
@@ -77,17 +73,17 @@ def log_stage(event: StageStarted | StageEnded) -> None:
     """Tell the log of a stage that began or ended."""
     of = f"{event.stage} of {title(event.item)}" + (f" ({event.twin_id})" if event.twin_id else "")
     if isinstance(event, StageStarted):
-        LOG.debug("%s begins", of)
+        RUN.debug("%s begins", of)
         return
     took = f" in {event.seconds:.2f} s" if event.seconds else ""
     why = f": {event.detail}" if event.detail else ""
     level = logging.WARNING if event.state in ("waiting", "failed") else logging.INFO
-    LOG.log(level, "%s %s%s%s", of, event.state, took, why)
+    RUN.log(level, "%s %s%s%s", of, event.state, took, why)
     if event.trace:
-        LOG.debug("%s", event.trace.rstrip())
+        RUN.debug("%s", event.trace.rstrip())
 
 
 def log_item(event: ItemEnded) -> None:
     """Tell the log what became of an item."""
     found = " (there already)" if event.found else ""
-    LOG.info("item %d %s %s %s%s: %s", event.number, title(event.item), event.twin_id, event.state, found, event.detail)
+    RUN.info("item %d %s %s %s%s: %s", event.number, title(event.item), event.twin_id, event.state, found, event.detail)

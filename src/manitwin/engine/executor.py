@@ -27,7 +27,7 @@ class Executor(Protocol):
         ...
 
     def parts(self) -> dict[int, StagePart]:
-        """Return how much the stages that run have done, by item number, where they say so and it is time to look."""
+        """Return how much the stages that run have done, by ticket, where they say so and it is time to look."""
         ...
 
     def close(self) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import faulthandler
-import json
 import multiprocessing
 import os
 import queue
@@ -11,7 +10,6 @@ import signal
 import tempfile
 import time
 from concurrent.futures import CancelledError, TimeoutError
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -24,14 +22,12 @@ from manitwin.engine.jobs import Failure, Job, Reply, RunStage, WorkerSetup
 from manitwin.engine.worker import Worker
 from manitwin.executors.child_processes import die_with, spared_from_interrupts
 from manitwin.executors.one_thread import one_thread_each
+from manitwin.executors.part_notes import EVERY_S, drop_note, parts_noted, read_notes
 from manitwin.main_module import hidden_main_module
-from manitwin.stages.stage_parts import StagePart, heard_by
-from manitwin.store import write_bytes_atomically
+from manitwin.stages.stage_parts import StagePart
 
 JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
 STACK_LINES = 12
-PART = ".part"
-PARTS_EVERY_S = 1.0
 
 
 class LocalExecutor:
@@ -68,7 +64,7 @@ class LocalExecutor:
     def submit(self, ticket: int, job: Job) -> None:
         """Give a job to the pool of what it needs."""
         with spared_from_interrupts():
-            future = self._pool(job.needs).schedule(_do, args=(job,), timeout=self._settings.stage_timeout_s)
+            future = self._pool(job.needs).schedule(_do, args=(ticket, job), timeout=self._settings.stage_timeout_s)
         future.add_done_callback(partial(self._hand_over, ticket))
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
@@ -82,16 +78,11 @@ class LocalExecutor:
             return ended
 
     def parts(self) -> dict[int, StagePart]:
-        """Return what the workers have left beside their stacks: a file outlives a worker that crashes, a queue may not."""
-        if time.monotonic() - self._looked_at < PARTS_EVERY_S:
+        """Return what the workers have left beside their stacks, once a second."""
+        if time.monotonic() - self._looked_at < EVERY_S:
             return {}
         self._looked_at = time.monotonic()
-        found = {}
-        for path in Path(self._stacks.name).glob(f"*{PART}"):
-            with suppress(FileNotFoundError):  # its stage has ended meanwhile
-                number, *part = json.loads(path.read_bytes())
-                found[number] = StagePart(*part)
-        return found
+        return read_notes(Path(self._stacks.name))
 
     def close(self) -> None:
         """Stop all processes at once."""
@@ -114,6 +105,7 @@ class LocalExecutor:
         return self._pools[needs]
 
     def _hand_over(self, ticket: int, future: Any) -> None:
+        drop_note(Path(self._stacks.name), ticket)  # of a worker that died, or was ended as it took too long
         self._ended.put((ticket, self._reply(future)))
 
     def _reply(self, future: Any) -> Reply:
@@ -121,7 +113,6 @@ class LocalExecutor:
             reply: Reply = future.result()
             return reply
         except ProcessExpired as error:
-            (Path(self._stacks.name) / f"{error.pid}{PART}").unlink(missing_ok=True)
             return Failure("died", f"the worker process died ({_how(error.exitcode)}){self._stack(error.pid)}")
         except TimeoutError:
             limit = self._settings.stage_timeout_s
@@ -158,26 +149,9 @@ def _start(setup: WorkerSetup, stacks: str, driver: int) -> None:
     _worker = Worker(setup)
 
 
-def _do(job: Job) -> Reply:
+def _do(ticket: int, job: Job) -> Reply:
     assert _worker is not None and _stack_file is not None
     if not isinstance(job, RunStage):
         return _worker.do(job)
-    part_file = Path(_stack_file.name).with_suffix(PART)
-    with heard_by(_NotedParts(part_file, job.number)):
-        try:
-            return _worker.do(job)
-        finally:
-            part_file.unlink(missing_ok=True)
-
-
-class _NotedParts:
-    """Write down what a stage says of itself, once a second at most."""
-
-    def __init__(self, path: Path, number: int):
-        self._path, self._number, self._at = path, number, 0.0
-
-    def __call__(self, part: StagePart) -> None:
-        if time.monotonic() - self._at >= PARTS_EVERY_S:
-            self._at = time.monotonic()
-            said = [self._number, part.done, part.total, part.unit]
-            write_bytes_atomically(self._path, json.dumps(said).encode())
+    with parts_noted(Path(_stack_file.name).parent, ticket):
+        return _worker.do(job)

@@ -8,7 +8,6 @@ import tempfile
 import time
 from collections import Counter
 from dataclasses import replace
-from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType, TracebackType
 from typing import Any
@@ -21,6 +20,7 @@ from manitwin.executors.ray_head import Head, reachable
 from manitwin.executors.ray_pool import Actor, RayPool, Running
 from manitwin.executors.ray_worker import RayWorker
 from manitwin.stages.stage_parts import StagePart
+from manitwin.version import installed_version
 
 OVERDUE_EVERY_S = 1.0
 NODES_LOST = 3  # a job under which so many nodes died is taken for the cause
@@ -59,7 +59,7 @@ class RayExecutor:
         self._make = self._ray.remote(max_restarts=0, max_task_retries=0)(RayWorker)
         root = DatasetRoot(setup.root_url)  # a worker's working directory is not the driver's
         self._setup = self._ray.put(replace(setup, root_url=str(root.local or root.url)))
-        self._version = version("manitwin")
+        self._version = installed_version()
         self._pools: dict[tuple[Resource, bool], RayPool] = {}
         self._nodes_lost: Counter[tuple[Any, ...]] = Counter()
         self._looked_at = 0.0

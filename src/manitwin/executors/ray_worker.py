@@ -7,13 +7,13 @@ import os
 import queue
 import tempfile
 import time
-from importlib.metadata import version
 from pathlib import Path
 
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
 from manitwin.errors import UsageError
 from manitwin.executors.one_thread import one_thread_each
+from manitwin.version import installed_version
 
 STACK_LINES = 12
 STALE_S = 3600.0  # a stack that nobody asked for by then is of a worker whose run is over
@@ -27,7 +27,7 @@ class RayWorker:
 
     def __init__(self, setup: WorkerSetup, wanted_version: str):
         """Raises UsageError where the node has another manitwin than the driver: its results would be others."""
-        here = version("manitwin")
+        here = installed_version()
         if here != wanted_version:
             raise UsageError(f"this node has manitwin {here} and the driver {wanted_version}; install the same on all")
         one_thread_each()

@@ -8,6 +8,7 @@ import queue
 import threading
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, TimeoutError
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from pebble import ProcessExpired, ProcessPool
 from manitwin.build_item import ItemResult, build_item
 from manitwin.charges import counted
 from manitwin.config import BuildConfig
-from manitwin.engine.events import OnStage, log_stage
+from manitwin.engine.events import OnStage, StageEnded, StageStarted, StageState, log_stage
 from manitwin.errors import Unavailable
 from manitwin.executors.child_processes import die_with, spared_from_interrupts
 from manitwin.executors.one_thread import one_thread_each
@@ -91,7 +92,7 @@ def _build_all(items: list[Item], out: Path, config: BuildConfig, jobs: int, on_
         for item in items:
             with spared_from_interrupts():
                 future = pool.schedule(_build_in_worker, args=(item, out, config), timeout=config.item_timeout_s)
-            future.add_done_callback(partial(_hand_over, item, config, done))
+            future.add_done_callback(partial(_hand_over, item, config, done, events))
         for _ in items:
             yield done.get()
         pool.close()
@@ -103,31 +104,59 @@ def _build_all(items: list[Item], out: Path, config: BuildConfig, jobs: int, on_
         events.close()
 
 
-def _hand_over(item: Item, config: BuildConfig, done: queue.Queue[ItemResult], future: Any) -> None:
-    done.put(_result(future, item, config))
+@dataclass(frozen=True)
+class _CutOff:
+    """A worker can say no more of its item; put behind all that it did say, as it is dead."""
+
+    item: Item
+    state: StageState
+    cause: str
 
 
-def _result(future: Any, item: Item, config: BuildConfig) -> ItemResult:
+def _hand_over(item: Item, config: BuildConfig, done: queue.Queue[ItemResult], events: Any, future: Any) -> None:
+    result = _result(future, item, config)
+    if isinstance(result, _CutOff):
+        events.put(result)
+        result = ItemResult(item, twin_id(item), "unfinished", result.cause, None)
+    done.put(result)
+
+
+def _result(future: Any, item: Item, config: BuildConfig) -> ItemResult | _CutOff:
+    state: StageState = "failed"
     try:
-        return future.result()
+        result: ItemResult = future.result()
+        return result
     except ProcessExpired as error:
         cause = f"the worker process died (exit code {error.exitcode}); run again to retry this item"
     except TimeoutError:
         cause = f"took longer than item_timeout_s = {config.item_timeout_s:g} s; raise it in the configuration, or run again"
     except CancelledError:
-        cause = "interrupted; run again to go on"
+        state, cause = "waiting", "interrupted; run again to go on"
     except Exception as error:  # what the worker could not turn into a result: kept visible, the other items go on
         cause = f"a defect in manitwin: {type(error).__name__}: {error}"
-    return ItemResult(item, twin_id(item), "unfinished", cause, None)
+    return _CutOff(item, state, cause)
 
 
 def _listen(events: Any, on_stage: OnStage, stop: threading.Event) -> None:
-    while not stop.is_set():
+    """Hand on what workers say, until ``stop`` is set and all of it is heard; say for a dead one that its stage has ended."""
+    under_way: dict[Item, StageStarted] = {}
+    while True:
+        stopping = stop.is_set()
         try:
             event = events.get(timeout=POLL_S)
         except queue.Empty:
+            if stopping:
+                return
             continue
         except (EOFError, OSError):
             return
+        if isinstance(event, StageStarted):
+            under_way[event.item] = event
+        else:
+            begun = under_way.pop(event.item, None)
+            if isinstance(event, _CutOff):
+                if begun is None:
+                    continue
+                event = StageEnded(event.item, begun.stage, event.state, detail=event.cause, twin_id=begun.twin_id)
         log_stage(event)
         on_stage(event)

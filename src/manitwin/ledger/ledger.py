@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import sqlite3
 import time
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from manitwin.errors import BackendError, UsageError
+from manitwin.ledger.lock import hold_lock, lock_file
 from manitwin.ledger.migrations import migrate
 from manitwin.stages.stage import Item
 
@@ -59,12 +59,8 @@ class Ledger:
         """Open or make a ledger; raises UsageError where another run holds it."""
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
-        self._lock = path.with_suffix(".lock").open("w")
-        try:
-            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            self._lock.close()
-            raise UsageError(f"{path}: another run is writing it now; wait for its end, or stop it") from error
+        self._lock = hold_lock(path)
+        self._new = not path.exists()
         self.connection = sqlite3.connect(path, isolation_level=None)
         self.connection.execute("PRAGMA journal_mode = WAL")
         self.connection.execute(
@@ -92,13 +88,18 @@ class Ledger:
             if not self.connection.in_transaction:
                 self.connection.execute("BEGIN")
 
-    def close(self) -> None:
-        """Commit and give the ledger free."""
+    def close(self, remove_new: bool = False) -> None:
+        """Commit and give the ledger free; ``remove_new``: one that was made here and got no items is removed before."""
+        removed = False
         try:
             self.commit()
+            removed = remove_new and self._new and not self.connection.execute("SELECT 1 FROM items").fetchone()
             self.connection.execute("ROLLBACK")
         finally:
             self.connection.close()
+            if removed:  # while the lock is held: nobody else can have made or filled it
+                self.path.unlink()
+                lock_file(self.path).unlink()
             self._lock.close()
 
     def add_items(self, items: Iterable[Item]) -> tuple[int, int]:
@@ -285,19 +286,6 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
         yield connection
     finally:
         connection.close()
-
-
-def is_written(path: Path) -> bool:
-    """Tell whether a run is at work on a ledger now."""
-    lock = path.with_suffix(".lock")
-    if not lock.is_file():
-        return False
-    with lock.open() as stream:
-        try:
-            fcntl.flock(stream, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return True
-    return False
 
 
 def stage_rows(connection: sqlite3.Connection, number: int) -> list[StageRow]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import glob
 import json
-import logging
 import os
 import platform
 import subprocess
@@ -18,6 +17,7 @@ import sys
 from dataclasses import asdict, dataclass
 
 from manitwin.errors import ManiTwinError, RendererMissing, UsageError
+from manitwin.loggers import RUN
 
 SWITCH = "MANITWIN_RENDER_DEVICE"
 """Set to ``cpu`` to leave GPUs alone (some hang: vla-evaluation-harness#112); ``auto`` otherwise."""
@@ -32,7 +32,6 @@ ICD_FOLDERS = (
     "/usr/local/share/vulkan/icd.d",
     "/usr/local/etc/vulkan/icd.d",
 )
-LOG = logging.getLogger("manitwin.run")
 PROBE_SECONDS = 120.0  # a device that takes longer to make one small picture hangs, or is of no use
 
 # Creating a RenderSystem is where an unfit driver is refused. A GPU must also make a picture: without the right
@@ -79,7 +78,7 @@ def require_renderer() -> RenderDevice:
         return RenderDevice(**known["device"])
     device = _first_working(question["switch"] == "cpu")
     why = f"{SWITCH}=cpu" if question["switch"] == "cpu" else "the first that renders, GPUs before the CPU"
-    LOG.info("renderer: %s, driver %s (%s)", device.name, device.driver_file or "chosen by the loader", why)
+    RUN.info("renderer: %s, driver %s (%s)", device.name, device.driver_file or "chosen by the loader", why)
     if device.driver_file is not None:
         for name in LOADER_VARIABLES:
             os.environ[name] = device.driver_file
