@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import sys
-from importlib.metadata import version as version_of
 from pathlib import Path
+
+from manitwin.version import installed_version
 
 sys.path.insert(0, str(Path(__file__).parent))  # the extension reference_directives
 
 project = "ManiTwin"
 author = "The ManiTwin authors"
 copyright = "The ManiTwin authors, Apache-2.0"
-version = release = version_of("manitwin")
+version = release = installed_version()
 
 extensions = ["myst_parser", "sphinx.ext.autodoc", "reference_directives"]
 exclude_patterns = ["examples/**"]

@@ -74,6 +74,9 @@ def test_columns_that_nobody_knows_are_an_error_where_it_is_asked_for(folder: Pa
     manifest.write_text("file,unit\ncup.glb,m\n")
     with pytest.raises(UsageError, match=r"unknown column 'unit' \(did you mean 'units'\?\); valid: file, text"):
         collect_items([manifest], strict=True)
+    manifest.write_text("file,zeal,yard,xylem,width,vigour,azimuth\ncup.glb,1,2,3,4,5,6\n")
+    with pytest.raises(UsageError, match="unknown column 'azimuth'"):
+        collect_items([manifest], strict=True)  # whatever the hashes of names are in this process
     manifest.write_text("file,units\ncup.glb,m\n")
     collect_items([manifest], strict=True)
 

@@ -26,7 +26,7 @@ from manitwin.commands.fake import fake
 from manitwin.commands.import_ import import_
 from manitwin.commands.index import index
 from manitwin.commands.interrupt import Interrupts
-from manitwin.commands.json_output import Json, print_document, print_failure
+from manitwin.commands.json_output import CommandLineError, Json, asked_for_json, print_document, print_failure
 from manitwin.commands.layout import layout
 from manitwin.commands.prompts import prompts
 from manitwin.commands.publish import publish
@@ -41,14 +41,10 @@ from manitwin.commands.status import status
 from manitwin.commands.trajectories import trajectories
 from manitwin.errors import BackendError, ManiTwinError, Unavailable
 from manitwin.shared_libraries import import_remedy, names_shared_library
+from manitwin.version import installed_version
 
 TYPER_INTERRUPTED = 130
 """What typer returns where it caught a KeyboardInterrupt by itself."""
-
-# the base of what typer raises for a wrong command line; it has no public name of its own
-CommandLineError: type[Exception] = next(
-    base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException"
-)
 
 _interrupts = Interrupts()
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -56,9 +52,7 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        from importlib.metadata import version
-
-        out_console.print(f"{PROGRAM} {version(PROGRAM)}", markup=False)
+        out_console.print(f"{PROGRAM} {installed_version()}", markup=False)
         raise typer.Exit
 
 
@@ -78,7 +72,9 @@ def _manitwin(
         out_console.print(context.get_help(), markup=False)
 
 
-for making in (build, run, index, stats, publish, export, layout, trajectories, render):
+for watched in (build, run, layout, trajectories, render):
+    app.command()(reported(watched, own_log=True))
+for making in (index, stats, publish, export):
     app.command()(reported(making))
 app.command("import")(reported(import_))
 for other in (status, retry, check, query, doctor, fake, prompts, audit, completion):
@@ -122,7 +118,8 @@ def _told(error: Exception) -> tuple[int, str]:
     else:
         message = str(error)
     status = 4 if isinstance(error, BackendError) else 2
-    print_failure(error, message, status)
+    if asked_for_json(error):
+        print_failure(error, message, status)
     return status, f"{path}: {' '.join(message.split())}"
 
 
@@ -135,7 +132,8 @@ def _run() -> int:
         return int(status or 0)
     except (KeyboardInterrupt, typer.Abort) as error:
         LOG.warning("interrupted")
-        print_failure(error, _interrupts.message, _interrupts.status)
+        if asked_for_json(error):
+            print_failure(error, _interrupts.message, _interrupts.status)
         _interrupts.say()
         return _interrupts.status
     except (CommandLineError, ManiTwinError) as error:

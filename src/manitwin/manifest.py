@@ -112,7 +112,7 @@ def _manifest_items(
     unknown: dict[str, str] = {}
     line = None
     for line, row in _rows(path):
-        for column in map(str, row.keys() - set(COLUMNS) - unknown.keys()):
+        for column in sorted(map(str, row.keys() - set(COLUMNS) - unknown.keys())):
             near = get_close_matches(column.lower().strip(), COLUMNS, n=1, cutoff=0.6)
             unknown[column] = f"{column!r} (did you mean {near[0]!r}?)" if near else repr(column)
             if strict:

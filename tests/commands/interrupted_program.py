@@ -46,6 +46,6 @@ def rehearse() -> None:
 
 if __name__ == "__main__":
     cli.app.registered_commands = [each for each in cli.app.registered_commands if each.callback.__name__ != NAME]
-    cli.app.command(NAME)(reported(work))
+    cli.app.command(NAME)(reported(work, own_log=NAME in ("run", "trajectories")))
     sys.argv = ["manitwin", NAME]
     cli.main()

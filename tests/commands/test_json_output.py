@@ -108,6 +108,7 @@ def test_layout_and_trajectories_tell_numbers(data: Path, tmp_path: Path) -> Non
     [
         (("build", "nothing_here.png", "-o", "out"), "UsageError", "nothing_here.png: not there"),
         (("build", "--nonsense"), "NoSuchOption", "--nonsense"),
+        (("build", "--text", "a mug", "-v", "--nonsense"), "NoSuchOption", "--nonsense"),
         (("show", "nowhere"), None, "nowhere"),
         (("status", "nowhere"), None, "nowhere"),
         (("status", "nowhere", "--watch"), None, ""),
@@ -119,6 +120,22 @@ def test_an_error_is_a_document_too(tmp_path: Path, arguments: tuple[str, ...], 
     error = json.loads(done.stdout)["error"]
     assert set(error) == {"type", "message", "exit_status"} and error["exit_status"] == done.returncode == 2
     assert message in error["message"] and message in done.stderr and (kind is None or error["type"] == kind)
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("build", "x.png", "-o", "out", "--text", "--json"),
+        ("build", "-o", "out", "--text", "--json", "--nonsense"),
+        ("status", "--", "--json"),
+        ("status", "--why", "--json", "--nonsense"),
+        ("build", "-o", "--json", "--", "x.png", "--json"),
+    ],
+)
+def test_an_error_is_no_document_where_the_words_are_a_value(tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    command = [sys.executable, "-m", "manitwin.cli", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=dict(os.environ))
+    assert done.returncode == 2 and done.stdout == "" and done.stderr.startswith("manitwin ")
 
 
 def test_without_it_the_next_command_prints_as_ever(data: Path) -> None:

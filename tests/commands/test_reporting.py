@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import inspect
 import logging
 import os
 import re
 import subprocess
 import sys
+from importlib.metadata import PackageNotFoundError
 from pathlib import Path
 
 import pytest
 import typer
+from typer.testing import CliRunner
 
 from manitwin.cli import app
-from manitwin.commands.run_log import WithoutSecrets
+from manitwin.commands.run_log import RunLog, WithoutSecrets, begin_log, end_log
 from manitwin.dataset_root import DatasetRoot
 from manitwin.dataset_run import local_log
+from manitwin.loggers import PACKAGE
 
 MAKING = ("build", "run", "layout", "trajectories", "render", "export", "import", "publish", "stats", "index")
 TIME = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3}Z"
@@ -49,7 +53,7 @@ def work() -> None:
 
 KEY = "sk-1234567890-not-a-real-key"
 cli.app.registered_commands = [each for each in cli.app.registered_commands if each.callback.__name__ != "layout"]
-cli.app.command("layout")(reported(work))
+cli.app.command("layout")(reported(work, own_log=True))
 cli.main()
 """
 
@@ -115,6 +119,38 @@ def test_log_lies_where_it_is_asked_for(tmp_path: Path) -> None:
     rehearse(tmp_path, "layout", "--log", "here/mine.log")
     assert "run 1 begins" in (tmp_path / "here" / "mine.log").read_text()
     assert not (tmp_path / "data" / "run.log").exists()
+
+
+@pytest.mark.parametrize(("place_follows", "path"), [(False, None), (True, None), (False, "x.log")])
+def test_records_are_kept_only_for_a_log_that_has_a_place(
+    tmp_path: Path, place_follows: bool, path: str | None
+) -> None:
+    kept = place_follows or path is not None
+    begin_log(path and tmp_path / path, place_follows)
+    try:
+        assert any(isinstance(handler, RunLog) for handler in PACKAGE.handlers) is kept
+    finally:
+        end_log()
+
+
+def test_commands_without_a_place_for_a_log_keep_no_records() -> None:
+    callbacks = {each.name or each.callback.__name__: each.callback for each in app.registered_commands}  # type: ignore[union-attr]
+    own = {name for name in MAKING if inspect.getclosurevars(callbacks[name]).nonlocals["own_log"]}
+    assert own == {"build", "run", "layout", "trajectories", "render"}
+
+
+def test_a_tree_without_metadata_tells_that_it_has_no_version(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def missing(name: str) -> str:
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr("importlib.metadata.version", missing)
+    assert CliRunner().invoke(app, ["--version"]).output == "manitwin 0+unknown\n"
+    log = tmp_path / "a.log"
+    try:
+        CliRunner().invoke(app, ["index", str(tmp_path), "--log", str(log)])
+    finally:
+        end_log()
+    assert "manitwin 0+unknown: " in log.read_text()
 
 
 def test_log_that_cannot_be_written_is_a_usage_error(tmp_path: Path) -> None:

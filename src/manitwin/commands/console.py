@@ -10,6 +10,8 @@ from typing import Any
 
 from rich.console import Console
 
+from manitwin.loggers import PACKAGE
+
 SAID = logging.getLogger("manitwin.said")
 """What was printed; the log of a run has it, and ``--verbose`` does not print it again."""
 
@@ -44,7 +46,6 @@ class PrintedLog(logging.Handler):
 
 
 _printed_log = PrintedLog(logging.INFO)
-logging.getLogger("manitwin").addHandler(logging.NullHandler())  # else Python prints warnings where nobody listens
 
 
 def be_quiet(quiet: bool) -> None:
@@ -54,11 +55,10 @@ def be_quiet(quiet: bool) -> None:
 
 def be_verbose(verbose: bool) -> None:
     """Also print what the package logs, or no more."""
-    package = logging.getLogger("manitwin")
-    package.removeHandler(_printed_log)
+    PACKAGE.removeHandler(_printed_log)
     if verbose:
-        package.setLevel(logging.DEBUG)
-        package.addHandler(_printed_log)
+        PACKAGE.setLevel(logging.DEBUG)
+        PACKAGE.addHandler(_printed_log)
 
 
 def print_estimate(usd_by_kind: dict[str, float]) -> None:

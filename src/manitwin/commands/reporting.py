@@ -7,7 +7,6 @@ import logging
 import sys
 from collections.abc import Callable
 from functools import wraps
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,6 +15,7 @@ import typer
 from manitwin.commands.console import be_quiet, be_verbose
 from manitwin.commands.run_log import begin_log
 from manitwin.errors import UsageError
+from manitwin.version import installed_version
 
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Say more: stages and their seconds, what was chosen and why.")
@@ -45,14 +45,17 @@ def _say(verbose: bool, quiet: bool) -> None:
     be_verbose(verbose)
 
 
-def reported(command: Callable[..., None]) -> Callable[..., None]:
-    """Return a command that takes ``--verbose``, ``--quiet`` and ``--log`` as well."""
+def reported(command: Callable[..., None], own_log: bool = False) -> Callable[..., None]:
+    """Return a command that takes ``--verbose``, ``--quiet`` and ``--log`` as well.
+
+    ``own_log``: it has a place for its log (``log_into``); of another command nothing is kept without ``--log``.
+    """
 
     @wraps(command)
     def call(*, verbose: bool, quiet: bool, log: Path | None, **given: Any) -> None:
         _say(verbose or _before_command[0], quiet or _before_command[1])
-        begin_log(log)
-        LOG.info("manitwin %s: %s", version("manitwin"), " ".join(sys.argv[1:]))
+        begin_log(log, place_follows=own_log)
+        LOG.info("manitwin %s: %s", installed_version(), " ".join(sys.argv[1:]))
         command(**given)
 
     signature = inspect.signature(command, eval_str=True)

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 from manitwin.errors import UsageError
+from manitwin.loggers import PACKAGE
 
 SECRET_NAMES = re.compile(r"KEY|TOKEN|SECRET|PASSWORD|CREDENTIAL", re.IGNORECASE)
 SHORTEST_SECRET = 6
@@ -84,14 +85,18 @@ class RunLog(logging.Handler):
 _log: RunLog | None = None
 
 
-def begin_log(path: Path | None) -> None:
-    """Keep a log from now on: at ``path``, or where ``log_into`` says. Raises UsageError."""
+def begin_log(path: Path | None, place_follows: bool = False) -> None:
+    """Keep a log from now on: at ``path``, or where ``log_into`` will say if that ``place_follows``, else none.
+
+    Raises UsageError.
+    """
     global _log
     end_log()
+    if path is None and not place_follows:
+        return
     _log = RunLog()
-    package = logging.getLogger("manitwin")
-    package.setLevel(logging.DEBUG)
-    package.addHandler(_log)
+    PACKAGE.setLevel(logging.DEBUG)
+    PACKAGE.addHandler(_log)
     if path is not None:
         _log.open(path)
 
@@ -106,6 +111,6 @@ def end_log() -> None:
     """Close the log."""
     global _log
     if _log is not None:
-        logging.getLogger("manitwin").removeHandler(_log)
+        PACKAGE.removeHandler(_log)
         _log.close()
         _log = None
