@@ -44,6 +44,12 @@ def test_completion_finds_every_name_and_imports_nothing_for_it() -> None:
     assert said.splitlines() == ["True []", "[]"]
 
 
+def test_completion_offers_public_names_alone() -> None:
+    assert {name for name in dir(manitwin) if not (name.startswith("__") and name.endswith("__"))} == set(
+        manitwin.__all__
+    ) - {"__version__"}
+
+
 def test_a_name_that_is_not_there_lists_those_that_are() -> None:
     with pytest.raises(AttributeError, match=r"no attribute 'biuld'; it has .*\bbuild\b"):
         manitwin.biuld  # noqa: B018

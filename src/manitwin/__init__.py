@@ -113,5 +113,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Return what there is, asked for before or not, so that completion finds it."""
-    return sorted({*globals(), *__all__})
+    """Return the public names, asked for before or not, so that completion finds them and no others."""
+    return sorted({*(name for name in globals() if name.startswith("__")), *__all__})

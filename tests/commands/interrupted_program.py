@@ -1,13 +1,17 @@
 """A command that a test interrupts: ``python interrupted_program.py NAME FOLDER MODE``, registered in the command line.
 
 It notes in FOLDER that it is at work (``started``) and that it is ending (``ending``). MODE ``busy`` computes until it is
-interrupted; ``slow`` then takes for ever over its end; ``run`` has two workers asleep in a stage.
+interrupted; ``slow`` then takes for ever over its end; ``late`` gets a second one as Python takes the process down;
+``run`` has two workers asleep in a stage.
 """
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import manitwin.cli as cli
@@ -30,6 +34,15 @@ def work() -> None:
             time.sleep(0.01)
 
 
+class InterruptsWhenTakenDown:
+    """Interrupts this process as the modules' names are removed, which is the last that Python does."""
+
+    def __del__(
+        self, kill: Callable[[int, int], None] = os.kill, number: int = signal.SIGINT, me: int = os.getpid()
+    ) -> None:
+        kill(me, number)
+
+
 def rehearse() -> None:
     from manitwin.config import RunConfig
     from manitwin.dataset_root import DatasetRoot
@@ -45,6 +58,7 @@ def rehearse() -> None:
 
 
 if __name__ == "__main__":
+    last = InterruptsWhenTakenDown() if MODE == "late" else None
     cli.app.registered_commands = [each for each in cli.app.registered_commands if each.callback.__name__ != NAME]
     cli.app.command(NAME)(reported(work, own_log=NAME in ("run", "trajectories")))
     sys.argv = ["manitwin", NAME]

@@ -109,3 +109,39 @@ def test_an_interrupt_is_how_a_watch_ends(tmp_path: Path, monkeypatch: pytest.Mo
     done = CliRunner().invoke(app, ["status", str(tmp_path), "--watch"])
     assert done.exit_code == 0 and "0 of 0 items ended" in done.stdout
     assert "interrupted" not in done.output.lower() and "aborted" not in done.output.lower()
+
+
+@pytest.mark.parametrize(("name", "status"), [("layout", 4), ("export", 130)])
+def test_interrupt_while_python_takes_itself_down_keeps_the_exit_status(tmp_path: Path, name: str, status: int) -> None:
+    program = Interrupted(tmp_path, name, "late")
+    program.wait_for("started")
+    program.send(signal.SIGINT)
+    found, lines = program.end()
+    assert found == status and len(lines) == 1 and "interrupted" in lines[0]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_while_the_command_line_is_imported_is_one_line(number: signal.Signals) -> None:
+    program = """
+import os, sys
+class Interrupts:
+    def find_spec(self, name, *rest):
+        if name == "manitwin.cli":
+            os.kill(os.getpid(), int(sys.argv[1]))
+sys.meta_path.insert(0, Interrupts())
+from manitwin.entry import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", program, str(int(number))], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "manitwin: interrupted\n")
+
+
+def test_entry_imports_nothing_that_takes_time() -> None:
+    program = "import sys; old = set(sys.modules); import manitwin.entry; print(*sorted(set(sys.modules) - old))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert not {"multiprocessing", "typer", "rich", "asyncio", "importlib.metadata"} & set(done.stdout.split())
+
+
+def test_package_runs_as_a_module() -> None:
+    done = subprocess.run([sys.executable, "-m", "manitwin", "--version"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.startswith("manitwin ")

@@ -1,11 +1,15 @@
-"""Ctrl-C and SIGTERM: the first ends a command in order, the second at once; neither shows a traceback."""
+"""Ctrl-C and SIGTERM: the first ends a command in order, the second at once; neither shows a traceback.
+
+This is imported before all else, and imports nothing that takes time.
+"""
 
 from __future__ import annotations
 
-import multiprocessing
+import atexit
 import os
 import signal
 from contextlib import suppress
+from functools import cache
 from types import FrameType
 from typing import NoReturn
 
@@ -15,6 +19,34 @@ RESUMABLE_STATUS = 4
 INTERRUPTED_STATUS = 130
 """128 and the number of SIGINT, as shells say it: nothing is there that the same command could go on with."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+@cache
+def keep_exit_status() -> None:
+    """Ignore signals once Python takes itself down, after all exit functions that are registered after this one.
+
+    Until then it would give each signal back its default, and one that comes would end the process without its exit status.
+    """
+
+    def ignore() -> None:
+        for number in SIGNALS:
+            signal.signal(number, signal.SIG_IGN)
+
+    atexit.register(ignore)  # what is registered first is called last
+
+
+def leave_when_interrupted() -> None:
+    """End the process at a signal, while its imports are under way and there is nothing to end in order."""
+    keep_exit_status()
+    starting = Interrupts()
+
+    def leave(number: int, frame: FrameType | None) -> NoReturn:
+        starting.say()
+        os._exit(starting.status)
+
+    for number in SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as a shell's background jobs have it
+            signal.signal(number, leave)
 
 
 class Interrupts:
@@ -38,6 +70,7 @@ class Interrupts:
 
     def listen(self) -> None:
         """Raise KeyboardInterrupt at the first signal, and end the process at the second."""
+        keep_exit_status()
         for number in SIGNALS:
             if signal.getsignal(number) is not signal.SIG_IGN:  # as a shell's background jobs have it
                 signal.signal(number, self._caught)
@@ -63,6 +96,8 @@ class Interrupts:
         if self._seen == 1:
             raise KeyboardInterrupt
         self.say()
+        import multiprocessing
+
         for child in multiprocessing.active_children():
             child.kill()
         os._exit(self.status)
