@@ -182,3 +182,11 @@ def test_a_reader_leaves_nothing_beside_a_ledger_that_no_run_writes(tmp_path: Pa
     with read_ledger(path) as connection:
         assert connection.execute("SELECT count(*) FROM items").fetchone()[0] == 1
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_what_a_run_writes_is_seen_by_readers_that_open_while_it_is_at_work(path: Path, ledger: Ledger) -> None:
+    ledger.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")  # the log holds nothing, and yet a run is at work
+    with read_ledger(path) as connection:
+        before = connection.execute("SELECT count(*) FROM items").fetchone()[0]
+        ledger.add_items([Item(file=None, text="one more")])
+        assert connection.execute("SELECT count(*) FROM items").fetchone()[0] == before + 1

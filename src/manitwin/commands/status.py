@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from contextlib import suppress
 from datetime import timedelta
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -46,6 +47,9 @@ def status(
     from manitwin.ledger.unaccepted import read_unaccepted
 
     path = local_ledger(DatasetRoot(dataset))
+    if watch:
+        _watch(path)
+        return
     with read_ledger(path) as ledger:
         if why is not None:
             story = read_story(ledger, why)
@@ -56,19 +60,30 @@ def status(
         elif json:
             progress = read_progress(ledger, is_written(path))
             print_document(status_document(progress, dataset, group_causes(read_unaccepted(ledger))))
-        elif watch:
-            from rich.live import Live
-
-            with (
-                suppress(KeyboardInterrupt),  # how a watch is meant to end
-                Live(_view(read_progress(ledger, is_written(path))), console=out_console, auto_refresh=False) as live,
-            ):
-                while True:
-                    time.sleep(REFRESH_S)
-                    live.update(_view(read_progress(ledger, is_written(path))), refresh=True)
         else:
             out_console.print(_view(read_progress(ledger, is_written(path))))
             _print_causes(group_causes(read_unaccepted(ledger)), dataset)
+
+
+def _watch(path: Path) -> None:
+    """Show a ledger anew every two seconds, until interrupted."""
+    from rich.live import Live
+
+    from manitwin.ledger.ledger import read_ledger
+    from manitwin.ledger.lock import is_written
+    from manitwin.ledger.progress import read_progress
+
+    def view() -> RenderableType:
+        with read_ledger(path) as ledger:
+            return _view(read_progress(ledger, is_written(path)))
+
+    with (
+        suppress(KeyboardInterrupt),  # how a watch is meant to end
+        Live(view(), console=out_console, auto_refresh=False) as live,
+    ):
+        while True:
+            time.sleep(REFRESH_S)
+            live.update(view(), refresh=True)
 
 
 def _print_causes(causes: list[Cause], dataset: str) -> None:

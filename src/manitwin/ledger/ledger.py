@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from manitwin.errors import BackendError, UsageError
-from manitwin.ledger.lock import hold_lock, lock_file
+from manitwin.ledger.lock import hold_lock, is_written, lock_file
 from manitwin.ledger.migrations import migrate
 from manitwin.stages.stage import Item
 
@@ -274,13 +274,14 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
     """Open a ledger for reading, also while a run writes it; raises UsageError where there is none.
 
     Nothing is left beside one that no run writes: SQLite's reader of a write-ahead log makes files there and does not remove
-    them, so where that log holds nothing it is told to leave it alone (https://sqlite.org/uri.html, ``immutable``).
+    them, so where that log holds nothing it is told to leave it alone (https://sqlite.org/uri.html, ``immutable``). What
+    watches a ledger opens it anew each time: a run that begins meanwhile is not seen through such a connection.
     """
     if not path.is_file():
         raise UsageError(f"{path}: no ledger; `manitwin run MANIFEST -o DATASET` makes one")
     log = path.with_name(f"{path.name}-wal")
-    complete = not log.is_file() or log.stat().st_size == 0
-    connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro{'&immutable=1' if complete else ''}", uri=True)
+    at_rest = not is_written(path) and (not log.is_file() or log.stat().st_size == 0)
+    connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro{'&immutable=1' if at_rest else ''}", uri=True)
     connection.row_factory = sqlite3.Row
     try:
         yield connection
