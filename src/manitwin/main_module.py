@@ -1,11 +1,31 @@
-"""Spawned workers and the script that started them."""
+"""Spawned workers: the script that started them, and the locks that they share."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing.context import SpawnContext
+from multiprocessing.synchronize import RLock
 from typing import Any
+
+
+class WorkerContext(SpawnContext):
+    """Spawn the workers of one pool, whose locks last as long as this context.
+
+    pebble takes its locks away before it ends its last workers (``WorkerChannel.close``): one that is starting at that
+    moment does not find them, and says so with a traceback.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._kept: list[RLock] = []
+
+    def RLock(self) -> RLock:
+        """Return a lock that is there until this context is gone."""
+        lock = super().RLock()
+        self._kept.append(lock)
+        return lock
 
 
 @contextmanager

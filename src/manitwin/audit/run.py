@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
@@ -21,7 +20,7 @@ from manitwin.audit.measured import MeasuredAsset
 from manitwin.audit.rules import RULES_BY_CODE
 from manitwin.audit.select import select_rules
 from manitwin.errors import AssetError, TwinError, UsageError
-from manitwin.main_module import hidden_main_module
+from manitwin.main_module import WorkerContext, hidden_main_module
 from manitwin.store import RECORD, read_record
 
 AHEAD = 4
@@ -134,7 +133,7 @@ def _one_thread_each() -> Iterator[None]:
 
 
 def _in_processes(paths: Sequence[Path], codes: tuple[str, ...], jobs: int, fix: bool) -> Iterator[Audited]:
-    pool = ProcessPool(max_workers=min(jobs, len(paths)), context=multiprocessing.get_context("spawn"))
+    pool = ProcessPool(max_workers=min(jobs, len(paths)), context=WorkerContext())
     waiting: deque[tuple[Path, Any]] = deque()
     try:
         for path in paths:

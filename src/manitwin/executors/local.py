@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import faulthandler
-import multiprocessing
 import os
 import queue
 import signal
@@ -23,7 +22,7 @@ from manitwin.engine.worker import Worker
 from manitwin.executors.child_processes import die_with, spared_from_interrupts
 from manitwin.executors.one_thread import one_thread_each
 from manitwin.executors.part_notes import EVERY_S, drop_note, parts_noted, read_notes
-from manitwin.main_module import hidden_main_module
+from manitwin.main_module import WorkerContext, hidden_main_module
 from manitwin.stages.stage_parts import StagePart
 
 JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
@@ -98,7 +97,7 @@ class LocalExecutor:
             self._pools[needs] = ProcessPool(
                 max_workers=self._slots[needs],
                 max_tasks=JOBS_A_PROCESS,
-                context=multiprocessing.get_context("spawn"),
+                context=WorkerContext(),
                 initializer=_start,
                 initargs=(self._setup, self._stacks.name, os.getpid()),
             )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import queue
 import threading
@@ -23,7 +22,7 @@ from manitwin.errors import Unavailable
 from manitwin.executors.child_processes import die_with, spared_from_interrupts
 from manitwin.executors.one_thread import one_thread_each
 from manitwin.identity import twin_id
-from manitwin.main_module import hidden_main_module
+from manitwin.main_module import WorkerContext, hidden_main_module
 from manitwin.stages.stage import Item
 
 POLL_S = 0.2
@@ -80,14 +79,16 @@ def build_all(
 
 
 def _build_all(items: list[Item], out: Path, config: BuildConfig, jobs: int, on_stage: OnStage) -> Iterator[ItemResult]:
-    context = multiprocessing.get_context("spawn")
+    context = WorkerContext()
     events = context.Queue()
     done: queue.Queue[ItemResult] = queue.Queue()
     stop = threading.Event()
     listener = threading.Thread(target=_listen, args=(events, on_stage, stop), daemon=True)
     listener.start()
     shared = (events, context.Value("d", 0.0), os.getpid())
-    pool = ProcessPool(max_workers=jobs, context=context, initializer=_start_worker, initargs=shared)
+    pool = ProcessPool(
+        max_workers=max(1, min(jobs, len(items))), context=context, initializer=_start_worker, initargs=shared
+    )
     try:
         for item in items:
             with spared_from_interrupts():

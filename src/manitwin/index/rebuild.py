@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from manitwin.index.merge import merged, write_rows
 from manitwin.index.part_list import INDEX, Part, PartList, in_order_of_twins, sweep
 from manitwin.index.parts import rows_of_twins
 from manitwin.index.tables import TABLES, joined, parquet
-from manitwin.main_module import hidden_main_module
+from manitwin.main_module import WorkerContext, hidden_main_module
 
 CHUNK = 64
 """Twins of a task: some seconds of work, some thousand rows."""
@@ -84,7 +83,7 @@ def _first_unused_number(root: DatasetRoot) -> int:
 
 
 def _read_all(root: DatasetRoot, chunks: list[list[str]], scratch: Path, jobs: int) -> Iterator[_Read]:
-    pool = ProcessPool(max_workers=jobs, context=multiprocessing.get_context("spawn"))
+    pool = ProcessPool(max_workers=jobs, context=WorkerContext())
     try:
         futures = [pool.schedule(_read, args=(root, chunk, scratch, number)) for number, chunk in enumerate(chunks)]
         for chunk, future in zip(chunks, futures, strict=True):
