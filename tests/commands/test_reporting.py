@@ -189,3 +189,10 @@ def test_log_is_no_part_of_a_data_set(tmp_path: Path) -> None:
         [sys.executable, "-m", "manitwin.cli", "check", "data"], cwd=tmp_path, capture_output=True, text=True
     )
     assert "ledger and folders agree" in done.stdout and (tmp_path / "data" / "run.log").exists()
+
+
+def test_addresses_are_printed_as_they_are(capfd: pytest.CaptureFixture[str]) -> None:
+    from manitwin.commands.console import err_console
+
+    err_console.print("failed http://h:x: no", markup=False)
+    assert capfd.readouterr().err == "failed http://h:x: no\n"

@@ -20,7 +20,7 @@ class LoggedConsole(Console):
     """A console whose lines are also told to a logger, as ``level``."""
 
     def __init__(self, level: int, **options: Any):
-        super().__init__(highlight=False, soft_wrap=True, **options)
+        super().__init__(highlight=False, soft_wrap=True, emoji=False, **options)  # 'host:x:' is no emoji
         self._level = level
 
     def print(self, *objects: Any, logged: bool = True, **options: Any) -> None:

@@ -18,7 +18,7 @@ from manitwin.config import BuildConfig
 from manitwin.errors import ConfigError, Unavailable, choose_from
 
 GROUP = "manitwin.backends"
-URL_OF_SERVER = re.compile(r"^(?!command:)(.*)@[a-z]+://\S+$")
+URL_OF_SERVER = re.compile(r"^(?!command:)(.*)@[A-Za-z][A-Za-z0-9+.-]*://\S+$")
 
 
 @cache

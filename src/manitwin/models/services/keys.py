@@ -7,9 +7,12 @@ import re
 from collections.abc import Sequence
 from urllib.parse import urlsplit
 
-from manitwin.errors import ConfigError
+from manitwin.errors import ConfigError, choose_from
 
-ADDRESS = re.compile(r"(?:^|@)([a-z]+://.*)$")
+ADDRESS = re.compile(r"(?:^|@)([A-Za-z][A-Za-z0-9+.-]*://.*)$")
+SCHEMES = ("http", "https", "tcp")
+_EXAMPLE = "one such as http://localhost:8000/v1, or tcp://localhost:5556 of a grasp server"
+HOST = re.compile(r"[\w.:%-]+")  # names, also of other alphabets, and IPv4 and IPv6 addresses
 LOCAL_HOSTS = frozenset({"localhost", "127.0.0.1", "::1"})
 
 
@@ -25,11 +28,17 @@ def split_url(argument: str) -> tuple[str, str | None]:
 
 
 def _checked(url: str) -> str:
-    parts = urlsplit(url)
-    if parts.username or parts.password:
+    if "@" in url.partition("://")[2].partition("/")[0]:  # first of all: what comes after shows the URL
         raise ConfigError("a server's URL holds a user name or password; keys come from the environment only")
-    if not parts.hostname:
-        raise ConfigError(f"{url!r} is no URL of a server; give one such as http://localhost:8000/v1")
+    try:
+        parts = urlsplit(url)
+        host, port = parts.hostname or "", parts.port
+    except ValueError as error:
+        raise ConfigError(f"{url!r} is no URL of a server ({error}); give {_EXAMPLE}") from error
+    if parts.scheme not in SCHEMES:
+        raise ConfigError(f"{url!r}: {choose_from('scheme', parts.scheme, SCHEMES)}")
+    if not HOST.fullmatch(host) or port == 0 or any(letter.isspace() for letter in url):
+        raise ConfigError(f"{url!r} is no URL of a server; give {_EXAMPLE}")
     return url.rstrip("/")
 
 
