@@ -136,16 +136,16 @@ def drive(
 ) -> RunReport:
     """Add items to the ledger below a root and make of each what the recipe says, until all have ended.
 
-    ``configuration`` is left beside the ledger. What was remarked while items were read is in ``remarks``. Raises
+    ``configuration`` is left beside the ledger. What was remarked while items were read is in ``remarks``,
+    and how many were there already is added to it. Raises
     UsageError for wrong arguments, or where another run is at work there.
     """
     if executor not in EXECUTORS:
         raise UsageError(choose_from("executor", executor, EXECUTORS))
-    remarks = [] if remarks is None else remarks
     path = local_ledger(root)
     ledger, given, new = _opened_with(items, path)
     try:
-        if given and given > new:
+        if remarks is not None and given > new:
             remarks.append(f"{given - new} of {given} items were in the data set already")
         root.write_bytes(CONFIG, canonical_json(configuration).encode())
         setup = WorkerSetup(root.url, recipe, cache_folder(root), settings.keep_work)
@@ -160,7 +160,7 @@ def drive(
         counts = ledger.counts()
         said = ", ".join(f"{count} {state}" for state, count in counts.items() if count)
         RUN.info("run ends: %s; %s", result.stopped or "finished", said)
-        return RunReport(counts, result.stopped, result.left, remarks)
+        return RunReport(counts, result.stopped, result.left, [] if remarks is None else remarks)
     finally:
         ledger.close()
         _LedgerCopy(root, path).upload()

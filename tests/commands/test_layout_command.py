@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,8 +11,10 @@ import typer
 from PIL import Image
 from typer.testing import CliRunner
 
+from manitwin.apps.layouts.run import CONTACT_SHEET
 from manitwin.commands.layout import layout
 from manitwin.dataset_root import twin_name
+from manitwin.errors import UsageError
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_file import read_scene
 from manitwin.store import RECORD, seal
@@ -55,3 +58,35 @@ def test_upright_is_what_the_scenes_are_and_who_lies_is_said(bottles: Path, tmp_
     assert len(scenes) == 2
     for scene in scenes:
         assert {(each.category, each.placement) for each in scene.objects} == {("bottle", 1), ("ruler", 0)}
+
+
+def test_scenes_of_other_settings_stay_as_they_are(bottles: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    made = [str(bottles), "-o", str(out), "--jobs", "1", "--objects", "1..1", "--seed", "3"]
+    assert CliRunner().invoke(app, [*made, "-n", "2", "--sheet", "--pictures"]).exit_code == 0
+    drawn = {path: path.read_bytes() for path in sorted(out.rglob("scenes/**/*")) if path.is_file()}
+    sheet = (out / CONTACT_SHEET).read_bytes()
+    assert any(path.suffix == ".webp" for path in drawn)
+    refused = CliRunner().invoke(app, [*made, "-n", "1", "--upright", "--objects", "2..3"])
+    assert isinstance(refused.exception, UsageError)
+    assert re.search(
+        r"out: 2 scenes in it were made with other settings \(layout\.objects: \[1, 1\] there, \[2, 3\] now;"
+        r" layout\.upright: false there, true now\); .* or another folder",
+        str(refused.exception),
+    )
+    assert {path: path.read_bytes() for path in drawn} == drawn
+    assert (out / CONTACT_SHEET).read_bytes() == sheet
+    # more of the same: those that were drawn stay so, the new one is drawn, and the sheet shows it
+    done = CliRunner().invoke(app, [*made, "-n", "3"])
+    assert done.exit_code == 0, done.output
+    assert "3 layouts, 1 to do" in done.output
+    assert {path: path.read_bytes() for path in drawn} == drawn
+    assert len(list(out.rglob("pictures.json"))) == 3
+    assert (out / CONTACT_SHEET).read_bytes() != sheet
+
+
+def test_a_folder_of_something_else_is_refused(bottles: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "config.json").write_text('{"kind": "trajectories"}')
+    refused = CliRunner().invoke(app, [str(bottles), "-o", str(tmp_path / "out"), "-n", "1"])
+    assert "holds trajectories, not layouts; give another folder" in str(refused.exception)

@@ -61,12 +61,12 @@ def layout(
         "upright": upright or None,
     }  # fmt: skip
     settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
-    from manitwin.apps.layouts.run import layout_totals, make_layouts, without_upright
+    from manitwin.apps.layouts.run import CONTACT_SHEET, layout_totals, make_layouts, without_upright
     from manitwin.commands.watched_run import WatchedRun
     from manitwin.dataset_root import DatasetRoot
     from manitwin.dataset_run import local_log
 
-    sheet = sheet or settings.pictures
+    sheet = sheet or settings.pictures or DatasetRoot(out).exists(CONTACT_SHEET)  # one that is there is kept up to date
     if sheet:
         from manitwin.render.device import require_renderer
 
@@ -81,7 +81,7 @@ def layout(
         out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}", markup=False)
     _print_totals(totals)
     if sheet and totals.accepted:
-        from manitwin.apps.layouts.contact_sheet import CONTACT_SHEET, write_contact_sheet
+        from manitwin.apps.layouts.contact_sheet import write_contact_sheet
 
         shown = write_contact_sheet(dataset, out)
         out_console.print(f"{shown} of {totals.accepted} scenes in {out}/{CONTACT_SHEET}", markup=False)

@@ -9,13 +9,12 @@ from PIL import Image
 from manitwin.app_config import LayoutsConfig, LayoutSettings
 from manitwin.apps.layouts.contact_sheet import (
     CAPTION_PX,
-    CONTACT_SHEET,
     GAP_PX,
     TILE_PX,
     contact_sheet,
     write_contact_sheet,
 )
-from manitwin.apps.layouts.run import make_layouts
+from manitwin.apps.layouts.run import CONTACT_SHEET, make_layouts
 from manitwin.errors import UsageError
 from scene_twins import slab, write_things
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -148,3 +149,36 @@ def test_folders_without_episodes_are_said(tmp_path: Path) -> None:
         draw_episodes(tmp_path, PicturesConfig(), executor="inline")
     with pytest.raises(UsageError, match="manitwin trajectories"):
         collect(tmp_path, ["lerobot"])
+
+
+def test_episodes_made_in_steps_are_those_made_in_one_go(bricks: Path, episodes: Path, tmp_path: Path) -> None:
+    totals = []
+    for count in (2, 4, 6):
+        report = make_episodes(bricks, tmp_path, count, CONFIG, executor="inline")
+        totals.append(collect(tmp_path, ["lerobot"]).totals.attempted)
+    assert totals == [2, 4, 6]
+    assert report.remarks == ["4 of 6 episodes were there already"]
+    in_steps, in_one_go = (
+        {(each.seed, each.twin_id, each.grasp_id, each.length_s) for each in read_attempts(out / ATTEMPTS)}
+        for out in (tmp_path, episodes)
+    )
+    assert in_steps == in_one_go
+    assert len(in_steps) == 6
+    actions = [each.recording.object_positions_m.tobytes() for each in stored_episodes(batch_folders(tmp_path))]
+    assert len(set(actions)) == len(actions)
+    opened: list[int] = []
+    fewer = make_episodes(
+        bricks, tmp_path, 3, CONFIG, executor="inline", on_start=lambda items, todo: opened.append(todo)
+    )
+    assert opened == [0]
+    assert fewer.remarks == ["6 episodes are there already, more than the 3 asked for; none was added"]
+    with pytest.raises(UsageError, match=r"made with other settings \(seed: 5 there, 6 now\).*another folder"):
+        make_episodes(bricks, tmp_path, 6, CONFIG.model_copy(update={"seed": 6}), executor="inline")
+
+
+def test_batches_that_repeat_an_episode_are_refused(episodes: Path, tmp_path: Path) -> None:
+    shutil.copytree(episodes, tmp_path / "copy")
+    folder = batch_folders(tmp_path / "copy")[0]
+    shutil.copytree(folder, folder.parent / f"{folder.name[:2]}{'0' * 14}")
+    with pytest.raises(EpisodesError, match=r"repeats episode 00000000 of .*make the episodes again in a new folder"):
+        collect(tmp_path / "copy", ["lerobot"])

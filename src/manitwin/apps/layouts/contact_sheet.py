@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from manitwin.apps.layouts.layout_stages import PICTURES
 from manitwin.apps.layouts.preview import scene_pictures
-from manitwin.apps.layouts.run import accepted_scenes
+from manitwin.apps.layouts.run import CONTACT_SHEET, accepted_scenes
 from manitwin.dataset_root import DatasetRoot
 from manitwin.errors import UsageError
 from manitwin.scenes.scene import SCENE
@@ -20,7 +20,6 @@ from manitwin.scenes.scene_file import parse_scene
 from manitwin.scenes.scene_folders import scene_name
 from manitwin.scenes.twin_source import TwinSource
 
-CONTACT_SHEET = "contact_sheet.webp"
 SCENES_SHOWN = 48
 CAMERA = "oblique"
 TILE_PX, MOST_COLUMNS, CAPTION_PX, GAP_PX = 256, 8, 18, 4

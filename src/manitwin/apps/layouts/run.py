@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from manitwin.app_config import LayoutsConfig
+from manitwin.apps.earlier_settings import check_settings, earlier_settings
 from manitwin.apps.layouts.pool import pool_of
 from manitwin.apps.layouts.recipe import LayoutsRecipe
 from manitwin.dataset_root import DatasetRoot
@@ -17,6 +19,9 @@ from manitwin.ledger.ledger import read_ledger
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_file import parse_scene
 from manitwin.scenes.scene_folders import scene_name
+
+CONTACT_SHEET = "contact_sheet.webp"
+DECIDE_NO_SCENE = frozenset(("dataset", "run", "pictures", "picture_px"))
 
 
 @dataclass(frozen=True)
@@ -52,7 +57,10 @@ def make_layouts(
 ) -> RunReport:
     """Sample the layouts number 0 to ``count - 1`` of a data set's twins below ``out``; those that are there stay.
 
-    Raises UsageError for a data set without twins, categories that it has not, or where another run is at work at ``out``.
+    Scenes that were drawn by an earlier run stay so: ``pictures`` is kept. A contact sheet is removed before scenes are made,
+    which it would not show.
+    Raises UsageError for a data set without twins, categories that it has not, scenes of other settings at ``out``, or where
+    another run is at work there.
     """
     if count < 1:
         raise UsageError(f"{count} layouts; ask for 1 or more")
@@ -60,13 +68,28 @@ def make_layouts(
     pool = pool_of(place)
     for category in config.layout.include:
         pool.of_category(category)
+    root = DatasetRoot(out)
+    config = _with_pictures_there(config, earlier_settings(root))
     recipe = LayoutsRecipe(config, place)
     configuration = {"kind": "layouts", "dataset": place, **config.model_dump(mode="json")}
+    check_settings(root, configuration, free=DECIDE_NO_SCENE, made="scenes")
+
+    def started(items: int, opened: int) -> None:
+        if opened and root.exists(CONTACT_SHEET):
+            root.remove(CONTACT_SHEET)
+        on_start(items, opened)
+
     return drive(
-        recipe, recipe.items(count), DatasetRoot(out), config.run, configuration=configuration, executor=executor,
-        address=address, on_start=on_start, on_stage=on_stage,
-        on_ended=on_ended,
+        recipe, recipe.items(count), root, config.run, configuration=configuration, executor=executor,
+        address=address, on_start=started, on_stage=on_stage, on_ended=on_ended,
     )  # fmt: skip
+
+
+def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any]) -> LayoutsConfig:
+    """Return a configuration that draws scenes where an earlier run did: those that it drew are not made without pictures."""
+    if config.pictures or not before.get("pictures"):
+        return config
+    return config.model_copy(update={"pictures": True, "picture_px": before.get("picture_px", config.picture_px)})
 
 
 def without_upright(dataset: str | Path) -> tuple[str, ...]:

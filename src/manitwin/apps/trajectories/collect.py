@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from manitwin.apps.trajectories.attempts_table import ATTEMPTS, merge_attempts, read_attempts
-from manitwin.apps.trajectories.batch import BATCH_RECORD, BATCHES
+from manitwin.apps.trajectories.batch import BATCH_RECORD, BATCHES, REMEDY_OF_REPEATS
 from manitwin.apps.trajectories.episodes_stage import EPISODES
 from manitwin.apps.trajectories.hdf5_file import EpisodeFile
 from manitwin.apps.trajectories.hdf5_merge import merge_episodes
 from manitwin.apps.trajectories.lerobot.write import write_lerobot
 from manitwin.apps.trajectories.stored_episode import StoredEpisode
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import EpisodesError, UsageError, choose_from
 
 LEROBOT, MANISKILL = "lerobot", "maniskill"
 FORMATS = (LEROBOT, MANISKILL)
@@ -50,19 +50,22 @@ def chosen_formats(text: str) -> list[str]:
 
 
 def batch_folders(out: Path) -> list[Path]:
-    """Return the finished batches of a run, by the numbers of their episodes."""
-    records = [
-        (
-            min(
-                (attempt.episode_id.rpartition("-")[2] for attempt in read_attempts(path.parent / ATTEMPTS)), default=""
-            ),
-            path,
-        )
-        for path in sorted((out / BATCHES).glob(f"*/*/{BATCH_RECORD}"))
-    ]
-    if not records:
+    """Return the finished batches of a run, by the numbers of their episodes.
+
+    Raises UsageError where there are none, EpisodesError where two have an episode of the same number: both drew with one seed.
+    """
+    folders = [path.parent for path in sorted((out / BATCHES).glob(f"*/*/{BATCH_RECORD}"))]
+    if not folders:
         raise UsageError(f"{out}: no episodes there; `manitwin trajectories` makes some")
-    return [path.parent for _, path in sorted(records)]
+    of, first = dict[str, Path](), dict[Path, str]()
+    for folder in folders:
+        for attempt in read_attempts(folder / ATTEMPTS):
+            number = attempt.episode_id.rpartition("-")[2]
+            other = of.setdefault(number, folder)
+            if other != folder:
+                raise EpisodesError(f"{folder}: repeats episode {number} of {other}; {REMEDY_OF_REPEATS}")
+            first[folder] = min(number, first.get(folder, number))
+    return sorted(folders, key=lambda folder: first.get(folder, ""))
 
 
 def stored_episodes(folders: Iterable[Path]) -> Iterator[StoredEpisode]:

@@ -110,7 +110,7 @@ class EpisodesStage:
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Make the batch that the item asks for."""
-        batch = Batch.of(draft.item)
+        batch = Batch.of_item(draft.item)
         attempts: list[Attempt] = []
         twins: dict[str, str] = {}
         write_episodes(folder / EPISODES, self._episodes(draft, batch, attempts, twins))
@@ -127,7 +127,7 @@ class EpisodesStage:
         self, draft: Draft, batch: Batch, attempts: list[Attempt], twins: dict[str, str]
     ) -> Iterator[StoredEpisode]:
         """Yield those that are kept, one at a time; all attempts are added to ``attempts``."""
-        for number in range(batch.first, batch.first + batch.count):
+        for number in batch.numbers:
             words = np.random.SeedSequence([draft.seed, number]).generate_state(2)
             setting = self._setting(batch, np.random.default_rng(words))
             stored = self._attempt(batch, number, int(words[0]), setting)

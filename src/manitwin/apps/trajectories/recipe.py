@@ -53,7 +53,7 @@ class EpisodesRecipe:
 
     def identify(self, item: Item) -> Identity:
         """Return the batch's id."""
-        return Identity(Batch.of(item).batch_id, "batch")
+        return Identity(Batch.of_item(item).batch_id, "batch")
 
     def stages(self, kind: str) -> list[Stage]:
         """Return the one stage."""

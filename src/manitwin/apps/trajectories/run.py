@@ -8,21 +8,25 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from manitwin.app_config import TrajectoriesConfig
+from manitwin.apps.earlier_settings import check_settings
 from manitwin.apps.layouts.pool import pool_of
 from manitwin.apps.trajectories.attempts_table import ATTEMPTS, read_attempts
-from manitwin.apps.trajectories.batch import batches
+from manitwin.apps.trajectories.batch import Batch, batches
 from manitwin.apps.trajectories.recipe import EpisodesRecipe
 from manitwin.apps.trajectories.retirement import Retirement, find_retirements, retire
 from manitwin.dataset_root import DatasetRoot
-from manitwin.dataset_run import CONFIG, ExecutorName, RunReport, drive
+from manitwin.dataset_run import CONFIG, ExecutorName, RunReport, drive, local_ledger
 from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.errors import UsageError
+from manitwin.ledger.ledger import read_ledger
 from manitwin.robots.load import load_robot
 from manitwin.scenes.scene_file import read_scene
 from manitwin.scenes.scene_folders import SCENES, scene_ids, scene_name
 from manitwin.scenes.twin_source import TwinSource
+from manitwin.stages.stage import Item
 
 KIND = "trajectories"
+DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "run", "batch", "retire_failed_share"))
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ def _check_out(out: DatasetRoot, source: Source) -> None:
     said = json.loads(out.read_bytes(CONFIG))
     if "scenes" in said and (said["scenes"] is None) != (source.scenes is None):
         raise UsageError(
-            f"{out}: its episodes are of {said['scenes'] or said['dataset']}; give another folder for those of"
+            f"{out.url}: its episodes are of {said['scenes'] or said['dataset']}; give another folder for those of"
             f" {source.scenes or source.dataset}"
         )
 
@@ -91,25 +95,46 @@ def make_episodes(
     """Attempt ``count`` episodes with the twins, or in the scenes, of a place; those that are there stay.
 
     ``twins`` names where the twins of scenes are now, None: where they were as the layouts were made.
+    ``count`` is how many there are at the end; where there are as many already, none is made.
     Raises UsageError for a place without twins or scenes, an unknown robot, an ``out`` that has episodes of
-    scenes where twins are given or the other way, or where another run is at work there.
+    scenes where twins are given or the other way, or made with other settings, or where another run is at work there.
     """
     if count < 1:
         raise UsageError(f"{count} episodes; ask for 1 or more")
     robot, source, root = load_robot(config.robot), Source.of(place, twins), DatasetRoot(out)
     _check_out(root, source)
-    if source.scenes is None:
-        deal = batches(
-            robot.name, count, config.batch, twin_ids=[twin.twin_id for twin in pool_of(source.dataset).twins]
-        )
-    else:
-        deal = batches(robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)))
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
-    return drive(
+    check_settings(root, configuration, free=DECIDE_NO_EPISODE, made="batches of episodes")
+    there = _batches_there(root)
+    try:
+        if source.scenes is None:
+            twin_ids = [twin.twin_id for twin in pool_of(source.dataset).twins]
+            deal = batches(robot.name, count, config.batch, twin_ids=twin_ids, there=there)
+        else:
+            deal = batches(robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)), there=there)
+    except UsageError as error:
+        raise UsageError(f"{root.url}: {error}") from error
+    report = drive(
         EpisodesRecipe(config, source.dataset, source.scenes), (batch.item() for batch in deal), root, config.run,
         configuration=configuration, executor=executor, address=address, on_start=on_start, on_stage=on_stage,
         on_ended=on_ended,
     )  # fmt: skip
+    before = sum(batch.count for batch in there)
+    if before > count:
+        report.remarks.append(f"{before} episodes are there already, more than the {count} asked for; none was added")
+    elif before:
+        report.remarks.append(f"{before} of {count} episodes were there already")
+    return report
+
+
+def _batches_there(root: DatasetRoot) -> list[Batch]:
+    """Return the batches that earlier runs at a root were to make."""
+    path = local_ledger(root)
+    if not path.is_file():
+        return []
+    with read_ledger(path) as ledger:
+        rows = ledger.execute("SELECT item FROM items WHERE state <> 'duplicate' ORDER BY number")
+        return [Batch.of_item(Item(**json.loads(text))) for (text,) in rows]
 
 
 def retire_failing(out: Path) -> tuple[list[Retirement], int]:
