@@ -139,6 +139,7 @@ def request_build(
     Raises UsageError for wrong arguments.
     """
     from manitwin.config import BuildConfig, load_config
+    from manitwin.files.output_folder import require_writable_folder
     from manitwin.generator_input import refusal
     from manitwin.manifest import collect_items
 
@@ -149,8 +150,7 @@ def request_build(
     if not items:
         raise UsageError("nothing to build; give images, meshes, folders, manifests or texts")
     place = Path(out)
-    if place.exists() and not place.is_dir():
-        raise UsageError(f"{out}: a file; give a folder to write twins into")
+    require_writable_folder(place, "twins")
     # this takes two CPU-seconds to import: what was given wrongly is said before
     from manitwin.pipeline import check_names
 

@@ -8,7 +8,7 @@ import os
 import sqlite3
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, closing, suppress
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -27,6 +27,7 @@ from manitwin.engine.recipe import Recipe
 from manitwin.engine.work import WorkFolder
 from manitwin.errors import UsageError, choose_from
 from manitwin.files.folder_listing import FolderListing
+from manitwin.files.output_folder import require_writable_folder
 from manitwin.ledger.ledger import LEDGER, Ledger, read_ledger
 from manitwin.loggers import RUN
 from manitwin.manifest import Notes, iterate_items
@@ -92,7 +93,8 @@ def run(
     # two CPU-seconds to import, which `status` does without
     from manitwin.pipeline import TwinRecipe, check_names, estimate_usd, log_choices
 
-    root = DatasetRoot(dataset)
+    root, given, words = DatasetRoot(dataset), list(inputs), list(texts)
+    require_work(root, given, words)
     settings = config or stored_config(root)
     check_names(settings)
     log_choices(settings)
@@ -104,7 +106,7 @@ def run(
 
     report = drive(
         TwinRecipe(settings),
-        iterate_items(inputs, defaults or {}, notes, texts, strict=strict, refusal=refusal(settings)),
+        iterate_items(given, defaults or {}, notes, words, strict=strict, refusal=refusal(settings)),
         root,
         settings.run,
         configuration=settings.model_dump(mode="json"),
@@ -178,6 +180,14 @@ def _opened_with(items: Iterable[Item], path: Path) -> tuple[Ledger, int, int]:
             with suppress(OSError):  # not empty: another run has begun there
                 path.parent.rmdir()
         raise
+
+
+def require_work(root: DatasetRoot, inputs: Sequence[str | Path], texts: Sequence[str]) -> None:
+    """Raise UsageError where a run has no inputs and its data set is not there, and where that cannot be made or written."""
+    if not inputs and not texts and not root.exists(CONFIG) and not root.exists(LEDGER):
+        raise UsageError(f"{root.url}: no data set there to go on with; give a manifest, files, folders or --text")
+    if root.local is not None:
+        require_writable_folder(root.local)
 
 
 def stored_config(root: DatasetRoot) -> BuildConfig:

@@ -112,3 +112,11 @@ def test_a_build_tells_the_most_frequent_reason_and_that_there_are_others(tmp_pa
     assert done.exit_code == 3, done.output
     assert "why rejected: 2 of 3 empty, such as" in done.stderr
     assert "remedy: export or download it again" in done.stderr and "1 other cause: in the lines above" in done.stderr
+
+
+def test_quiet_build_of_one_rejected_input_says_cause_and_remedy(tmp_path: Path) -> None:
+    notes = tmp_path / "notes.txt"
+    notes.write_text("no mesh")
+    done = CliRunner().invoke(app, ["build", "-q", str(notes), "-o", str(tmp_path / "out")])
+    lines = done.stderr.splitlines()
+    assert done.exit_code == 3 and "wrong_type" in lines[0] and "remedy: give a photo or a mesh" in done.stderr

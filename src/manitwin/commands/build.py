@@ -30,7 +30,10 @@ def build(
             callback=choices.must_exist("an image, a mesh, a folder, or a .csv or .jsonl manifest"),
         ),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="The folder to write twins into.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", "-o", help="The folder to write twins into.", callback=choices.folder_to_write),
+    ] = None,
     text: options.Text = None,
     name: Annotated[str | None, typer.Option(help="What the object is ('mug'): the key to the priors.")] = None,
     units: options.Units = "auto",

@@ -145,3 +145,12 @@ def must_exist(remedy: str) -> Callable[[Any], Any]:
         return value
 
     return check
+
+
+def folder_to_write(value: Any) -> Any:
+    """Return a folder that can be made and written, or a URL, which is not asked; a callback."""
+    if value and "://" not in str(value):
+        from manitwin.files.output_folder import require_writable_folder
+
+        require_writable_folder(Path(value))
+    return value

@@ -26,7 +26,12 @@ def export(
             callback=choices.must_exist("a folder that manitwin has built"),
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write OUT/<twin>/<format>/ into.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", help="The folder to write OUT/<twin>/<format>/ into.", callback=choices.folder_to_write
+        ),
+    ],
     to: Annotated[
         str, choices.EXPORT_FORMATS.option(help="Formats by commas (mjcf,urdf,sdf,usd,...), or all.")
     ] = "all",
@@ -48,8 +53,6 @@ def export(
         return
     formats = chosen_formats(to.split(","))
     allowed = None if license_allow is None else allowed_licenses(license_allow.split(","))
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"{out}: a file; give a folder to write exports into")
     ids: dict[str, str] = {}
     done = [_export(folder, formats, out, allowed, ids) for folder in twin_folders(twins)]
     refused = done.count(False)

@@ -20,7 +20,10 @@ def import_(
             callback=choices.must_exist("an asset's file or folder, or a folder of assets"),
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write imported assets into.")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="The folder to write imported assets into.", callback=choices.folder_to_write),
+    ],
     format: Annotated[
         str,
         choices.IMPORT_FORMATS.option(
@@ -31,10 +34,7 @@ def import_(
     ] = "auto",
 ) -> None:
     """Take assets of other tools over, keep what is annotated, and say what is missing."""
-    from manitwin.errors import UsageError
 
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"{out}: a file; give a folder to write into")
     from manitwin.importers.importer import import_assets
     from manitwin.importers.record import kept_words
 

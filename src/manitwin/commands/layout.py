@@ -27,7 +27,9 @@ def layout(
             callback=choices.must_exist("a data set, or the folder that manitwin build wrote"),
         ),
     ],
-    out: Annotated[str, typer.Option("--out", "-o", help="The folder to write scenes into.")],
+    out: Annotated[
+        str, typer.Option("--out", "-o", help="The folder to write scenes into.", callback=choices.folder_to_write)
+    ],
     count: Annotated[int, typer.Option("-n", help="How many layouts.", callback=choices.count_of("-n"))] = 100,
     objects: Annotated[str | None, typer.Option(help="How many objects: LOW..HIGH.", metavar="LOW..HIGH")] = None,
     surface: Annotated[str | None, choices.SURFACES.option(help="table, shelf or tray.")] = None,

@@ -21,7 +21,10 @@ def prompts(
             help="A twin folder.", metavar="TWIN", callback=choices.must_exist("a folder that manitwin build made")
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write the questions into.")],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="The folder to write the questions into.", callback=choices.folder_to_write),
+    ],
     config: options.Config = None,
     vlm: Annotated[
         str, choices.ANNOTATORS.option(help="The model, as for build; nothing is sent to it.")

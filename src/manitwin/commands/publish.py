@@ -26,7 +26,12 @@ def publish(
             callback=choices.must_exist("the folder or URL of a data set"),
         ),
     ],
-    out: Annotated[str, typer.Option("--out", "-o", help="A new folder or URL, or an older publication.")],
+    out: Annotated[
+        str,
+        typer.Option(
+            "--out", "-o", help="A new folder or URL, or an older publication.", callback=choices.folder_to_write
+        ),
+    ],
     license_allow: Annotated[
         str | None,
         typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: all but 'unknown'."),

@@ -31,7 +31,10 @@ def run(
         ),
     ] = None,
     dataset: Annotated[
-        str, typer.Option("--dataset", "-o", help="The data set: a folder, or a URL (s3://, gs://).")
+        str,
+        typer.Option(
+            "--dataset", "-o", help="The data set: a folder, or a URL (s3://, gs://).", callback=choices.folder_to_write
+        ),
     ] = "",
     config: options.Config = None,
     text: options.Text = None,
@@ -94,11 +97,13 @@ def _print_dry_run(
     inputs: list[Path], dataset: str, settings: BuildConfig, given: dict[str, Any], *, as_json: bool
 ) -> None:
     from manitwin.dataset_root import DatasetRoot
+    from manitwin.dataset_run import require_work
     from manitwin.dry_run import plan_run
     from manitwin.generator_input import refusal
     from manitwin.manifest import Notes, iterate_items
     from manitwin.pipeline import check_names
 
+    require_work(DatasetRoot(dataset), inputs, given["texts"])
     check_names(settings)
     notes = Notes()
     items = iterate_items(inputs, notes=notes, refusal=refusal(settings), **given)

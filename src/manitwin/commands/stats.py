@@ -21,7 +21,13 @@ def stats(
         ),
     ],
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="The folder to write into; default: DATASET/statistics.")
+        Path | None,
+        typer.Option(
+            "--out",
+            "-o",
+            help="The folder to write into; default: DATASET/statistics.",
+            callback=choices.folder_to_write,
+        ),
     ] = None,
 ) -> None:
     """Write the statistics of a data set, or of episodes: a page, its figures, and its numbers with the SQL of each."""

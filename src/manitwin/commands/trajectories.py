@@ -26,7 +26,9 @@ def trajectories(
             callback=choices.must_exist("a data set, a folder of twins, or what manitwin layout wrote"),
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="The folder to write episodes into.")],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", help="The folder to write episodes into.", callback=choices.folder_to_write)
+    ],
     count: Annotated[
         int, typer.Option("-n", help="How many episodes to attempt.", callback=choices.count_of("-n"))
     ] = 100,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from manitwin.commands.console import print_error
+from manitwin.commands.console import out_console, print_error
 
 if TYPE_CHECKING:
     from manitwin.api import BuildReport
@@ -19,7 +19,8 @@ def print_causes(place: str) -> None:
 def print_causes_of_build(report: BuildReport) -> None:
     """Print the most frequent causes of a build's report, with their remedies."""
     causes = causes_of_build(report)
-    said = len(report.results) == 1  # in the one line above
+    # in the one line above, which --quiet leaves out unless nothing was made
+    said = len(report.results) == 1 and (not out_console.quiet or report.results[0].status == "unfinished")
     _print(causes, "the same command again", "in the lines above", skip=1 if said else 0)
 
 

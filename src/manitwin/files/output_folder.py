@@ -1,0 +1,41 @@
+"""A folder to write into: asked before any work whether it can be made and written."""
+
+from __future__ import annotations
+
+import errno
+import os
+import tempfile
+from pathlib import Path
+
+from manitwin.errors import UsageError
+
+
+def require_writable_folder(folder: Path, what: str = "") -> None:
+    """Raise UsageError where a folder is none, or cannot be made or written; it is not made.
+
+    ``what`` is to be written, for the message. One that is there is left as it is, its times too.
+    """
+    remedy = f"give a folder to write{f' {what}' if what else ''} into"
+    try:
+        for place in (folder, *folder.absolute().parents):
+            if place.is_dir():
+                _try(place, made=place != folder)
+                return
+            if place.exists():
+                raise UsageError(f"{folder}: {_named(place, folder)}a file; {remedy}")
+            if place.is_symlink():
+                raise UsageError(f"{folder}: {_named(place, folder)}a link that leads nowhere; {remedy}")
+    except OSError as error:
+        raise UsageError(f"{folder}: cannot be written ({error.strerror or error}); {remedy}") from error
+
+
+def _try(place: Path, *, made: bool) -> None:
+    """Raise OSError where a folder cannot be written; ``made``: where none can be made in it, of which permissions do not tell all."""
+    if made:
+        os.rmdir(tempfile.mkdtemp(prefix=".manitwin-", dir=place))
+    elif not os.access(place, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+def _named(place: Path, folder: Path) -> str:
+    return "" if place == folder else f"{place} is "
