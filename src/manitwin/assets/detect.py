@@ -16,6 +16,12 @@ _FIRST_TAG = re.compile(rb"<([A-Za-z][\w.:-]*)[\s/>]")
 _MARKS = re.compile(rb"<extra_info[\s/>]|<custom_data[\s/>]")
 _ROBOTWIN_DATA = re.compile(r"model_data\d*\.json")
 
+VALID_ASSETS = (
+    "valid are twin folders, RoboTwin, ManiTwin-100K, EmbodiedGen and Google Scanned Objects folders, .urdf, .sdf, MJCF"
+    " .xml and USD files; a plain mesh goes to `manitwin build`"
+)
+"""What a person is told who gave something else."""
+
 
 def detect(path: Path) -> Format:
     """Return the format of the asset in a file or folder.
@@ -29,10 +35,7 @@ def detect(path: Path) -> Format:
         return found
     if path.is_dir():
         return detect(only_file(path))
-    raise AssetError(
-        f"{path.name}: no asset of a known format; valid are twin folders, RoboTwin, ManiTwin-100K, EmbodiedGen and"
-        " Google Scanned Objects folders, .urdf, .sdf, MJCF .xml and USD files"
-    )
+    raise AssetError(f"{path.name}: no asset of a known format; {VALID_ASSETS}")
 
 
 def folder_format(folder: Path) -> Format | None:
@@ -78,7 +81,7 @@ def only_file(folder: Path) -> Path:
             if named:
                 listed = ", ".join(file.name for file in named[:4])
                 raise AssetError(f"{folder}: holds {len(named)} assets ({listed}); name one of them")
-    raise AssetError(f"{folder}: holds no asset of a known format")
+    raise AssetError(f"{folder}: holds no asset of a known format; {VALID_ASSETS}")
 
 
 def robotwin_data(folder: Path) -> list[Path]:

@@ -43,6 +43,7 @@ def audit(
 
     if explain is None and not paths:
         raise UsageError("no PATH given: name assets or folders of them, or --explain CODE")
+    from manitwin.assets.detect import VALID_ASSETS
     from manitwin.audit.report import explanation
     from manitwin.audit.run import audit_all, find_all
     from manitwin.audit.select import rule_of, select_rules
@@ -55,7 +56,7 @@ def audit(
         raise UsageError("--select and --ignore leave no rule; leave one of them out")
     assets = find_all(paths or [])
     if not assets:
-        raise UsageError(f"{', '.join(map(str, paths or []))}: no asset of a known format there")
+        raise UsageError(f"{', '.join(map(str, paths or []))}: holds no asset of a known format; {VALID_ASSETS}")
     audited = []
     for each in audit_all(assets, rules, jobs=jobs, fix=fix):
         audited.append(each)

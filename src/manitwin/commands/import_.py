@@ -42,7 +42,8 @@ def import_(
     for imported in import_assets(paths, out, format=format):  # type: ignore[arg-type]
         if imported.record is None or imported.folder is None:
             failed += 1
-            print_error(f"{imported.path}: {imported.error}")
+            named = str(imported.error).startswith(f"{imported.path}: ")
+            print_error(str(imported.error) if named else f"{imported.path}: {imported.error}")
             continue
         if imported.there_already:
             there += 1
@@ -56,7 +57,6 @@ def import_(
         for remark in record.remarks:
             out_console.print(f"  {remark}", markup=False)
     before = f", {there} imported before" if there else ""
-    out_console.print(
-        f"{done} imported{before}, {failed} not; manitwin build {out} -o TWINS fills in what is missing", markup=False
-    )
+    then = f"; manitwin build {out} -o TWINS fills in what is missing" if done or there else ""
+    out_console.print(f"{done} imported{before}, {failed} not{then}", markup=False)
     raise typer.Exit(3 if failed else 0)

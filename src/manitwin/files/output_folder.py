@@ -30,7 +30,7 @@ def require_writable_folder(folder: Path, what: str = "") -> None:
 
 
 def _try(place: Path, *, made: bool) -> None:
-    """Raise OSError where a folder cannot be written; ``made``: where none can be made in it, of which permissions do not tell all."""
+    """Raise OSError where a folder cannot be written; ``made``: where none can be made in it (/proc)."""
     if made:
         os.rmdir(tempfile.mkdtemp(prefix=".manitwin-", dir=place))
     elif not os.access(place, os.W_OK | os.X_OK):
