@@ -11,7 +11,8 @@ import numpy as np
 from PIL import Image, ImageCms, ImageOps
 
 from manitwin.errors import InputError, choose_from
-from manitwin.files.sniff import HEIC_NOT_READ, sniff
+from manitwin.files.not_read import HEIC_NOT_READ
+from manitwin.files.sniff import sniff
 
 MAX_PIXELS = 250_000_000
 MIN_SIDE_PX = 32

@@ -10,12 +10,10 @@ from pathlib import Path
 from typing import Literal
 
 from manitwin.errors import InputError
+from manitwin.files.not_read import NOT_READ
 
 IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "avif")
 MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz")
-
-HEIC_NOT_READ = "HEIC is not read; convert it to PNG or JPEG"
-"""Its only free decoder comes in wheels that bundle an encoder under the GPL."""
 
 _HEAD_BYTES = 65536
 _OBJ_KEYWORDS = frozenset(
@@ -33,7 +31,7 @@ class Sniffed:
 
 
 def sniff(path: Path) -> Sniffed:
-    """Tell what a file is from its bytes; its name is not believed.
+    """Tell what a file is from its bytes; its name is not believed, and only says what a file is that is neither.
 
     Raises InputError: ``unreadable`` (no such file, or no permission), ``empty`` (zero bytes), ``wrong_type`` (neither
     an image nor a mesh).
@@ -44,7 +42,8 @@ def sniff(path: Path) -> Sniffed:
             head = stream.read(_HEAD_BYTES)
     except OSError as error:
         raise InputError("unreadable", f"{path.name}: {error.strerror or error}; check the path") from error
-    if size == 0:
+    not_read = NOT_READ.get(path.suffix.lower())
+    if size == 0 and not_read is None:
         raise InputError("empty", f"{path.name}: the file has zero bytes; export or download it again")
     image = image_format(head)
     if image is not None:
@@ -52,6 +51,8 @@ def sniff(path: Path) -> Sniffed:
     mesh = _mesh_format(head, size, path)
     if mesh is not None:
         return Sniffed("mesh", mesh)
+    if not_read is not None:
+        raise InputError("wrong_type", f"{path.name}: {not_read}")
     raise InputError(
         "wrong_type",
         f"{path.name}: holds {_describe(head)}, neither an image ({', '.join(IMAGE_FORMATS)})"
