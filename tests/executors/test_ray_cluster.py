@@ -93,7 +93,7 @@ def test_of_the_threads_of_a_worker_only_the_one_that_hangs_is_given_up(connecte
 def test_workers_of_another_version_are_refused(
     connected: str, tmp_path: Path, recipe: RehearsalRecipe, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("manitwin.executors.ray_cluster.version", lambda name: "9.9")
+    monkeypatch.setattr("manitwin.executors.ray_cluster.installed_version", lambda: "9.9")
     monkeypatch.setattr("manitwin.executors.ray_pool.FAILED_STARTS", 2)
     with executor_for(tmp_path, recipe, connected) as executor:
         executor.submit(0, stage_job(0, "good", recipe))

@@ -19,6 +19,8 @@ RESUMABLE_STATUS = 4
 INTERRUPTED_STATUS = 130
 """128 and the number of SIGINT, as shells say it: nothing is there that the same command could go on with."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
+TRACKER_WARNING = "ignore:resource_tracker"
+"""What keeps multiprocessing's resource tracker from telling of semaphores that it removes (``PYTHONWARNINGS``)."""
 
 
 @cache
@@ -71,6 +73,10 @@ class Interrupts:
     def listen(self) -> None:
         """Raise KeyboardInterrupt at the first signal, and end the process at the second."""
         keep_exit_status()
+        # a second signal leaves no time to remove semaphores: the tracker of this process does, and need not say so
+        filters = os.environ.get("PYTHONWARNINGS", "")
+        if TRACKER_WARNING not in filters.split(","):
+            os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (filters, TRACKER_WARNING)))
         for number in SIGNALS:
             if signal.getsignal(number) is not signal.SIG_IGN:  # as a shell's background jobs have it
                 signal.signal(number, self._caught)

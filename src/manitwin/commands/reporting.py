@@ -53,10 +53,15 @@ def reported(command: Callable[..., None], own_log: bool = False) -> Callable[..
 
     @wraps(command)
     def call(*, verbose: bool, quiet: bool, log: Path | None, **given: Any) -> None:
-        _say(verbose or _before_command[0], quiet or _before_command[1])
-        begin_log(log, place_follows=own_log)
-        LOG.info("manitwin %s: %s", installed_version(), " ".join(sys.argv[1:]))
-        command(**given)
+        global _before_command
+        before, _before_command = _before_command, (False, False)
+        _say(verbose or before[0], quiet or before[1])
+        try:
+            begin_log(log, place_follows=own_log)
+            LOG.info("manitwin %s: %s", installed_version(), " ".join(sys.argv[1:]))
+            command(**given)
+        finally:
+            _say(False, False)  # a process may run more commands than one
 
     signature = inspect.signature(command, eval_str=True)
     added = [
