@@ -23,11 +23,11 @@ vlm-real: setup
 
 usd-validate: setup
 	@$(BIN)/python scripts/setup_side_environment.py usd-validate
-	@USD_VALIDATOR_REQUIRED=1 $(BIN)/python -m pytest tests/export/test_usd_validator.py
+	@USD_VALIDATOR_REQUIRED=1 $(BIN)/python -m pytest tests/assets/writers/test_usd_validator.py
 
 lerobot-real: setup
 	@$(BIN)/python scripts/setup_side_environment.py lerobot
-	@LEROBOT_REQUIRED=1 $(BIN)/python -m pytest tests/apps/trajectories/test_real_lerobot.py
+	@LEROBOT_REQUIRED=1 $(BIN)/python -m pytest tests/episodes/test_real_lerobot.py
 
 lint: setup
 	@$(BIN)/ruff check .
@@ -44,12 +44,12 @@ lock-vlm-real:
 
 lock-usd-validate:
 	@$(BIN)/uv pip compile --quiet --universal --generate-hashes --python-version 3.11 --no-annotate --no-header \
-	  tests/export/usd_validator.in -o tests/export/usd_validator.lock
+	  tests/assets/writers/usd_validator.in -o tests/assets/writers/usd_validator.lock
 
 lock-lerobot-real:
 	@$(BIN)/uv pip compile --quiet --universal --generate-hashes --python-version 3.11 --no-annotate --no-header \
-	  --override tests/apps/trajectories/real_lerobot.overrides tests/apps/trajectories/real_lerobot.in \
-	  -o tests/apps/trajectories/real_lerobot.lock
+	  --override tests/episodes/real_lerobot.overrides tests/episodes/real_lerobot.in \
+	  -o tests/episodes/real_lerobot.lock
 
 clean:
 	rm -rf .venv .venv-vlm .venv-usd-validate .venv-lerobot demo

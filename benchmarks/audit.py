@@ -18,11 +18,11 @@ from collections import Counter
 from importlib import import_module
 from pathlib import Path
 
-from manitwin.audit.run import audit_all, find_all
-from manitwin.audit.select import select_rules
-from manitwin.export.content import TwinContent
-from manitwin.loaded_twin import Twin
-from manitwin.store import RECORD
+from manitwin.assets.audit.run import audit_all, find_all
+from manitwin.assets.audit.select import select_rules
+from manitwin.assets.writers.content import TwinContent
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.store import RECORD
 
 TWINS = 8
 """Different ones that are copied."""
@@ -36,7 +36,7 @@ def write_assets(dataset: Path, out: Path, count: int, formats: list[str]) -> No
         raise SystemExit(f"{dataset}: no accepted twin")
     contents = [TwinContent.of(Twin(folder)) for folder in accepted] if formats else []
     exported = {
-        (format, index): import_module(f"manitwin.export.{format}").export(content).files
+        (format, index): import_module(f"manitwin.assets.writers.{format}").export(content).files
         for format in formats
         for index, content in enumerate(contents)
     }

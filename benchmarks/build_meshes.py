@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 import manitwin
-from manitwin.run_summary import grasp_lines, summarize_grasps
-from manitwin.store import read_record
+from manitwin.cli.run_summary import grasp_lines, summarize_grasps
+from manitwin.twin.store import read_record
 
 GRASPS_WANTED = 100
 

@@ -17,7 +17,7 @@ import time
 
 import typer
 
-from manitwin.cli import app
+from manitwin.cli.main import app
 
 WRONG_VALUES = (
     "paint",
@@ -36,7 +36,7 @@ WRONG_VALUES = (
 def measured(words: list[str], environment: dict[str, str]) -> tuple[float, float, int]:
     """Return CPU seconds, wall seconds and exit status of one command."""
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    done = subprocess.run([sys.executable, "-m", "manitwin.cli", *words], capture_output=True, env=environment)
+    done = subprocess.run([sys.executable, "-m", "manitwin", *words], capture_output=True, env=environment)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu_s = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
     return cpu_s, time.perf_counter() - started, done.returncode

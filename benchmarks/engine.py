@@ -14,14 +14,14 @@ import tempfile
 import time
 from pathlib import Path
 
-from manitwin.config import RunConfig
+from manitwin.config import Resource, RunConfig
 from manitwin.engine.driver import Driver
 from manitwin.engine.events import ItemEnded
+from manitwin.engine.executors.local import LocalExecutor
 from manitwin.engine.jobs import WorkerSetup
-from manitwin.engine.rehearsal import RehearsalRecipe
-from manitwin.executors.local import LocalExecutor
-from manitwin.ledger.ledger import Ledger
-from manitwin.stages.stage import Item
+from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.stage import Item
+from manitwin.pipeline.rehearsal import RehearsalRecipe
 
 EVERY = 500
 
@@ -40,7 +40,8 @@ def main() -> None:
 
 
 def _run(root: Path, arguments: argparse.Namespace) -> None:
-    recipe = RehearsalRecipe(tuple((f"stage_{n}", "cpu") for n in range(arguments.stages)))
+    plan: tuple[tuple[str, Resource], ...] = tuple((f"stage_{n}", "cpu") for n in range(arguments.stages))
+    recipe = RehearsalRecipe(plan)
     settings = RunConfig(cpu=arguments.jobs, index_every=0, keep_work=False)  # the tables' cost is that of the twins
     setup = WorkerSetup(str(root), recipe, root / "cache", keep_work=False)
     ledger = Ledger(root / "ledger.sqlite")

@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from manitwin.apps.trajectories.attempts_table import ATTEMPTS, read_attempts
-from manitwin.dataset_root import DatasetRoot
-from manitwin.dataset_run import local_ledger
-from manitwin.ledger.ledger import read_ledger
+from manitwin.engine.ledger.ledger import read_ledger
+from manitwin.episodes.attempts_table import ATTEMPTS, read_attempts
+from manitwin.pipeline.dataset_run import local_ledger
+from manitwin.twin.dataset_root import DatasetRoot
 
 
 def figures(folder: Path) -> str:

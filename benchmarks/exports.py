@@ -23,12 +23,12 @@ import sapien
 import trimesh
 from pxr import Usd, UsdGeom, UsdPhysics
 
-from manitwin.export.content import TwinContent
-from manitwin.export.write import export_twin
+from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.write import export_twin
 from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, rotation_from_quaternion_wxyz, transform
-from manitwin.loaded_twin import Twin
-from manitwin.simulate.mujoco_body import STIFF_SOLREF
+from manitwin.physics.mujoco.body import STIFF_SOLREF
+from manitwin.twin.loaded_twin import Twin
 
 DROP_M, SECONDS, STEP_S = 0.001, 2.0, 1 / 500
 BALL_SHARE, BALL_KG = 1 / 3, 0.01  # of the rim's radius or the depth, as in simulate.settle

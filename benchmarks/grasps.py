@@ -16,11 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.config import BuildConfig
+from manitwin.engine.stage import Draft, Item
+from manitwin.engine.stage_runner import StageCost, run_stage
 from manitwin.errors import Rejected
-from manitwin.identity import twin_id
-from manitwin.pipeline import stages_for
-from manitwin.stage_runner import StageCost, run_stage
-from manitwin.stages.stage import Draft, Item
+from manitwin.pipeline.identity import twin_id
+from manitwin.pipeline.recipe import stages_for
 
 LAST_STAGE = "verify"
 FILTERS = ("raw", "after_pad", "after_collision", "after_association", "after_diversity")

@@ -26,7 +26,7 @@ from manitwin.geometry.hulls.decomposition import convex_decomposition
 from manitwin.geometry.hulls.error import hull_error, hull_union
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.geometry.repair.cascade import repair
-from manitwin.simulate.settle import ball_stays_inside
+from manitwin.physics.sapien.settle import ball_stays_inside
 
 Y_UP = ("bowl_evo", "plate_8in", "tomato_soup_can", "salt_shaker", "gelatin_box")  # glTF, and two OBJ of such sources
 

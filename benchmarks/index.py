@@ -22,14 +22,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute
 
-from manitwin.dataset_root import DatasetRoot
+from manitwin.dataset.index.dataset import Dataset
+from manitwin.dataset.index.merge import PART_ROWS, write_rows
+from manitwin.dataset.index.near_duplicates import near_duplicates
+from manitwin.dataset.index.part_list import PartList
+from manitwin.dataset.index.query import Index
+from manitwin.dataset.index.tables import TABLES, joined
 from manitwin.geometry.shape_descriptor import LENGTH
-from manitwin.index.dataset import Dataset
-from manitwin.index.merge import PART_ROWS, write_rows
-from manitwin.index.near_duplicates import near_duplicates
-from manitwin.index.part_list import PartList
-from manitwin.index.query import Index
-from manitwin.index.tables import TABLES, joined
+from manitwin.twin.dataset_root import DatasetRoot
 
 CATEGORIES = (
     "mug",

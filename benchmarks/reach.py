@@ -14,16 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
-from manitwin.apps.layouts.furniture import make_furniture
-from manitwin.apps.layouts.pool import Pool, pool_of
-from manitwin.apps.trajectories.target_grasps import usable_grasps
-from manitwin.apps.trajectories.tasks import Placeable, Room, sample_task
-from manitwin.loaded_twin import Twin
-from manitwin.planning.pick_place import PickPlacePlanner
-from manitwin.planning.problem import PickPlaceProblem
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.problem import PickPlaceProblem
+from manitwin.episodes.target_grasps import usable_grasps
+from manitwin.episodes.tasks import Placeable, Room, sample_task
 from manitwin.robots.load import load_robot, shipped_robots
+from manitwin.scenes.layouts.furniture import make_furniture
+from manitwin.scenes.layouts.pool import Pool, pool_of
 from manitwin.scenes.loaded_scene import furniture_boxes
-from manitwin.scenes.twin_source import TwinSource
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.twin_source import TwinSource
 
 
 def shares(robot_name: str, source: TwinSource, pool: Pool, starts: int) -> tuple[int, list[float], list[str], float]:

@@ -21,13 +21,15 @@ from pathlib import Path
 
 import numpy as np
 
-from manitwin.loaded_twin import Twin
-from manitwin.simulate import sapien_scene, sapien_trial, trial_phases
-from manitwin.simulate.gripper import load_gripper
-from manitwin.simulate.jitter import jittered
-from manitwin.simulate.rigid_body import RigidBody
-from manitwin.simulate.sapien_trial import SapienTrial
-from manitwin.simulate.trial import TrialSettings
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics import trial_phases
+from manitwin.physics.jitter import jittered
+from manitwin.physics.sapien import scene as sapien_scene
+from manitwin.physics.sapien import trial as sapien_trial
+from manitwin.physics.sapien.trial import SapienTrial
+from manitwin.physics.trial import TrialSettings
+from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.twin.loaded_twin import Twin
 
 REFERENCE = {"timestep_s": 1 / 960, "solver_iterations": 40, "steps_per_frame": 16, "max_steps": 8000}
 NO_LIMITS = {

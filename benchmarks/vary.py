@@ -17,8 +17,8 @@ import numpy as np
 import trimesh
 from PIL import Image, ImageEnhance, ImageOps
 
-from manitwin.files.glb import write_glb
-from manitwin.files.meshes.read import read_mesh
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.read import read_mesh
 
 TEXTURE_PX = 512
 SPDX = {

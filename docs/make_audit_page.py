@@ -9,8 +9,8 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from manitwin.audit.finding import Rule
-from manitwin.audit.rules import MODULES, RULES
+from manitwin.assets.audit.finding import Rule
+from manitwin.assets.audit.rules import MODULES, RULES
 
 PAGE = Path(__file__).parent / "audit.md"
 INTRODUCTION = """# Audit: is this asset true?

@@ -14,8 +14,8 @@ from typing import cast
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from manitwin.app_config import LayoutsConfig, PicturesConfig, TrajectoriesConfig
 from manitwin.config import BuildConfig
+from manitwin.scenes.app_config import LayoutsConfig, PicturesConfig, TrajectoriesConfig
 
 PAGE = Path(__file__).parent / "configuration.md"
 APPLICATIONS: dict[str, type[BaseModel]] = {

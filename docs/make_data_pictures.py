@@ -17,22 +17,22 @@ import numpy as np
 from picture_file import of_episode, of_scene, save_picture
 from PIL import Image
 
-from manitwin.app_config import LayoutsConfig, LayoutSettings, TrajectoriesConfig
-from manitwin.apps.furniture_pictures import lighting_of
-from manitwin.apps.layouts.preview import scene_pictures
-from manitwin.apps.layouts.run import make_layouts
-from manitwin.apps.trajectories.cameras import named_cameras
-from manitwin.apps.trajectories.collect import batch_folders, stored_episodes
-from manitwin.apps.trajectories.replay_pictures import Replay, twin_drawable
-from manitwin.apps.trajectories.run import make_episodes
-from manitwin.apps.trajectories.stored_episode import StoredEpisode
-from manitwin.apps.trajectories.video import write_animation
+from manitwin.episodes.cameras import named_cameras
+from manitwin.episodes.collect import batch_folders, stored_episodes
+from manitwin.episodes.replay_pictures import Replay, twin_drawable
+from manitwin.episodes.run import make_episodes
+from manitwin.episodes.stored_episode import StoredEpisode
+from manitwin.episodes.video import write_animation
 from manitwin.render.false_colors import depth_in_colors, depth_range_m, ids_in_colors
 from manitwin.robots.load import load_robot
+from manitwin.scenes.app_config import LayoutsConfig, LayoutSettings, TrajectoriesConfig
+from manitwin.scenes.furniture_pictures import lighting_of
+from manitwin.scenes.layouts.preview import scene_pictures
+from manitwin.scenes.layouts.run import make_layouts
 from manitwin.scenes.scene import Furniture, Light
 from manitwin.scenes.scene_file import read_scene
 from manitwin.scenes.scene_folders import scene_name
-from manitwin.scenes.twin_source import TwinSource
+from manitwin.twin.twin_source import TwinSource
 
 DOCS = Path(__file__).resolve().parent
 TILE_PX, ANIMATION_PX = 300, 360

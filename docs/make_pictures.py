@@ -17,9 +17,9 @@ from picture_file import of_twin, save_picture
 from PIL import Image, ImageDraw, ImageFont
 
 import manitwin
-from manitwin.commands.annotator_questions import questions_about
+from manitwin.cli.annotator_questions import questions_about
 from manitwin.config import BuildConfig
-from manitwin.files.glb import read_glb
+from manitwin.formats.glb import read_glb
 from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.poses import OBJECT_TO_GLTF, rotation_between, transform, transform_points
 from manitwin.models.vlm.protocol import Picture as ChatPicture
@@ -28,10 +28,10 @@ from manitwin.render.gripper_fork import gripper_body
 from manitwin.render.raycast import merged
 from manitwin.render.renderer import shared_renderer
 from manitwin.render.surfaces import plain_part
-from manitwin.simulate.gripper import Gripper, load_gripper, shipped_grippers
-from manitwin.simulate.hand_collision import HandCollision
-from manitwin.simulate.hands.multi_finger import MultiFingerGripper
-from manitwin.simulate.hands.suction import SuctionGripper
+from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
+from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
+from manitwin.robots.grippers.suction import SuctionGripper
 
 DOCS = Path(__file__).resolve().parent
 MUG = DOCS.parent / "samples" / "mug.glb"

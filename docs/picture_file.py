@@ -9,10 +9,10 @@ import numpy as np
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from manitwin.apps.trajectories.stored_episode import StoredEpisode
+from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.scenes.scene import SceneRecord
-from manitwin.store import sha256_of_json
-from manitwin.twin import TwinRecord
+from manitwin.twin.record import TwinRecord
+from manitwin.twin.store import sha256_of_json
 
 KEY = "made_of"
 DECIMALS = 6

@@ -49,7 +49,7 @@ def commands_markdown() -> str:
     """Return the options of every command, as typer's own `utils docs` writes them."""
     from typer.cli import get_docs_for_click
 
-    from manitwin.cli import app
+    from manitwin.cli.main import app
 
     command = typer.main.get_command(app)
     text = get_docs_for_click(obj=command, ctx=typer.Context(command), name="manitwin")

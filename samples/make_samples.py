@@ -19,7 +19,7 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
-from manitwin.files.glb import write_glb
+from manitwin.formats.glb import write_glb
 
 PHOTO_SIZE_PX = (480, 640)
 _SIDES = 96

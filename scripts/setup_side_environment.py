@@ -44,13 +44,13 @@ SIDES = {
     ),
     "usd-validate": Side(
         "NVIDIA's validator of USD assets, which the slow tests ask about exported stages; it wants numpy below 2",
-        "tests/export/usd_validator.lock",
+        "tests/assets/writers/usd_validator.lock",
         "from pxr import Usd; import usd_validation_nvidia",
         0.3,
     ),
     "lerobot": Side(
         "LeRobot itself, which a slow test has load the data sets that this package writes; its torch brings NVIDIA's libraries",
-        "tests/apps/trajectories/real_lerobot.lock",
+        "tests/episodes/real_lerobot.lock",
         "from lerobot.datasets.lerobot_dataset import LeRobotDataset",
         6.8,
     ),

@@ -13,13 +13,13 @@ import trimesh
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from manitwin.engine.cube import CUBE
-from manitwin.export.content import TwinContent
-from manitwin.files.glb import write_glb
-from manitwin.files.meshes.textures import make_part, pbr_material
+from manitwin.assets.writers.content import TwinContent
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.hulls.reduction import hull_to_obj
-from manitwin.loaded_twin import Twin
-from manitwin.store import seal
+from manitwin.pipeline.rehearsal_cube import CUBE
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.store import seal
 from record_overlay import overlaid
 from twin_folders import grasp_table
 

@@ -11,8 +11,8 @@ import trimesh
 from PIL import Image
 
 from handmade import mug, visual
-from manitwin.files.glb import write_glb
-from manitwin.files.import_record import ImportRecord
+from manitwin.formats.glb import write_glb
+from manitwin.twin.import_record import ImportRecord
 
 
 def mug_urdf(folder: Path, *, mass_kg: float | None = 0.32, name: str = "mug") -> Path:

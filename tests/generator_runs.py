@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.charges import counted
 from manitwin.config import BuildConfig
-from manitwin.dataset_root import DatasetRoot
-from manitwin.models.generators.job_memory import JobMemory, RootJobMemory
+from manitwin.engine.charges import counted
+from manitwin.engine.job_memory import JobMemory, RootJobMemory
 from manitwin.models.generators.protocol import Generated, GenerationRequest, Generator, JobState
 from manitwin.models.generators.run import run_generator
+from manitwin.twin.dataset_root import DatasetRoot
 
 KEY = "rehearsal-key-of-tests"
 USD = 0.5

@@ -9,10 +9,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from manitwin.dataset_root import twin_name
 from manitwin.geometry.poses import quaternion_wxyz
-from manitwin.stages.grasp_table import SCHEMA
-from manitwin.store import RECORD, seal
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.grasp_table import SCHEMA
+from manitwin.twin.store import RECORD, seal
 from rigid_boxes import PANDA, above
 from scene_twins import slab, write_thing
 

@@ -8,13 +8,13 @@ import numpy as np
 import trimesh
 
 from handmade import visual
-from manitwin.engine.cube import CUBE
-from manitwin.export.content import TwinContent, export_name
-from manitwin.files.glb import write_glb
+from manitwin.assets.writers.content import TwinContent, export_name
+from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import quaternion_wxyz
-from manitwin.simulate.rigid_body import RigidBody
-from manitwin.stages.grasp_table import SCHEMA
-from manitwin.twin import TwinRecord
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.pipeline.rehearsal_cube import CUBE
+from manitwin.twin.grasp_table import SCHEMA
+from manitwin.twin.record import TwinRecord
 from record_overlay import overlaid
 from rigid_boxes import above
 

@@ -6,9 +6,9 @@ import numpy as np
 import trimesh
 
 from manitwin.geometry.poses import transform
-from manitwin.simulate.gripper import load_gripper
-from manitwin.simulate.rigid_body import RigidBody
-from manitwin.simulate.trial import GraspTrial, TrialResult, TrialSettings
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics.trial import GraspTrial, TrialResult, TrialSettings
+from manitwin.robots.grippers.gripper import load_gripper
 
 PANDA = load_gripper("panda")
 SETTINGS = TrialSettings(force_n=50.0, finger_friction=1.0)

@@ -11,11 +11,11 @@ import mujoco
 import numpy as np
 import trimesh
 
-from manitwin.apps.layouts.pool import Pool, PoolTwin, StandingPose
 from manitwin.geometry.poses import transform
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 from manitwin.scenes.loaded_scene import Scene
-from manitwin.simulate.rigid_body import RigidBody
-from manitwin.store import RECORD, read_record, seal
+from manitwin.twin.store import RECORD, read_record, seal
 from rigid_boxes import block
 from twin_folders import twin_id, write_accepted
 

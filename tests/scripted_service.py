@@ -10,7 +10,7 @@ import pytest
 
 from manitwin.config import ServicesConfig
 from manitwin.errors import ManiTwinError
-from manitwin.fakes.server import Request, Response
+from manitwin.models.fakes.server import Request, Response
 from manitwin.models.services.http import Service
 
 KEY = "sk-the-secret-key-of-tests"

@@ -9,10 +9,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from generator_runs import KEY
-from manitwin.fakes.faults import Faults
-from manitwin.fakes.rodin import FakeRodin
-from manitwin.fakes.server import FakeServer
-from manitwin.fakes.tripo import FakeTripo
+from manitwin.models.fakes.faults import Faults
+from manitwin.models.fakes.rodin import FakeRodin
+from manitwin.models.fakes.server import FakeServer
+from manitwin.models.fakes.tripo import FakeTripo
 from manitwin.models.generators.rodin import RodinGenerator
 from manitwin.models.generators.tripo import TripoGenerator
 

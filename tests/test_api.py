@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 import manitwin
-from manitwin import simulate
 from manitwin.config import BuildConfig, SecondOpinionConfig
 from manitwin.errors import UsageError
+from manitwin.robots import grippers
 
-PANDA_FILE = Path(simulate.__file__).with_name("grippers") / "panda.toml"
+PANDA_FILE = Path(grippers.__file__).parent / "definitions" / "panda.toml"
 
 
 @pytest.mark.parametrize(

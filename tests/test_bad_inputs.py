@@ -14,8 +14,8 @@ from PIL import Image, ImageOps
 
 import manitwin
 import manitwin.config
-from manitwin.build_item import ItemResult
-from manitwin.twin import TwinRecord
+from manitwin.pipeline.build_item import ItemResult
+from manitwin.twin.record import TwinRecord
 
 pytestmark = pytest.mark.shared_data
 

@@ -20,8 +20,8 @@ from sapien import physx
 
 import manitwin
 from manitwin.config import BuildConfig
-from manitwin.loaded_twin import Twin
-from manitwin.twin import Check
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.record import Check
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"
 QUICK = BuildConfig(
@@ -226,7 +226,7 @@ def test_killed_build_leaves_no_half_twin_and_goes_on(tmp_path: Path) -> None:
     command = [
         sys.executable,
         "-m",
-        "manitwin.cli",
+        "manitwin.cli.main",
         "build",
         str(SAMPLES / "mug.glb"),
         "-o",
@@ -259,7 +259,7 @@ def test_interrupted_build_says_so_and_exits_with_4(tmp_path: Path) -> None:
     command = [
         sys.executable,
         "-m",
-        "manitwin.cli",
+        "manitwin.cli.main",
         "build",
         str(SAMPLES / "mug.glb"),
         "-o",

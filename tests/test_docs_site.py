@@ -12,7 +12,7 @@ import pytest
 import typer
 
 import manitwin
-from manitwin.cli import app
+from manitwin.cli.main import app
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

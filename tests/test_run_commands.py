@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from manitwin import dataset_run
+from manitwin.engine.ledger.ledger import Ledger, read_ledger
+from manitwin.engine.stage import Item
 from manitwin.errors import UsageError
-from manitwin.ledger.ledger import Ledger, read_ledger
-from manitwin.stages.stage import Item
+from manitwin.pipeline import dataset_run
 
 
 def manitwin(*arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:
     environment = {**os.environ, "XDG_STATE_HOME": str(folder / "state"), "COLUMNS": "160"}
-    command = [sys.executable, "-m", "manitwin.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "manitwin", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, env=environment, cwd=folder)
 
 

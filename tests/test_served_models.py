@@ -23,19 +23,20 @@ from rich.console import Console
 
 from manitwin import load
 from manitwin.api import with_flags
+from manitwin.cli.summary import print_summary
 from manitwin.config import BuildConfig
-from manitwin.dataset_run import RunReport, run
-from manitwin.fakes.anthropic_messages import FakeAnthropic
-from manitwin.fakes.catalog import serving
-from manitwin.fakes.faults import ALWAYS, Faults
-from manitwin.fakes.graspgen import FakeGraspGen
-from manitwin.fakes.openai_chat import FakeOpenAi
-from manitwin.fakes.rodin import FakeRodin
-from manitwin.fakes.server import FakeServer
-from manitwin.loaded_twin import Twin
+from manitwin.dataset.index.parts import IndexTables
+from manitwin.models.fakes.anthropic_messages import FakeAnthropic
+from manitwin.models.fakes.catalog import serving
+from manitwin.models.fakes.faults import ALWAYS, Faults
+from manitwin.models.fakes.graspgen import FakeGraspGen
+from manitwin.models.fakes.openai_chat import FakeOpenAi
+from manitwin.models.fakes.rodin import FakeRodin
+from manitwin.models.fakes.server import FakeServer
+from manitwin.pipeline.dataset_run import RunReport, run
 from manitwin.render.card import RED
-from manitwin.store import RUN
-from manitwin.summary import print_summary
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.store import RUN
 
 SAMPLE = Path(__file__).resolve().parent.parent / "samples" / "bottle.jpg"
 KEYS = {"MANITWIN_VLM_KEY": "key-of-the-vlm-3141", "RODIN_API_KEY": "key-of-the-generator-2718"}
@@ -99,7 +100,7 @@ def start(folder: Path, *arguments: str) -> subprocess.Popen[str]:
     """Start a command as a user would, with caches of its own."""
     (folder / "settings.toml").write_text(SETTINGS)
     return subprocess.Popen(
-        [sys.executable, "-m", "manitwin.cli", *arguments, "--config", str(folder / "settings.toml")],
+        [sys.executable, "-m", "manitwin", *arguments, "--config", str(folder / "settings.toml")],
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, cwd=folder, start_new_session=True,
         env={**os.environ, "COLUMNS": "200"},
     )  # fmt: skip
@@ -136,7 +137,15 @@ def run_here(folder: Path, served: Servers, *texts: str, **services: Any) -> Run
         "run": settings.run.model_copy(update={"patience_s": 0}),
     }
     settings = settings.model_copy(update=update)
-    return run([], str(folder / "data"), config=settings, texts=texts, defaults={"name": "bottle"}, executor="inline")
+    return run(
+        [],
+        str(folder / "data"),
+        tables=IndexTables(),
+        config=settings,
+        texts=texts,
+        defaults={"name": "bottle"},
+        executor="inline",
+    )
 
 
 def twins(folder: Path) -> list[Path]:
@@ -308,7 +317,8 @@ def test_every_generator_and_grasper_ends_in_a_twin_while_it_fails(
             BuildConfig.model_validate(tomllib.loads(SETTINGS)), vlm=chat.spec, generator=spec, grasper=grasps.spec
         )
         report = run(
-            [SAMPLE], str(tmp_path / "data"), config=settings, texts=[] if name == "hunyuan3d" else ["a bottle"],
+            [SAMPLE], str(tmp_path / "data"), tables=IndexTables(), config=settings,
+            texts=[] if name == "hunyuan3d" else ["a bottle"],
             defaults={"name": "bottle"}, executor="inline",
         )  # fmt: skip
     assert report.exit_code == 0, report

@@ -71,7 +71,9 @@ def test_wheel_holds_every_file_of_the_package_and_no_others(wheel: Path) -> Non
 
 def test_wheel_registers_the_command_and_the_builtin_backends(wheel: Path) -> None:
     (text,) = (content for name, content in _contents(wheel).items() if name.endswith("entry_points.txt"))
-    assert "manitwin = manitwin.entry:main" in text.decode() and "builtin = manitwin.models.builtin" in text.decode()
+    assert (
+        "manitwin = manitwin.cli.entry:main" in text.decode() and "builtin = manitwin.models.builtin" in text.decode()
+    )
     assert any(name.endswith("licenses/LICENSE") for name in _contents(wheel))
     assert _metadata(wheel)["Version"] == [manitwin.__version__]
 

@@ -13,12 +13,12 @@ import pyarrow.parquet as pq
 import trimesh
 
 from handmade import visual
-from manitwin.dataset_root import twin_name
-from manitwin.engine.cube import CUBE
-from manitwin.files.glb import write_glb
-from manitwin.stages.grasp_table import SCHEMA
-from manitwin.stages.stage_order import STAGE_ORDER
-from manitwin.store import seal
+from manitwin.engine.stage_order import STAGE_ORDER
+from manitwin.formats.glb import write_glb
+from manitwin.pipeline.rehearsal_cube import CUBE
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.grasp_table import SCHEMA
+from manitwin.twin.store import seal
 from record_overlay import overlaid
 
 OUTCOMES = ("held", "held", "slips", "drops")

@@ -10,26 +10,26 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from manitwin.api import BuildReport, build, export_twin, load, load_scene, schema, statistics_connection
-    from manitwin.apps.trajectories.hdf5_file import EpisodeFile
-    from manitwin.apps.trajectories.lerobot.read import LeRobotSet, read_lerobot
-    from manitwin.apps.trajectories.publication.publish import PublishedEpisodes, publish_episodes
-    from manitwin.audit.run import Audited
-    from manitwin.audit.run import audit as audit_assets
+    from manitwin.assets.audit.run import Audited
+    from manitwin.assets.audit.run import audit as audit_assets
     from manitwin.config import BuildConfig, load_config
+    from manitwin.dataset.index.dataset import Dataset
+    from manitwin.dataset.index.near_duplicates import NearDuplicates, near_duplicates
+    from manitwin.dataset.index.query import Index
+    from manitwin.dataset.index.twins import Twins
+    from manitwin.dataset.publish.publish import Published
+    from manitwin.dataset.publish.publish import publish as publish_dataset
+    from manitwin.dataset.publish.unpack import unpack_shard
+    from manitwin.episodes.hdf5_file import EpisodeFile
+    from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
+    from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
     from manitwin.errors import BackendError, ManiTwinError, Rejected, TwinError, UsageError
-    from manitwin.index.dataset import Dataset
-    from manitwin.index.near_duplicates import NearDuplicates, near_duplicates
-    from manitwin.index.query import Index
-    from manitwin.index.twins import Twins
-    from manitwin.loaded_twin import Grasps, Twin
-    from manitwin.publish.publish import Published
-    from manitwin.publish.publish import publish as publish_dataset
-    from manitwin.publish.unpack import unpack_shard
+    from manitwin.physics.sapien.robot import SapienRobot
     from manitwin.robots.load import load_robot
     from manitwin.robots.robot import Robot
-    from manitwin.robots.sapien_robot import SapienRobot
     from manitwin.scenes.loaded_scene import Scene
-    from manitwin.twin import TwinRecord
+    from manitwin.twin.loaded_twin import Grasps, Twin
+    from manitwin.twin.record import TwinRecord
 
     __version__: str
 
@@ -75,33 +75,33 @@ __all__ = [
 
 _DEFINED_IN = {
     "manitwin.api": ("BuildReport", "build", "export_twin", "load", "load_scene", "schema", "statistics_connection"),
-    "manitwin.apps.trajectories.hdf5_file": ("EpisodeFile",),
-    "manitwin.apps.trajectories.lerobot.read": ("LeRobotSet", "read_lerobot"),
-    "manitwin.apps.trajectories.publication.publish": ("PublishedEpisodes", "publish_episodes"),
-    "manitwin.audit.run": ("Audited", "audit_assets"),
+    "manitwin.episodes.hdf5_file": ("EpisodeFile",),
+    "manitwin.episodes.lerobot.read": ("LeRobotSet", "read_lerobot"),
+    "manitwin.episodes.publication.publish": ("PublishedEpisodes", "publish_episodes"),
+    "manitwin.assets.audit.run": ("Audited", "audit_assets"),
     "manitwin.config": ("BuildConfig", "load_config"),
     "manitwin.errors": ("BackendError", "ManiTwinError", "Rejected", "TwinError", "UsageError"),
-    "manitwin.index.dataset": ("Dataset",),
-    "manitwin.index.near_duplicates": ("NearDuplicates", "near_duplicates"),
-    "manitwin.index.query": ("Index",),
-    "manitwin.index.twins": ("Twins",),
-    "manitwin.loaded_twin": ("Grasps", "Twin"),
-    "manitwin.publish.publish": ("Published", "publish_dataset"),
-    "manitwin.publish.unpack": ("unpack_shard",),
+    "manitwin.dataset.index.dataset": ("Dataset",),
+    "manitwin.dataset.index.near_duplicates": ("NearDuplicates", "near_duplicates"),
+    "manitwin.dataset.index.query": ("Index",),
+    "manitwin.dataset.index.twins": ("Twins",),
+    "manitwin.twin.loaded_twin": ("Grasps", "Twin"),
+    "manitwin.dataset.publish.publish": ("Published", "publish_dataset"),
+    "manitwin.dataset.publish.unpack": ("unpack_shard",),
     "manitwin.robots.load": ("load_robot",),
     "manitwin.robots.robot": ("Robot",),
-    "manitwin.robots.sapien_robot": ("SapienRobot",),
+    "manitwin.physics.sapien.robot": ("SapienRobot",),
     "manitwin.scenes.loaded_scene": ("Scene",),
-    "manitwin.twin": ("TwinRecord",),
+    "manitwin.twin.record": ("TwinRecord",),
 }
 _NAMED_THERE = {"audit_assets": "audit", "publish_dataset": "publish"}
-"""``manitwin.audit`` and ``manitwin.publish`` are packages: an attribute of that name would be hidden by an import of them."""
+"""The names that these functions have in their modules."""
 
 
 def __getattr__(name: str) -> Any:
     """Import the public names when they are first used, so that `manitwin --help` answers at once."""
     if name == "__version__":
-        from manitwin.version import installed_version
+        from manitwin.twin.version import installed_version
 
         return installed_version()
     if name not in __all__:

@@ -1,6 +1,6 @@
 """``python -m manitwin``: the same as the command ``manitwin``."""
 
-from manitwin.entry import main
+from manitwin.cli.entry import main
 
 if __name__ == "__main__":
     main()

@@ -13,15 +13,15 @@ from manitwin.errors import UsageError
 if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     import duckdb
 
-    from manitwin.build_item import ItemResult
     from manitwin.config import BuildConfig
     from manitwin.engine.events import OnStage
-    from manitwin.files.folder_listing import FolderListing
-    from manitwin.loaded_twin import Twin
-    from manitwin.manifest import Notes
+    from manitwin.engine.stage import Item
+    from manitwin.pipeline.build_item import ItemResult
+    from manitwin.pipeline.folder_listing import FolderListing
+    from manitwin.pipeline.manifest import Notes
     from manitwin.scenes.loaded_scene import Scene
-    from manitwin.stages.stage import Item
-    from manitwin.twin import TwinRecord
+    from manitwin.twin.loaded_twin import Twin
+    from manitwin.twin.record import TwinRecord
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class BuildReport:
 
     def records(self) -> Iterator[TwinRecord]:
         """Read the records of the accepted twins, one after the other."""
-        from manitwin.store import read_record
+        from manitwin.twin.store import read_record
 
         return (read_record(r.folder) for r in self.results if r.status == "accepted" and r.folder is not None)
 
@@ -100,8 +100,8 @@ def build(
             "max_cost_usd": max_cost_usd, "record": record, "require_agreement": require_agreement, "quick": quick,
         },
     )  # fmt: skip
-    from manitwin.executors.whole_items import build_all
-    from manitwin.pipeline import estimate_usd, log_choices
+    from manitwin.pipeline.recipe import estimate_usd, log_choices
+    from manitwin.pipeline.whole_items import build_all
 
     settings, items, place = request.settings, request.items, request.place
     log_choices(settings)
@@ -139,9 +139,9 @@ def request_build(
     Raises UsageError for wrong arguments.
     """
     from manitwin.config import BuildConfig, load_config
-    from manitwin.files.output_folder import require_writable_folder
-    from manitwin.generator_input import refusal
-    from manitwin.manifest import collect_items
+    from manitwin.formats.output_folder import require_writable_folder
+    from manitwin.pipeline.generator_input import refusal
+    from manitwin.pipeline.manifest import collect_items
 
     settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
     settings = with_flags(settings, **flags)
@@ -152,7 +152,7 @@ def request_build(
     place = Path(out)
     require_writable_folder(place, "twins")
     # this takes two CPU-seconds to import: what was given wrongly is said before
-    from manitwin.pipeline import check_names
+    from manitwin.pipeline.recipe import check_names
 
     check_names(settings)
     return BuildRequest(settings, items, notes, place)
@@ -195,7 +195,7 @@ def with_flags(
 
 def load(folder: str | Path, verify: bool = False) -> Twin:
     """Load a finished twin; with ``verify``, check the digest of every file. Raises TwinError."""
-    from manitwin.loaded_twin import Twin
+    from manitwin.twin.loaded_twin import Twin
 
     return Twin(folder, verify=verify)
 
@@ -218,10 +218,10 @@ def export_twin(
 
     Raises UsageError for an unknown format, ExportError for a licence that is not allowed or a twin that a format cannot take.
     """
-    from manitwin.export.content import TwinContent
-    from manitwin.export.registry import chosen_formats
-    from manitwin.export.write import export_twin as write
-    from manitwin.loaded_twin import Twin
+    from manitwin.assets.writers.content import TwinContent
+    from manitwin.assets.writers.registry import chosen_formats
+    from manitwin.assets.writers.write import export_twin as write
+    from manitwin.twin.loaded_twin import Twin
 
     content = TwinContent.of(twin if isinstance(twin, Twin) else Twin(twin))
     formats = chosen_formats([to] if isinstance(to, str) else to)
@@ -233,14 +233,14 @@ def statistics_connection(dataset: str | Path) -> duckdb.DuckDBPyConnection:
 
     Raises UsageError where there is no index.
     """
-    from manitwin.dataset_root import DatasetRoot
-    from manitwin.statistics.tables import Tables
+    from manitwin.dataset.statistics.tables import Tables
+    from manitwin.twin.dataset_root import DatasetRoot
 
     return Tables.of_index(DatasetRoot(dataset)).connection
 
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema of twin.json."""
-    from manitwin.twin import TwinRecord
+    from manitwin.twin.record import TwinRecord
 
     return TwinRecord.model_json_schema()

@@ -4,6 +4,8 @@ Raise ``BackendError`` or one of its kinds where the backend fails (the item sta
 is at fault.
 """
 
+from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import Exported, Exporter, FormatNotes
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import (
     AccessDenied,
@@ -16,8 +18,7 @@ from manitwin.errors import (
     Unavailable,
     Unsupported,
 )
-from manitwin.export.content import TwinContent
-from manitwin.export.exporter import Exported, Exporter, FormatNotes
+from manitwin.geometry.rigid_body import RigidBody
 from manitwin.models.annotators.protocol import (
     Annotator,
     PhysicalEstimates,
@@ -28,10 +29,9 @@ from manitwin.models.annotators.protocol import (
 )
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, Generator, JobState
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest
-from manitwin.simulate.gripper import Gripper
-from manitwin.simulate.rigid_body import RigidBody
-from manitwin.simulate.trial import GraspTrial, TrialResult, TrialSettings
-from manitwin.twin import Estimate, FunctionalPoint, GraspPoint, Language
+from manitwin.physics.trial import GraspTrial, TrialResult, TrialSettings
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.twin.record import Estimate, FunctionalPoint, GraspPoint, Language
 
 __all__ = [
     "IMAGE_OR_TEXT",

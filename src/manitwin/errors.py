@@ -57,7 +57,7 @@ class EpisodesError(ManiTwinError):
 class Rejected(ManiTwinError):
     """The decision not to make a twin of this input.
 
-    ``reason`` is one of ``manitwin.twin.REJECTION_REASONS[stage]``; ``detail`` is one line for a person.
+    ``reason`` is one of ``manitwin.twin.record.REJECTION_REASONS[stage]``; ``detail`` is one line for a person.
     ``stage`` is needed only where two stages share the reason.
     """
 

@@ -10,7 +10,7 @@ from PIL import Image
 
 from manitwin.assets.read import read_asset
 from manitwin.errors import AssetError
-from manitwin.files.meshes.textures import material_of
+from manitwin.formats.meshes.textures import material_of
 
 
 def mjcf(folder: Path, worldbody: str, before: str = "", name: str = "object.xml") -> Path:

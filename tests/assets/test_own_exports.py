@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from exported_twins import content
+from manitwin.assets.audit.run import audit
+from manitwin.assets.importers.importer import import_assets
 from manitwin.assets.read import read_asset
-from manitwin.audit.run import audit
-from manitwin.dataset_root import twin_name
-from manitwin.export.content import TwinContent
-from manitwin.export.registry import exporter
-from manitwin.export.write import export_twin as write_export
-from manitwin.importers.importer import import_assets
-from manitwin.loaded_twin import Twin
-from manitwin.manifest import collect_items
+from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.registry import exporter
+from manitwin.assets.writers.write import export_twin as write_export
+from manitwin.pipeline.manifest import collect_items
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.loaded_twin import Twin
 from twin_folders import box, write_accepted
 
 READABLE = ("mjcf", "urdf", "sdf", "usd", "usdz", "robotwin", "isaaclab")

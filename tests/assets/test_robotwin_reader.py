@@ -13,11 +13,11 @@ import trimesh
 from handmade import visual
 from known_twins import TWINS, brick, hammer
 from manitwin.assets.readers.robotwin import read
+from manitwin.assets.writers import robotwin
+from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.grasp_rows import grasp_rows
 from manitwin.errors import AssetError
-from manitwin.export import robotwin
-from manitwin.export.content import TwinContent
-from manitwin.export.grasp_rows import grasp_rows
-from manitwin.files.glb import write_glb
+from manitwin.formats.glb import write_glb
 
 Y_UP = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
 

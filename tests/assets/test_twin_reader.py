@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from manitwin.assets.read import read_asset
-from manitwin.dataset_root import twin_name
 from manitwin.errors import AssetError
+from manitwin.twin.dataset_root import twin_name
 from twin_folders import OUTCOMES, box, write_accepted, write_rejected
 
 

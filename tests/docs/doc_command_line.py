@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from manitwin.cli import app
+from manitwin.cli.main import app
 
 
 @cache

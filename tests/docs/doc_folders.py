@@ -16,7 +16,7 @@ from PIL import Image
 
 from foreign_assets import mug_urdf
 from grasped_twins import write_brick
-from manitwin.store import RECORD, seal
+from manitwin.twin.store import RECORD, seal
 from scene_twins import bowl, can, slab, write_thing
 from twin_folders import twin_id
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from manitwin.fakes.catalog import REHEARSALS, serving
-from manitwin.fakes.server import FakeServer, Request, Response, Service
+from manitwin.models.fakes.catalog import REHEARSALS, serving
+from manitwin.models.fakes.server import FakeServer, Request, Response, Service
 
 KEY = "rehearsal-key"
 REDIRECTED = Path(__file__).parent / "redirected"

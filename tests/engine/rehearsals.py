@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
 from manitwin.config import RunConfig
-from manitwin.dataset_root import DatasetRoot
-from manitwin.dataset_run import sweep as sweep_work
+from manitwin.dataset.check import disagreements
+from manitwin.dataset.index.parts import IndexTables
 from manitwin.engine.driver import Driver, RunResult
 from manitwin.engine.events import ItemEnded
 from manitwin.engine.executor import InlineExecutor
+from manitwin.engine.executors.local import LocalExecutor
 from manitwin.engine.jobs import WorkerSetup
-from manitwin.engine.rehearsal import RehearsalRecipe
-from manitwin.executors.local import LocalExecutor
-from manitwin.ledger.audit import disagreements
-from manitwin.ledger.ledger import Ledger
-from manitwin.stages.stage import Item
+from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.stage import Item
+from manitwin.pipeline.dataset_run import sweep as sweep_work
+from manitwin.pipeline.rehearsal import RehearsalRecipe
+from manitwin.twin.dataset_root import DatasetRoot
 
 
 @dataclass
@@ -53,6 +54,7 @@ def rehearse(
 ) -> Rehearsed:
     """Run once, in this process or in workers."""
     settings = settings or RunConfig(patience_s=0)
+    recipe = replace(recipe, tables=IndexTables())
     where = DatasetRoot(root)
     folder = ledger_folder or Path(root)
     setup = WorkerSetup(str(root), recipe, folder / "cache", settings.keep_work)

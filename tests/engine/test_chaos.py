@@ -17,10 +17,10 @@ import pytest
 from rehearsals import Rehearsed, rehearse, runs
 
 from manitwin.config import RunConfig
-from manitwin.engine.rehearsal import RehearsalRecipe
+from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.stage import Item
 from manitwin.errors import UsageError
-from manitwin.ledger.ledger import Ledger
-from manitwin.stages.stage import Item
+from manitwin.pipeline.rehearsal import RehearsalRecipe
 
 SLOTS = 2
 UNDER_WAY = 2 * SLOTS  # of which half run, and half wait beside them
@@ -95,7 +95,7 @@ DRIVER = """
 import sys
 from pathlib import Path
 from manitwin.config import RunConfig
-from manitwin.engine.rehearsal import RehearsalRecipe
+from manitwin.pipeline.rehearsal import RehearsalRecipe
 from rehearsals import rehearse
 root = Path(sys.argv[1])
 rehearse(root, recipe=RehearsalRecipe(log=Path(sys.argv[2])), settings=RunConfig(cpu=2, index_every=5), processes=True,

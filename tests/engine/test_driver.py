@@ -9,9 +9,9 @@ import pytest
 from rehearsals import rehearse, runs
 
 from manitwin.config import RunConfig
-from manitwin.dataset_root import twin_name
-from manitwin.engine.rehearsal import RehearsalRecipe
-from manitwin.index.parts import indexed_twins
+from manitwin.dataset.index.parts import indexed_twins
+from manitwin.pipeline.rehearsal import RehearsalRecipe
+from manitwin.twin.dataset_root import twin_name
 
 
 @pytest.fixture
@@ -57,11 +57,11 @@ def test_a_changed_stage_is_done_again_with_what_follows_and_nothing_else(
 
 
 def test_two_items_of_one_twin_make_one_folder(tmp_path: Path, recipe: RehearsalRecipe) -> None:
-    from manitwin.stages.stage import Item
+    from manitwin.engine.stage import Item
 
     run = rehearse(tmp_path / "d", ["same"], recipe=recipe)
     assert run.states == {"same": "accepted"}
-    from manitwin.ledger.ledger import Ledger
+    from manitwin.engine.ledger.ledger import Ledger
 
     ledger = Ledger(tmp_path / "d" / "ledger.sqlite")
     ledger.add_items([Item(file=None, text="same", license="MIT")])  # the licence is not part of who a twin is
@@ -135,8 +135,8 @@ def test_a_short_failure_of_a_service_is_waited_for(tmp_path: Path, recipe: Rehe
 def test_a_lost_folder_is_found_missing_and_made_again_from_its_stages(tmp_path: Path, recipe: RehearsalRecipe) -> None:
     import shutil
 
-    from manitwin.ledger.audit import disagreements
-    from manitwin.ledger.ledger import Ledger
+    from manitwin.dataset.check import disagreements
+    from manitwin.engine.ledger.ledger import Ledger
 
     run = rehearse(tmp_path / "d", ["one", "two"], recipe=recipe)
     shutil.rmtree(tmp_path / "d" / twin_name(run.ended[0].twin_id))
@@ -153,8 +153,8 @@ def test_a_lost_folder_is_found_missing_and_made_again_from_its_stages(tmp_path:
 
 
 def test_a_result_that_is_not_there_is_done_again(tmp_path: Path, recipe: RehearsalRecipe) -> None:
-    from manitwin.ledger.audit import disagreements
-    from manitwin.ledger.ledger import Ledger
+    from manitwin.dataset.check import disagreements
+    from manitwin.engine.ledger.ledger import Ledger
 
     run = rehearse(tmp_path / "d", ["one"], recipe=recipe)
     next((tmp_path / "d" / ".work" / run.ended[0].twin_id / "b").glob("*/result.json")).write_text("{ half")

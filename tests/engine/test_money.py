@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 from rehearsals import Rehearsed, rehearse
 
-from manitwin.dataset_root import twin_name
 from manitwin.engine.budget import Budget
-from manitwin.engine.rehearsal import RehearsalRecipe
-from manitwin.store import RUN
+from manitwin.pipeline.rehearsal import RehearsalRecipe
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.store import RUN
 
 PLAN = (("a", "cpu"), ("b", "vlm"), ("c", "cpu"))
 TEXTS = [f"charge:b:0.02 {number}" for number in range(10)]

@@ -8,10 +8,10 @@ import pytest
 from rehearsals import rehearse, runs
 
 from manitwin.config import RunConfig
-from manitwin.dataset_root import DatasetRoot, twin_name
-from manitwin.engine.rehearsal import RehearsalRecipe
-from manitwin.index.parts import indexed_twins
-from manitwin.store import parse_record, sha256_of_file
+from manitwin.dataset.index.parts import indexed_twins
+from manitwin.pipeline.rehearsal import RehearsalRecipe
+from manitwin.twin.dataset_root import DatasetRoot, twin_name
+from manitwin.twin.store import parse_record, sha256_of_file
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from manitwin.engine.jobs import Failure, WriteTables
+from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.stage import Item
 from manitwin.engine.table_writer import TableWriter
-from manitwin.ledger.ledger import Ledger
-from manitwin.stages.stage import Item
 
 BROKEN = Failure("error", "the part is broken")
 

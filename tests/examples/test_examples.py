@@ -87,7 +87,7 @@ def test_the_notebook_of_one_twin_shows_its_card_views_hulls_and_grasps(
 def test_the_notebook_of_a_data_set_counts_what_is_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for number, category in enumerate(("brick", "brick", "kettle")):
         write_brick(tmp_path / "dataset", number, category)
-    subprocess.run([sys.executable, "-m", "manitwin.cli", "index", tmp_path / "dataset"], check=True)
+    subprocess.run([sys.executable, "-m", "manitwin", "index", tmp_path / "dataset"], check=True)
     monkeypatch.setenv("MANITWIN_DATASET", str(tmp_path / "dataset"))
     book = executed("statistics_of_a_data_set.ipynb", tmp_path)
     assert pictures(book) == 2

@@ -3,8 +3,8 @@ import pytest
 import trimesh
 
 from handmade import cup, hammer, mug, screwdriver
+from manitwin.dataset.index.near_duplicates import MAX_SHAPE_DISTANCE
 from manitwin.geometry.shape_descriptor import LENGTH, QUANTILES, shape_descriptor, surface_moments
-from manitwin.index.near_duplicates import MAX_SHAPE_DISTANCE
 
 NOISE = 0.012
 

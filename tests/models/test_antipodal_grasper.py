@@ -10,7 +10,7 @@ import trimesh
 
 from manitwin.models.graspers.antipodal import AntipodalGrasper
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
-from manitwin.simulate.gripper import load_gripper
+from manitwin.robots.grippers.gripper import load_gripper
 
 PANDA = load_gripper("panda")
 

@@ -13,10 +13,10 @@ from manitwin.models.graspers.postures import PostureGrasper
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.seal_screen import SealScreen
 from manitwin.models.graspers.suction import SuctionGrasper
-from manitwin.simulate.gripper import Gripper, load_gripper
-from manitwin.simulate.hand_collision import HandCollision
-from manitwin.simulate.hands.multi_finger import MultiFingerGripper
-from manitwin.simulate.hands.suction import SuctionGripper
+from manitwin.robots.grippers.gripper import Gripper, load_gripper
+from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
+from manitwin.robots.grippers.suction import SuctionGripper
 
 CUP = load_gripper("suction")
 assert isinstance(CUP, SuctionGripper)

@@ -14,7 +14,7 @@ from manitwin.render.card import HEIGHT, PANEL, RED, WIDTH, CardText, make_card
 from manitwin.render.card_panels import GRASP, CardGrasp, CardPoint, diverse, input_panel
 from manitwin.render.renderer import BACKDROP
 from manitwin.render.surfaces import plain_part
-from manitwin.simulate.gripper import load_gripper
+from manitwin.robots.grippers.gripper import load_gripper
 
 TEXT = CardText("box", "a plain box", [("size", "60 x 40 x 100 mm"), ("mass", "0.2 kg")], "source box.obj")
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manitwin.render.gripper_fork import gripper_body, gripper_fork
-from manitwin.simulate.gripper import load_gripper
+from manitwin.robots.grippers.gripper import load_gripper
 
 
 @pytest.mark.parametrize("opening_m", [0.0, 0.03, 0.08])

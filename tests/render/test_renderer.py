@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from PIL import Image
 
-from manitwin.files.meshes.textures import make_part, pbr_material
+from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera, framing_camera, look_at, orbit_cameras, project
 from manitwin.render.raycast import cast_camera, merged

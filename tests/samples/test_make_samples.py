@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from manitwin.files.glb import read_glb
+from manitwin.formats.glb import read_glb
 
 SAMPLES = Path(__file__).resolve().parents[2] / "samples"
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import sapien
 
-from manitwin.app_config import LayoutSettings
-from manitwin.apps.layouts.pool import read_pool
-from manitwin.apps.layouts.sample import sample_layout
 from manitwin.geometry.poses import rotation_angle_rad, transform
+from manitwin.scenes.app_config import LayoutSettings
+from manitwin.scenes.layouts.pool import read_pool
+from manitwin.scenes.layouts.sample import sample_layout
 from manitwin.scenes.loaded_scene import Scene, object_pose
 from manitwin.scenes.scene_file import write_scene
 from scene_twins import write_things

@@ -9,13 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 import manitwin
-from manitwin.app_config import LayoutsConfig, LayoutSettings
-from manitwin.apps.layouts.run import layout_totals, make_layouts
-from manitwin.cli import app
-from manitwin.dataset_root import DatasetRoot
-from manitwin.dataset_run import stored_config
+from manitwin.cli.main import app
 from manitwin.errors import UsageError
+from manitwin.pipeline.dataset_run import stored_config
+from manitwin.scenes.app_config import LayoutsConfig, LayoutSettings
+from manitwin.scenes.layouts.run import layout_totals, make_layouts
 from manitwin.scenes.scene_folders import scene_ids, scene_name
+from manitwin.twin.dataset_root import DatasetRoot
 from scene_twins import write_things
 
 CONFIG = LayoutsConfig(seed=4, layout=LayoutSettings(objects=(2, 4)))

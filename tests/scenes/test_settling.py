@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import transform
-from manitwin.scenes.placed_object import PlacedObject, StaticBox
 from manitwin.scenes.settling import settle_scene
 from scene_twins import bowl, can, slab, standing_at
 

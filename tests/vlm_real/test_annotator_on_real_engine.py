@@ -23,15 +23,15 @@ from handmade import mug, visual
 from manitwin import build
 from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, Rejected
-from manitwin.files.glb import write_glb
+from manitwin.formats.glb import write_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.annotators.protocol import PointsRequest, Subject
 from manitwin.models.annotators.vlm.annotator import VlmAnnotator
 from manitwin.models.vlm.protocol import Picture, Turn
+from manitwin.pipeline.candidates import choose_candidates
 from manitwin.render.cameras import orbit_cameras
 from manitwin.render.raycast import merged
 from manitwin.render.renderer import shared_renderer
-from manitwin.stages.candidates import choose_candidates
 
 pytestmark = [pytest.mark.slow, pytest.mark.vlm_real]
 

@@ -18,8 +18,8 @@ from picture_questions import SETTINGS, Judgement, Overheard, Protocol, chat_at,
 from pydantic import BaseModel, create_model
 from tiny_engine import MODEL, MOST_PICTURES, TinyEngine
 
-from manitwin.charges import counted
 from manitwin.config import BuildConfig, ServicesConfig, VlmConfig
+from manitwin.engine.charges import counted
 from manitwin.errors import BadReply, RateLimited, Unavailable
 from manitwin.models.vlm.chat_from_spec import anthropic_from_spec, openai_from_spec, replay_from_spec
 from manitwin.models.vlm.json_text import json_object_in

@@ -1,1 +1,1 @@
-"""Object assets of any tool, as they are: read without believing them."""
+"""Assets of other tools: read as they are, written, audited."""

@@ -11,9 +11,9 @@ import numpy as np
 import trimesh
 
 from manitwin.errors import AssetError, InputError
-from manitwin.files.meshes.read import MeshFile, read_mesh
-from manitwin.files.meshes.source import MeshLimits
-from manitwin.files.source_files import side_files
+from manitwin.formats.meshes.read import MeshFile, read_mesh
+from manitwin.formats.meshes.source import MeshLimits
+from manitwin.formats.source_files import side_files
 
 MESH_LIMITS = MeshLimits(max_bytes=1 << 29, max_faces=2_000_000)
 MAX_SHAPES = 4096

@@ -1,1 +1,1 @@
-"""The engine of a run: what is to be done next, for which item, and on what; it knows nothing of meshes or grasps."""
+"""Tasks, stages, driver, ledger, executors: how work is done, whatever it is."""

@@ -15,8 +15,8 @@ from manitwin.engine.events import (
     log_stage,
 )
 from manitwin.engine.flight import Flight
-from manitwin.ledger.ledger import ItemState
-from manitwin.stages.stage_parts import StagePart
+from manitwin.engine.ledger.ledger import ItemState
+from manitwin.engine.stage_parts import StagePart
 
 
 class Announcer:

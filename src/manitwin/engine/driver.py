@@ -21,12 +21,12 @@ from manitwin.engine.executor import Executor
 from manitwin.engine.flight import Flight, PlannedStage
 from manitwin.engine.gate import Gate
 from manitwin.engine.jobs import MAKE_ROOM, Failure, Job, Reply, StageRejected, Surveyed, WriteTables
+from manitwin.engine.ledger.ledger import Ledger, LedgerFull
 from manitwin.engine.recipe import Ending, Recipe
+from manitwin.engine.stage_order import ASSEMBLE, INPUT
+from manitwin.engine.stage_runner import StageRun
 from manitwin.engine.table_writer import TableWriter
-from manitwin.ledger.ledger import Ledger, LedgerFull
-from manitwin.loggers import RUN
-from manitwin.stage_runner import StageRun
-from manitwin.stages.stage_order import ASSEMBLE, INPUT
+from manitwin.twin.loggers import RUN
 
 RESOURCES: tuple[Resource, ...] = get_args(Resource)
 LONGEST_WAIT_S = 0.5
@@ -71,7 +71,7 @@ class Driver:
         self._more = True
         self._budget = Budget(max_cost_usd)
         self._no_money: str | None = None
-        self._tables = TableWriter(ledger, settings.index_every, settings.attempts)
+        self._tables = TableWriter(ledger, settings.index_every if recipe.tables is not None else 0, settings.attempts)
         self.result = RunResult()
 
     def run(self) -> RunResult:

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from manitwin.ledger.ledger import ItemState
-from manitwin.loggers import RUN
-from manitwin.stages.stage import Item
-from manitwin.stages.stage_parts import StagePart
+from manitwin.engine.ledger.ledger import ItemState
+from manitwin.engine.stage import Item
+from manitwin.engine.stage_parts import StagePart
+from manitwin.twin.loggers import RUN
 
 StageState = Literal["done", "there already", "rejected", "waiting", "failed"]
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 
 from manitwin.config import Resource
 from manitwin.engine.jobs import Finish, Job, RunStage, StageRejected, Survey
+from manitwin.engine.ledger.ledger import OpenItem
+from manitwin.engine.stage import PaidStage, Stage
+from manitwin.engine.stage_order import ASSEMBLE, INPUT
 from manitwin.engine.work import StageKey
-from manitwin.ledger.ledger import OpenItem
-from manitwin.stages.stage import PaidStage, Stage
-from manitwin.stages.stage_order import ASSEMBLE, INPUT
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from typing import Literal
 
 from manitwin.config import Resource
 from manitwin.engine.recipe import Ending, Recipe
+from manitwin.engine.stage import Item
+from manitwin.engine.stage_runner import StageCost, StageRun
 from manitwin.engine.work import StageKey
 from manitwin.errors import Rejected
-from manitwin.stage_runner import StageCost, StageRun
-from manitwin.stages.stage import Item
 
 FailureKind = Literal["unavailable", "rate_limited", "denied", "unsupported", "no_space", "error", "died", "timeout"]
 MAKE_ROOM = "make room, then run again to go on where it stopped"

@@ -5,13 +5,15 @@ The engine speaks of twins; an application's recipe makes a folder of its own ki
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, Protocol
 
+from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import Rejected
-from manitwin.stage_runner import StageCost
-from manitwin.stages.stage import Draft, Item, Stage
+from manitwin.twin.dataset_root import DatasetRoot
 
 
 @dataclass(frozen=True)
@@ -42,12 +44,29 @@ class Identity:
     rejected: Rejected | None = None
 
 
+class Tables(Protocol):
+    """Tables over all finished folders of a data set, written by workers while a run goes on. It is sent to every worker."""
+
+    def add(self, root: DatasetRoot, ids: Sequence[str]) -> None:
+        """Add finished folders, new or made again."""
+        ...
+
+    def merge(self, root: DatasetRoot) -> None:
+        """Merge what was added in parts, once a run is at its end."""
+        ...
+
+
 class Recipe(Protocol):
     """The stages of every kind of input, and how their results become a folder. It is sent to every worker."""
 
     @property
     def sha256(self) -> str:
         """The digest of everything in it that decides a result: items that ended under another one are done again."""
+        ...
+
+    @property
+    def tables(self) -> Tables | None:
+        """The tables that are kept of what it makes; None: none are."""
         ...
 
     @property

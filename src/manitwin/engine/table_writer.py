@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from manitwin.engine.jobs import MAKE_ROOM, Failure, Reply, WriteTables
-from manitwin.ledger.ledger import Ledger
+from manitwin.engine.ledger.ledger import Ledger
 
 
 class TableWriter:

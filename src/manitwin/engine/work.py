@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from manitwin.dataset_root import DatasetRoot
-from manitwin.stage_runner import LOST, RESULT, StageCost, StageRun, run_stage, stage_key, take_up
-from manitwin.stages.stage import Draft, Stage, is_field
-from manitwin.store import WORK
+from manitwin.engine.stage import Draft, Stage, is_field
+from manitwin.engine.stage_runner import LOST, RESULT, StageCost, StageRun, run_stage, stage_key, take_up
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.store import WORK
 
 StageKey = tuple[str, str]
 """A stage's name and the key of its result."""

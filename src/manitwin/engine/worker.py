@@ -8,8 +8,8 @@ import time
 import traceback
 from dataclasses import replace
 
-from manitwin.charges import counted
-from manitwin.dataset_root import DatasetRoot
+from manitwin.engine.charges import counted
+from manitwin.engine.job_memory import RootJobMemory
 from manitwin.engine.jobs import (
     Failure,
     Finish,
@@ -23,13 +23,13 @@ from manitwin.engine.jobs import (
     WriteTables,
 )
 from manitwin.engine.recipe import Ending
+from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage_order import INPUT
+from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, lost_usd
 from manitwin.engine.work import WorkFolder
-from manitwin.errors import AccessDenied, BackendError, RateLimited, Rejected, Unavailable, Unsupported
-from manitwin.models.generators.job_memory import RootJobMemory
-from manitwin.stage_runner import JOBS, StageCost, StageRun, lost_usd
-from manitwin.stages.stage import Draft, Item, Stage
-from manitwin.stages.stage_order import INPUT
-from manitwin.store import WORK
+from manitwin.errors import AccessDenied, BackendError, ManiTwinError, RateLimited, Rejected, Unavailable, Unsupported
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.store import WORK
 
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 
@@ -140,15 +140,13 @@ class Worker:
         return ending
 
     def _write_tables(self, job: WriteTables) -> None:
-        from manitwin.index.parts import (  # takes a second to import, and one job in hundreds needs it
-            compact,
-            write_part,
-        )
-
+        tables = self.setup.recipe.tables
+        if tables is None:
+            raise ManiTwinError("a run of a recipe without tables was asked to write them")
         if job.twin_ids:
-            write_part(self.root, list(job.twin_ids))
+            tables.add(self.root, job.twin_ids)
         else:
-            compact(self.root)
+            tables.merge(self.root)
 
     def _work(self, twin_id: str) -> WorkFolder:
         work = WorkFolder(self.root, twin_id, self.setup.cache)

@@ -1,0 +1,1 @@
+"""Poses, sampling, mass properties, repair, convex hulls, distances: pure functions over arrays."""

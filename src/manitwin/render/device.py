@@ -17,7 +17,7 @@ import sys
 from dataclasses import asdict, dataclass
 
 from manitwin.errors import ManiTwinError, RendererMissing, UsageError
-from manitwin.loggers import RUN
+from manitwin.twin.loggers import RUN
 
 SWITCH = "MANITWIN_RENDER_DEVICE"
 """Set to ``cpu`` to leave GPUs alone (some hang: vla-evaluation-harness#112); ``auto`` otherwise."""

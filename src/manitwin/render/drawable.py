@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 import trimesh
 
-from manitwin.files.meshes.normals import with_creased_normals
-from manitwin.files.meshes.textures import make_part, material_of
+from manitwin.formats.meshes.normals import with_creased_normals
+from manitwin.formats.meshes.textures import make_part, material_of
 from manitwin.geometry.repair.welding import weld_equal
 from manitwin.render.back_faces import shows_back_faces
 from manitwin.render.raycast import merged

@@ -12,8 +12,8 @@ import cv2
 import numpy as np
 import trimesh
 
-from manitwin.files.meshes.normals import with_creased_normals
-from manitwin.files.meshes.textures import make_part, material_of, pbr_material, uv_of
+from manitwin.formats.meshes.normals import with_creased_normals
+from manitwin.formats.meshes.textures import make_part, material_of, pbr_material, uv_of
 
 MAX_TEXTURE_PX = 2048  # twice the largest picture made here; more only costs time and aliases
 

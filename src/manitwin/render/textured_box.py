@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from manitwin.files.meshes.textures import make_part, pbr_material
+from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.render.procedural_textures import ProceduralTexture
 
 # Corners of the faces as seen from outside, from the lower left one counterclockwise, in half extents; the face's

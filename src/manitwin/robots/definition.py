@@ -13,7 +13,7 @@ from pydantic import BaseModel, Field, ValidationError, field_validator
 
 from manitwin.errors import UsageError, choose_from
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
-from manitwin.simulate.hands.fields import STRICT
+from manitwin.robots.grippers.fields import STRICT
 
 UNIT_TOLERANCE = 1e-6
 

@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from manitwin.errors import Unavailable, UsageError
+from manitwin.formats.shared_libraries import import_remedy
 from manitwin.robots.definition import RobotDefinition
+from manitwin.robots.grippers.urdf import LinkShape
 from manitwin.robots.links import links_of_urdf
 from manitwin.robots.urdf_tree import UrdfTree, child_of, parent_of, parse_xml
-from manitwin.shared_libraries import import_remedy
-from manitwin.simulate.hands.urdf import LinkShape
 
 STATES = 300
 CONTACT_SHARE = 0.9

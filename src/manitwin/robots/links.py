@@ -13,9 +13,9 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import inverse, transform_points
+from manitwin.geometry.rigid_body import principal_frame
+from manitwin.robots.grippers.urdf import Link, link_poses, read_urdf
 from manitwin.robots.urdf_tree import UrdfTree
-from manitwin.simulate.hands.urdf import Link, link_poses, read_urdf
-from manitwin.simulate.rigid_body import principal_frame
 
 
 @lru_cache(maxsize=16)

@@ -20,14 +20,14 @@ from manitwin.robots.definition import (
     shipped_robots,
 )
 from manitwin.robots.disabled_pairs import disabled_pairs
+from manitwin.robots.grippers.gripper import load_gripper, of_kind
+from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.joints import fix_other_joints, limits_of, settle_arm_joints, settle_finger_joints
 from manitwin.robots.links import links_of_urdf, poses_at
 from manitwin.robots.mounted_hand import SIDES, finger_joint, generated_hand, mount, palm_link
 from manitwin.robots.robot import Robot, Workspace
 from manitwin.robots.urdf_files import urdf_files
 from manitwin.robots.urdf_tree import UrdfTree, child_of, parent_of, read_tree
-from manitwin.simulate.gripper import load_gripper, of_kind
-from manitwin.simulate.hands.parallel import ParallelGripper
 
 __all__ = ["load_robot", "shipped_robots"]
 

@@ -9,10 +9,10 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import inverse, transform, transform_points
+from manitwin.robots.grippers.box import PlacedBox
+from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.joints import set_origin
 from manitwin.robots.urdf_tree import UrdfTree
-from manitwin.simulate.hands.box import PlacedBox
-from manitwin.simulate.hands.parallel import ParallelGripper
 
 SIDES = (("plus", 1), ("minus", -1))
 _GREY = "0.25 0.25 0.27 1"

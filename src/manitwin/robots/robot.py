@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.robots.grippers.parallel import ParallelGripper
 
 
 @dataclass(frozen=True)

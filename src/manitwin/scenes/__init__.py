@@ -1,1 +1,1 @@
-"""Scenes of several twins: the scene file, and the way into simulators and pictures."""
+"""Scenes of several twins: layouts, files, exports."""

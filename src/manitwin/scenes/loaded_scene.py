@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
-from manitwin.loaded_twin import Twin
-from manitwin.scenes.placed_object import PlacedObject, StaticBox
+from manitwin.geometry.rigid_body import RigidBody
 from manitwin.scenes.scene import Furniture, SceneObject, SceneRecord
 from manitwin.scenes.scene_file import read_scene
-from manitwin.scenes.twin_source import TwinSource
-from manitwin.simulate.rigid_body import RigidBody
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.twin_source import TwinSource
 
 if TYPE_CHECKING:
     import mujoco

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.physics.mujoco.body import SOFT_SOLREF, contact_parameters
 from manitwin.scenes.loaded_scene import Scene
 from manitwin.scenes.sapien_scene import FURNITURE_FRICTION
-from manitwin.simulate.mujoco_body import SOFT_SOLREF, contact_parameters
 
 TIMESTEP_S = 0.002
 

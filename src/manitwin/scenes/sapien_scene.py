@@ -8,17 +8,17 @@ from typing import Any
 import sapien
 from sapien import physx
 
+from manitwin.geometry.placed_object import StaticBox
 from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.physics.sapien.body import add_body
 from manitwin.scenes.loaded_scene import Scene
-from manitwin.scenes.placed_object import StaticBox
-from manitwin.simulate.sapien_body import add_body
 
 FURNITURE_FRICTION = 0.5
 """Static and dynamic, of every piece of furniture."""
 
 CONTACT_OFFSET_M = 0.002
-"""As in simulate/settle.py. At SAPIEN's own 10 mm PhysX may take two thin things 14 mm apart for deep in each other, and throws
-them across the room: 1 of 250 layouts of real twins."""
+"""As in physics/sapien/settle.py. At SAPIEN's own 10 mm PhysX may take two thin things 14 mm apart for deep in each other,
+and throws them across the room: 1 of 250 layouts of real twins."""
 
 SOLVER_ITERATIONS = 20
 

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from manitwin.errors import UsageError
 from manitwin.scenes.scene import SCENE, SCENE_SCHEMA_VERSION, SceneRecord
-from manitwin.store import canonical_json, write_bytes_atomically
+from manitwin.twin.store import canonical_json, write_bytes_atomically
 
 
 def scene_bytes(record: SceneRecord) -> bytes:

@@ -11,14 +11,14 @@ import numpy as np
 import sapien
 from sapien import physx
 
+from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import quaternion_wxyz
-from manitwin.scenes.placed_object import PlacedObject, StaticBox
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics.sapien.body import dynamic_component, hull_shapes
+from manitwin.physics.sapien.physx_system import scene_with_gravity
 from manitwin.scenes.sapien_scene import CONTACT_OFFSET_M, SOLVER_ITERATIONS, static_entity
-from manitwin.simulate.physx_system import scene_with_gravity
-from manitwin.simulate.rigid_body import RigidBody
-from manitwin.simulate.sapien_body import dynamic_component, hull_shapes
 
-# As in simulate/settle.py, where each was measured.
+# As in physics/sapien/settle.py, where each was measured.
 TIMESTEP_S = 1 / 240
 CHECK_EVERY = 12  # steps between looks at whether all is still
 STILL_LOOKS = 3  # one slow look can be a turning point

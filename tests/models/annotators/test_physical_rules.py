@@ -10,7 +10,7 @@ import pytest
 import trimesh
 
 from handmade import cup, cylinder, subject
-from manitwin.files.meshes.read import read_mesh
+from manitwin.formats.meshes.read import read_mesh
 from manitwin.geometry.repair.cascade import repair
 from manitwin.models.annotators.physical_rules import estimate_physical
 from manitwin.models.annotators.priors import load_priors, lookup

@@ -12,7 +12,7 @@ from handmade import cylinder, mug, subject, visual
 from manitwin.models.annotators.priors import load_priors
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.annotators.words import article, joined, size_words, write_captions
-from manitwin.twin import Language
+from manitwin.twin.record import Language
 
 
 def described(mesh: trimesh.Trimesh, name: str | None, *parts: trimesh.Trimesh, material: str = "ceramic") -> Language:

@@ -11,7 +11,7 @@ import pytest
 
 from manitwin.config import BuildConfig, GenerateConfig, ServicesConfig
 from manitwin.errors import ManiTwinError
-from manitwin.fakes.server import FakeServer
+from manitwin.models.fakes.server import FakeServer
 from manitwin.models.generators.protocol import Generated, GenerationRequest, Generator
 
 KEY = "msy_k3y-that-nobody-may-see"

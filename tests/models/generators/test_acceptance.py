@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.fakes.meshes import Surface, body_and_cap, bottle, draco_glb, glb, open_surface, truncated, usdz, webp_glb
+from manitwin.models.fakes.meshes import (
+    Surface,
+    body_and_cap,
+    bottle,
+    draco_glb,
+    glb,
+    open_surface,
+    truncated,
+    usdz,
+    webp_glb,
+)
 from manitwin.models.generators.acceptance import flaw
 
 

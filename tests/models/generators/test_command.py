@@ -17,10 +17,10 @@ from PIL import Image
 from rehearsed_jobs import photo
 
 from manitwin.config import BuildConfig, GenerateConfig
+from manitwin.engine.job_memory import NoMemory
 from manitwin.errors import BadReply, ConfigError, Rejected, Unavailable, Unsupported
-from manitwin.fakes.meshes import bottle, glb, truncated
+from manitwin.models.fakes.meshes import bottle, glb, truncated
 from manitwin.models.generators.command import CommandGenerator
-from manitwin.models.generators.job_memory import NoMemory
 from manitwin.models.generators.protocol import GenerationRequest
 from manitwin.models.generators.run import run_generator
 from manitwin.models.services.refusal import Gone

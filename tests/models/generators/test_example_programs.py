@@ -11,7 +11,7 @@ import trimesh
 from rehearsed_jobs import made, photo
 
 from manitwin.config import BuildConfig
-from manitwin.fakes.meshes import bottle, glb
+from manitwin.models.fakes.meshes import bottle, glb
 from manitwin.models.generators.command import CommandGenerator
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "docs" / "examples"

@@ -10,9 +10,9 @@ from rehearsed_jobs import KEY, TEXT, KeptJobs, asked, check_key_is_nowhere, fin
 
 from manitwin.config import BuildConfig
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Rejected, Unavailable, Unsupported
-from manitwin.fakes.fal import FakeFal
-from manitwin.fakes.faults import ALWAYS, Faults
-from manitwin.fakes.server import FakeServer, Request, Response
+from manitwin.models.fakes.fal import FakeFal
+from manitwin.models.fakes.faults import ALWAYS, Faults
+from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.fal import FalGenerator, first_glb
 from manitwin.models.generators.run import run_generator
 from manitwin.models.services.http import Gone, Unanswered

@@ -11,8 +11,8 @@ import pytest
 import trimesh
 
 from manitwin.errors import Rejected, Unsupported
-from manitwin.files.glb import read_glb
-from manitwin.files.image_file import read_image
+from manitwin.formats.glb import read_glb
+from manitwin.formats.image_file import read_image
 from manitwin.models.generators.lift import LiftGenerator
 from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.inflation import inflate

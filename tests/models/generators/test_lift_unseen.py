@@ -10,8 +10,8 @@ import pytest
 import trimesh
 
 from manitwin.config import GenerateConfig
-from manitwin.files.glb import read_glb, write_glb
-from manitwin.models.generators.job_memory import NoMemory
+from manitwin.engine.job_memory import NoMemory
+from manitwin.formats.glb import read_glb, write_glb
 from manitwin.models.generators.lift import LiftGenerator
 from manitwin.models.generators.lift.generator import textured_part
 from manitwin.models.generators.lift.hint import ShapeHint

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from manitwin.errors import BadReply
-from manitwin.fakes.meshes import body_and_cap, bottle, glb, truncated, usdz, webp_glb
-from manitwin.files.glb import read_glb
-from manitwin.files.meshes.read import read_mesh
+from manitwin.formats.glb import read_glb
+from manitwin.formats.meshes.read import read_mesh
+from manitwin.models.fakes.meshes import body_and_cap, bottle, glb, truncated, usdz, webp_glb
 from manitwin.models.generators.mesh_file import as_glb
 
 

@@ -15,12 +15,12 @@ import trimesh
 from PIL import Image
 from rehearsed_jobs import KEY, TEXT, KeptJobs, asked, check_key_is_nowhere, finished, made, photo, refused, settings
 
-from manitwin.charges import counted
 from manitwin.config import BuildConfig
+from manitwin.engine.charges import counted
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Rejected, Unavailable
-from manitwin.fakes.faults import ALWAYS, Faults
-from manitwin.fakes.meshy import FakeMeshy
-from manitwin.fakes.server import FakeServer, Request, Response
+from manitwin.models.fakes.faults import ALWAYS, Faults
+from manitwin.models.fakes.meshy import FakeMeshy
+from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.meshy import MeshyGenerator
 from manitwin.models.generators.run import run_generator
 from manitwin.models.services.http import Unanswered

@@ -13,10 +13,10 @@ from PIL import Image
 
 from generator_runs import KEY, config, photo_request, run, text_request
 from manitwin.errors import AccessDenied, ConfigError, RateLimited, Rejected, Unavailable
-from manitwin.fakes.faults import ALWAYS, Faults
-from manitwin.fakes.rodin import FakeRodin
-from manitwin.fakes.server import FakeServer, Request, Response
-from manitwin.files.meshes.read import read_mesh
+from manitwin.formats.meshes.read import read_mesh
+from manitwin.models.fakes.faults import ALWAYS, Faults
+from manitwin.models.fakes.rodin import FakeRodin
+from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.mesh_file import as_glb
 from manitwin.models.generators.rodin import URL, RodinGenerator
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from generator_runs import photo_request
-from manitwin.charges import counted
 from manitwin.config import GenerateConfig
+from manitwin.engine.charges import counted
+from manitwin.engine.job_memory import NoMemory
 from manitwin.errors import AccessDenied, BadReply, Rejected, Unavailable
-from manitwin.fakes.meshes import bottle, glb, open_surface
-from manitwin.models.generators.job_memory import NoMemory
+from manitwin.models.fakes.meshes import bottle, glb, open_surface
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
 from manitwin.models.generators.run import request_digest, run_generator
 from manitwin.models.services.refusal import Gone, Unanswered

@@ -12,9 +12,9 @@ from PIL import Image
 
 from generator_runs import KEY, config, photo_request, run, text_request
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Rejected
-from manitwin.fakes.faults import Faults
-from manitwin.fakes.server import FakeServer, Request, Response
-from manitwin.fakes.tripo import FakeTripo
+from manitwin.models.fakes.faults import Faults
+from manitwin.models.fakes.server import FakeServer, Request, Response
+from manitwin.models.fakes.tripo import FakeTripo
 from manitwin.models.generators.tripo import URL, TripoGenerator
 from manitwin.models.services.http import Gone
 

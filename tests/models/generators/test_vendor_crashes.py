@@ -13,7 +13,7 @@ import pytest
 
 from generator_runs import USD, Crash, Fuse, FusedGenerator, FusedMemory, Ran, config, memory, run
 from manitwin.errors import BadReply
-from manitwin.fakes.faults import ALWAYS, Faults
+from manitwin.models.fakes.faults import ALWAYS, Faults
 from served_vendors import VENDORS, Vendor, serving, set_keys
 
 

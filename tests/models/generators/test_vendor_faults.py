@@ -10,7 +10,7 @@ import pytest
 
 from generator_runs import KEY, USD, Fuse, FusedGenerator, Ran, config, run, text_request
 from manitwin.errors import AccessDenied, BadReply, RateLimited, Rejected, Unavailable
-from manitwin.fakes.faults import ALWAYS, Faults
+from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.services.refusal import Unanswered
 from served_vendors import VENDORS, Vendor, serving, set_keys
 

@@ -11,8 +11,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from manitwin.models.graspers.base_link_frames import BASE_LINK_Z_M, HANDS, gripper_poses
-from manitwin.simulate.gripper import load_gripper
-from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.robots.grippers.parallel import ParallelGripper
 
 PANDA = load_gripper("panda")
 assert isinstance(PANDA, ParallelGripper)

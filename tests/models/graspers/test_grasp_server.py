@@ -13,11 +13,11 @@ import pytest
 import zmq
 from test_array_messages import hostile
 
-from manitwin.charges import counted
 from manitwin.config import ServicesConfig
+from manitwin.engine.charges import counted
 from manitwin.errors import BadReply, ConfigError, Unavailable
-from manitwin.fakes.faults import Faults
-from manitwin.fakes.graspgen import FakeGraspGen
+from manitwin.models.fakes.faults import Faults
+from manitwin.models.fakes.graspgen import FakeGraspGen
 from manitwin.models.graspers import grasp_server
 from manitwin.models.graspers.grasp_server import GraspServer, ServerError, server_url
 

@@ -12,19 +12,19 @@ import trimesh
 
 from grasp_drafts import PANDA, box_draft, run_all
 from manitwin.config import BuildConfig, CollisionConfig, GraspConfig, ServicesConfig, VerifyConfig
+from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply, ConfigError, Rejected, Unavailable, UsageError
-from manitwin.fakes.faults import Faults
-from manitwin.fakes.graspgen import FakeGraspGen
-from manitwin.fakes.graspgenx import FakeGraspGenX
+from manitwin.models.fakes.faults import Faults
+from manitwin.models.fakes.graspgen import FakeGraspGen
+from manitwin.models.fakes.graspgenx import FakeGraspGenX
 from manitwin.models.graspers.graspgen import GraspGenGrasper
 from manitwin.models.graspers.graspgenx import GraspGenXGrasper
 from manitwin.models.graspers.protocol import Grasper, GraspRequest
-from manitwin.simulate.gripper import load_gripper
-from manitwin.simulate.sapien_trial import SapienTrial
-from manitwin.stages.collision import CollisionStage
-from manitwin.stages.grasps import GraspsStage
-from manitwin.stages.stage import Draft
-from manitwin.stages.verify import VerifyStage
+from manitwin.physics.sapien.trial import SapienTrial
+from manitwin.pipeline.collision import CollisionStage
+from manitwin.pipeline.grasps import GraspsStage
+from manitwin.pipeline.verify import VerifyStage
+from manitwin.robots.grippers.gripper import load_gripper
 from real_meshes import load_real_mesh
 
 # grasp_gen/serving/zmq_server.py: every field that it reads

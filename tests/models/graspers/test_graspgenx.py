@@ -11,13 +11,13 @@ from test_graspgen import BAR, request_for
 
 from manitwin.config import BuildConfig, ServicesConfig
 from manitwin.errors import BadReply, Unavailable
-from manitwin.fakes import graspgenx as fake_module
-from manitwin.fakes.faults import Faults
-from manitwin.fakes.graspgenx import FakeGraspGenX
+from manitwin.models.fakes import graspgenx as fake_module
+from manitwin.models.fakes.faults import Faults
+from manitwin.models.fakes.graspgenx import FakeGraspGenX
 from manitwin.models.graspers.graspgenx import GraspGenXGrasper, sweep_volume
 from manitwin.models.graspers.pad_screen import PadScreen
-from manitwin.simulate.gripper import load_gripper
-from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.robots.grippers.parallel import ParallelGripper
 
 CONFIG = BuildConfig(services=ServicesConfig(timeout_s=20, retries=0))
 # client-server/README.md, "Protocol Reference": what infer_object takes

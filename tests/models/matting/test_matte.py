@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from manitwin.errors import Rejected
-from manitwin.files.image_file import read_image
+from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
 
 SIZE = (300, 400)

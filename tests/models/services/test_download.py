@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from manitwin.errors import BadReply, Unavailable
-from manitwin.fakes.server import FakeServer, Response
+from manitwin.models.fakes.server import FakeServer, Response
 from scripted_service import KEY, Client, Script, error_of
 
 

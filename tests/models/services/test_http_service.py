@@ -12,7 +12,7 @@ import pytest
 
 from manitwin.config import ServicesConfig
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Rejected, Unavailable
-from manitwin.fakes.server import FakeServer, Request, Response
+from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.services.http import FormFile, Gone, Refusal, Service, Unanswered
 from scripted_service import KEY, OK, Client, Script, error_of
 

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 from mug_question import KEY, MUG, PRICE, Mug, Waits, answer_mug, question, services
 
-from manitwin.charges import counted
 from manitwin.config import VlmConfig
+from manitwin.engine.charges import counted
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Unavailable
-from manitwin.fakes.anthropic_messages import FakeAnthropic
-from manitwin.fakes.faults import ALWAYS, Faults
-from manitwin.fakes.server import FakeServer, Response
+from manitwin.models.fakes.anthropic_messages import FakeAnthropic
+from manitwin.models.fakes.faults import ALWAYS, Faults
+from manitwin.models.fakes.server import FakeServer, Response
 from manitwin.models.vlm.anthropic_messages import AnthropicMessages
 from manitwin.models.vlm.protocol import Turn
 from manitwin.models.vlm.structured import ask

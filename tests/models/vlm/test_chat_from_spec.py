@@ -10,9 +10,9 @@ from mug_question import KEY, MUG, answer_mug, question
 
 from manitwin.config import BuildConfig
 from manitwin.errors import AccessDenied, ConfigError
-from manitwin.fakes.anthropic_messages import FakeAnthropic
-from manitwin.fakes.openai_chat import FakeOpenAi
-from manitwin.fakes.server import FakeServer
+from manitwin.models.fakes.anthropic_messages import FakeAnthropic
+from manitwin.models.fakes.openai_chat import FakeOpenAi
+from manitwin.models.fakes.server import FakeServer
 from manitwin.models.vlm.chat_from_spec import anthropic_from_spec, openai_from_spec, replay_from_spec
 
 NAMES = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GEMINI_API_KEY", "MANITWIN_VLM_KEY")

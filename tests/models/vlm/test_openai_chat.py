@@ -13,12 +13,12 @@ from typing import Any
 import pytest
 from mug_question import KEY, MUG, PRICE, Mug, Waits, answer_mug, question, services
 
-from manitwin.charges import counted
 from manitwin.config import VlmConfig
+from manitwin.engine.charges import counted
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Unavailable
-from manitwin.fakes.faults import ALWAYS, Faults
-from manitwin.fakes.openai_chat import FakeOpenAi
-from manitwin.fakes.server import FakeServer, Response
+from manitwin.models.fakes.faults import ALWAYS, Faults
+from manitwin.models.fakes.openai_chat import FakeOpenAi
+from manitwin.models.fakes.server import FakeServer, Response
 from manitwin.models.vlm.openai_chat import OpenAiChat
 from manitwin.models.vlm.openai_completion import completion
 from manitwin.models.vlm.probe import probe

@@ -9,11 +9,11 @@ import pytest
 from many_askers import Echo, ask_recorded, asked, at_once
 from mug_question import KEY, MUG, Mug, Scripted, Waits, answer_mug, question, services
 
-from manitwin.charges import counted
 from manitwin.config import VlmConfig
+from manitwin.engine.charges import counted
 from manitwin.errors import BadReply, ConfigError
-from manitwin.fakes.openai_chat import FakeOpenAi
-from manitwin.fakes.server import FakeServer
+from manitwin.models.fakes.openai_chat import FakeOpenAi
+from manitwin.models.fakes.server import FakeServer
 from manitwin.models.vlm.openai_chat import OpenAiChat
 from manitwin.models.vlm.replay import Recorded, Replay
 from manitwin.models.vlm.structured import ask

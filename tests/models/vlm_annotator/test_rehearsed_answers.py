@@ -9,8 +9,8 @@ import pytest
 from scripted_chat import ScriptedChat, annotator, points_request
 
 from handmade import mug
-from manitwin.fakes.vlm_answers import rehearsal_answer
 from manitwin.models.annotators.protocol import PointsRequest
+from manitwin.models.fakes.vlm_answers import rehearsal_answer
 from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn
 from real_meshes import load_real_mesh, mesh_rows
 

@@ -11,7 +11,7 @@ from scripted_chat import ScriptedChat, annotator, changed, subject
 
 from handmade import cup
 from manitwin.errors import BadReply
-from manitwin.twin import Language
+from manitwin.twin.record import Language
 
 EXTENTS_M = np.array([0.08, 0.08, 0.1])
 GOOD: dict[str, Any] = {

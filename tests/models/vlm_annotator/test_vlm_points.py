@@ -21,7 +21,7 @@ from manitwin.models.annotators.vlm.points import Numbering, functional_numberin
 from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.render.cameras import project
 from manitwin.render.markers import DOT
-from manitwin.twin import GraspPoint
+from manitwin.twin.record import GraspPoint
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset import Asset, Contact
 from manitwin.assets.readers.urdf import UrdfTree, asset_of, open_urdf
-from manitwin.assets.urdf_contact import gazebo_friction
-from manitwin.assets.xml_file import number, origin_of, text_of
+from manitwin.assets.readers.urdf_contact import gazebo_friction
+from manitwin.formats.xml_file import number, origin_of, text_of
 
 _RANGES = (("mass", "kg"), ("height", "m"))
 _FAILED = (1.0, 1.0, 1.0, 1.0)  # what URDFGenerator writes for mass and height where its model did not answer

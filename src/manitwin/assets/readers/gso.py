@@ -13,8 +13,8 @@ from manitwin.assets.asset import Asset
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.detect import SCAN_METADATA
 from manitwin.assets.readers.sdf import asset_of, open_sdf
-from manitwin.files.meshes.source import MeshSource
-from manitwin.files.meshes.textures import decode_texture, make_part, material_of, normals_of, uv_of
+from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.textures import decode_texture, make_part, material_of, normals_of, uv_of
 
 LICENSE, ATTRIBUTION = "CC-BY-4.0", "Google Research, Google Scanned Objects"
 """Of the collection as a whole (Downs et al. 2022, arXiv 2204.11918, section 3)."""

@@ -9,10 +9,10 @@ import numpy as np
 
 from manitwin.assets.asset import Asset, Contact, Inertial
 from manitwin.assets.asset_files import AssetFiles
-from manitwin.assets.json_file import json_number, json_object, json_vector, parse_json
-from manitwin.assets.manitwin100k_places import DeclaredPlace, declared_places
+from manitwin.assets.readers.manitwin100k_places import DeclaredPlace, declared_places
 from manitwin.errors import AssetError
-from manitwin.files.meshes.textures import bake_transform
+from manitwin.formats.json_file import json_number, json_object, json_vector, parse_json
+from manitwin.formats.meshes.textures import bake_transform
 from manitwin.geometry.poses import GLTF_TO_OBJECT, rotation_between, transform
 
 ANNOTATIONS, CAPTIONS = "manipulation_annotations.json", "caption.json"

@@ -11,10 +11,10 @@ from manitwin.assets.asset import Asset, Contact, Inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence
-from manitwin.assets.mjcf_shapes import BodyShapes
-from manitwin.assets.mjcf_source import MjcfSource, open_mjcf
-from manitwin.assets.mjcf_spec import compiled
-from manitwin.assets.urdf_inertial import combined
+from manitwin.assets.readers.mjcf_shapes import BodyShapes
+from manitwin.assets.readers.mjcf_source import MjcfSource, open_mjcf
+from manitwin.assets.readers.mjcf_spec import compiled
+from manitwin.assets.readers.urdf_inertial import combined
 from manitwin.errors import AssetError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 

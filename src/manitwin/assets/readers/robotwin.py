@@ -15,9 +15,9 @@ import trimesh
 from manitwin.assets.asset import Asset, CollisionShape, Contact, Inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.detect import robotwin_data
-from manitwin.assets.robotwin_data import RobotwinData, read_json
+from manitwin.assets.readers.robotwin_data import RobotwinData, read_json
 from manitwin.errors import AssetError
-from manitwin.files.meshes.textures import bake_transform
+from manitwin.formats.meshes.textures import bake_transform
 from manitwin.geometry.poses import GLTF_TO_OBJECT, OBJECT_TO_GLTF, transform
 
 _NUMBERED = re.compile(r"^\d+_(.+)$")

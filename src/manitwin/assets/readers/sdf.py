@@ -12,11 +12,11 @@ from manitwin.assets.asset import Asset, Contact, Inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence, stated_or_none
-from manitwin.assets.sdf_poses import ModelFrames, pose_of
-from manitwin.assets.sdf_shapes import SdfShapes
-from manitwin.assets.urdf_inertial import combined
-from manitwin.assets.xml_file import comments_before, number, parse_xml, text_of
+from manitwin.assets.readers.sdf_poses import ModelFrames, pose_of
+from manitwin.assets.readers.sdf_shapes import SdfShapes
+from manitwin.assets.readers.urdf_inertial import combined
 from manitwin.errors import AssetError
+from manitwin.formats.xml_file import comments_before, number, parse_xml, text_of
 
 MAIN_FILE, CONFIG_FILE = "model.sdf", "model.config"
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

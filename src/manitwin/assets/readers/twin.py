@@ -10,12 +10,12 @@ import numpy as np
 from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset, CollisionShape, Contact, Inertial
 from manitwin.assets.asset_files import MESH_LIMITS, joined
 from manitwin.errors import AssetError, InputError, TwinError
-from manitwin.files.glb import read_glb
-from manitwin.files.meshes.obj import read_obj
-from manitwin.files.meshes.source import MeshSource
+from manitwin.formats.glb import read_glb
+from manitwin.formats.meshes.obj import read_obj
+from manitwin.formats.meshes.source import MeshSource
 from manitwin.geometry.poses import rotation_between, rotation_from_quaternion_wxyz, transform
-from manitwin.loaded_twin import Twin
-from manitwin.twin import FunctionalPoint, GraspPoint, GraspSummary
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.record import FunctionalPoint, GraspPoint, GraspSummary
 
 
 def read(path: Path) -> Asset:

@@ -12,11 +12,11 @@ from manitwin.assets.asset import Asset, Contact
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence
-from manitwin.assets.urdf_contact import declared_contact
-from manitwin.assets.urdf_inertial import declared_inertial
-from manitwin.assets.urdf_shapes import LinkShapes
-from manitwin.assets.xml_file import comments_before, origin_of, parse_xml
+from manitwin.assets.readers.urdf_contact import declared_contact
+from manitwin.assets.readers.urdf_inertial import declared_inertial
+from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.errors import AssetError
+from manitwin.formats.xml_file import comments_before, origin_of, parse_xml
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,13 @@ from manitwin.assets.asset import Asset
 from manitwin.assets.asset_files import MESH_LIMITS
 from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence
-from manitwin.assets.usd_layers import LayerFiles
-from manitwin.assets.usd_physics import declared_contact, declared_inertial
-from manitwin.assets.usd_process import read_apart
-from manitwin.assets.usd_shapes import StageShapes
-from manitwin.assets.usd_textures import LayeredSurfaces
+from manitwin.assets.readers.usd_layers import LayerFiles
+from manitwin.assets.readers.usd_physics import declared_contact, declared_inertial
+from manitwin.assets.readers.usd_process import read_apart
+from manitwin.assets.readers.usd_shapes import StageShapes
+from manitwin.assets.readers.usd_textures import LayeredSurfaces
 from manitwin.errors import AssetError, InputError
-from manitwin.files.meshes.source import MeshSource
+from manitwin.formats.meshes.source import MeshSource
 
 
 def read(path: Path) -> Asset:

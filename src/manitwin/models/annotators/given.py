@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from manitwin.config import Resource
-from manitwin.files.import_record import ImportRecord
 from manitwin.models.annotators.given_points import GivenPoints
 from manitwin.models.annotators.protocol import (
     Annotator,
@@ -18,7 +17,8 @@ from manitwin.models.annotators.protocol import (
     SelectedPoints,
     Subject,
 )
-from manitwin.twin import Estimate, Language
+from manitwin.twin.import_record import ImportRecord
+from manitwin.twin.record import Estimate, Language
 
 
 class KeepsGiven:

@@ -6,9 +6,9 @@ from typing import TypeVar, get_args
 
 import numpy as np
 
-from manitwin.files.import_record import GivenPoint, ImportRecord
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
-from manitwin.twin import FunctionalPoint, GraspPoint, GraspType
+from manitwin.twin.import_record import GivenPoint, ImportRecord
+from manitwin.twin.record import FunctionalPoint, GraspPoint, GraspType
 
 NEAR_M, NEAR_SHARE = 0.02, 0.1
 """A candidate stands for a given point within 2 cm, or 10 % of the longest side: 42 candidates lie about so far apart."""

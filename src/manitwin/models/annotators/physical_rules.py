@@ -10,7 +10,7 @@ from manitwin.geometry.parts.local_thickness import local_thickness
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.annotators.priors import Interval, Prior, unknown_prior
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
-from manitwin.twin import Estimate
+from manitwin.twin.record import Estimate
 
 _SPREAD = 3.29  # natural logs between low and high, in standard deviations: an interval of 90 %
 _SIZE_EXPONENT = (

@@ -1,6 +1,6 @@
 """What is usually true of things people handle: a table of priors, keyed by what a person calls the thing.
 
-The table is ``manitwin/data/priors/*.toml``: ``materials.toml`` (friction, restitution), ``forms.toml`` (shape, parts
+The table is ``prior_tables/*.toml`` beside this module: ``materials.toml`` (friction, restitution), ``forms.toml`` (shape, parts
 and how they are used, shared by many categories) and one file a domain with the categories. docs/priors.md says how it
 was made.
 """
@@ -19,8 +19,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from manitwin.errors import ManiTwinError, choose_from
 from manitwin.geometry.parts.elongation import HeadEnd
 from manitwin.geometry.parts.features import Feature
-from manitwin.twin import Estimate, Finite, GraspType, Record
+from manitwin.twin.record import Estimate, Finite, GraspType, Record
 
+TABLES = resources.files("manitwin.models.annotators") / "prior_tables"
 VOCABULARY_FILES = ("materials", "forms")
 """The files of the folder that are not a domain."""
 
@@ -126,13 +127,12 @@ class Prior(Form):
 
 
 def _read(name: str) -> dict[str, Any]:
-    path = resources.files("manitwin") / "data" / "priors" / f"{name}.toml"
+    path = TABLES / f"{name}.toml"
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 def _domains() -> list[str]:
-    folder = resources.files("manitwin") / "data" / "priors"
-    names = (entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    names = (entry.name.removesuffix(".toml") for entry in TABLES.iterdir() if entry.name.endswith(".toml"))
     return sorted(name for name in names if name not in VOCABULARY_FILES)
 
 

@@ -10,9 +10,9 @@ import numpy as np
 import trimesh
 
 from manitwin.config import Resource
-from manitwin.files.import_record import ImportRecord
 from manitwin.render.cameras import Camera
-from manitwin.twin import Estimate, FunctionalPoint, GraspPoint, Language
+from manitwin.twin.import_record import ImportRecord
+from manitwin.twin.record import Estimate, FunctionalPoint, GraspPoint, Language
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from manitwin.models.annotators.protocol import (
     Subject,
 )
 from manitwin.models.annotators.words import describe
-from manitwin.twin import Language
+from manitwin.twin.record import Language
 
 
 class RulesAnnotator:

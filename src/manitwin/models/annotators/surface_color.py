@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from manitwin.files.meshes.textures import linear_to_srgb, material_of, uv_of
+from manitwin.formats.meshes.textures import linear_to_srgb, material_of, uv_of
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.annotators.color_names import color_name, lab_from_srgb
 

@@ -9,7 +9,7 @@ from manitwin.geometry.parts.overall_shape import overall_shape
 from manitwin.models.annotators.priors import Prior, normalised
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.surface_color import UNTEXTURED, ColorShare, measure_colors
-from manitwin.twin import Language
+from manitwin.twin.record import Language
 
 UNKNOWN_FUNCTION = "unknown function (no name given that the priors know)"
 

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from manitwin.errors import InputError
-from manitwin.files.meshes.read import read_mesh
+from manitwin.formats.meshes.read import read_mesh
 from manitwin.geometry.repair.cascade import repair
 from manitwin.geometry.repair.surface import signed_volumes
 

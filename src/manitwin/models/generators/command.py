@@ -21,7 +21,7 @@ from typing import Any
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, ConfigError, InputError, Rejected, Unavailable, Unsupported, choose_from
-from manitwin.files.sniff import sniff
+from manitwin.formats.sniff import sniff
 from manitwin.models.generators import supervisor
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.service import png_of

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.errors import BadReply, InputError
-from manitwin.files.glb import write_glb
-from manitwin.files.meshes.read import MeshFile, read_mesh
-from manitwin.files.meshes.textures import bake_transform
-from manitwin.files.sniff import sniff
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.read import MeshFile, read_mesh
+from manitwin.formats.meshes.textures import bake_transform
+from manitwin.formats.sniff import sniff
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 
 MAX_TEXTURE_PX = 8192  # the largest that generators make; the mesh stage brings them down to its own limit

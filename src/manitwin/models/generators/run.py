@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.charges import charge
 from manitwin.config import GenerateConfig
+from manitwin.engine.charges import charge
+from manitwin.engine.job_memory import JobMemory, NoMemory
 from manitwin.errors import BackendError, BadReply, Rejected, Unavailable
 from manitwin.models.generators.acceptance import flaw
-from manitwin.models.generators.job_memory import JobMemory, NoMemory
 from manitwin.models.generators.protocol import Generated, GenerationRequest, Generator
 from manitwin.models.services.refusal import Gone, Unanswered
 

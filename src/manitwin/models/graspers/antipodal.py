@@ -9,8 +9,8 @@ from manitwin.geometry.antipodal import AntipodalPairs, antipodal_pairs, grasp_f
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.starting_points import starting_points
-from manitwin.simulate.gripper import of_kind
-from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.parallel import ParallelGripper
 
 ROLLS = 8  # approach directions a pair
 CONE_SAFETY = 1.5  # the friction cone is narrowed by this: contacts are patches, and hulls are not the surface

@@ -14,8 +14,8 @@ from urllib.parse import urlsplit
 
 import zmq
 
-from manitwin.charges import REHEARSAL_MARK, note_rehearsal
 from manitwin.config import ServicesConfig
+from manitwin.engine.charges import REHEARSAL_MARK, note_rehearsal
 from manitwin.errors import BadReply, ConfigError, Unavailable
 from manitwin.models.graspers.array_messages import pack, unpack
 from manitwin.models.services.keys import redacted, split_url

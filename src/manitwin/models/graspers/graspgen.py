@@ -18,8 +18,8 @@ from manitwin.models.graspers.base_link_frames import BASE_LINK_Z_M, HANDS
 from manitwin.models.graspers.grasp_server import GraspServer, server_url
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.served_proposals import ASKED_FOR, ask_for_proposals, point_cloud
-from manitwin.simulate.gripper import Gripper, load_gripper, of_kind
-from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.robots.grippers.gripper import Gripper, load_gripper, of_kind
+from manitwin.robots.grippers.parallel import ParallelGripper
 
 POINTS = 2000  # what its client samples of a mesh (client-server/graspgen_client.py) and what it is trained with
 NO_THRESHOLD = -1.0

@@ -21,8 +21,8 @@ from manitwin.errors import BadReply, Unavailable
 from manitwin.models.graspers.grasp_server import GraspServer, server_url
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.served_proposals import ASKED_FOR, ask_for_proposals, point_cloud
-from manitwin.simulate.gripper import of_kind
-from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.parallel import ParallelGripper
 
 POINTS = 3500  # what its demonstration samples of a mesh (scripts/demo_object_mesh.py)
 ACTION = "infer_object"

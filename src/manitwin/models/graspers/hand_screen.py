@@ -6,12 +6,12 @@ import numpy as np
 
 from manitwin.errors import Rejected
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screened
-from manitwin.simulate.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2
-from manitwin.simulate.grasp_selection import Merits
-from manitwin.simulate.gripper import of_kind
-from manitwin.simulate.hand_collision import HandCollision
-from manitwin.simulate.hands.multi_finger import MultiFingerGripper
-from manitwin.simulate.trial import GRAVITY_M_S2
+from manitwin.physics.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2
+from manitwin.physics.grasp_selection import Merits
+from manitwin.physics.trial import GRAVITY_M_S2
+from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 
 CLEARANCE_M = 0.0005
 # The arm at which friction under the closing force would just carry weight and slides. Of 600 grasps of six objects 93 % held

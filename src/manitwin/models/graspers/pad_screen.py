@@ -11,9 +11,9 @@ from manitwin.geometry.antipodal import antipodal_pairs
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screened
-from manitwin.simulate.grasp_filters import GraspFilter, pad_merits, torque_ratio
-from manitwin.simulate.gripper import of_kind
-from manitwin.simulate.hands.parallel import ParallelGripper
+from manitwin.physics.grasp_filters import GraspFilter, pad_merits, torque_ratio
+from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.parallel import ParallelGripper
 
 MIN_WIDTH_M = 0.0005  # thinner than this, a wall is not told from the surface's noise
 WIDTH_SAMPLES = 2000

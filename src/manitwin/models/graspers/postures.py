@@ -10,8 +10,8 @@ from manitwin.geometry.antipodal import AntipodalPairs, antipodal_pairs, tangent
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.starting_points import starting_points
-from manitwin.simulate.gripper import of_kind
-from manitwin.simulate.hands.multi_finger import MultiFingerGripper, Posture
+from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper, Posture
 
 ROLLS = 8  # approach directions a pair
 CONE_SAFETY = 1.5  # as for parallel jaws: contacts are patches, and hulls are not the surface

@@ -10,8 +10,8 @@ import trimesh
 
 from manitwin.config import Resource
 from manitwin.errors import Rejected
-from manitwin.simulate.grasp_selection import Merits
-from manitwin.simulate.gripper import Gripper
+from manitwin.physics.grasp_selection import Merits
+from manitwin.robots.grippers.gripper import Gripper
 
 
 @dataclass(frozen=True)

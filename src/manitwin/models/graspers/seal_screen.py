@@ -7,15 +7,15 @@ import numpy as np
 from manitwin.errors import Rejected
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screened
-from manitwin.simulate.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2
-from manitwin.simulate.grasp_selection import Merits
-from manitwin.simulate.gripper import of_kind
-from manitwin.simulate.hand_collision import HandCollision
-from manitwin.simulate.hands.suction import SuctionGripper
-from manitwin.simulate.suction_load import lip_load
-from manitwin.simulate.suction_seal import seal
-from manitwin.simulate.trial import GRAVITY_M_S2
-from manitwin.simulate.trial_phases import SLIDE_DIRECTIONS
+from manitwin.physics.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2
+from manitwin.physics.grasp_selection import Merits
+from manitwin.physics.suction_load import lip_load
+from manitwin.physics.suction_seal import seal
+from manitwin.physics.trial import GRAVITY_M_S2
+from manitwin.physics.trial_phases import SLIDE_DIRECTIONS
+from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.suction import SuctionGripper
 
 CLEARANCE_M = 0.0005
 GOOD_LOAD = 0.5  # half of the limits: what is left over is for what the twin does not know

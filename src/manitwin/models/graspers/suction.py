@@ -9,9 +9,9 @@ from manitwin.geometry.antipodal import tangents
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.starting_points import starting_points
-from manitwin.simulate.gripper import of_kind
-from manitwin.simulate.hands.suction import SuctionGripper
-from manitwin.simulate.suction_seal import seal
+from manitwin.physics.suction_seal import seal
+from manitwin.robots.grippers.gripper import of_kind
+from manitwin.robots.grippers.suction import SuctionGripper
 
 ROLLS = 2  # angles of the tool about the approach a point
 HALF_LEVER_M, LEVER_SLOPE_M = 0.04, 0.02  # the tilt that a lip of 15 mm carries: at 40 mm half of the vacuum's force

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import httpx2
 
-from manitwin.charges import REHEARSAL_MARK, note_rehearsal
+from manitwin.engine.charges import REHEARSAL_MARK, note_rehearsal
 
 
 def note_rehearsal_answer(response: httpx2.Response) -> None:

@@ -8,7 +8,7 @@ import tempfile
 from hashlib import sha256
 from pathlib import Path
 
-from manitwin.charges import counted, note_rehearsal
+from manitwin.engine.charges import counted, note_rehearsal
 from manitwin.models.vlm.client import Around, ChatClient
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
 from manitwin.models.vlm.question_digest import question_digest

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from manitwin.charges import charge
+from manitwin.engine.charges import charge
 from manitwin.errors import BadReply
 from manitwin.models.vlm.prices import TokenPrice
 from manitwin.models.vlm.protocol import Reply, Usage

@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from manitwin.charges import counted, note_rehearsal
+from manitwin.engine.charges import counted, note_rehearsal
 from manitwin.errors import BadReply, ConfigError
 from manitwin.models.vlm.client import Around, ChatClient, Forgetful
 from manitwin.models.vlm.prices import FREE, TokenPrice

@@ -43,7 +43,7 @@ from manitwin.models.vlm.protocol import ChatModel
 from manitwin.models.vlm.protocol import Question as ChatQuestion
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.models.vlm.structured import Forgetful, ask
-from manitwin.twin import Language
+from manitwin.twin.record import Language
 
 PROMPTS: dict[Question, tuple[str, ...]] = {
     "quality": ("quality",),

@@ -16,7 +16,7 @@ from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.wording import name_line, size_phrase
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
-from manitwin.twin import Language
+from manitwin.twin.record import Language
 
 LEAST_SENTENCES = 6
 ATTRIBUTES = ("category", "color", "material", "size", "shape", "function")

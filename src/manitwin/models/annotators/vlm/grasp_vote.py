@@ -15,7 +15,7 @@ from manitwin.models.annotators.vlm.points import (
     PointsAnswer,
     contradiction,
 )
-from manitwin.twin import GraspPoint
+from manitwin.twin.record import GraspPoint
 
 
 @dataclass(frozen=True)

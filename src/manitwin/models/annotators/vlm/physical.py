@@ -13,7 +13,7 @@ from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.wording import name_line
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
-from manitwin.twin import Estimate
+from manitwin.twin.record import Estimate
 
 Matter = Literal[
     "plastic", "ceramic", "glass", "steel", "aluminium", "wood", "cardboard", "paper", "rubber", "foam", "textile",

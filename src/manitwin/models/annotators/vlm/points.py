@@ -16,7 +16,7 @@ from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.wording import extents_of, length_phrase, name_line, size_phrase
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
-from manitwin.twin import FunctionalPoint, GraspType
+from manitwin.twin.record import FunctionalPoint, GraspType
 
 FUNCTIONAL, GRASP = (2, 4), (2, 3)
 """How many points an object has (paper)."""

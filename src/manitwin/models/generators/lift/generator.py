@@ -15,7 +15,7 @@ from trimesh.visual.material import PBRMaterial
 
 from manitwin.config import Resource
 from manitwin.errors import Unavailable, Unsupported
-from manitwin.files.glb import write_glb
+from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.generators.lift.hint import hint_from_name
 from manitwin.models.generators.lift.lifting import Lifted, lift

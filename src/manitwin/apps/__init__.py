@@ -1,1 +1,0 @@
-"""What twins are used for: one folder an application of the paper."""

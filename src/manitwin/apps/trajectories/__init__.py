@@ -1,1 +1,0 @@
-"""Manipulation data (paper, Manipulation Data Generation and Cross-Embodiment Data): demonstrations planned and proven."""

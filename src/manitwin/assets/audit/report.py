@@ -1,0 +1,149 @@
+"""Findings for a person, for a program, and for whoever reads SARIF."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+from urllib.parse import quote
+
+from manitwin.assets.audit.finding import Finding, Rule
+from manitwin.assets.audit.run import Audited
+from manitwin.twin.version import installed_version
+
+ReportFormat = Literal["text", "json", "sarif"]
+PAGE = "docs/audit.md"
+SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+
+
+def count_by_severity(audited: Sequence[Audited]) -> dict[str, int]:
+    """Return how many errors, warnings and notes there are."""
+    counts = Counter(finding.severity for each in audited for finding in each.findings)
+    return {"error": counts["error"], "warning": counts["warning"], "note": counts["note"]}
+
+
+def text_of(each: Audited) -> str:
+    """Return the lines of one asset, empty where nothing was found and nothing fixed."""
+    if not each.findings and not each.fixed:
+        return ""
+    lines = [f"{each.asset}{f' ({each.format})' if each.format else ''}"]
+    lines += [f"  fixed           {said}" for said in each.fixed]
+    lines += [f"  {finding.code} {finding.severity:<8} {_one_line(finding.message)}" for finding in each.findings]
+    return "\n".join(lines)
+
+
+def summary(audited: Sequence[Audited]) -> str:
+    """Return the last line of a report."""
+    counts = count_by_severity(audited)
+    clean = sum(not each.findings for each in audited)
+    said = ", ".join(f"{count} {name}{'' if count == 1 else 's'}" for name, count in counts.items())
+    return f"{len(audited)} assets, {clean} without findings: {said}"
+
+
+def explanation(rule: Rule) -> str:
+    """Return all that is known of a rule, for a person."""
+    fixable = "\nmanitwin audit --fix does it where that is safe." if rule.fix is not None else ""
+    return f"{rule.code} {rule.name} ({rule.severity})\n\n{rule.why}\n\n{rule.remedy}{fixable}"
+
+
+def json_of(audited: Sequence[Audited]) -> str:
+    """Return all findings as JSON, sorted as they were found."""
+    content = {
+        "manitwin_version": installed_version(),
+        "summary": {"assets": len(audited), **count_by_severity(audited)},
+        "assets": [
+            {
+                "asset": each.asset,
+                "format": each.format,
+                "fixed": list(each.fixed),
+                "findings": [_finding_json(finding) for finding in each.findings],
+            }
+            for each in audited
+        ],
+    }
+    return json.dumps(content, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _finding_json(finding: Finding) -> dict[str, Any]:
+    return {
+        "code": finding.code,
+        "severity": finding.severity,
+        "message": _one_line(finding.message),
+        "file": None if finding.file is None else str(finding.file),
+        "values": _plain(finding.values),
+    }
+
+
+def sarif_of(audited: Sequence[Audited], rules: Sequence[Rule]) -> str:
+    """Return all findings as a SARIF log, with the help of every rule that was applied.
+
+    Source: OASIS, Static Analysis Results Interchange Format 2.1.0, sections 3.13 (log), 3.19 (driver), 3.27 (result), 3.49
+    (rules).
+    """
+    index = {rule.code: number for number, rule in enumerate(rules)}
+    log = {
+        "$schema": SARIF_SCHEMA,
+        "version": "2.1.0",
+        "runs": [
+            {
+                "tool": {
+                    "driver": {
+                        "name": "manitwin audit",
+                        "version": installed_version(),
+                        "rules": [_rule_sarif(rule) for rule in rules],
+                    }
+                },
+                "columnKind": "unicodeCodePoints",
+                "results": [
+                    _result_sarif(finding, index[finding.code]) for each in audited for finding in each.findings
+                ],
+            }
+        ],
+    }
+    return json.dumps(log, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
+
+
+def _rule_sarif(rule: Rule) -> dict[str, Any]:
+    return {
+        "id": rule.code,
+        "name": "".join(word.capitalize() for word in rule.name.split("-")),
+        "shortDescription": {"text": rule.name.replace("-", " ")},
+        "fullDescription": {"text": rule.why},
+        "help": {"text": f"{rule.remedy} See {PAGE}#{rule.code.lower()}."},
+        "defaultConfiguration": {"level": rule.severity},
+    }
+
+
+def _result_sarif(finding: Finding, rule_index: int) -> dict[str, Any]:
+    place = {"artifactLocation": {"uri": _uri(finding.file or Path(finding.asset))}}
+    return {
+        "ruleId": finding.code,
+        "ruleIndex": rule_index,
+        "level": finding.severity,
+        "message": {"text": _one_line(finding.message)},
+        "locations": [{"physicalLocation": place, "logicalLocations": [{"fullyQualifiedName": finding.asset}]}],
+        "properties": {"values": _plain(finding.values)},
+    }
+
+
+def _uri(path: Path) -> str:
+    """Return a path as a URI: relative as it was given, or absolute with its scheme."""
+    return path.as_uri() if path.is_absolute() else quote(path.as_posix())
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _plain(value: Any) -> Any:
+    """Return values that JSON has: numbers that are not finite become words."""
+    if isinstance(value, dict):
+        return {key: _plain(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else str(value)
+    return value

@@ -1,0 +1,30 @@
+"""All rules, in the order of their codes."""
+
+from __future__ import annotations
+
+from manitwin.assets.audit.finding import Rule
+from manitwin.assets.audit.rules import (
+    center_of_mass,
+    collision,
+    contacts,
+    files,
+    frames,
+    friction,
+    grasps,
+    inertia,
+    licence,
+    mass,
+    placement,
+    scale,
+    textures,
+    twin,
+)
+
+MODULES = (
+    files, mass, inertia, center_of_mass, collision, scale, friction, frames, contacts, grasps, placement, licence, textures, twin
+)  # fmt: skip
+
+RULES: tuple[Rule, ...] = tuple(rule for module in MODULES for rule in module.RULES)
+"""Every rule once, by subject as a person reads a report."""
+
+RULES_BY_CODE = {rule.code: rule for rule in RULES}

@@ -1,0 +1,237 @@
+"""COL: do the collision shapes stand for what is seen?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from manitwin.assets.asset import CollisionShape
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
+from manitwin.assets.audit.measured import MeasuredAsset
+
+BOX_SLACK_M, BOX_SLACK_SHARE = 0.003, 0.03
+"""How far a side of the collision's box may be from the visual's, and which share of the longest side."""
+
+LEAST_KEPT = 0.5
+"""Of an open cavity: less, and what is put in stands on air."""
+
+STICKS_OUT_M, STICKS_OUT_SHARE = 0.01, 0.05
+"""How far collision shapes may reach into the open air: a finger's thickness."""
+
+UNCOVERED_M, UNCOVERED_SHARE = 0.005, 0.03
+"""How far the visual surface may be outside all collision shapes: fingers sink in by that."""
+
+CONVEX_SHARE = 0.97
+"""A mesh that fills less of its convex hull is not convex."""
+
+MANY_SHAPES, MANY_VERTICES = 128, 255
+"""PhysX cooks hulls of at most 255 vertices (its manual); hundreds of shapes make every contact slow."""
+
+
+def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of an asset without collision shapes."""
+    if not measured.asset.collision and measured.visual is not None:
+        yield Complaint("there are no collision shapes: the object falls through the table")
+
+
+def flat(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of shapes without volume."""
+    if not measured.shapes.flat:
+        return
+    shapes = [measured.asset.collision[index] for index in measured.shapes.flat]
+    names = ", ".join(shape.name for shape in shapes[:4])
+    yield Complaint(
+        f"{len(shapes)} of {len(measured.asset.collision)} collision shapes have no volume: {names}",
+        file=shapes[0].file,
+    )
+
+
+def box_differs(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of a collision whose box is not that of the visual."""
+    if measured.visual is None or measured.collision is None:
+        return
+    seen, felt = np.asarray(measured.visual.bounds), np.asarray(measured.collision.bounds)
+    apart = float(np.abs(seen - felt).max())
+    if apart > max(BOX_SLACK_M, BOX_SLACK_SHARE * measured.longest_m):
+        sides = ["x".join(f"{1000 * side:.4g}" for side in np.ptp(box, axis=0)) for box in (seen, felt)]
+        yield Complaint(
+            f"what is seen measures {sides[0]} mm, what collides {sides[1]} mm, and a side is {1000 * apart:.3g} mm off",
+            values={"visual_bounds_m": seen.tolist(), "collision_bounds_m": felt.tolist(), "apart_m": apart},
+        )
+
+
+def has_convex_pieces(measured: MeasuredAsset) -> bool:
+    """Tell whether the collision is made of convex pieces, in the place of what is seen: only then is it what it looks."""
+    return bool(len(measured.shapes)) and not measured.complaints(box_differs) and not measured.complaints(not_convex)
+
+
+def filled_opening(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of a container that the collision shapes fill."""
+    air = measured.air
+    if air is None or air.opens is None or not has_convex_pieces(measured):
+        return
+    kept = 1 - float(measured.shapes.within(air.points_m[air.hollow]).mean())
+    if kept < LEAST_KEPT:
+        yield Complaint(
+            f"the collision shapes fill the opening: {kept:.0%} of its volume is kept, nothing can be put in",
+            values={"cavity_kept": kept, "opens": air.opens.tolist()},
+        )
+
+
+def sticks_out(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of collision shapes that reach far into the open air beside the object, hollows of containers apart."""
+    air = measured.air
+    if air is None or not has_convex_pieces(measured):
+        return
+    limit = max(STICKS_OUT_M, STICKS_OUT_SHARE * measured.longest_m)
+    beside = air.points_m[~air.hollow]
+    inside = beside[measured.shapes.within(beside)]
+    if not len(inside):
+        return
+    distance = measured.distance_m(inside, limit)
+    if float(distance.max()) > limit:
+        worst = inside[int(distance.argmax())]
+        yield Complaint(
+            f"collision shapes reach {1000 * distance.max():.3g} mm into the air beside the object, as at"
+            f" {', '.join(f'{1000 * v:.3g}' for v in worst)} mm: unseen walls, a filled handle or concavity",
+            values={"reach_m": float(distance.max()), "at_m": worst.tolist()},
+        )
+
+
+def stands_for_object(measured: MeasuredAsset) -> bool:
+    """Tell whether fingers meet the collision shapes where they would meet the object."""
+    return (
+        has_convex_pieces(measured) and not measured.complaints(filled_opening) and not measured.complaints(sticks_out)
+    )
+
+
+def uncovered(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of visible surface that nothing collides for."""
+    if measured.visual is None or not has_convex_pieces(measured):
+        return
+    limit = max(UNCOVERED_M, UNCOVERED_SHARE * measured.longest_m)
+    looked = measured.samples[::3]
+    bare = looked[~measured.shapes.within(looked, limit)]
+    if len(bare):
+        depth, share = float(measured.shapes.depth_outside(bare).max()), len(bare) / len(looked)
+        yield Complaint(
+            f"{share:.1%} of the visible surface lies up to {1000 * depth:.3g} mm outside all collision shapes: fingers sink"
+            " in",
+            values={"uncovered_m": depth, "share": share},
+        )
+
+
+def not_convex(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of concave triangle meshes that are to be taken as they are."""
+    concave = [
+        shape for shape, volume in _with_hull_volume(measured) if not shape.convex and _is_concave(shape, volume)
+    ]
+    if concave:
+        names = ", ".join(shape.name for shape in concave[:4])
+        yield Complaint(
+            f"{len(concave)} collision shapes are concave triangle meshes ({names}): engines refuse them for bodies that"
+            " move, or take their convex hulls",
+            file=concave[0].file,
+        )
+
+
+def _with_hull_volume(measured: MeasuredAsset) -> Iterator[tuple[CollisionShape, float]]:
+    for index, volume in zip(measured.shapes.kept, measured.shapes.volumes_m3, strict=True):
+        yield measured.asset.collision[index], float(volume)
+
+
+def _is_concave(shape: CollisionShape, hull_volume_m3: float) -> bool:
+    corners = np.asarray(shape.vertices, float)[shape.faces] - np.asarray(shape.vertices, float).mean(0)
+    volume = float(np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))) / 6
+    return abs(volume) < CONVEX_SHARE * hull_volume_m3
+
+
+def costly(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of more shapes or vertices than engines take well."""
+    shapes = measured.asset.collision
+    if len(shapes) > MANY_SHAPES:
+        yield Complaint(f"{len(shapes)} collision shapes: every contact becomes slow", values={"shapes": len(shapes)})
+    large = [shape for shape in shapes if shape.convex and len(shape.vertices) > MANY_VERTICES]
+    if large:
+        most = max(len(shape.vertices) for shape in large)
+        yield Complaint(
+            f"{len(large)} convex shapes have more than {MANY_VERTICES} vertices, up to {most}: PhysX simplifies them",
+            file=large[0].file,
+            values={"vertices": most},
+        )
+
+
+RULES = (
+    Rule(
+        "COL001",
+        "collision-missing",
+        "error",
+        why="DexVerse had to add collision to every USDZ of ManiTwin-100K before an object stayed on a table.",
+        remedy="Add convex hulls; `manitwin import` and `manitwin build` make them.",
+        check=missing,
+    ),
+    Rule(
+        "COL002",
+        "collision-box-differs",
+        "error",
+        why="Visual and collision that differ in size, place or axes come from a scale or turn applied to one of them (IsaacLab"
+        " PR #7476, obj2mjcf #28): a policy sees the object where it cannot be touched.",
+        remedy="Bake scale and axes into both meshes; use one frame for both.",
+        check=box_differs,
+    ),
+    Rule(
+        "COL003",
+        "opening-filled",
+        "error",
+        why="One convex hull around a bowl fills it: nothing can be put in (ManiSkill #867 'my bowl is filled', #1205). The"
+        " open cavity that is seen is held against what the collision shapes leave open; half of it must stay.",
+        remedy="Decompose the shape (a wall of convex pieces) instead of taking its hull.",
+        check=filled_opening,
+    ),
+    Rule(
+        "COL004",
+        "collision-sticks-out",
+        "error",
+        why="Unseen walls: a single hull over a handle leaves no room for a finger, over a banana none for a pad; decomposers"
+        " also inflate (CoACD #67: hulls 5 mm larger). Grasps then fail, or hold on nothing.",
+        remedy="Decompose finer, or cut the hulls to the surface.",
+        check=sticks_out,
+    ),
+    Rule(
+        "COL005",
+        "surface-uncovered",
+        "warning",
+        why="Where the visible surface is outside all collision shapes, fingers and other objects sink in, and rendered data"
+        " shows it.",
+        remedy="Decompose finer, or with more hulls.",
+        check=uncovered,
+    ),
+    Rule(
+        "COL006",
+        "collision-not-convex",
+        "warning",
+        why="PhysX refuses triangle meshes on bodies that move; MuJoCo takes the convex hull of every mesh, which fills what is"
+        " hollow (CoACD #53).",
+        remedy="Ship convex pieces, each as a shape of its own.",
+        check=not_convex,
+    ),
+    Rule(
+        "COL007",
+        "collision-costly",
+        "warning",
+        why="BEHAVIOR-1K #1678: objects of more than 3000 pieces; CoACD #10: users need at most 64 hulls of 60 vertices. PhysX"
+        " cooks at most 255 vertices a hull and drops the rest.",
+        remedy="Merge and simplify the pieces.",
+        check=costly,
+    ),
+    Rule(
+        "COL008",
+        "collision-flat",
+        "error",
+        why="MuJoCo does not load a mesh without volume, PhysX leaves the shape out.",
+        remedy="Give the piece a thickness, or leave it out.",
+        check=flat,
+    ),
+)

@@ -1,0 +1,156 @@
+"""FIL: is all there, once, and as it was written?"""
+
+from __future__ import annotations
+
+import hashlib
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
+from manitwin.assets.audit.measured import MeasuredAsset
+from manitwin.errors import TwinError
+from manitwin.twin.store import RECORD, verify_record
+
+LARGEST_COORDINATE_M = 1e6
+"""Beyond it nothing can be measured in double precision."""
+
+_LEAST_BYTES = 1024
+_GEOMETRY = frozenset({".obj", ".glb", ".gltf", ".stl", ".ply", ".dae", ".usd", ".usdc", ".usda", ".usdz"})
+_PICTURES = frozenset({".png", ".jpg", ".jpeg", ".webp"})
+
+
+def unreadable(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Say nothing: what could be measured could be read. ``audit.run`` raises this for what could not."""
+    yield from ()
+
+
+def no_geometry(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of an asset without anything to see or to touch."""
+    if measured.body is None:
+        yield Complaint("it has neither visual nor collision geometry")
+
+
+def wild_geometry(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of coordinates that nothing can be measured of."""
+    for kind, meshes in (("visual", measured.asset.visual), ("collision", measured.asset.collision)):
+        for mesh in meshes:
+            vertices = np.asarray(mesh.vertices, float)
+            if len(vertices) and not (np.abs(vertices) <= LARGEST_COORDINATE_M).all():  # NaN is not less either
+                yield Complaint(f"a {kind} mesh has coordinates that are no finite number of metres below 1e6")
+                break
+
+
+def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of files that are named and not there."""
+    names = measured.asset.missing_files
+    if names:
+        more = f" and {len(names) - 4} more" if len(names) > 4 else ""
+        yield Complaint(f"not there: {', '.join(names[:4])}{more}", values={"missing": list(names[:50])})
+
+
+def duplicates(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of meshes or textures that are the same bytes under two names."""
+    by_size: dict[tuple[bool, int], list[Path]] = defaultdict(list)
+    for path in measured.asset.files:
+        suffix = path.suffix.lower()
+        wanted = _GEOMETRY if measured.asset.format == "twin" else _GEOMETRY | _PICTURES  # its pictures are renders
+        if suffix in wanted and path.is_file() and path.stat().st_size >= _LEAST_BYTES:
+            by_size[suffix in _GEOMETRY, path.stat().st_size].append(path)
+    for paths in by_size.values():
+        seen: dict[str, Path] = {}
+        for path in paths if len(paths) > 1 else ():
+            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            if digest in seen:
+                yield Complaint(f"{path.name} is the same file as {seen[digest].name}", file=path)
+            seen.setdefault(digest, path)
+
+
+def altered(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of a twin whose files are not those that its record names."""
+    if measured.record is None or measured.asset.missing_files:
+        return
+    path = measured.asset.path
+    folder = path if path.is_dir() else path.parent
+    try:
+        verify_record(folder, measured.record)
+    except TwinError as error:
+        yield Complaint(str(error).removeprefix(f"{folder}/"), file=folder / RECORD)
+
+
+def remarks(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Pass on what the reader had to note."""
+    for remark in measured.asset.remarks:
+        yield Complaint(remark)
+
+
+RULES = (
+    Rule(
+        "FIL001",
+        "unreadable",
+        "error",
+        why="What cannot be read cannot be used; a set with one such file stops a loader at night. This finding is never left"
+        " out by --select, only by --ignore.",
+        remedy="The message names the file and the cause.",
+        check=unreadable,
+    ),
+    Rule(
+        "FIL002",
+        "file-missing",
+        "error",
+        why="A texture or mesh that is named and not shipped leaves a grey or a hollow object, often without a word.",
+        remedy="Ship the file beside the asset, under the name that is written, with the same case of letters.",
+        check=missing,
+    ),
+    Rule(
+        "FIL003",
+        "file-duplicate",
+        "warning",
+        why="The same mesh under two names is most often the visual mesh used as collision, or a variant that was never edited.",
+        remedy="Name one file twice, or put the right one in its place.",
+        check=duplicates,
+    ),
+    Rule(
+        "FIL004",
+        "file-altered",
+        "error",
+        why="A twin names the sha256 of its files: one that differs was edited, or damaged on the way, after it was verified.",
+        remedy="Build the twin again, or fetch it again.",
+        check=altered,
+    ),
+    Rule(
+        "FIL005",
+        "no-geometry",
+        "error",
+        why="An asset without a shape loads in most simulators and then is nowhere.",
+        remedy="Check the names of the meshes and the root element of the file.",
+        check=no_geometry,
+    ),
+    Rule(
+        "FIL006",
+        "geometry-not-finite",
+        "error",
+        why="One NaN or 1e30 among the vertices makes bounds, hulls and inertia meaningless; nothing else is checked then.",
+        remedy="Export the mesh again.",
+        check=wild_geometry,
+    ),
+    Rule(
+        "FIL007",
+        "remark",
+        "note",
+        why="What the reader had to leave out or to assume, so that you know what was audited.",
+        remedy="Nothing, where it is what you meant.",
+        check=remarks,
+    ),
+    Rule(
+        "FIL008",
+        "rejected-twin",
+        "note",
+        why="A rejected twin is an answer, not an asset: its record says why there is none.",
+        remedy="`manitwin status --why` tells; nothing is to be done here.",
+        check=unreadable,
+    ),
+)

@@ -1,0 +1,135 @@
+"""GRA: did the grasps hold, and are they grasps of this object?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+
+import numpy as np
+
+from manitwin.assets.asset import AnnotatedGrasps
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
+from manitwin.assets.audit.measured import MeasuredAsset
+from manitwin.assets.audit.rules.contacts import REACH_M, SLACK_M, distance_to_matter, under_table
+from manitwin.assets.audit.rules.frames import frames_of
+from manitwin.assets.audit.rules.scale import is_of_wrong_size
+from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
+
+PALM_REACH_M = 0.08
+"""How far the fingertips of hands may be from the surface that hold with more than these."""
+
+TRIED = 64
+"""Grasps of a set that are looked at, evenly spread over it."""
+
+SHARE_OFF = 0.1
+"""Of the grasps that are said to hold: more of them off the object, and the set belongs to another mesh, scale or frame."""
+
+
+def none_held(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of an asset whose grasps have been tried, and none held."""
+    counts = {grasps.gripper: (int(np.sum(grasps.held)), len(grasps.held)) for grasps in measured.asset.grasps}
+    tried = {gripper: count for gripper, (_, count) in counts.items() if count}
+    if tried and not any(held for held, _ in counts.values()):
+        said = ", ".join(f"{count} of {gripper}" for gripper, count in tried.items())
+        yield Complaint(f"none of the grasps held ({said})", values={"tried": tried})
+
+
+def held_sets(measured: MeasuredAsset) -> list[tuple[AnnotatedGrasps, np.ndarray, np.ndarray, Gripper | None]]:
+    """Return each set with some of its held grasps that are frames: indices, the points between fingertips, the gripper."""
+    found = []
+    for grasps in measured.asset.grasps:
+        held = np.flatnonzero(np.asarray(grasps.held, bool))
+        held = held[np.linspace(0, len(held) - 1, min(TRIED, len(held))).round().astype(int)]
+        poses = np.asarray(grasps.gripper_to_asset, float)
+        held = held[frames_of(list(poses[held])).sound]
+        if len(held):
+            points = poses[held, :3, 3] + np.asarray(grasps.depth_m, float)[held, None] * poses[held, :3, 2]
+            found.append((grasps, held, points, _shipped(grasps.gripper)))
+    return found
+
+
+@cache
+def _shipped(gripper: str) -> Gripper | None:
+    return load_gripper(gripper) if gripper in shipped_grippers() else None
+
+
+def grasps_off_object(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of sets of held grasps whose fingertips are not at the object."""
+    if not len(measured.samples) or is_of_wrong_size(measured):
+        return
+    for grasps, held, points, gripper in measured.once(held_sets):
+        reach = REACH_M if gripper is not None and gripper.kind != "multi_finger" else PALM_REACH_M
+        off = distance_to_matter(measured, points, reach) > reach
+        if off.mean() > SHARE_OFF:
+            yield Complaint(
+                f"{off.mean():.0%} of {len(held)} grasps of {grasps.gripper} that are said to hold have their fingertips more"
+                f" than {1000 * reach:.3g} mm away from the object",
+                values={"gripper": grasps.gripper, "share_off": float(off.mean())},
+            )
+
+
+def grasps_too_wide(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of held grasps that are wider than their gripper opens."""
+    for grasps, held, _, gripper in measured.once(held_sets):
+        if gripper is None or gripper.kind != "parallel":
+            continue
+        widths = np.asarray(grasps.width_m, float)[held]
+        wide = ~(widths <= gripper.opening_m + SLACK_M)
+        if wide.any():
+            yield Complaint(
+                f"{wide.sum()} of {len(held)} grasps that are said to hold need up to {1000 * widths.max():.3g} mm,"
+                f" {gripper.name} opens {1000 * gripper.opening_m:.3g} mm",
+                values={"gripper": gripper.name, "widest_m": float(widths.max())},
+            )
+
+
+def all_through_table(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of sets of held grasps that all come from below at rest."""
+    if measured.bounds is None or is_of_wrong_size(measured):
+        return
+    for grasps, held, _, _ in measured.once(held_sets):
+        palms = np.asarray(grasps.gripper_to_asset, float)[held, :3, 3]
+        if under_table(measured, palms).all():
+            yield Complaint(
+                f"every one of {len(held)} grasps of {grasps.gripper} comes from below the table",
+                values={"gripper": grasps.gripper},
+            )
+
+
+RULES = (
+    Rule(
+        "GRA005",
+        "no-grasp-held",
+        "error",
+        why="Zero is a failure, not a skip: sets that keep only successes lose such objects without a word (RoboTwin #486).",
+        remedy="Look at the outcomes: too wide, unreachable and slips ask for different things.",
+        check=none_held,
+    ),
+    Rule(
+        "GRA006",
+        "grasps-off-object",
+        "error",
+        why="Grasps in another frame convention (base, fingertip, panda_hand) or scale miss the object by a hand's length"
+        " (GraspGen #20, #41).",
+        remedy="State the frame: +Z approach, X closing, the base link's origin, depth to the fingertips.",
+        check=grasps_off_object,
+    ),
+    Rule(
+        "GRA007",
+        "grasps-too-wide",
+        "error",
+        why="A grasp wider than the gripper that it names was made for another one (GraspGen #6, #27: my gripper is not"
+        " covered).",
+        remedy="Name the gripper that they were made for, or take those out that it cannot do.",
+        check=grasps_too_wide,
+    ),
+    Rule(
+        "GRA008",
+        "grasps-through-table",
+        "warning",
+        why="Where every grasp comes from below, none can be done while the object stands on a table.",
+        remedy="Propose more grasps, from above and from the sides.",
+        check=all_through_table,
+    ),
+)

@@ -1,0 +1,69 @@
+"""TWN: does a twin's record say what its files hold?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from manitwin.assets.audit.complaint import Complaint
+from manitwin.assets.audit.finding import Rule
+from manitwin.assets.audit.measured import MeasuredAsset
+
+CANDIDATE_M, CANDIDATE_SHARE = 0.005, 0.03
+"""How far a candidate may be from the visual surface: it was sampled on the repaired solid, which repair may move."""
+
+SIDE_M, SIDE_SHARE = 0.001, 0.01
+"""How far a side in the record may be from the mesh's, and which share of the longest."""
+
+
+def candidates_off_surface(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of candidate points that do not lie on the surface."""
+    if measured.record is None or measured.record.points is None or not len(measured.samples):
+        return
+    points = np.array(measured.record.points.candidates.positions_m, float).reshape(-1, 3)
+    if not len(points):
+        return
+    limit = max(CANDIDATE_M, CANDIDATE_SHARE * measured.longest_m)
+    distance = measured.distance_m(points, limit)
+    if (distance > limit).any():
+        yield Complaint(
+            f"{int((distance > limit).sum())} of {len(points)} candidate points lie up to {1000 * distance.max():.3g} mm off"
+            " the surface",
+            values={"off": int((distance > limit).sum()), "farthest_m": float(distance.max())},
+        )
+
+
+def extents_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of a record whose size is not that of the mesh."""
+    if measured.record is None or measured.record.physical is None or measured.bounds is None:
+        return
+    said, real = np.array(measured.record.physical.extents_m), np.ptp(measured.bounds, axis=0)
+    apart = float(np.abs(said - real).max())
+    if apart > max(SIDE_M, SIDE_SHARE * measured.longest_m):
+        sides = [" x ".join(f"{1000 * side:.4g}" for side in box) for box in (said, real)]
+        yield Complaint(
+            f"the record says {sides[0]} mm, the mesh measures {sides[1]} mm",
+            values={"said_m": said.tolist(), "measured_m": real.tolist()},
+        )
+
+
+RULES = (
+    Rule(
+        "TWN001",
+        "candidates-off-surface",
+        "error",
+        why="Functional and grasp points are chosen among the candidates: off the surface they belong to another mesh or scale.",
+        remedy="Build the twin again from its source.",
+        check=candidates_off_surface,
+    ),
+    Rule(
+        "TWN002",
+        "extents-differ",
+        "error",
+        why="The record's size is what people search and filter by; where the mesh has another one, the scale was applied to one"
+        " of them only.",
+        remedy="Build the twin again from its source.",
+        check=extents_differ,
+    ),
+)

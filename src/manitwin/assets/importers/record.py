@@ -1,0 +1,186 @@
+"""What an asset gives, in the object frame of twins, and in words what it does not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import trimesh
+from pydantic import ValidationError
+
+from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset
+from manitwin.assets.importers.rests import settled_rests
+from manitwin.errors import AssetError
+from manitwin.geometry.canonical.frame import object_frame
+from manitwin.geometry.poses import GLTF_TO_OBJECT
+from manitwin.twin.import_record import GivenGrasps, GivenPoint, ImportRecord
+
+MAX_FRICTION = 10.0
+"""Above any coefficient of dry friction: clean metals that seize have about 5."""
+
+_UP_TO_Z = {"z": np.eye(3), "y": GLTF_TO_OBJECT[:3, :3]}
+_MAX_TEXTS, _MAX_LETTERS, _MAX_POINTS = 64, 500, 64
+
+
+def shown_parts(asset: Asset) -> tuple[trimesh.Trimesh, ...]:
+    """Return the visual parts that have faces; raises AssetError where there are none."""
+    parts = tuple(part for part in asset.visual if len(part.faces))
+    if not parts:
+        raise AssetError(f"{asset.path.name}: no visual mesh to make a twin of{_why(asset)}")
+    return parts
+
+
+def asset_to_object(asset: Asset) -> np.ndarray:
+    """Return the rigid transform ``(4, 4)`` of the asset's axes into the object frame of its visual meshes."""
+    points = np.concatenate([part.vertices[np.unique(part.faces)] for part in shown_parts(asset)])
+    return object_frame(points, _UP_TO_Z[asset.up])
+
+
+def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
+    """Return the import record of an asset; what cannot be true is not kept, and named among what is missing."""
+    remarks = list(asset.remarks)
+    numbers, missing = _numbers(asset)
+    functional = [_point(frame, to_object) for frame in asset.frames if frame.kind in ("functional", "target")]
+    grasp = [_point(frame, to_object) for frame in asset.frames if frame.kind == "contact"]
+    for points, what in ((functional, "functional"), (grasp, "grasp")):
+        if len(points) > _MAX_POINTS:
+            remarks.append(f"of {len(points)} {what} points the first {_MAX_POINTS} were kept")
+    rests, repairs = settled_rests(asset, to_object)
+    remarks += repairs
+    center, inertia = asset.inertial.center_of_mass_m, asset.inertial.inertia_kg_m2
+    rotation = to_object[:3, :3]
+    captions = list(dict.fromkeys(" ".join(text.split())[:_MAX_LETTERS] for text in asset.captions if text.strip()))
+    grasps = [_grasps(entry, to_object) for entry in asset.grasps if len(entry.held)]
+    absent = {
+        "centre of mass": center is None,
+        "inertia": inertia is None,
+        "material": not asset.contact.material,
+        "category": not asset.category,
+        "captions": not captions,
+        "functional points": not functional,
+        "grasp points": not grasp,
+        "grasps": not grasps,
+        "resting poses": not rests,
+        "collision shapes": not asset.collision,
+        "licence": not asset.license,
+    }
+    missing += [what for what, is_absent in absent.items() if is_absent]
+    missing += [f"file {name}" for name in asset.missing_files]
+    return _validated(
+        asset,
+        {
+            "format": asset.format,
+            "file": asset.path.name or asset.path.resolve().name,
+            "name": _words(asset.name) or "object",
+            "category": asset.category or None,
+            "license": asset.license,
+            "attribution": asset.attribution,
+            "asset_to_object": to_object.tolist(),
+            "center_of_mass_m": None if center is None else (rotation @ center + to_object[:3, 3]).tolist(),
+            "inertia_kg_m2": None if inertia is None else (rotation @ inertia @ rotation.T).tolist(),
+            "material": asset.contact.material,
+            "captions": captions[:_MAX_TEXTS],
+            "functional_points": functional[:_MAX_POINTS],
+            "grasp_points": grasp[:_MAX_POINTS],
+            "grasps": grasps,
+            "rests": [rest.tolist() for rest in rests],
+            "missing": missing,
+            "remarks": list(dict.fromkeys(remarks)),
+            **numbers,
+        },
+    )
+
+
+def _validated(asset: Asset, fields: dict[str, Any]) -> ImportRecord:
+    try:
+        return ImportRecord.model_validate(fields)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise AssetError(f"{asset.path.name}: {place}: {first['msg']}; mend it where it was made") from error
+
+
+def kept_words(record: ImportRecord) -> list[str]:
+    """Return in words what an import kept, besides the mesh."""
+    kept = [] if record.category is None else [record.category]
+    kept += [] if record.mass_kg is None else [f"mass {record.mass_kg:.4g} kg"]
+    kept += [] if record.friction_static is None else [f"friction {record.friction_static:.3g}"]
+    kept += [] if record.inertia_kg_m2 is None else ["inertia"]
+    for count, what in (
+        (len(record.captions), "captions"),
+        (len(record.functional_points), "functional points"),
+        (len(record.grasp_points), "grasp points"),
+        (sum(len(grasps.held) for grasps in record.grasps), "grasps"),
+        (len(record.rests), "resting poses"),
+    ):
+        kept += [f"{count} {what}"] if count else []
+    return kept
+
+
+def _numbers(asset: Asset) -> tuple[dict[str, float | None], list[str]]:
+    """Return mass, friction and restitution where they can be true, and what is missing of them."""
+    contact = asset.contact
+    given = {
+        "mass_kg": ("mass", asset.inertial.mass_kg, 0.0, np.inf),
+        "friction_static": ("friction", contact.friction_static, 0.0, MAX_FRICTION),
+        "friction_dynamic": ("dynamic friction", contact.friction_dynamic, 0.0, MAX_FRICTION),
+        "restitution": ("restitution", contact.restitution, -1e-9, 1.0),
+    }
+    numbers: dict[str, float | None] = {}
+    missing = []
+    for key, (what, value, above, at_most) in given.items():
+        numbers[key] = value if value is not None and above < value <= at_most else None
+        if value is None:
+            missing.append(what)
+        elif numbers[key] is None:
+            missing.append(f"{what} (declared as {value:g})")
+    static, dynamic = numbers["friction_static"], numbers["friction_dynamic"]
+    if static is not None and dynamic is not None and dynamic > static:
+        numbers["friction_dynamic"] = None
+        missing.append(f"dynamic friction (declared as {dynamic:g}, above the static {static:g})")
+    return numbers, missing
+
+
+def _point(frame: AnnotatedFrame, to_object: np.ndarray) -> GivenPoint:
+    rotation = to_object[:3, :3]
+    position = rotation @ frame.frame_to_asset[:3, 3] + to_object[:3, 3]
+    if frame.kind == "contact":
+        normal = None
+    else:
+        normal = _unit(rotation @ frame.frame_to_asset[:3, 2])  # functional frames: +Z is the way out (twins, RoboTwin)
+    return GivenPoint(
+        position_m=position.tolist(),
+        normal=normal,
+        label=_words(frame.label)[:_MAX_LETTERS],
+        approach=None if frame.approach is None else _unit(rotation @ frame.approach),
+        closing=None if frame.closing is None else _unit(rotation @ frame.closing),
+    )
+
+
+def _grasps(entry: AnnotatedGrasps, to_object: np.ndarray) -> GivenGrasps:
+    return GivenGrasps(
+        gripper=entry.gripper,
+        gripper_to_object=[(to_object @ pose).tolist() for pose in entry.gripper_to_asset],
+        depth_m=entry.depth_m.tolist(),
+        width_m=entry.width_m.tolist(),
+        held=[bool(held) for held in entry.held],
+    )
+
+
+def _unit(vector: np.ndarray) -> list[float] | None:
+    length = float(np.linalg.norm(vector))
+    return (vector / length).tolist() if length > 1e-9 else None
+
+
+def _words(name: str) -> str:
+    """Return a file's or an element's name as words: no underscores, and no numbers around it."""
+    spaced = " ".join(re.sub(r"[_\-]+", " ", name).split())
+    return re.sub(r"^(\d+\s+)+|(\s+[0-9a-f]{8,}|\s+\d+)+$", "", spaced).strip() or spaced
+
+
+def _why(asset: Asset) -> str:
+    lines: Iterator[str] = iter([*(f"{name} is missing" for name in asset.missing_files), *asset.remarks])
+    first = next(lines, None)
+    return f" ({first})" if first else ""

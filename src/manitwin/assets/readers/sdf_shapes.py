@@ -1,0 +1,152 @@
+"""The visual and collision shapes of SDF links, poses and scales applied."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from lxml import etree  # type: ignore[import-untyped]
+
+from manitwin.assets import primitives
+from manitwin.assets.asset import CollisionShape
+from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.readers.sdf_poses import ModelFrames, pose_of
+from manitwin.assets.readers.urdf_shapes import plain_material
+from manitwin.errors import AssetError
+from manitwin.formats.meshes.read import MeshFile
+from manitwin.formats.meshes.textures import bake_transform, make_part
+from manitwin.formats.xml_file import number, numbers, text_of
+
+_BARE_MESHES = (".stl",)  # a mesh that has a colour of its own keeps it
+_SCHEMES = ("model://", "package://")
+
+
+class SdfShapes:
+    """Reads shapes of the links of one SDF model; meshes are looked up in the asset's folder and nowhere else."""
+
+    def __init__(self, file: Path, frames: ModelFrames, files: AssetFiles):
+        self._file, self._frames, self._files = file, frames, files
+
+    def visual(self, link: etree._Element) -> Iterator[trimesh.Trimesh]:
+        """Yield a link's visual parts in the model's frame."""
+        for element, what in self._elements(link, "visual"):
+            yield from self._placed(element, link, what)
+
+    def collision(self, link: etree._Element) -> Iterator[CollisionShape]:
+        """Yield a link's collision shapes in the model's frame.
+
+        A mesh counts as its convex hull, as in every other format: Gazebo's own engines take its triangles, which only
+        SDFormat 1.11 can change.
+        """
+        for index, (element, what) in enumerate(self._elements(link, "collision")):
+            parts = self._placed(element, link, what)
+            if parts:
+                name = element.get("name") or f"{link.get('name')}_{index:02d}"
+                yield CollisionShape(name, *joined(parts), convex=True, file=self._mesh_path(element))
+
+    def _elements(self, link: etree._Element, tag: str) -> Iterator[tuple[etree._Element, str]]:
+        for element in link.findall(tag):
+            yield element, f"{self._file.name}: link {link.get('name')} {tag} {element.get('name')}"
+
+    def _placed(self, element: etree._Element, link: etree._Element, what: str) -> list[trimesh.Trimesh]:
+        pose = element.find("pose")
+        base = None if pose is None else pose.get("relative_to")
+        to_model = self._frames.to_model(base or link.get("name")) @ pose_of(element, what)
+        return [bake_transform(part, to_model) for part in self._parts(element, what)]
+
+    def _parts(self, element: etree._Element, what: str) -> list[trimesh.Trimesh]:
+        geometry = element.find("geometry")
+        shapes = [] if geometry is None else list(geometry.iterchildren(tag="*"))
+        if len(shapes) != 1:
+            raise AssetError(f"{what}: its <geometry> holds {len(shapes)} shapes, not one")
+        shape, color = shapes[0], _diffuse(element, what)
+        if shape.tag == "mesh":
+            return self._mesh_parts(shape, color, what)
+        solid = _primitive(shape, what)
+        if solid is None:
+            if shape.tag != "empty":
+                self._files.remark(f"{element.get('name')!r} is <{shape.tag}>, not read as a shape, and was left out")
+            return []
+        self._files.count(len(solid.faces))
+        return [make_part(solid.vertices, solid.faces, material=plain_material(color), name=str(shape.tag))]
+
+    def _mesh_parts(self, shape: etree._Element, color: np.ndarray | None, what: str) -> list[trimesh.Trimesh]:
+        uri = text_of(shape, "uri") or ""
+        path = self._files.find(uri, self._candidates(uri))
+        if path is None:
+            return []
+        mesh = self._files.mesh(path)
+        parts = self._submesh(shape, mesh, path)
+        if mesh.format == "dae" and mesh.up == "y":
+            # as for URDF: simulators disagree on turning it
+            self._files.remark(f"{path.name}: its COLLADA says that Y is up; it was not turned")
+        unit_m = mesh.unit_m if mesh.format == "dae" and mesh.unit_m is not None else 1.0
+        scale = text_of(shape, "scale")
+        factors = np.ones(3) if scale is None else numbers(scale, 3, f"{what} scale")
+        parts = [bake_transform(part, np.diag([*(factors * unit_m), 1.0])) for part in parts]
+        if color is None or path.suffix.lower() not in _BARE_MESHES:
+            return parts
+        return [make_part(p.vertices, p.faces, material=plain_material(color), name=p.metadata["name"]) for p in parts]
+
+    def _submesh(self, shape: etree._Element, mesh: MeshFile, path: Path) -> list[trimesh.Trimesh]:
+        name = text_of(shape, "submesh/name")
+        if name is None:
+            return mesh.parts
+        chosen = [part for part in mesh.parts if part.metadata["name"] == name]
+        if not chosen or (text_of(shape, "submesh/center") or "").lower() in ("true", "1"):
+            self._files.remark(f"{path.name}: submesh {name[:60]!r} could not be taken alone; the whole mesh was read")
+            return mesh.parts
+        return chosen
+
+    def _candidates(self, uri: str) -> Iterator[Path]:
+        clean = uri.replace("\\", "/").removeprefix("file://")
+        root = self._files.root
+        for scheme in _SCHEMES:
+            if clean.startswith(scheme):
+                inside = clean.removeprefix(scheme)  # the model's name comes first, and the model is this folder
+                yield from (root / inside.partition("/")[2], root / inside)
+                return
+        yield self._file.parent / clean
+
+    def _mesh_path(self, element: etree._Element) -> Path | None:
+        uri = text_of(element, "geometry/mesh/uri")
+        paths = [] if uri is None else [path.resolve() for path in self._candidates(uri)]
+        return next((path for path in paths if path in self._files.used), None)
+
+
+def _primitive(shape: etree._Element, what: str) -> trimesh.Trimesh | None:
+    if shape.tag == "box":
+        return primitives.box(_all_positive(shape, "size", what))
+    if shape.tag == "ellipsoid":
+        return primitives.ellipsoid(_all_positive(shape, "radii", what))
+    if shape.tag == "sphere":
+        return primitives.sphere(_positive(shape, "radius", what))
+    if shape.tag in ("cylinder", "capsule"):
+        build = primitives.cylinder if shape.tag == "cylinder" else primitives.capsule
+        return build(_positive(shape, "radius", what), _positive(shape, "length", what))
+    return None
+
+
+def _positive(shape: etree._Element, tag: str, what: str) -> float:
+    value = number(text_of(shape, tag), f"{what} {tag}")
+    if value <= 0:
+        raise AssetError(f"{what} {tag}: {value} is not above zero")
+    return value
+
+
+def _all_positive(shape: etree._Element, tag: str, what: str) -> np.ndarray:
+    values = numbers(text_of(shape, tag), 3, f"{what} {tag}")
+    if (values <= 0).any():
+        raise AssetError(f"{what} {tag}: {values.min()} is not above zero")
+    return values
+
+
+def _diffuse(element: etree._Element, what: str) -> np.ndarray | None:
+    text = text_of(element, "material/diffuse")
+    if text is None:
+        return None
+    if len(text.split()) == 3:
+        text += " 1"
+    return numbers(text, 4, f"{what} diffuse")

@@ -1,0 +1,161 @@
+"""A USD stage of a stranger's, composed of the layers in its own folder and of nothing else."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from pxr import Sdf, Tf, Usd
+
+from manitwin.assets.readers.usd_expansion import composed_prims
+from manitwin.errors import AssetError
+from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.usdz_archive import UsdzArchive, package_path
+
+_LAYERS = (".usd", ".usda", ".usdc", ".usdz")
+_MAX_LAYERS = 1_000
+MAX_PRIMS = 100_000
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a layer or a texture is: a file, and a member of it where the file is a package."""
+
+    file: Path
+    member: str | None = None
+
+
+class LayerFiles:
+    """The layers of an asset, each opened without composing, then joined by what they name inside of the folder.
+
+    Every layer is copied into memory, and each name of another layer in it is replaced by that layer's copy, or taken out
+    where it leads out of the folder: composing then opens nothing any more. Value clips, which would be opened later, are
+    taken out too. ``missing`` are names of files that are not there.
+    """
+
+    def __init__(self, source: MeshSource):
+        self._source = source
+        self._folder = source.path.parent.resolve()
+        self._archives: dict[Path, UsdzArchive] = {}
+        self._layers: dict[Place, Sdf.Layer] = {}
+        self._places: dict[str, Place] = {}
+        self.files: set[Path] = set()
+        self.missing: set[str] = set()
+
+    def compose(self) -> Usd.Stage:
+        """Return the stage. Raises AssetError and InputError ``unreadable``, and Tf.ErrorException for broken USD."""
+        start = self._inside_package(self._folder / self._source.path.name)
+        root = self._open(start)
+        if root is None:
+            raise AssetError(f"{self._source.path}: no USD layer; export it again")
+        waiting = [start]
+        while waiting:
+            place = waiting.pop()
+            waiting += self._join(self._layers[place], place)
+            if len(self._layers) > _MAX_LAYERS:
+                raise AssetError(f"{self._source.path}: more than {_MAX_LAYERS} layers; flatten it with usdcat")
+        prims = composed_prims(root, {layer.identifier: layer for layer in self._layers.values()})
+        if prims is None or prims > MAX_PRIMS:
+            raise AssetError(f"{self._source.path}: it composes to more than {MAX_PRIMS} prims; it is no single object")
+        return Usd.Stage.Open(root)
+
+    def texture(self, layer: Sdf.Layer, name: str) -> bytes | None:
+        """Return the file that ``layer`` names as a texture, or None with a finding."""
+        place = self._locate(self._places[layer.identifier], name, "texture")
+        if place is None:
+            return None
+        if place.member is not None:
+            return self._archives[place.file].read(place.member, "texture")
+        data = self._source.sibling(place.file.relative_to(self._folder).as_posix(), "texture")
+        if data is None:
+            self.missing.add(name)
+        else:
+            self.files.add(place.file)
+        return data
+
+    def _open(self, place: Place) -> Sdf.Layer | None:
+        """Open a layer as a copy in memory; None where it is not there or no layer, with a finding."""
+        if place in self._layers:
+            return self._layers[place]
+        if not place.file.is_file():
+            return None
+        self._source.bytes_read += place.file.stat().st_size
+        if self._source.bytes_read > self._source.limits.max_bytes:
+            raise AssetError(
+                f"{self._source.path}: it and the layers that it names have more than {self._source.limits.max_bytes} bytes"
+                "; simplify it"
+            )
+        name = str(place.file) if place.member is None else package_path(place.file, place.member)
+        layer = Sdf.Layer.OpenAsAnonymous(name)
+        if layer is not None:
+            self._layers[place] = layer
+            self._places[layer.identifier] = place
+            self.files.add(place.file)
+        return layer
+
+    def _join(self, layer: Sdf.Layer, place: Place) -> list[Place]:
+        """Point a layer at the copies of those that it names; returns where the new ones are."""
+        opened = []
+        for named in layer.GetCompositionAssetDependencies():
+            target = self._locate(place, named, "layer")
+            known = target in self._layers
+            copy = None if target is None else self._open_named(target, named)
+            layer.UpdateCompositionAssetDependency(named, "" if copy is None else copy.identifier)
+            if target is not None and copy is not None and not known:
+                opened.append(target)
+        self._take_out_clips(layer)
+        return opened
+
+    def _open_named(self, place: Place, named: str) -> Sdf.Layer | None:
+        if not place.file.is_file() or (place.member and place.member not in self._archives[place.file].names):
+            self.missing.add(named)
+            return None
+        try:
+            return self._open(place)
+        except Tf.ErrorException:
+            self._source.find(f"layer {named[:80]!r} cannot be read; carried on without it")
+            return None
+
+    def _locate(self, base: Place, name: str, what: str) -> Place | None:
+        """Return where a name leads from a layer; None with a finding where that is not inside the folder or package."""
+        clean = Sdf.Layer.SplitIdentifier(name)[0].replace("\\", "/")
+        outside = not clean or clean.startswith(("/", "~")) or re.search(r"[:`\[\]\0]", clean) is not None
+        if not outside and base.member is not None:
+            member = posixpath.normpath(posixpath.join(posixpath.dirname(base.member), clean))
+            if not member.startswith("../"):
+                return Place(base.file, member)
+        elif not outside:
+            file = (base.file.parent / clean).resolve()
+            if file.is_relative_to(self._folder) and (what != "layer" or file.suffix.lower() in _LAYERS):
+                return self._inside_package(file) if what == "layer" else Place(file)
+        self._source.find(
+            f"{what} {name[:80]!r} lies outside the asset's folder, or is no USD layer; it was not followed"
+        )
+        return None
+
+    def _inside_package(self, file: Path) -> Place:
+        """Return the first layer of a package, or the file itself where it is none."""
+        if file.suffix.lower() != ".usdz" or not file.is_file():
+            return Place(file)
+        if file not in self._archives:
+            self._archives[file] = UsdzArchive(MeshSource(file, self._source.limits, self._source.findings))
+        root = self._archives[file].root
+        if root is None:
+            raise AssetError(f"{file}: its first member is no USD layer; pack it with usdzip")
+        return Place(file, root)
+
+    def _take_out_clips(self, layer: Sdf.Layer) -> None:
+        found: list[Sdf.Path] = []
+
+        def look(path: Sdf.Path) -> None:
+            prim = layer.GetPrimAtPath(path) if path.IsPrimPath() or path.IsPrimVariantSelectionPath() else None
+            if prim is not None and (prim.HasInfo("clips") or prim.HasInfo("clipSets")):
+                found.append(path)
+
+        layer.Traverse(Sdf.Path.absoluteRootPath, look)
+        for path in found:
+            self._source.find("its animation by value clips was left out")
+            layer.GetPrimAtPath(path).ClearInfo("clips")
+            layer.GetPrimAtPath(path).ClearInfo("clipSets")

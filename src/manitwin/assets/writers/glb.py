@@ -1,0 +1,61 @@
+"""GLB: the visual mesh as the twin has it, and the hulls as a second file whose ``asset.extras`` hold the physics.
+
+glTF 2.0 has no ratified extension for rigid bodies (KHR_physics_rigid_bodies is a draft): extras are what it leaves to
+applications (section 3.3), and ``asset.copyright`` is its own field for the licence (section 5.9).
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import Exported
+from manitwin.assets.writers.licenses import license_of, one_line
+from manitwin.assets.writers.mesh_files import hulls_of
+from manitwin.assets.writers.physics_json import physics_of
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.textures import make_part, pbr_material
+
+FRAME = (
+    "numbers here: right-handed, +Z up, origin at the bottom centre, quaternions wxyz; "
+    "(x, y, z) of it is (x, z, -y) of this file's meshes"
+)
+_HEADER = struct.Struct("<4sII")
+_CHUNK = struct.Struct("<II")
+
+
+def export(twin: TwinContent) -> Exported:
+    """Write a twin as two Y-up GLB files. Raises ExportError for mass properties that no rigid body has."""
+    grey = pbr_material("hull", base_color=(0.5, 0.5, 0.5))
+    hulls = [
+        make_part(vertices, faces, material=grey, name=f"{twin.name}_hull_{i:02d}")
+        for i, (vertices, faces) in enumerate(hulls_of(twin))
+    ]
+    credit = one_line(twin.record.source.attribution or "")
+    asset = {
+        "copyright": f"{license_of(twin.record)}{', ' if credit else ''}{credit}",
+        "extras": {"manitwin_physics": {**physics_of(twin), "frame": FRAME}},
+    }
+    return Exported(
+        files={"visual.glb": twin.visual_glb, "collision.glb": with_asset(write_glb(hulls), asset)},
+        main="visual.glb",
+        cannot_say=(
+            "mass, centre of mass, inertia and friction: glTF has none; collision.glb has them in asset.extras.",
+            "which meshes collide, and that they are convex: every mesh of collision.glb is one convex hull.",
+        ),
+    )
+
+
+def with_asset(glb: bytes, fields: dict[str, Any]) -> bytes:
+    """Return a GLB with ``fields`` added to the ``asset`` of its document (glTF 2.0, section 4.4: the JSON chunk is first)."""
+    length, kind = _CHUNK.unpack_from(glb, _HEADER.size)
+    start = _HEADER.size + _CHUNK.size
+    tree = json.loads(glb[start : start + length])
+    tree["asset"] |= fields
+    text = json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    rest = glb[start + length :]
+    total = _HEADER.size + _CHUNK.size + len(text) + len(rest)
+    return _HEADER.pack(b"glTF", 2, total) + _CHUNK.pack(len(text), kind) + text + rest

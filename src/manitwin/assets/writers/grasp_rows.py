@@ -1,0 +1,113 @@
+"""Grasps of a twin's table by gripper, as arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.assets.writers.content import TwinContent
+from manitwin.geometry.grasp_diversity import farthest_grasps
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+
+CONTROLS = (":unfiltered", ":jittered")
+"""How the proposers of grasps end that count in no summary: a sample without filters, and held ones jittered on purpose."""
+
+
+GRASP_JOINTS = "grasp_joints_rad"  # null in the table but for hands with more joints
+
+
+@dataclass(frozen=True)
+class GraspRows:
+    """Grasps of one gripper in the order of the table: ``gripper_to_object (N, 4, 4)``, ``depth_m``, ``width_m (N,)``.
+
+    ``held (N,)`` is the trial's verdict. ``quality (N,)`` in 0..1 is the robustness where it was measured, else the
+    proposer's score.
+    """
+
+    gripper: str
+    ids: tuple[str, ...]
+    gripper_to_object: np.ndarray
+    depth_m: np.ndarray
+    width_m: np.ndarray
+    quality: np.ndarray
+    held: np.ndarray
+    point_ids: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    def take(self, index: np.ndarray) -> GraspRows:
+        """Return the rows ``index``."""
+        chosen = [int(i) for i in index]
+        return GraspRows(
+            self.gripper,
+            tuple(self.ids[i] for i in chosen),
+            self.gripper_to_object[chosen],
+            self.depth_m[chosen],
+            self.width_m[chosen],
+            self.quality[chosen],
+            self.held[chosen],
+            tuple(self.point_ids[i] for i in chosen),
+        )
+
+
+def grippers_of(twin: TwinContent) -> list[str]:
+    """Return the grippers that the table has grasps of, the one that the twin was verified with first."""
+    first = twin.record.grasps.gripper if twin.record.grasps is not None else ""
+    return sorted(set(twin.grasps["gripper"]), key=lambda name: (name != first, name))
+
+
+def parallel_grippers_of(twin: TwinContent) -> list[str]:
+    """Return those of the grippers that close two fingers along a line: others have joints in the table, or no width."""
+    table = twin.grasps
+    others = {
+        name
+        for name, width_m, joints in zip(table["gripper"], table["width_m"], table[GRASP_JOINTS], strict=True)
+        if joints is not None or not width_m
+    }
+    return [name for name in grippers_of(twin) if name not in others]
+
+
+def grasp_rows(twin: TwinContent, gripper: str, *, controls: bool) -> GraspRows:
+    """Return a gripper's grasps, held and failed, but those that a person has retired.
+
+    With ``controls`` also the unfiltered sample and the jittered ones: their verdicts are as true as the others'.
+    """
+    table = twin.grasps
+    rows = [
+        i
+        for i, (name, proposer, retired) in enumerate(
+            zip(table["gripper"], table["proposer"], table["retired"], strict=True)
+        )
+        if name == gripper and not retired and (controls or not proposer.endswith(CONTROLS))
+    ]
+    column = {name: [table[name][i] for i in rows] for name in table}
+    quality = [
+        score if robustness is None else robustness
+        for score, robustness in zip(column["score"], column["robustness"], strict=True)
+    ]
+    poses = np.tile(np.eye(4), (len(rows), 1, 1))
+    poses[:, :3, :3] = rotation_from_quaternion_wxyz(np.array(column["quaternion_wxyz"], float).reshape(-1, 4))
+    poses[:, :3, 3] = np.array(column["position_m"], float).reshape(-1, 3)
+    return GraspRows(
+        gripper,
+        tuple(column["grasp_id"]),
+        poses,
+        np.array(column["depth_m"], float),
+        np.array(column["width_m"], float),
+        np.array(quality, float),
+        np.array(column["verified"], bool),
+        tuple(point or "" for point in column["grasp_point_id"]),
+    )
+
+
+def best_and_diverse(rows: GraspRows, count: int) -> GraspRows:
+    """Return at most ``count`` of the grasps that held, the best first.
+
+    Of the best four times as many, those that lie farthest from each other: an arm that cannot reach one may reach another.
+    """
+    held = np.flatnonzero(rows.held)
+    best = held[np.argsort(-rows.quality[held], kind="stable")][: 4 * count]
+    pool = rows.take(best)
+    return pool.take(np.sort(farthest_grasps(pool.gripper_to_object, pool.depth_m, count)))

@@ -1,0 +1,116 @@
+"""GraspGen's training data: the object, every grasp that was tried with its verdict, and the lists that its loader reads.
+
+Sources: GraspGen docs/GRASP_DATASET_FORMAT.md, docs/GRIPPER_DESCRIPTION.md and grasp_gen/dataset/dataset_utils.py:
+``GraspJsonDatasetReader`` (which file by which name) and ``load_object_grasp_data``, which multiplies each transform by the
+gripper's ``transform_offset_from_asset_to_graspgen_convention``: the file holds poses of the gripper model's base link, not
+of the grasp frame.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import Exported
+from manitwin.assets.writers.grasp_rows import GraspRows, grasp_rows, parallel_grippers_of
+from manitwin.assets.writers.gripper_assets import ASSETS, parallel_gripper
+from manitwin.assets.writers.licenses import license_of, provenance_lines
+from manitwin.assets.writers.object_mesh import object_mesh
+from manitwin.errors import ExportError
+from manitwin.twin.store import canonical_json
+
+FRAME = "transforms: poses of the gripper's base link in the frame of the object file (metres, +Z up), at its scale"
+VALID_SHARE = 0.2  # GraspDataGen's default share of objects to validate with
+FEWEST = 5  # of those that held: GraspGen passes over an object with less (and, for its discriminator, with less that failed)
+
+
+def export(twin: TwinContent) -> Exported:
+    """Write a twin as one object of a GraspGen data set, with a grasp file for each of its parallel grippers.
+
+    The object root is ``objects/``, the grasp root ``grasp_data/<gripper>/``, the splits' ``splits/<gripper>/``. Which split
+    an object is in follows from the twin's id. The mesh is the visual one in the object frame, +Z up. Grasps that failed
+    are in it, with ``object_in_gripper`` false; those that a person has retired are not. Raises ExportError for a twin with
+    grasps of no parallel gripper.
+    """
+    grippers = parallel_grippers_of(twin)
+    if not grippers:
+        raise ExportError(f"{twin.name}: it has no grasps of a parallel gripper, and GraspGen data is nothing else")
+    object_file = f"{twin.name}.obj"
+    files = {f"objects/{object_file}": object_mesh(twin)}
+    lines: list[str] = []
+    for gripper in grippers:
+        rows = grasp_rows(twin, gripper, controls=True)
+        block, known = _gripper(gripper, rows)
+        name = block["name"]
+        files[f"grasp_data/{name}/{twin.name}.json"] = canonical_json(_content(twin, object_file, block, rows)).encode()
+        files[f"grasp_data/{name}/map_uuid_to_path.json"] = canonical_json({object_file: f"{twin.name}.json"}).encode()
+        for split in ("train", "valid"):
+            chosen = split == ("valid" if _is_valid(twin) else "train")
+            files[f"splits/{name}/{split}.txt"] = f"{object_file}\n".encode() if chosen else b""
+        lines += known + _few(name, rows)
+    return Exported(
+        files=files,
+        main=f"grasp_data/{ASSETS[grippers[0]].name if grippers[0] in ASSETS else grippers[0]}/{twin.name}.json",
+        cannot_say=(
+            "mass, inertia and friction of the object: GraspGen takes a mesh and its scale.",
+            "a set of several objects: put the folders into one, and the entries of map_uuid_to_path.json and the lines of the"
+            " splits together.",
+            "why a grasp failed, its width and its robustness: the format has one truth value a grasp.",
+            *lines,
+        ),
+    )
+
+
+def _content(twin: TwinContent, object_file: str, gripper: dict[str, Any], rows: GraspRows) -> dict[str, Any]:
+    base_to_object = rows.gripper_to_object @ _grasp_to_base(rows.gripper)
+    return {
+        "object": {"file": object_file, "scale": 1.0},
+        "gripper": gripper,
+        "grasps": {"transforms": base_to_object.tolist(), "object_in_gripper": rows.held.tolist()},
+        "frame": FRAME,
+        "provenance": list(provenance_lines(twin.record)),
+        "license": license_of(twin.record),
+        "attribution": twin.record.source.attribution,
+    }
+
+
+def _gripper(name: str, rows: GraspRows) -> tuple[dict[str, Any], list[str]]:
+    """Return the gripper's block, and what a reader has to know of it."""
+    asset, gripper = ASSETS.get(name), parallel_gripper(name)
+    depths = sorted(set(rows.depth_m.tolist()))
+    block: dict[str, Any] = {
+        "name": asset.name if asset else name,
+        "depth": gripper.tip_depth_m if gripper else depths[-1],
+        "transform_offset_from_asset_to_graspgen_convention": [
+            [0.0, 0.0, 0.0],
+            list(asset.base_to_grasp_xyzw) if asset else [0.0, 0.0, 0.0, 1.0],
+        ],
+    }
+    if gripper is not None:
+        block["width"] = gripper.opening_m
+    if asset is not None:
+        block["file_name"] = asset.usd
+        return block, []
+    return block, [
+        f"which link of {name} the poses are of: they are of the grasp frame (+Z approach, X closing), with the identity as"
+        " offset; GraspGen's configuration of that gripper must have the same offset."
+    ]
+
+
+def _grasp_to_base(gripper: str) -> np.ndarray:
+    return ASSETS[gripper].grasp_to_base if gripper in ASSETS else np.eye(4)
+
+
+def _few(name: str, rows: GraspRows) -> list[str]:
+    held, failed = int(rows.held.sum()), int((~rows.held).sum())
+    return [
+        f"enough of {name}: {count} grasps {word}, and GraspGen passes over objects with less than {FEWEST}."
+        for word, count in (("held", held), ("failed", failed))
+        if count < FEWEST
+    ]
+
+
+def _is_valid(twin: TwinContent) -> bool:
+    return int(twin.record.twin_id, 16) % 1000 < 1000 * VALID_SHARE

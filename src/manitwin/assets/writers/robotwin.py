@@ -1,0 +1,176 @@
+"""RoboTwin 2.0: an object folder with visual and collision GLB, model_data and descriptions.
+
+Sources: RoboTwin's envs/utils/create_actor.py (which files), envs/utils/actor_utils.py (frames: the scale goes onto their
+translations), envs/_base_task.py ``get_grasp_pose`` (contact frame to gripper frame), envs/robot/robot.py
+``_trans_from_gripper_to_endlink`` and the manual's page on new embodiments (the gripper frame's X approaches, its Y is the
+direction in which the fingers move).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import Exported
+from manitwin.assets.writers.grasp_rows import GraspRows, best_and_diverse, grasp_rows, parallel_grippers_of
+from manitwin.assets.writers.licenses import license_of, provenance_lines
+from manitwin.assets.writers.phrases import seen_and_unseen
+from manitwin.assets.writers.physics_json import physics_of
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.textures import make_part, pbr_material
+from manitwin.geometry.grasp_diversity import fingertips
+from manitwin.geometry.poses import OBJECT_TO_GLTF, rotation_between, rotation_from_quaternion_wxyz, transform
+from manitwin.twin.record import FunctionalPoint, Placement
+from manitwin.twin.store import canonical_json
+
+MAX_GRASPS = (
+    16  # RoboTwin plans a path to every contact frame each time it chooses one: two frames a grasp are 32 plans
+)
+SEEN, UNSEEN = 12, 3  # phrases of a description, as in RoboTwin's own
+STABLE_TILT_RAD = math.radians(3)  # RoboTwin's check_stable throws a scene away in which an object turned by more
+_FIRST_NUMBER, _NUMBERS = 200, 800  # below are RoboTwin's own objects
+FRANKA_GRIPPER_BIAS_M = 0.08  # of its franka-panda embodiment, by the manual's page on new embodiments
+
+
+def export(twin: TwinContent) -> Exported:
+    """Write a twin as object ``base0`` of a RoboTwin object folder: metres, Y up, scale 1.
+
+    Each of the best grasps that held is written as two contact frames, half a turn about the approach direction apart: the
+    two ways in which a hand of two fingers can be held. Raises ExportError where the descriptions cannot be made.
+    """
+    name = object_name(twin)
+    folder = f"assets/objects/{name}"
+    gripper = next(iter(parallel_grippers_of(twin)), "")
+    grasps = best_and_diverse(_from_above(grasp_rows(twin, gripper, controls=False)), MAX_GRASPS)
+    files = {
+        f"{folder}/visual/base0.glb": twin.visual_glb,
+        f"{folder}/collision/base0.glb": _collision_glb(twin),
+        f"{folder}/model_data0.json": canonical_json(_model_data(twin, grasps)).encode(),
+        f"{folder}/physics0.json": canonical_json(_physics(twin)).encode(),
+        f"description/objects_description/{name}/base0.json": canonical_json(_description(twin)).encode(),
+        "object_mass.json": canonical_json({f"{name}/base0": twin.physical.mass_kg.value}).encode(),
+    }
+    return Exported(files=files, main=f"{folder}/model_data0.json", cannot_say=_cannot_say(twin, grasps))
+
+
+def _from_above(rows: GraspRows) -> GraspRows:
+    """Return the grasps that a hand can take of an object that stands on a table; all of them where there is none."""
+    above = np.flatnonzero(rows.gripper_to_object[:, 2, 3] >= 0.0)
+    return rows.take(above) if len(above) else rows
+
+
+def object_name(twin: TwinContent) -> str:
+    """Return ``NNN_name``: a number by the twin's id, as RoboTwin asks of objects for clutter; the name is what is unique."""
+    return f"{_FIRST_NUMBER + int(twin.record.twin_id, 16) % _NUMBERS}_{twin.name}"
+
+
+def contact_frames(gripper_to_object: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
+    """Return RoboTwin's two contact frames ``(N, 2, 4, 4)``, Y up, of grasps ``(N, 4, 4)`` in the object frame.
+
+    The origin lies between the fingertips, Y points against the approach, Z along the closing direction; the second frame is
+    the first after half a turn about Y. RoboTwin's gripper frame is ``C_R [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]`` and lies
+    0.12 m behind C along its X: that X is the approach direction, its Y the closing one.
+    """
+    closing, side, approach = (gripper_to_object[:, :3, i] for i in range(3))
+    frames = np.tile(np.eye(4), (len(gripper_to_object), 2, 1, 1))
+    for twin, sign in enumerate((1.0, -1.0)):
+        frames[:, twin, :3, :3] = np.stack([-sign * side, -approach, sign * closing], axis=-1)
+        frames[:, twin, :3, 3] = fingertips(gripper_to_object, depth_m)
+    return OBJECT_TO_GLTF @ frames
+
+
+def _model_data(twin: TwinContent, grasps: GraspRows) -> dict[str, Any]:
+    low, high = _bounds(twin)
+    contacts = contact_frames(grasps.gripper_to_object, grasps.depth_m).reshape(-1, 4, 4)
+    points = twin.record.points
+    functional = points.functional if points is not None else []
+    words = {point.id: f"{point.type.replace('_', ' ')}: {point.scenario}" for point in points.grasp} if points else {}
+    return {
+        "scale": [1.0, 1.0, 1.0],
+        # along the axes and not of an oriented box: RoboTwin's clutter reads index 1 as the height
+        "center": ((low + high) / 2).tolist(),
+        "extents": (high - low).tolist(),
+        "transform_matrix": np.eye(4).tolist(),
+        "target_pose": [],
+        "target_point_description": [],
+        "contact_points_pose": contacts.tolist(),
+        "contact_points_group": [[2 * i, 2 * i + 1] for i in range(len(grasps))],
+        "contact_points_mask": [True] * len(grasps),
+        "contact_points_description": [words.get(p) or "a verified grasp" for p in grasps.point_ids for _ in range(2)],
+        "functional_matrix": [_functional_frame(point).tolist() for point in functional],
+        "functional_point_description": [f"{point.label}: {point.description}" for point in functional],
+        "orientation_point": [transform(None, (low + high) / 2).tolist()],
+        "orientation_point_description": ["the middle of the object, with the axes of its mesh: Y is up"],
+        "stable": any(_stands(placement) for placement in twin.record.placements or []),
+        "provenance": list(provenance_lines(twin.record)),
+        "license": license_of(twin.record),
+        "attribution": twin.record.source.attribution,
+    }
+
+
+def _functional_frame(point: FunctionalPoint) -> np.ndarray:
+    """Return a functional point's frame, Y up: its Z points out of the object, where the interaction comes from."""
+    outward = OBJECT_TO_GLTF[:3, :3] @ np.array(point.normal)
+    return transform(rotation_between(np.array([0.0, 0.0, 1.0]), outward), OBJECT_TO_GLTF[:3, :3] @ point.position_m)
+
+
+def _bounds(twin: TwinContent) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest corner ``(3,)`` m of the hulls along RoboTwin's axes."""
+    corners = np.concatenate([vertices for vertices, _ in twin.hulls]) @ OBJECT_TO_GLTF[:3, :3].T
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def _stands(placement: Placement) -> bool:
+    """Tell whether the object rests as RoboTwin sets it down: with the object frame's +Z up."""
+    up = rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz))[2, 2]
+    return placement.settled and math.acos(min(1.0, float(up))) <= STABLE_TILT_RAD
+
+
+def _collision_glb(twin: TwinContent) -> bytes:
+    """Return the hulls as separate meshes: SAPIEN's ``load_multiple`` makes one convex shape of each."""
+    grey = pbr_material("hull", base_color=(0.5, 0.5, 0.5))
+    return write_glb(
+        [
+            make_part(vertices, faces, material=grey, name=f"{twin.name}_hull_{i:02d}")
+            for i, (vertices, faces) in enumerate(twin.hulls)
+        ]
+    )
+
+
+def _description(twin: TwinContent) -> dict[str, Any]:
+    language = twin.record.language
+    assert language is not None  # an accepted twin has it
+    seen, unseen = seen_and_unseen(language, SEEN, UNSEEN)
+    return {"raw_description": language.category, "seen": seen, "unseen": unseen}
+
+
+def _physics(twin: TwinContent) -> dict[str, Any]:
+    return {
+        **physics_of(twin),
+        "frame": "object frame: +Z up; (x, y, z) of it is (x, z, -y) of the meshes and of model_data0.json",
+        "remark": "RoboTwin reads none of this: set mass, centre of mass, inertia and friction on the actor yourself",
+    }
+
+
+def _cannot_say(twin: TwinContent, grasps: GraspRows) -> tuple[str, ...]:
+    lines = [
+        "mass: RoboTwin gives rigid objects 0.01 kg; where ROBOTWIN_OBJECT_MASS_CONFIG names object_mass.json, newer"
+        " versions take the mass from it. The inertia stays that of density 1000 either way.",
+        "friction and restitution: RoboTwin's scene has one material for all, 0.5 and 0.5; physics0.json has the object's.",
+        "convex collision: create_actor needs convex=True, or the hulls become one mesh that no dynamic body may have.",
+        f"how far a robot's fingertips reach past the contact frame: RoboTwin puts the hand gripper_bias behind it"
+        f" ({FRANKA_GRIPPER_BIAS_M} m for its Franka); set it to the distance from hand to fingertips for the poses that"
+        f" were verified{_depth_of(grasps)}.",
+        "grasps that failed, and of other grippers: the formats graspgen and isaac_grasp have them.",
+    ]
+    if not len(grasps):
+        lines.append("contacts: no grasp of this twin held, so contact_points_pose is empty and it cannot be grasped.")
+    return tuple(lines)
+
+
+def _depth_of(grasps: GraspRows) -> str:
+    depths = sorted(set(grasps.depth_m.tolist()))
+    return f": {depths[0]} m for {grasps.gripper}" if len(depths) == 1 else ""

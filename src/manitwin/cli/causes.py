@@ -1,0 +1,144 @@
+"""Why items were not accepted: equal causes counted, the most frequent one told with its remedy."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from manitwin import errors
+from manitwin.engine.ledger.unaccepted import Unaccepted, UnacceptedState
+
+REMEDIES = {
+    "unreadable": "open it in the program that made it and save it again: a photo as PNG or JPEG, a mesh as GLB",
+    "empty": "export or download it again",
+    "wrong_type": "give a photo or a mesh; `manitwin import` takes what other simulators use",
+    "too_small": "give a larger photo",
+    "animated": "save one of its pictures as PNG, or choose one by matting.frame in the configuration",
+    "no_faces": "export it with faces: points and curves have no surface",
+    "not_finite": "export it again: some of its numbers are none",
+    "no_object": "photograph the object whole and larger, on a plain surface of another colour",
+    "several_objects": "one object an input: crop the photo, or give each object in a file of its own",
+    "low_confidence_matte": "photograph it whole on a plain surface of another colour, or give an image with an alpha channel",
+    "generator_failed": "another photo, another generator (--generator, see docs/generators.md), or a mesh",
+    "not_watertight": "close the holes of the mesh in a modeller",
+    "degenerate": "give a mesh that encloses a volume, with walls and no holes",
+    "absurd_size": "say the unit: --units m, cm or mm, or a column units",
+    "poor_quality": "another photo, or another generator (--generator, see docs/generators.md)",
+    "implausible_mass": "check --units and --name, or the columns units and name",
+    "implausible_size": "check --units and --name, or the columns units and name",
+    "too_wide": "a gripper that opens wider (--gripper, see docs/grippers.md)",
+    "too_thin": "a gripper for thin things, such as a suction cup (--gripper, see docs/grippers.md)",
+    "no_proposal": "another gripper (--gripper, see docs/grippers.md); hands may not reach such a thing at all",
+    "none_held": "another gripper (--gripper, see docs/grippers.md); it may be too heavy or too smooth for this one",
+    "no_stable_pose": "nothing, where it is round: it rolls; else check that the mesh is the whole object",
+    "unstable": "fewer --stacked or --contained, or larger layout.repairs in the configuration",
+    "no_room": "fewer --objects, or a sparser --clutter",
+    "nothing_fits": "fewer --stacked or --contained, or twins that others stand on or fit into",
+    "crashed": "open it again once more; where it dies again, leave this input out and report it with its file",
+    "timeout": "a larger run.stage_timeout_s in the configuration",
+}
+"""What a person can do about a reason: those of twins (``REJECTION_REASONS``), of layouts, and of what failed."""
+
+LONGEST_MESSAGE = 500  # what a native stack adds is told by status --why
+
+_OWN_ERRORS = "|".join(
+    name for name, kind in vars(errors).items() if isinstance(kind, type) and issubclass(kind, errors.ManiTwinError)
+)
+_TRIES = re.compile(r"^\S+ failed \d+ times: ")
+_OWN_ERROR = re.compile(rf"^(?:{_OWN_ERRORS}): ")
+_LINE_OF_CODE = re.compile(r" \(\w+\.py:\d+\)$")
+_QUOTED = r"(?<!\w)(?:'[^']*'|\"[^\"]*\")(?!\w)"  # an apostrophe begins no quotation
+_SEMICOLON = re.compile(rf"{_QUOTED}|; ")
+_VARIES = (
+    (re.compile(_QUOTED), "'...'"),
+    (re.compile(r"(?:[a-z0-9]+://|\.{0,2}/)\S*[^\s:;,.)]"), "PATH"),
+    (re.compile(r"\b[\w.-]+\.(?:[A-Za-z]\w{1,4})\b"), "FILE"),
+    (re.compile(r"\b(?=[0-9a-f]*\d)[0-9a-f]{8,64}\b"), "ID"),
+    (re.compile(r"\w*\d[\w.]*"), "N"),
+)
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One cause and how many items it ended; ``example`` is the first of them, ``message`` what was said of it."""
+
+    state: UnacceptedState
+    reason: str | None
+    count: int
+    example: str
+    message: str
+    remedy: str | None
+
+
+def group_causes(unaccepted: Iterable[Unaccepted]) -> list[Cause]:
+    """Count equal causes, frequent ones first.
+
+    A rejection's cause is its reason; any other cause is what was said, without ids, names, paths and numbers.
+    """
+    found: dict[tuple[str, str], list[Unaccepted]] = {}
+    for item in unaccepted:
+        told = item.reason or "" if item.state == "rejected" else _without_what_varies(item.message)
+        found.setdefault((item.state, told), []).append(item)
+    groups = sorted(found.values(), key=lambda items: -len(items))
+    return [_cause(items[0], len(items)) for items in groups]
+
+
+def cause_lines(causes: list[Cause], *, again: str, others: str) -> list[str]:
+    """Write the most frequent cause of each way to end, with its remedy.
+
+    ``again`` says how to go on once it is mended, ``others`` where the other causes are told.
+    """
+    lines = []
+    for state in dict.fromkeys(cause.state for cause in causes):
+        alike = [cause for cause in causes if cause.state == state]
+        total, first = sum(cause.count for cause in alike), alike[0]
+        lines.append(f"why {state}: {first.count} of {total}{_reason(first)}: {first.message}")
+        remedies = [text for text in (first.remedy, again if state == "failed" else None) if text]
+        if remedies:
+            lines.append(f"  remedy: {'; then '.join(remedies)}")
+        if len(alike) > 1:
+            lines.append(f"  {len(alike) - 1} other cause{'s' if len(alike) > 2 else ''}: {others}")
+    return lines
+
+
+def _reason(cause: Cause) -> str:
+    example = f", such as {cause.example}" if cause.count > 1 else f", {cause.example}"
+    return f" {cause.reason}{example}" if cause.state == "rejected" else example
+
+
+def _cause(first: Unaccepted, count: int) -> Cause:
+    message, remedy = without_prefixes(first.message), REMEDIES.get(first.reason or "")
+    if first.reason:
+        message = message.removeprefix(f"{first.reason}: ")
+    if remedy is None and _is_own(first.message):
+        message, remedy = _without_remedy(message)
+    elif remedy is not None:
+        message = message.removesuffix(f"; {remedy}")  # some messages end with the same words
+    return Cause(first.state, first.reason, count, first.which, _shortened(message), remedy)
+
+
+def without_prefixes(message: str) -> str:
+    """Return what was said without the stage and the attempts, the class of our own errors and the line of code."""
+    return _LINE_OF_CODE.sub("", _OWN_ERROR.sub("", _TRIES.sub("", message)))
+
+
+def _is_own(message: str) -> bool:
+    return _OWN_ERROR.match(_TRIES.sub("", message)) is not None
+
+
+def _without_remedy(message: str) -> tuple[str, str | None]:
+    """Split a message of our own errors, which ends with its remedy where it has one; a semicolon in quotes is none."""
+    ends = [found.start() for found in _SEMICOLON.finditer(message) if found[0] == "; "]
+    return (message[: ends[-1]], message[ends[-1] + 2 :]) if ends else (message, None)
+
+
+def _shortened(message: str) -> str:
+    return message if len(message) <= LONGEST_MESSAGE else f"{message[:LONGEST_MESSAGE]} ..."
+
+
+def _without_what_varies(message: str) -> str:
+    told = _shortened(without_prefixes(message))
+    for pattern, stand_in in _VARIES:
+        told = pattern.sub(stand_in, told)
+    return told

@@ -1,0 +1,156 @@
+"""The names that options know: checked before anything heavy is imported, and what a shell completes.
+
+What is written out here stands in modules that take seconds to import; a test keeps both the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from manitwin.errors import UsageError, choose_from
+
+
+@dataclass(frozen=True)
+class Choices:
+    """The valid values of an option: ``check`` is its callback, ``complete`` what a shell offers.
+
+    ``listed`` values are several by commas. ``spec`` values are names before ``:`` or ``@``. A value with the suffix
+    ``or_file`` is the name of a file, and checked by whoever reads it. Where an option may be repeated, each is named once.
+    """
+
+    kind: str
+    find: Callable[[], Iterable[str]]
+    listed: bool = False
+    spec: bool = False
+    or_file: str | None = None
+
+    def option(self, *names: str, **more: Any) -> Any:
+        """Return ``typer.Option(*names, **more)`` of these values."""
+        return typer.Option(*names, callback=self.check, autocompletion=self.complete, **more)
+
+    def argument(self, **more: Any) -> Any:
+        """Return ``typer.Argument(**more)`` of these values."""
+        return typer.Argument(callback=self.check, autocompletion=self.complete, **more)
+
+    def check(self, value: Any) -> Any:
+        """Return the value, or the values, of the option; raises UsageError naming the nearest valid one."""
+        given = [] if value is None else [value] if isinstance(value, str) else list(value)
+        for each in given:
+            for name in each.lower().split(",") if self.listed else [each]:
+                self._check_one(name.strip())
+        if len(set(given)) < len(given):
+            raise UsageError(f"{self.kind}s {', '.join(given)}: each may be named once")
+        return value
+
+    def complete(self, incomplete: str) -> list[str]:
+        """Return the values that begin as what was typed; of a list, with what stands before the last comma."""
+        before, comma, last = incomplete.rpartition(",") if self.listed else ("", "", incomplete)
+        taken = before.split(",") if comma else []
+        return [f"{before}{comma}{name}" for name in self.find() if name.startswith(last) and name not in taken]
+
+    def _check_one(self, name: str) -> None:
+        if self.or_file is not None and name.endswith(self.or_file):
+            return
+        if self.spec:
+            name = name[: min((name.index(mark) for mark in ":@" if mark in name), default=len(name))]
+        valid = list(self.find())
+        if (name or not self.listed) and name not in valid:
+            also = f", or a {self.or_file} file" if self.or_file is not None else ""
+            raise UsageError(choose_from(self.kind, name, valid) + also)
+
+
+def _of(*names: str) -> Callable[[], Iterable[str]]:
+    return lambda: names
+
+
+def _backends(kind: str) -> Callable[[], Iterable[str]]:
+    def find() -> Iterable[str]:
+        from manitwin.models.registry import backends
+
+        return sorted(backends().get(kind, {}))
+
+    return find
+
+
+def _shipped(folder: str) -> Callable[[], Iterable[str]]:
+    """Return a search for the TOML files of a folder of this package."""
+
+    def find() -> Iterable[str]:
+        files = (resources.files("manitwin") / folder).iterdir()
+        return sorted(Path(file.name).stem for file in files if file.name.endswith(".toml"))
+
+    return find
+
+
+UNITS = Choices("units", _of("m", "cm", "mm", "auto"))
+UP = Choices("up", _of("y", "z", "auto"))
+EXECUTORS = Choices("executor", _of("local", "ray", "inline"))
+ANNOTATORS = Choices("annotator", _backends("annotator"), spec=True)
+GENERATORS = Choices("generator", _backends("generator"), spec=True)
+GRASPERS = Choices("grasper", _backends("grasper"), spec=True)
+GRIPPERS = Choices("gripper", _shipped("robots/grippers/definitions"), or_file=".toml")
+ROBOTS = Choices("robot", _shipped("robots/definitions"), or_file=".toml")
+SKILLS = Choices("skill", _of("pick_place"))
+SURFACES = Choices("surface", _of("table", "shelf", "tray"))
+CLUTTER = Choices("clutter", _of("sparse", "medium", "dense"))
+CAMERAS = Choices("camera", _of("front", "side", "top", "wrist"), listed=True)
+CODECS = Choices("codec", _of("mpeg4", "vp9"))
+EPISODE_FORMATS = Choices("format", _of("lerobot", "maniskill"), listed=True)
+EXPORT_FORMATS = Choices("format", lambda: ["all", *_backends("exporter")()], listed=True)
+IMPORT_FORMATS = Choices(
+    "format", _of("auto", "twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
+)
+AUDIT_FORMATS = Choices("format", _of("text", "json", "sarif"))
+QUERY_FORMATS = Choices("format", _of("table", "csv", "json", "ids"))
+TABLES = Choices("table", _of("twins", "points", "grasps", "placements", "rejections", "stages"))
+ENDED_STATES = Choices("state", _of("failed", "rejected"))
+SERVED_KINDS = Choices("thing to look at", _of("vlm", "generator", "grasper"))
+SHELLS = Choices("shell", _of("bash", "zsh", "fish"))
+REHEARSALS = Choices(
+    "server", _of("openai", "anthropic", "rodin", "tripo", "meshy", "hunyuan3d", "fal", "graspgen", "graspgenx")
+)
+
+
+def count_of(what: str) -> Callable[[Any], Any]:
+    """Return the callback of a number of which at least one is asked for."""
+
+    def check(value: int | None) -> int | None:
+        if value is not None and value < 1:
+            raise UsageError(f"{what} is {value}; give 1 or more")
+        return value
+
+    return check
+
+
+def settings_file(value: Path | None) -> Path | None:
+    """Return the path of a TOML file that is there; a callback."""
+    if value is not None and not value.is_file():
+        raise UsageError(f"{value}: not there; give a TOML file of settings")
+    return value
+
+
+def must_exist(remedy: str) -> Callable[[Any], Any]:
+    """Return the callback of places that must be there: files and folders, or URLs, which are not asked."""
+
+    def check(value: Any) -> Any:
+        for place in [] if value is None else value if isinstance(value, list | tuple) else [value]:
+            if "://" not in str(place) and not Path(place).exists():
+                raise UsageError(f"{place}: not there; give {remedy}")
+        return value
+
+    return check
+
+
+def folder_to_write(value: Any) -> Any:
+    """Return a folder that can be made and written, or a URL, which is not asked; a callback."""
+    if value and "://" not in str(value):
+        from manitwin.formats.output_folder import require_writable_folder
+
+        require_writable_folder(Path(value))
+    return value

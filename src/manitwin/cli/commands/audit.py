@@ -1,0 +1,84 @@
+"""``manitwin audit``: is this asset true?"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manitwin.cli import choices
+from manitwin.cli.console import err_console
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from manitwin.assets.audit.finding import Rule
+    from manitwin.assets.audit.run import Audited
+
+
+def audit(
+    paths: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="Assets, or folders of assets.",
+            metavar="PATH...",
+            callback=choices.must_exist("an asset, or a folder of them"),
+        ),
+    ] = None,
+    select: Annotated[
+        str | None, typer.Option(help="Only these rules: codes or their beginnings.", metavar="A,B")
+    ] = None,
+    ignore: Annotated[str | None, typer.Option(help="All but these rules.", metavar="A,B")] = None,
+    format: Annotated[
+        str, choices.AUDIT_FORMATS.option("--format", "-f", help="text, json or sarif.", metavar="FORMAT")
+    ] = "text",
+    fix: Annotated[bool, typer.Option("--fix", help="Mend what is safe; old files stay beside as .orig.")] = False,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes.")] = 1,
+    explain: Annotated[str | None, typer.Option(help="Say what a rule is about, and stop.", metavar="CODE")] = None,
+) -> None:
+    """Find what is wrong with assets of any tool: mass, inertia, collision, scale, frames, grasps. Exit 1 on errors."""
+    from manitwin.errors import UsageError
+
+    if explain is None and not paths:
+        raise UsageError("no PATH given: name assets or folders of them, or --explain CODE")
+    from manitwin.assets.audit.report import explanation
+    from manitwin.assets.audit.run import audit_all, find_all
+    from manitwin.assets.audit.select import rule_of, select_rules
+    from manitwin.assets.detect import VALID_ASSETS
+
+    if explain is not None:
+        sys.stdout.write(explanation(rule_of(explain)) + "\n")
+        return
+    rules = select_rules((select or "").split(","), (ignore or "").split(","))
+    if not rules:
+        raise UsageError("--select and --ignore leave no rule; leave one of them out")
+    assets = find_all(paths or [])
+    if not assets:
+        raise UsageError(f"{', '.join(map(str, paths or []))}: holds no asset of a known format; {VALID_ASSETS}")
+    audited = []
+    for each in audit_all(assets, rules, jobs=jobs, fix=fix):
+        audited.append(each)
+        if format == "text":
+            _write_text(each)
+    _write_end(audited, rules, format)
+    raise typer.Exit(1 if any(f.severity == "error" for each in audited for f in each.findings) else 0)
+
+
+def _write_text(each: Audited) -> None:
+    from manitwin.assets.audit.report import text_of
+
+    text = text_of(each)
+    if text:
+        sys.stdout.write(text + "\n")
+
+
+def _write_end(audited: Sequence[Audited], rules: Sequence[Rule], format: str) -> None:
+    from manitwin.assets.audit.report import json_of, sarif_of, summary
+
+    if format == "text":
+        sys.stdout.write(summary(audited) + "\n")
+        return
+    sys.stdout.write(json_of(audited) if format == "json" else sarif_of(audited, rules))
+    err_console.print(summary(audited), markup=False)

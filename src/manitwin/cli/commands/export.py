@@ -1,0 +1,131 @@
+"""``manitwin export``: twins in the files of simulators and graspers."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manitwin.cli import choices
+from manitwin.cli.console import out_console, print_error
+
+if TYPE_CHECKING:
+    from manitwin.assets.writers.content import TwinContent
+
+
+def export(
+    twins: Annotated[
+        list[str],
+        typer.Argument(
+            help="Twin folders, folders of twins, data sets (a folder or URL); or scenes of `manitwin layout`.",
+            metavar="TWIN|SCENE",
+            callback=choices.must_exist("a folder that manitwin has built"),
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option(
+            "--out", "-o", help="The folder to write OUT/<twin>/<format>/ into.", callback=choices.folder_to_write
+        ),
+    ],
+    to: Annotated[
+        str, choices.EXPORT_FORMATS.option(help="Formats by commas (mjcf,urdf,sdf,usd,...), or all.")
+    ] = "all",
+    license_allow: Annotated[
+        str | None,
+        typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: any, also 'unknown'."),
+    ] = None,
+) -> None:
+    """Write twins as MJCF, URDF, SDF, USD and GLB, and for RoboTwin, ManiSkill, Isaac Lab and graspers; scenes as MJCF, USD."""
+    from manitwin.assets.writers.licenses import allowed_licenses
+    from manitwin.assets.writers.registry import chosen_formats
+    from manitwin.cli.commands.export_scenes import export_scenes, scene_files
+    from manitwin.errors import UsageError
+
+    if scenes := scene_files(twins):
+        if license_allow is not None:
+            raise UsageError("--license-allow is for twins; export those of a scene by themselves to have them judged")
+        export_scenes(scenes, out, to)
+        return
+    formats = chosen_formats(to.split(","))
+    allowed = None if license_allow is None else allowed_licenses(license_allow.split(","))
+    ids: dict[str, str] = {}
+    done = [_export(folder, formats, out, allowed, ids) for folder in twin_folders(twins)]
+    refused = done.count(False)
+    line = f"{done.count(True):,} twins exported to {out}"
+    out_console.print(f"{line}, {refused:,} refused" if refused else line, markup=False)
+    raise typer.Exit(3 if refused else 0)
+
+
+def twin_folders(given: list[str]) -> Iterator[Path]:
+    """Yield the folders of the twins that are meant, each once; those of a URL as copies that last until the next.
+
+    Raises UsageError for what is not there or has no twins.
+    """
+    from manitwin.errors import UsageError
+    from manitwin.twin.dataset_root import DatasetRoot, twin_name
+
+    seen = set[Path]()
+    for each in given:
+        root, found = DatasetRoot(each), False
+        for folder in _local_twins(root.local) if root.local is not None else ():
+            found = True
+            if folder.resolve() not in seen:
+                seen.add(folder.resolve())
+                yield folder
+        for twin_id in root.twin_ids() if root.local is None else ():
+            found = True
+            with tempfile.TemporaryDirectory() as copy:
+                yield root.fetch_folder(twin_name(twin_id), Path(copy) / twin_id)
+        if not found:
+            raise UsageError(f"{each}: no twin.json in it or below it; give a folder that manitwin has built")
+
+
+def _local_twins(folder: Path) -> Iterator[Path]:
+    """Yield the folders at or below one that hold a twin, sorted; hidden ones are work in progress."""
+    from manitwin.twin.store import RECORD
+
+    for path, folders, files in os.walk(folder):
+        folders[:] = [] if RECORD in files else sorted(name for name in folders if not name.startswith("."))
+        if RECORD in files:
+            yield Path(path)
+
+
+def _export(
+    folder: Path, formats: tuple[str, ...], out: Path, allowed: frozenset[str] | None, ids: dict[str, str]
+) -> bool:
+    """Write one twin in all formats and say so, or say why not; tells whether all went out."""
+    from manitwin.assets.writers.write import export_twin
+    from manitwin.errors import ExportError, TwinError
+
+    try:
+        content = _content(folder, allowed)
+        if ids.setdefault(content.name, content.record.twin_id) != content.record.twin_id:
+            raise ExportError(f"{folder}: another twin has the name {content.name} too; export it to another folder")
+    except (ExportError, TwinError) as error:
+        print_error(str(error))
+        return False
+    written = []
+    for name in formats:
+        try:
+            export_twin(content, name, out)
+            written.append(name)
+        except ExportError as error:
+            print_error(f"{name}: {error}")
+    out_console.print(f"{content.name}: {', '.join(written) or 'nothing'}", markup=False)
+    return len(written) == len(formats)
+
+
+def _content(folder: Path, allowed: frozenset[str] | None) -> TwinContent:
+    from manitwin.assets.writers.content import TwinContent
+    from manitwin.assets.writers.licenses import check_license
+    from manitwin.twin.loaded_twin import Twin
+
+    twin = Twin(folder)
+    if twin.record.rejection is None:
+        check_license(twin.record, allowed)  # before its meshes are read; a rejected one says first that it is
+    return TwinContent.of(twin)

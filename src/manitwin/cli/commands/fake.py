@@ -1,0 +1,45 @@
+"""``manitwin fake``: a local server that keeps a service's contract, to rehearse without a key or a GPU."""
+
+from __future__ import annotations
+
+import threading
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import choices
+from manitwin.cli.console import out_console
+
+
+def fake(
+    name: Annotated[str | None, choices.REHEARSALS.argument(help="Which service: openai, rodin, graspgen ...")] = None,
+    port: Annotated[int, typer.Option(help="The port; 0: any that is free.", min=0, max=65535)] = 0,
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(help="What is to go wrong: NAME always, NAME=2 twice; may be repeated.", metavar="FAULT"),
+    ] = None,
+    key: Annotated[str | None, typer.Option(help="The key that it accepts; default: one made for it.")] = None,
+    polls: Annotated[int | None, typer.Option(help="How often a job is looked at before it is done.", min=0)] = None,
+    list_faults: Annotated[bool, typer.Option("--list-faults", help="List what can go wrong, and end.")] = False,
+) -> None:
+    """Serve a rehearsal of a service on this machine until interrupted."""
+    from manitwin.errors import UsageError
+    from manitwin.models.fakes.catalog import REHEARSALS, serving
+    from manitwin.models.fakes.faults import FAULTS, Faults
+
+    if list_faults:
+        for word, meaning in FAULTS.items():
+            out_console.print(f"{word:<15} {meaning}", markup=False)
+        return
+    if name is None:
+        raise UsageError(f"no service is named; give one of {', '.join(REHEARSALS)}")
+    given = Faults.parse(fault or [])
+    try:
+        with serving(name, port=port, faults=given, key=key, polls=polls) as server:
+            out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)", markup=False)
+            if server.key_variable is not None:
+                out_console.print(f"export {server.key_variable}={server.key}", markup=False)
+            out_console.print(f"manitwin build PHOTO -o OUT {server.option} {server.spec}", markup=False)
+            threading.Event().wait()
+    except KeyboardInterrupt:  # as soon as it has said where it is, it may be interrupted
+        out_console.print("stopped", markup=False)

@@ -1,0 +1,62 @@
+"""``manitwin import``: assets of other tools as inputs of a build, with all that is annotated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import choices
+from manitwin.cli.console import out_console, print_error
+
+
+def import_(
+    paths: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Assets: files, folders, or folders of them.",
+            metavar="PATH...",
+            callback=choices.must_exist("an asset's file or folder, or a folder of assets"),
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="The folder to write imported assets into.", callback=choices.folder_to_write),
+    ],
+    format: Annotated[
+        str,
+        choices.IMPORT_FORMATS.option(
+            "--from",
+            help="auto, robotwin, manitwin100k, embodiedgen, urdf, mjcf, sdf, usd, gso or twin.",
+            metavar="FORMAT",
+        ),
+    ] = "auto",
+) -> None:
+    """Take assets of other tools over, keep what is annotated, and say what is missing."""
+
+    from manitwin.assets.importers.importer import import_assets
+    from manitwin.assets.importers.record import kept_words
+
+    done = there = failed = 0
+    for imported in import_assets(paths, out, format=format):  # type: ignore[arg-type]
+        if imported.record is None or imported.folder is None:
+            failed += 1
+            named = str(imported.error).startswith(f"{imported.path}: ")
+            print_error(str(imported.error) if named else f"{imported.path}: {imported.error}")
+            continue
+        if imported.there_already:
+            there += 1
+            out_console.print(f"{imported.folder.name}: imported before, left as it is", markup=False)
+            continue
+        done += 1
+        record = imported.record
+        kept = ", ".join(kept_words(record)) or "the mesh only"
+        missing = f"; missing {', '.join(record.missing)}" if record.missing else ""
+        out_console.print(f"{imported.folder.name}: {record.format}; kept {kept}{missing}", markup=False)
+        for remark in record.remarks:
+            out_console.print(f"  {remark}", markup=False)
+    before = f", {there} imported before" if there else ""
+    then = f"; manitwin build {out} -o TWINS fills in what is missing" if done or there else ""
+    out_console.print(f"{done} imported{before}, {failed} not{then}", markup=False)
+    raise typer.Exit(3 if failed else 0)

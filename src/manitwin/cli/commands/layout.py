@@ -1,0 +1,128 @@
+"""``manitwin layout``: scenes of several twins."""
+
+from __future__ import annotations
+
+from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import out_console, print_error
+from manitwin.cli.json_output import Json, print_document
+from manitwin.cli.why import causes_of, print_causes
+
+if TYPE_CHECKING:
+    from manitwin.scenes.app_config import LayoutsConfig
+    from manitwin.scenes.layouts.run import LayoutTotals
+
+
+def layout(
+    dataset: Annotated[
+        str,
+        typer.Argument(
+            help="A data set, or a folder of twins.",
+            metavar="DATASET",
+            callback=choices.must_exist("a data set, or the folder that manitwin build wrote"),
+        ),
+    ],
+    out: Annotated[
+        str, typer.Option("--out", "-o", help="The folder to write scenes into.", callback=choices.folder_to_write)
+    ],
+    count: Annotated[int, typer.Option("-n", help="How many layouts.", callback=choices.count_of("-n"))] = 100,
+    objects: Annotated[str | None, typer.Option(help="How many objects: LOW..HIGH.", metavar="LOW..HIGH")] = None,
+    surface: Annotated[str | None, choices.SURFACES.option(help="table, shelf or tray.")] = None,
+    clutter: Annotated[
+        str | None, choices.CLUTTER.option(help="How close they stand: sparse, medium or dense.")
+    ] = None,
+    include: Annotated[
+        list[str] | None, typer.Option(help="A category that must be there; may be repeated.", metavar="CATEGORY")
+    ] = None,
+    stacked: Annotated[int | None, typer.Option(help="How many stand on another object.")] = None,
+    contained: Annotated[int | None, typer.Option(help="How many lie in a vessel.")] = None,
+    upright: Annotated[
+        bool, typer.Option("--upright", help="Put down upright what has an upright placement that stayed.")
+    ] = False,
+    robot: Annotated[str | None, choices.ROBOTS.option(help="Stay in the workspace of this robot.")] = None,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="Also draw each (colours, depth, normals, instance ids) and a sheet.")
+    ] = False,
+    sheet: Annotated[bool, typer.Option("--sheet", help="Draw one picture of the first 48 scenes.")] = False,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    jobs: options.Jobs = None,
+    executor: options.Executor = "local",
+    address: options.Address = None,
+    json: Json = False,
+) -> None:
+    """Sample scenes of twins at rest on a table, a shelf or a tray; run it again to go on where it stopped."""
+    given = {
+        "objects": None if objects is None else _range(objects), "surface": surface, "clutter": clutter, "robot": robot,
+        "include": tuple(include) if include else None, "stacked": stacked, "contained": contained,
+        "upright": upright or None,
+    }  # fmt: skip
+    settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
+    from manitwin.cli.watched_run import WatchedRun
+    from manitwin.pipeline.dataset_run import local_log
+    from manitwin.scenes.layouts.run import CONTACT_SHEET, layout_totals, make_layouts, without_upright
+    from manitwin.twin.dataset_root import DatasetRoot
+
+    sheet = sheet or settings.pictures or DatasetRoot(out).exists(CONTACT_SHEET)  # one that is there is kept up to date
+    if sheet:
+        from manitwin.render.device import require_renderer
+
+        require_renderer()
+    with WatchedRun("layouts", lambda: local_log(DatasetRoot(out))) as watched:
+        report = make_layouts(
+            dataset, out, count, settings, executor=options.executor_name(executor), address=address,
+            on_start=watched.start, on_stage=watched.progress.stage, on_ended=watched.progress.item_ended,
+        )  # fmt: skip
+    totals = layout_totals(out)
+    if settings.layout.upright and (lying := without_upright(dataset)):
+        out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}", markup=False)
+    _print_totals(totals)
+    if sheet and totals.accepted:
+        from manitwin.scenes.layouts.contact_sheet import write_contact_sheet
+
+        shown = write_contact_sheet(dataset, out)
+        out_console.print(f"{shown} of {totals.accepted} scenes in {out}/{CONTACT_SHEET}", markup=False)
+    if report.stopped:
+        print_error(f"stopped: {report.stopped}")
+    print_causes(out)
+    if json:
+        from manitwin.cli.documents import layouts_document
+
+        print_document(layouts_document(report, out, causes_of(out), totals))
+    raise typer.Exit(report.exit_code)
+
+
+def _print_totals(totals: LayoutTotals) -> None:
+    ended = totals.accepted + sum(totals.rejected.values())
+    why = "".join(f", {n} {reason}" for reason, n in totals.rejected.items())
+    out_console.print(f"{totals.accepted} of {ended} layouts accepted ({totals.acceptance:.1%}){why}", markup=False)
+    out_console.print(
+        f"{totals.objects} objects; {totals.repaired} layouts were repaired; as they settled, objects moved at most "
+        f"{1000 * totals.max_moved_m:.1f} mm and turned {degrees(totals.max_turned_rad):.1f} degrees; they overlap by at most "
+        f"{1000 * totals.max_penetration_m:.2f} mm; {totals.cpu_seconds / max(1, ended):.2f} CPU-s each",
+        markup=False,
+    )
+
+
+def _range(text: str) -> tuple[int, int]:
+    from manitwin.errors import UsageError
+
+    low, _, high = text.partition("..")
+    try:
+        return int(low), int(high or low)
+    except ValueError:
+        raise UsageError(f"--objects {text}: give LOW..HIGH, such as 3..12") from None
+
+
+def _settings(
+    file: Path | None, layout: dict[str, Any], seed: int | None, pictures: bool, jobs: int | None
+) -> LayoutsConfig:
+    from manitwin.scenes.app_config import LayoutsConfig, load_app_config
+
+    given = {"seed": seed, "pictures": pictures or None, "layout": layout, "run": options.run_settings(jobs)}
+    return load_app_config(LayoutsConfig, file, given)

@@ -1,0 +1,40 @@
+"""``manitwin prompts``: what a vision-language model is asked about a twin, written out to be read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import out_console
+
+if TYPE_CHECKING:
+    from manitwin.config import BuildConfig
+
+
+def prompts(
+    twin: Annotated[
+        Path,
+        typer.Argument(
+            help="A twin folder.", metavar="TWIN", callback=choices.must_exist("a folder that manitwin build made")
+        ),
+    ],
+    out: Annotated[
+        Path,
+        typer.Option("--out", "-o", help="The folder to write the questions into.", callback=choices.folder_to_write),
+    ],
+    config: options.Config = None,
+    vlm: Annotated[
+        str, choices.ANNOTATORS.option(help="The model, as for build; nothing is sent to it.")
+    ] = "openai:MODEL",
+) -> None:
+    """Write the questions that a vision-language model would be asked about a twin: text, pictures, schema and cost."""
+    from manitwin.cli.annotator_questions import questions_about, write_questions
+    from manitwin.config import BuildConfig, load_config
+
+    settings: BuildConfig = load_config(config) if config else BuildConfig()
+    asked = questions_about(twin, settings, vlm)
+    write_questions(asked, out)
+    out_console.print(f"{len(asked.questions)} questions in {out}: begin with README.md", markup=False)

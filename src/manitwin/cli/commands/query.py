@@ -1,0 +1,121 @@
+"""``manitwin query``: find twins, grasps and the rest by a condition."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
+
+import typer
+
+from manitwin.cli import choices
+from manitwin.cli.console import out_console
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+SHOWN = {
+    "twins": ("twin_id", "name", "category", "mass_kg", "longest_m", "verified", "success_rate"),
+    "points": ("twin_id", "point_id", "role", "label", "type", "confidence"),
+    "grasps": ("twin_id", "grasp_id", "category", "outcome", "verified", "robustness", "holds_in_second_engine"),
+    "placements": ("twin_id", "number", "upright", "probability", "settled", "collision_radius_m"),
+    "rejections": ("twin_id", "name", "stage", "reason", "detail"),
+    "stages": ("twin_id", "position", "stage", "backend", "seconds", "cpu_seconds", "cost_usd"),
+}
+"""What a table on the screen shows where no columns are asked for; the other formats write all."""
+
+NARROWEST = 16
+"""Characters that a column keeps: a twin's id."""
+
+
+def query(
+    dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
+    where: Annotated[
+        str | None, typer.Argument(help="An SQL condition: \"category = 'mug' and mass_kg < 0.4\". None: all rows.")
+    ] = None,
+    table: Annotated[
+        str, choices.TABLES.option(help="twins, points, grasps, placements, rejections or stages.", metavar="NAME")
+    ] = "twins",
+    columns: Annotated[str | None, typer.Option(help="Columns to print, with commas between.", metavar="A,B")] = None,
+    limit: Annotated[int | None, typer.Option(help="Print at most so many rows.", metavar="N")] = None,
+    format: Annotated[
+        str, choices.QUERY_FORMATS.option("--format", "-f", help="table, csv, json or ids.", metavar="FORMAT")
+    ] = "table",
+) -> None:
+    """Print the rows of a data set's index that satisfy a condition, sorted by twin."""
+    from manitwin.errors import UsageError
+
+    if format == "ids" and columns is not None:
+        raise UsageError("format ids prints twins' ids alone; leave out --columns, or choose another format")
+    from manitwin.dataset.index.query import Index
+
+    names = [name.strip() for name in columns.split(",")] if columns is not None else None
+    if names is None and format == "table":
+        names = list(SHOWN.get(table, ())) or None
+    if format == "ids":
+        names = ["twin_id"]
+    rows = Index(dataset).select(table, where or (), columns=names, limit=limit)
+    try:
+        WRITERS[format](rows, sys.stdout)
+        sys.stdout.flush()
+    except BrokenPipeError:  # `| head` has seen enough; Python flushes once more at its end (its manual, "SIGPIPE")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _write_table(rows: pa.Table, stream: TextIO) -> None:
+    """Write columns side by side; a terminal's width cuts the widest ones, into a file or pipe they go whole."""
+    lines = [rows.column_names, *([_shown(value) for value in row.values()] for row in rows.to_pylist())]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
+    room = out_console.width - 2 * (len(widths) - 1) if out_console.is_terminal else sum(widths)
+    while sum(widths) > room and max(widths) > NARROWEST:
+        widths[widths.index(max(widths))] -= 1
+    for line in lines:
+        cells = (_cut(cell, width).ljust(width) for cell, width in zip(line, widths, strict=True))
+        stream.write("  ".join(cells).rstrip() + "\n")
+    stream.write(f"{len(rows)} rows\n")
+
+
+def _cut(cell: str, width: int) -> str:
+    return cell if len(cell) <= width else cell[: width - 1] + "…"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, list):
+        return json.dumps([float(f"{v:.4g}") if isinstance(v, float) else v for v in value])
+    return "" if value is None else " ".join(str(value).split())
+
+
+def _write_csv(rows: pa.Table, stream: TextIO) -> None:
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(rows.column_names)
+    for batch in rows.to_batches(max_chunksize=4096):
+        for row in batch.to_pylist():
+            writer.writerow([json.dumps(value) if isinstance(value, list) else value for value in row.values()])
+
+
+def _write_json(rows: pa.Table, stream: TextIO) -> None:
+    """Write one array with one row a line, so that it can also be read line by line."""
+    before = "[\n"
+    for batch in rows.to_batches(max_chunksize=4096):
+        for row in batch.to_pylist():
+            stream.write(before + json.dumps(row, ensure_ascii=False))
+            before = ",\n"
+    stream.write("\n]\n" if len(rows) else "[]\n")
+
+
+def _write_ids(rows: pa.Table, stream: TextIO) -> None:
+    for twin_id in dict.fromkeys(rows["twin_id"].to_pylist()):
+        stream.write(f"{twin_id}\n")
+
+
+WRITERS: dict[str, Callable[[pa.Table, TextIO], None]] = {
+    "table": _write_table,
+    "csv": _write_csv,
+    "json": _write_json,
+    "ids": _write_ids,
+}

@@ -1,0 +1,69 @@
+"""``manitwin render``: pictures of recorded episodes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import err_console, out_console, print_error
+from manitwin.cli.why import print_causes
+
+
+def render(
+    episodes: Annotated[
+        Path,
+        typer.Argument(
+            help="What `manitwin trajectories` wrote.",
+            metavar="EPISODES",
+            callback=choices.must_exist("the folder that manitwin trajectories wrote"),
+        ),
+    ],
+    cameras: Annotated[str | None, choices.CAMERAS.option(help="By commas: front, side, top, wrist.")] = None,
+    size: Annotated[int | None, typer.Option(help="Width and height of a picture in pixels.")] = None,
+    codec: Annotated[
+        str | None, choices.CODECS.option(help="vp9 (plays in browsers), or mpeg4 (quicker to write).")
+    ] = None,
+    twins: options.Twins = None,
+    config: options.Config = None,
+    jobs: options.Jobs = None,
+    executor: options.Executor = "local",
+    address: options.Address = None,
+) -> None:
+    """Draw the kept episodes by showing their states again, and add the films to the LeRobot data set."""
+    from manitwin.scenes.app_config import PicturesConfig, load_app_config
+
+    names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
+    given = {"cameras": names, "size_px": size, "codec": codec, "run": options.run_settings(jobs)}
+    settings = load_app_config(PicturesConfig, config, given)
+    from manitwin.cli.watched_run import WatchedRun
+    from manitwin.episodes.render_run import PICTURES, draw_episodes, write_with_pictures
+    from manitwin.episodes.video import require_encoder
+    from manitwin.pipeline.dataset_run import local_log
+    from manitwin.render.device import require_renderer
+    from manitwin.twin.dataset_root import DatasetRoot
+
+    if executor != "ray":
+        require_renderer()
+        require_encoder(settings.codec)
+    with WatchedRun("batches", lambda: local_log(DatasetRoot(episodes / PICTURES))) as watched:
+        report = draw_episodes(
+            episodes, settings, twins=twins, executor=options.executor_name(executor), address=address,
+            on_start=watched.start, on_stage=watched.progress.stage, on_ended=watched.progress.item_ended,
+        )  # fmt: skip
+    if report.exit_code == 4:
+        if report.stopped:
+            print_error(f"stopped: {report.stopped}")
+        print_causes(f"{episodes}/pictures")
+        if report.open:
+            err_console.print(
+                f"manitwin status {episodes}/pictures says more; run the same command again", markup=False
+            )
+        raise typer.Exit(4)
+    written = write_with_pictures(episodes, settings.cameras)
+    out_console.print(
+        f"{written.episodes} episodes, {written.frames} frames, {len(settings.cameras)} cameras: {episodes}/lerobot",
+        markup=False,
+    )

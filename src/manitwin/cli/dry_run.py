@@ -1,0 +1,192 @@
+"""What a build or a run would do, and about what it would cost: everything is read, nothing is written."""
+
+from __future__ import annotations
+
+import tempfile
+from collections import Counter
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, get_args
+
+from manitwin.config import BuildConfig
+from manitwin.engine.ledger.ledger import LEDGER, Ledger
+from manitwin.engine.recipe import Recipe
+from manitwin.engine.stage import Item
+from manitwin.errors import Rejected
+from manitwin.formats.image_file import check_header
+from manitwin.pipeline.dataset_run import copy_ledger
+from manitwin.pipeline.recipe import TwinRecipe, estimate_usd
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.store import RECORD
+
+CHAIN_CPU_S = 13.8
+SECOND_ENGINE_CPU_S = 11.1
+ROBUSTNESS_CPU_S = 26.7
+TRIALS_CPU_S = 6.1
+"""Medians of 25 real meshes (docs/measured.md, "Twins of 25 meshes"): the whole chain with ``--quick``, what the second engine
+and robustness add for each gripper, and the trials that each further gripper adds. A generator's own work is not in them."""
+ENOUGH_ITEMS = 3
+"""So many accepted items must there be before a data set's own rate is believed."""
+MEASURED = "docs/measured.md, the median of 25 meshes"
+
+RecordOf = Callable[[str], bytes | None]
+PlannedState = Literal["to_build", "accepted", "rejected", "failed", "would_be_rejected", "duplicate"]
+PLANNED_STATES: tuple[PlannedState, ...] = get_args(PlannedState)
+
+
+@dataclass(frozen=True)
+class PlannedItem:
+    """One input: ``accepted`` and ``rejected`` are there already, ``failed`` waits for ``manitwin retry``.
+
+    ``would_be_rejected`` is what it would be as it is read. ``twin_id`` and ``kind`` are None where it failed before they were
+    known.
+    """
+
+    item: Item
+    twin_id: str | None
+    kind: str | None
+    state: PlannedState
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Rate:
+    """CPU seconds that an item of a kind takes, and whose figure that is."""
+
+    cpu_s: float
+    source: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What would be done. ``rates`` is by kind of input; results of single stages that are there are not taken off."""
+
+    items: list[PlannedItem]
+    rates: dict[str, Rate]
+    usd_each: dict[str, float]
+    remarks: list[str] = field(default_factory=list)
+
+    def count(self, state: PlannedState) -> int:
+        """Return how many items are in a state."""
+        return sum(planned.state == state for planned in self.items)
+
+    @property
+    def to_build(self) -> Counter[str]:
+        """Return how many items would be built, by the kind of their input."""
+        return Counter(planned.kind for planned in self.items if planned.state == "to_build" and planned.kind)
+
+    @property
+    def cpu_s(self) -> float:
+        """Estimate the CPU time (s) of what would be built."""
+        return sum((number * self.rates[kind].cpu_s for kind, number in self.to_build.items()), 0.0)
+
+    @property
+    def cost_usd(self) -> float:
+        """Estimate what services would charge for it (USD)."""
+        return sum((number * self.usd_each[kind] for kind, number in self.to_build.items()), 0.0)
+
+
+def plan_build(items: Iterable[Item], out: Path, config: BuildConfig, remarks: list[str]) -> Plan:
+    """Say what ``build`` would make of items in the folder ``out``."""
+    recipe, usd = TwinRecipe(config), estimate_usd(config)
+
+    def record_of(twin_id: str) -> bytes | None:
+        path = out / twin_id / RECORD
+        return path.read_bytes() if path.is_file() else None
+
+    planner = _Planner(recipe, config, record_of)
+    planned = [planner.plan(item) for item in items]
+    return Plan(planned, dict.fromkeys(usd, measured_rate(config)), usd, remarks)
+
+
+def plan_run(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, remarks: list[str]) -> Plan:
+    """Say what ``run`` would do for a data set: all its items, and new ones. Its ledger is read, a copy is worked on.
+
+    ``remarks`` is filled while the items are read.
+    """
+    recipe, usd = TwinRecipe(config), estimate_usd(config)
+
+    def record_of(twin_id: str) -> bytes | None:
+        name = f"{recipe.folder_of(twin_id)}/{RECORD}"
+        return root.read_bytes(name) if root.exists(name) else None
+
+    with tempfile.TemporaryDirectory(prefix="manitwin-dry-run-") as scratch:
+        copy = Path(scratch) / LEDGER
+        copy_ledger(root, copy)
+        ledger = Ledger(copy)
+        try:
+            ledger.add_items(items)
+            rates = {kind: own_rate(ledger, kind, recipe.sha256) or measured_rate(config) for kind in usd}
+            ledger.begin_run(recipe.sha256)  # opens again what a run would open again
+            return Plan(_planned_by(ledger, _Planner(recipe, config, record_of)), rates, usd, remarks)
+        finally:
+            ledger.close()
+
+
+def _planned_by(ledger: Ledger, planner: _Planner) -> list[PlannedItem]:
+    """Plan what is open; what has ended is as the ledger says, since a run does not look at it again."""
+    rows = ledger.connection.execute(
+        "SELECT number, twin_id, kind, state, reason, detail FROM items ORDER BY number"
+    ).fetchall()
+    planner.seen.update(twin_id for _, twin_id, _, state, _, _ in rows if twin_id is not None and state != "open")
+    planned = []
+    for number, twin_id, kind, state, reason, detail in rows:
+        item = ledger.item(number)
+        if state == "open":
+            planned.append(planner.plan(item))
+            continue
+        said = f"{reason}: {detail}" if state == "rejected" else detail
+        planned.append(PlannedItem(item, twin_id, kind, state, said or ""))
+    return planned
+
+
+def measured_rate(config: BuildConfig) -> Rate:
+    """Return what an item takes by the published measurements, for these grippers and engines."""
+    grippers = len(config.grippers)
+    each = SECOND_ENGINE_CPU_S * config.second_opinion.enabled + ROBUSTNESS_CPU_S * config.robustness.enabled
+    return Rate(CHAIN_CPU_S + TRIALS_CPU_S * (grippers - 1) + each * grippers, MEASURED)
+
+
+def own_rate(ledger: Ledger, kind: str, recipe_sha256: str) -> Rate | None:
+    """Return what accepted items of a kind took in this data set under the same recipe; None where they are too few."""
+    number, total = ledger.connection.execute(
+        "SELECT count(DISTINCT i.number), coalesce(sum(s.cpu_seconds), 0) FROM items i JOIN stages s ON s.number = i.number"
+        " WHERE i.state = 'accepted' AND i.kind = ? AND i.recipe_sha256 = ?",
+        (kind, recipe_sha256),
+    ).fetchone()
+    if number < ENOUGH_ITEMS:
+        return None
+    return Rate(total / number, f"the mean of {number} accepted items of this data set")
+
+
+class _Planner:
+    """Says of one input after the other what would be made of it; ``seen`` are the ids of twins that have their item."""
+
+    def __init__(self, recipe: Recipe, config: BuildConfig, record_of: RecordOf):
+        self._recipe, self._config, self._record_of = recipe, config, record_of
+        self.seen: set[str] = set()
+
+    def plan(self, item: Item) -> PlannedItem:
+        identity = self._recipe.identify(item)
+        twin_id, kind = identity.twin_id, identity.kind
+        if twin_id in self.seen:
+            return PlannedItem(item, twin_id, kind, "duplicate", "the same input as another one")
+        self.seen.add(twin_id)
+        record = self._record_of(twin_id)
+        ending = None if record is None else self._recipe.ending_of(record)
+        if ending is not None:
+            detail = f"{ending.reason}: {ending.detail}" if ending.reason else ending.detail
+            return PlannedItem(item, twin_id, kind, ending.status, detail)
+        refused = identity.rejected or _refused_by_header(item, kind, self._config)
+        state: PlannedState = "to_build" if refused is None else "would_be_rejected"
+        return PlannedItem(item, twin_id, kind, state, "" if refused is None else str(refused))
+
+
+def _refused_by_header(item: Item, kind: str, config: BuildConfig) -> Rejected | None:
+    if kind == "image" and item.file is not None:
+        try:
+            check_header(Path(item.file), frame=config.matting.frame)
+        except Rejected as answer:
+            return answer
+    return None

@@ -1,0 +1,148 @@
+"""What is there and what is missing on this machine."""
+
+from __future__ import annotations
+
+import shutil
+import sys
+import sysconfig
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from manitwin.errors import ManiTwinError
+from manitwin.formats.shared_libraries import missing_libraries, package_by_policy
+
+PACKAGES = (
+    "sapien",
+    "mujoco",
+    "trimesh",
+    "embreex",
+    "manifold3d",
+    "numpy",
+    "scipy",
+    "opencv-python",
+    "pyarrow",
+    "usd-core",
+    "pycollada",
+)
+MIN_FREE_GB = 2
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at."""
+
+    name: str
+    ok: bool
+    detail: str
+
+
+def examine() -> list[Finding]:
+    """Look at Python, the packages, what they want of the system, physics, the renderer, the backends and the disk."""
+    looks: tuple[tuple[str, Callable[[], str]], ...] = (
+        ("python", _python),
+        ("packages", _packages),
+        ("shared libraries", _shared_libraries),
+        ("physics", _physics),
+        ("second engine", _second_engine),
+        ("grippers", _grippers),
+        ("ray casting", _ray_casting),
+        ("renderer", _renderer),
+        ("backends", _backends),
+        ("disk", _disk),
+    )
+    return [_look(name, look) for name, look in looks]
+
+
+def _look(name: str, look: Callable[[], str]) -> Finding:
+    try:
+        return Finding(name, True, look())
+    except (ManiTwinError, ImportError, RuntimeError, OSError) as error:
+        return Finding(name, False, " ".join(str(error).split()))
+
+
+def _python() -> str:
+    return f"{sys.version.split()[0]} at {sys.executable}"
+
+
+def _packages() -> str:
+    missing, found = [], []
+    for package in PACKAGES:
+        try:
+            found.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            missing.append(package)
+    if missing:
+        raise ImportError(f"{', '.join(missing)} not installed; run: make setup")
+    return ", ".join(found)
+
+
+def _shared_libraries() -> str:
+    places = sorted({sysconfig.get_path("platlib"), sysconfig.get_path("purelib")})
+    missing = sorted({library for place in places for library in missing_libraries(Path(place))})
+    if missing:
+        packages = " ".join(sorted({package_by_policy(library) for library in missing}))
+        raise ImportError(
+            f"{', '.join(missing)} not found by the loader; on Debian and Ubuntu they are in packages of such names: {packages}"
+            " (apt-file search finds others)"
+        )
+    return "the loader finds all that the installed packages want"
+
+
+def _physics() -> str:
+    import sapien
+    import sapien.physx
+
+    scene = sapien.Scene([sapien.physx.PhysxCpuSystem()])
+    scene.step()
+    return f"SAPIEN {sapien.__version__} steps a scene (PhysX on the CPU)"
+
+
+def _second_engine() -> str:
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    mujoco.mj_step(model, mujoco.MjData(model))
+    return f"MuJoCo {mujoco.__version__} steps a scene"
+
+
+def _grippers() -> str:
+    from manitwin.robots.grippers.gripper import load_gripper, shipped_grippers
+
+    usable, left_out = [], []
+    for name in shipped_grippers():
+        try:
+            usable.append(load_gripper(name).name)
+        except ManiTwinError as error:  # a hand whose files come with an extra
+            left_out.append(str(error))
+    return "; ".join([", ".join(usable), *left_out])
+
+
+def _ray_casting() -> str:
+    import trimesh
+    from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+    hit = RayMeshIntersector(trimesh.creation.box()).intersects_any([[0, 0, 2]], [[0, 0, -1]])
+    if not hit.all():
+        raise RuntimeError("embree misses a box that is there; reinstall embreex")
+    return "embree hits what it should"
+
+
+def _renderer() -> str:
+    from manitwin.render.device import renderer_summary
+
+    return renderer_summary()
+
+
+def _backends() -> str:
+    from manitwin.models.registry import backends
+
+    return "; ".join(f"{kind}: {', '.join(sorted(names))}" for kind, names in sorted(backends().items()))
+
+
+def _disk() -> str:
+    free = shutil.disk_usage(Path.cwd()).free / 1e9
+    if free < MIN_FREE_GB:
+        raise OSError(f"{free:.1f} GB free here; a thousand twins want about 10 GB")
+    return f"{free:.0f} GB free here"

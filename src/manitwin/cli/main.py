@@ -1,0 +1,178 @@
+"""The command line: one twin or many, a data set, and what is asked of both.
+
+Exit status: 0 all accepted, 3 some rejected, 4 some unfinished and resumable, 2 wrong use or configuration,
+130 interrupted where nothing can be resumed.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli.choices import must_exist
+from manitwin.cli.commands.audit import audit
+from manitwin.cli.commands.build import build
+from manitwin.cli.commands.check import check
+from manitwin.cli.commands.completion import COMPLETION_VARIABLE, PROGRAM, completion, completion_init
+from manitwin.cli.commands.doctor import doctor
+from manitwin.cli.commands.export import export
+from manitwin.cli.commands.fake import fake
+from manitwin.cli.commands.import_ import import_
+from manitwin.cli.commands.index import index
+from manitwin.cli.commands.layout import layout
+from manitwin.cli.commands.prompts import prompts
+from manitwin.cli.commands.publish import publish
+from manitwin.cli.commands.query import query
+from manitwin.cli.commands.render import render
+from manitwin.cli.commands.retry import retry
+from manitwin.cli.commands.run import run
+from manitwin.cli.commands.stats import stats
+from manitwin.cli.commands.status import status
+from manitwin.cli.commands.trajectories import trajectories
+from manitwin.cli.console import error_console, out_console
+from manitwin.cli.interrupt import Interrupts
+from manitwin.cli.json_output import CommandLineError, Json, asked_for_json, print_document, print_failure
+from manitwin.cli.reporting import LOG, Quiet, Verbose, reported, say_as_told
+from manitwin.cli.run_log import end_log
+from manitwin.errors import BackendError, ManiTwinError, Unavailable
+from manitwin.formats.shared_libraries import import_remedy, names_shared_library
+from manitwin.twin.version import installed_version
+
+TYPER_INTERRUPTED = 130
+"""What typer returns where it caught a KeyboardInterrupt by itself."""
+
+_interrupts = Interrupts()
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        out_console.print(f"{PROGRAM} {installed_version()}", markup=False)
+        raise typer.Exit
+
+
+@app.callback(invoke_without_command=True)
+def _manitwin(
+    context: typer.Context,
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version, and end.", callback=_print_version, is_eager=True)
+    ] = False,
+    verbose: Verbose = False,
+    quiet: Quiet = False,
+) -> None:
+    """Turn photos, texts and meshes into data-generation-ready digital twins."""
+    _interrupts.command = context.invoked_subcommand or ""
+    say_as_told(verbose, quiet)
+    if context.invoked_subcommand is None:
+        out_console.print(context.get_help(), markup=False)
+
+
+for watched in (build, run, layout, trajectories, render):
+    app.command()(reported(watched, own_log=True))
+for making in (index, stats, publish, export):
+    app.command()(reported(making))
+app.command("import")(reported(import_))
+for other in (status, retry, check, query, doctor, fake, prompts, audit, completion):
+    app.command()(other)
+
+
+@app.command()
+def show(
+    twin: Annotated[
+        Path,
+        typer.Argument(help="A twin folder.", metavar="TWIN", callback=must_exist("a folder that manitwin build made")),
+    ],
+    json_: Json = False,
+) -> None:
+    """Print a readable summary of a twin, after checking its files."""
+    from manitwin.api import load
+    from manitwin.cli.documents import show_document
+    from manitwin.cli.summary import print_summary
+
+    loaded = load(twin, verify=True)
+    if json_:
+        print_document(show_document(loaded))
+    else:
+        print_summary(loaded, out_console)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON Schema of twin.json."""
+    from manitwin.api import schema as record_schema
+
+    sys.stdout.write(json.dumps(record_schema(), indent=1) + "\n")
+
+
+def _told(error: Exception) -> tuple[int, str]:
+    """Tell who asked for JSON of an error, and return its exit status and the line that a person reads."""
+    path = f"{PROGRAM} {_interrupts.command}".rstrip()
+    if isinstance(error, CommandLineError):
+        message = getattr(error, "format_message", error.__str__)()
+        message = f"{message.removesuffix('.')}{'' if message.endswith('?') else '.'} See {path} --help"
+    else:
+        message = str(error)
+    status = 4 if isinstance(error, BackendError) else 2
+    if asked_for_json(error):
+        print_failure(error, message, status)
+    return status, f"{path}: {' '.join(message.split())}"
+
+
+def _run() -> int:
+    """Run what the command line says and return the exit status; every error is one line."""
+    try:
+        status = app(prog_name=PROGRAM, standalone_mode=False)
+        if status == TYPER_INTERRUPTED:
+            raise KeyboardInterrupt
+        return int(status or 0)
+    except (KeyboardInterrupt, typer.Abort) as error:
+        LOG.warning("interrupted")
+        if asked_for_json(error):
+            print_failure(error, _interrupts.message, _interrupts.status)
+        _interrupts.say()
+        return _interrupts.status
+    except (CommandLineError, ManiTwinError) as error:
+        LOG.debug("the error came from here", exc_info=error)
+        code, line = _told(error)
+        error_console.print(line, markup=False, style="red")
+        return code
+    except ImportError as error:
+        if not names_shared_library(error):
+            LOG.exception("a defect in manitwin")
+            raise
+        LOG.debug("the error came from here", exc_info=error)
+        code, line = _told(Unavailable(f"{error}: {import_remedy(error, '')}"))
+        error_console.print(line, markup=False, style="red")
+        return code
+    except Exception:
+        LOG.exception("a defect in manitwin")
+        raise
+
+
+def main() -> None:
+    """Run the command line."""
+    global _interrupts
+    _interrupts = Interrupts()
+    _interrupts.listen()
+    if COMPLETION_VARIABLE in os.environ:
+        completion_init()
+    try:
+        status = _run()
+        LOG.info("ends with exit status %d", status)
+        _interrupts.ending(status)
+    except KeyboardInterrupt:  # as the first interrupt came while an error was said
+        _interrupts.say()
+        status = _interrupts.status
+        _interrupts.ending(status)
+    finally:
+        end_log()
+    sys.exit(status)
+
+
+if __name__ == "__main__":
+    main()

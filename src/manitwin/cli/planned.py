@@ -1,0 +1,71 @@
+"""``--dry-run``: what a command would do, for a person or a program; nothing is written."""
+
+from __future__ import annotations
+
+from collections import Counter
+from datetime import timedelta
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manitwin.cli.console import err_console, out_console
+from manitwin.cli.json_output import print_document
+
+if TYPE_CHECKING:
+    from manitwin.cli.dry_run import Plan, PlannedItem
+    from manitwin.engine.stage import Item
+
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="Say what would be done, and about what it would cost; write nothing.")
+]
+MOST_LINES = 50
+WORDS = {
+    "to_build": "to build",
+    "accepted": "accepted already",
+    "rejected": "rejected already",
+    "failed": "failed already",
+    "would_be_rejected": "would be rejected",
+    "duplicate": "the same again",
+}
+
+
+def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:
+    """Print a plan: its items, how many are in each state, and the estimates with their source."""
+    for remark in plan.remarks:
+        err_console.print(remark, markup=False)
+    if as_json:
+        from manitwin.cli.documents import plan_document
+
+        print_document(plan_document(plan, place))
+        return
+    for planned in plan.items[:MOST_LINES]:
+        out_console.print(_line(planned), markup=False)
+    if len(plan.items) > MOST_LINES:
+        out_console.print(f"... and {len(plan.items) - MOST_LINES} more (--json tells them all)", markup=False)
+    counts: Counter[str] = Counter(planned.state for planned in plan.items)
+    told = ", ".join(f"{counts[state]} {words}" for state, words in WORDS.items() if counts[state])
+    out_console.print(f"dry run, nothing is written: {told or 'nothing to do'}", markup=False)
+    if counts["failed"]:
+        out_console.print(f"what failed is not tried again by itself: manitwin retry {place}", markup=False)
+    each = "; ".join(
+        f"{number} {kind} of {plan.rates[kind].cpu_s:.1f} CPU-s ({plan.rates[kind].source})"
+        for kind, number in plan.to_build.items()
+    )
+    out_console.print(
+        f"about {timedelta(seconds=round(plan.cpu_s))} of CPU time{f': {each}' if each else ''}", markup=False
+    )
+    out_console.print(f"services charge about {plan.cost_usd:.2f} USD", markup=False)
+
+
+def _line(planned: PlannedItem) -> str:
+    from manitwin.engine.events import title
+
+    item = planned.item
+    given = _given(item, planned.kind)
+    detail = f": {planned.detail}" if planned.detail else ""
+    return f"{WORDS[planned.state]:<17} {planned.kind or '?':<5} {title(item)}{f' ({given})' if given else ''}{detail}"
+
+
+def _given(item: Item, kind: str | None) -> str:
+    units = f"units {item.units}" if kind == "mesh" else ""
+    return ", ".join(filter(None, (item.name or "no name", units)))

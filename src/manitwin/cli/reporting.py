@@ -1,0 +1,73 @@
+"""How much a command says, and where it leaves a log: the options of every command that makes something."""
+
+from __future__ import annotations
+
+import inspect
+import logging
+import sys
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from manitwin.cli.console import be_quiet, be_verbose
+from manitwin.cli.run_log import begin_log
+from manitwin.errors import UsageError
+from manitwin.twin.version import installed_version
+
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="Say more: stages and their seconds, what was chosen and why.")
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say nothing but errors.")]
+LogFile = Annotated[
+    Path | None,
+    typer.Option("--log", help="Append what is said, with times, to this file.", metavar="FILE", dir_okay=False),
+]
+OPTIONS = {"verbose": (Verbose, False), "quiet": (Quiet, False), "log": (LogFile, None)}
+LOG = logging.getLogger("manitwin.command")
+
+_before_command = (False, False)
+
+
+def say_as_told(verbose: bool, quiet: bool) -> None:
+    """Take what stands before a command's name; ``reported`` adds what stands behind it."""
+    global _before_command
+    _before_command = (verbose, quiet)
+    _say(verbose, quiet)
+
+
+def _say(verbose: bool, quiet: bool) -> None:
+    if verbose and quiet:
+        raise UsageError("--verbose and --quiet contradict each other; give one of them")
+    be_quiet(quiet)
+    be_verbose(verbose)
+
+
+def reported(command: Callable[..., None], own_log: bool = False) -> Callable[..., None]:
+    """Return a command that takes ``--verbose``, ``--quiet`` and ``--log`` as well.
+
+    ``own_log``: it has a place for its log (``log_into``); of another command nothing is kept without ``--log``.
+    """
+
+    @wraps(command)
+    def call(*, verbose: bool, quiet: bool, log: Path | None, **given: Any) -> None:
+        global _before_command
+        before, _before_command = _before_command, (False, False)
+        _say(verbose or before[0], quiet or before[1])
+        try:
+            begin_log(log, place_follows=own_log)
+            LOG.info("manitwin %s: %s", installed_version(), " ".join(sys.argv[1:]))
+            command(**given)
+        finally:
+            _say(False, False)  # a process may run more commands than one
+
+    signature = inspect.signature(command, eval_str=True)
+    added = [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+        for name, (annotation, default) in OPTIONS.items()
+    ]
+    call.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *added])  # type: ignore[attr-defined]
+    call.__annotations__ = {**command.__annotations__, **{name: each for name, (each, _) in OPTIONS.items()}}
+    return call

@@ -1,0 +1,1 @@
+"""Many twins: index, queries, statistics, publication."""

@@ -1,0 +1,137 @@
+"""Batches of point clouds with grasps, for learners."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from typing import Any, Literal
+
+import numpy as np
+import pyarrow as pa
+
+from manitwin.dataset.index.query import Index, grasps_of, sql_texts
+from manitwin.dataset.index.rows import VISUAL, surface
+from manitwin.dataset.index.twin_files import local_files
+from manitwin.errors import UsageError, choose_from
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.geometry.sampling import sample_surface
+
+_COLUMNS = ("twin_id", "gripper", "position_m", "quaternion_wxyz", "verified")
+_USUAL = "NOT retired AND NOT suffix(proposer, ':unfiltered') AND NOT suffix(proposer, ':jittered')"
+
+
+def batches(
+    index: Index,
+    twins: pa.Table,
+    size: int,
+    *,
+    points: int,
+    grasps: int,
+    verified_only: bool,
+    framework: Literal["numpy", "torch"],
+    seed: int,
+) -> Iterator[dict[str, Any]]:
+    """Yield the twins (columns ``twin_id, category, gripper``) once, in an order by the seed, as dicts of arrays.
+
+    ``points (N, P, 3) float32`` m, uniform by area on the visual mesh, in the object frame; ``grasps (N, G, 4, 4) float32``
+    ``gripper_to_object``; ``mask (N, G) bool``, where there is a grasp (elsewhere the identity stands); ``verified
+    (N, G) bool``; ``twin_ids``, a list of N. torch tensors where the framework is torch.
+    Grasps are those of the twin's own gripper, drawn at random where there are more than G, without retired ones, the
+    unfiltered sample and the jittered controls; with ``verified_only`` those alone that held. What is drawn for a twin depends
+    on the seed and its id alone, not on the batch. Raises UsageError for sizes below 1, an unknown framework or one that is
+    not installed, and TwinError for a mesh that cannot be read.
+    """
+    for name, value in (("size", size), ("points", points), ("grasps", grasps)):
+        if value < 1:
+            raise UsageError(f"{name} is {value}; give 1 or more")
+    convert = _converter(framework)
+    order = np.random.default_rng(seed).permutation(len(twins))
+    return _batches(
+        index,
+        twins,
+        [order[i : i + size] for i in range(0, len(order), size)],
+        points,
+        grasps,
+        verified_only,
+        seed,
+        convert,
+    )
+
+
+def _batches(
+    index: Index,
+    twins: pa.Table,
+    chunks: list[np.ndarray],
+    points: int,
+    grasps: int,
+    verified_only: bool,
+    seed: int,
+    convert: Callable[[np.ndarray], Any],
+) -> Iterator[dict[str, Any]]:
+    for chunk in chunks:
+        some = twins.take(pa.array(chunk))
+        ids = some["twin_id"].to_pylist()
+        found = _grasps(index, some, verified_only)
+        rngs = [_rng(seed, twin_id) for twin_id in ids]
+        clouds = [_cloud(index, twin_id, points, rng) for twin_id, rng in zip(ids, rngs, strict=True)]
+        drawn = [_drawn(*found[twin_id], grasps, rng) for twin_id, rng in zip(ids, rngs, strict=True)]
+        poses, mask, verified = (np.stack(each) for each in zip(*drawn, strict=True))
+        arrays = {"points": np.stack(clouds), "grasps": poses, "mask": mask, "verified": verified}
+        yield {
+            **{name: convert(array) for name, array in arrays.items()},
+            "twin_ids": ids,
+        }
+
+
+def _converter(framework: str) -> Callable[[np.ndarray], Any]:
+    if framework == "numpy":
+        return lambda array: array
+    if framework != "torch":
+        raise UsageError(choose_from("framework", framework, ("numpy", "torch")))
+    try:
+        from torch import from_numpy
+    except ImportError as error:
+        raise UsageError("framework torch: PyTorch is not installed; run pip install torch, or take numpy") from error
+    convert: Callable[[np.ndarray], Any] = from_numpy
+    return convert
+
+
+def _rng(seed: int, twin_id: str) -> np.random.Generator:
+    return np.random.default_rng(list(hashlib.sha256(f"{seed}:{twin_id}".encode()).digest()))
+
+
+def _cloud(index: Index, twin_id: str, count: int, rng: np.random.Generator) -> np.ndarray:
+    with local_files(index.root, twin_id, (VISUAL,)) as folder:
+        return sample_surface(surface(folder / VISUAL), count, rng)[0].astype(np.float32)
+
+
+def _grasps(index: Index, twins: pa.Table, verified_only: bool) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Return the poses ``(n, 4, 4)`` and verdicts ``(n,)`` of each twin's grasps by its id."""
+    gripper_of = dict(zip(twins["twin_id"].to_pylist(), twins["gripper"].to_pylist(), strict=True))
+    where = [
+        *grasps_of(twins),
+        f"gripper IN ({sql_texts(sorted(set(gripper_of.values())))})",
+        _USUAL,
+        *(["verified"] if verified_only else []),
+    ]
+    rows = index.select("grasps", where, columns=_COLUMNS)
+    # copies: arrays over Arrow's memory are read-only, which scipy refuses
+    positions = np.array(rows["position_m"].combine_chunks().flatten()).reshape(-1, 3)
+    quaternions = np.array(rows["quaternion_wxyz"].combine_chunks().flatten()).reshape(-1, 4)
+    poses = np.tile(np.eye(4), (len(rows), 1, 1))
+    poses[:, :3, :3], poses[:, :3, 3] = rotation_from_quaternion_wxyz(quaternions), positions
+    verified = rows["verified"].to_numpy(zero_copy_only=False).astype(bool)
+    ids, grippers = (rows[name].to_numpy(zero_copy_only=False).astype(str) for name in ("twin_id", "gripper"))
+    own = {twin_id: (ids == twin_id) & (grippers == gripper) for twin_id, gripper in gripper_of.items()}
+    return {twin_id: (poses[which], verified[which]) for twin_id, which in own.items()}
+
+
+def _drawn(
+    poses: np.ndarray, verified: np.ndarray, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return ``count`` grasps, filled up with the identity, where there is one, and which of them held."""
+    chosen = np.sort(rng.choice(len(poses), count, replace=False)) if len(poses) > count else np.arange(len(poses))
+    filled = np.tile(np.eye(4, dtype=np.float32), (count, 1, 1))
+    mask, held = np.zeros(count, bool), np.zeros(count, bool)
+    filled[: len(chosen)], mask[: len(chosen)], held[: len(chosen)] = poses[chosen], True, verified[chosen]
+    return filled, mask, held

@@ -1,0 +1,145 @@
+"""Write an index as a run goes: every twin is in exactly one part, so that readers need no joins.
+
+A part is written file by file and counts from when ``parts.json`` names it; a crash at any moment leaves the old list or the
+new one. Files that no list names are ignored, and removed by the next write. There is one writer at a time: the calls come
+from one worker process after the other, never two at once, and nothing here locks. Readers may read meanwhile: the files of
+the list before stay until the next write.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+from math import log
+
+import pyarrow as pa
+
+from manitwin.dataset.index.merge import PART_ROWS, file_system, files_of, merged, read_rows, twin_ids, write_rows
+from manitwin.dataset.index.part_list import Part, PartList, in_order_of_twins, read_part_list, sweep
+from manitwin.dataset.index.rows import FILES, rows_of
+from manitwin.dataset.index.tables import TABLES, joined
+from manitwin.dataset.index.twin_files import local_files
+from manitwin.twin.dataset_root import DatasetRoot
+
+MERGE_WIDTH = 8
+"""So many parts of one order of size are merged into one: a twin is written log8 times, and readers open few files."""
+
+
+class IndexTables:
+    """The index as the tables that a run keeps of its twins."""
+
+    def add(self, root: DatasetRoot, ids: Sequence[str]) -> None:
+        """Index finished twins, new or built again, as one more part."""
+        write_part(root, ids)
+
+    def merge(self, root: DatasetRoot) -> None:
+        """Merge all parts into few large ones."""
+        compact(root)
+
+
+def write_part(root: DatasetRoot, ids: Iterable[str]) -> Part | None:
+    """Index finished twins, new or built again, as one more part; returns it, or None where no ids are given.
+
+    A twin that an older part has is taken out of it: that part is written again, under another name. Where that makes
+    eight parts of about one size, they become one, and the part returned may be in that already. Raises TwinError for a
+    folder that cannot be read; the index then is what it was.
+    """
+    wanted = sorted(set(ids))
+    before = read_part_list(root) or PartList()
+    sweep(root, before)
+    if not wanted:
+        return None
+    writer = _Writer(root, before)
+    older = writer.parts_with(wanted)
+    writer.add(_joined(rows_of_twins(root, wanted)))
+    part = writer.parts[-1]
+    for each in older:
+        writer.replace([each], without=frozenset(wanted))
+    while alike := _alike(writer.parts):
+        writer.replace(alike)
+    writer.finish()
+    return part
+
+
+def compact(root: DatasetRoot) -> list[Part]:
+    """Merge all parts into few large ones that do not overlap; returns them. An index that is so already stays as it is."""
+    before = read_part_list(root) or PartList()
+    sweep(root, before)
+    if _is_compact(before):
+        return list(before.parts)
+    writer = _Writer(root, before)
+    writer.replace(list(before.parts))
+    after = writer.finish()
+    sweep(root, after)
+    return list(after.parts)
+
+
+def indexed_twins(root: DatasetRoot) -> dict[str, str]:
+    """Return the revision of every twin in the index by its id; empty where there is no index."""
+    parts = read_part_list(root) or PartList()
+    files, fs = files_of(root, parts.parts), file_system(root)
+    found: dict[str, str] = {}
+    for table in ("twins", "rejections") if parts.parts else ():
+        rows = read_rows(files, table, fs, columns=["twin_id", "revision"])
+        found |= dict(zip(rows["twin_id"].to_pylist(), rows["revision"].to_pylist(), strict=True))
+    return found
+
+
+def rows_of_twins(root: DatasetRoot, ids: Iterable[str]) -> Iterator[dict[str, pa.Table]]:
+    """Yield the rows of finished twins of a data set, one twin after the other; raises TwinError."""
+    for twin_id in ids:
+        with local_files(root, twin_id, FILES) as folder:
+            yield rows_of(folder)
+
+
+def _joined(rows: Iterator[dict[str, pa.Table]]) -> dict[str, pa.Table]:
+    each = list(rows)
+    return {table: joined(table, [tables[table] for tables in each]) for table in TABLES}
+
+
+def _is_compact(parts: PartList) -> bool:
+    """Tell whether the parts do not overlap and are as few as a merge would make them."""
+    ordered = parts.parts
+    apart = all(one.last < other.first for one, other in pairwise(ordered))
+    return apart and len(ordered) <= max(1, -(-parts.rows("grasps") // PART_ROWS))
+
+
+def _alike(parts: Sequence[Part]) -> list[Part]:
+    """Return parts of one order of size, where there are enough of them to merge; full ones are left alone."""
+    by_size: dict[int, list[Part]] = {}
+    for part in parts:
+        if part.rows["grasps"] < PART_ROWS // 2:
+            by_size.setdefault(int(log(sum(part.rows.values()), MERGE_WIDTH)), []).append(part)
+    return next((alike for alike in by_size.values() if len(alike) >= MERGE_WIDTH), [])
+
+
+class _Writer:
+    """The parts of an index while they change; nothing counts before ``finish``."""
+
+    def __init__(self, root: DatasetRoot, before: PartList):
+        self.root, self.fs = root, file_system(root)
+        self.parts, self.next = list(before.parts), before.next
+
+    def parts_with(self, ids: list[str]) -> list[Part]:
+        """Return the parts that have any of the ids (sorted)."""
+        near = [part for part in self.parts if part.first <= ids[-1] and ids[0] <= part.last] if ids else []
+        wanted = set(ids)
+        return [part for part in near if not wanted.isdisjoint(twin_ids(files_of(self.root, [part]), self.fs).tolist())]
+
+    def add(self, rows: dict[str, pa.Table]) -> None:
+        """Write rows as a part of their own."""
+        self.parts.append(write_rows(self.root, self.next, rows))
+        self.next += 1
+
+    def replace(self, parts: list[Part], without: frozenset[str] = frozenset()) -> None:
+        """Write the rows of parts again, merged, without those of some twins."""
+        grasps = sum(part.rows["grasps"] for part in parts)
+        for rows in merged(files_of(self.root, parts), self.fs, grasps, without=without):
+            self.add(rows)
+        self.parts = [part for part in self.parts if part not in parts]
+
+    def finish(self) -> PartList:
+        """Make these parts the index."""
+        after = PartList(in_order_of_twins(self.parts), self.next)
+        after.write(self.root)
+        return after

@@ -1,0 +1,116 @@
+"""Write the whole index again from the twins' folders alone, in several processes."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from pebble import ProcessExpired, ProcessPool
+from pyarrow.fs import LocalFileSystem
+
+from manitwin.dataset.index.merge import merged, write_rows
+from manitwin.dataset.index.part_list import INDEX, Part, PartList, in_order_of_twins, sweep
+from manitwin.dataset.index.parts import rows_of_twins
+from manitwin.dataset.index.tables import TABLES, joined, parquet
+from manitwin.engine.main_module import WorkerContext, hidden_main_module
+from manitwin.errors import TwinError
+from manitwin.twin.dataset_root import DatasetRoot
+
+CHUNK = 64
+"""Twins of a task: some seconds of work, some thousand rows."""
+
+
+@dataclass(frozen=True)
+class Rebuilt:
+    """The parts of a new index, and a line for every twin's folder that could not be read and is not in it."""
+
+    parts: list[Part]
+    unreadable: list[str]
+
+    def rows(self, table: str) -> int:
+        """Return how many rows a table has."""
+        return sum(part.rows[table] for part in self.parts)
+
+
+@dataclass(frozen=True)
+class _Read:
+    """What became of a task: its rows are in files."""
+
+    twins: int
+    grasps: int
+    unreadable: list[str]
+
+
+def rebuild(
+    root: DatasetRoot,
+    *,
+    jobs: int,
+    on_start: Callable[[int], None] = lambda twins: None,
+    on_read: Callable[[int], None] = lambda twins: None,
+) -> Rebuilt:
+    """Replace a data set's index by one made of its folders alone: the same rows as one that was written as the run went.
+
+    ``on_start`` is told how many twins there are, ``on_read`` how many more of them have been read. The old index stays until
+    the new one is whole. Raises TwinError where a worker process dies: nothing has changed then.
+    """
+    ids = list(root.twin_ids())
+    on_start(len(ids))
+    chunks = [ids[start : start + CHUNK] for start in range(0, len(ids), CHUNK)]
+    parts: list[Part] = []
+    unreadable: list[str] = []
+    number = _first_unused_number(root)
+    with hidden_main_module(), tempfile.TemporaryDirectory(prefix="manitwin-index-") as scratch:
+        grasps = 0
+        for read in _read_all(root, chunks, Path(scratch), jobs):
+            unreadable += read.unreadable
+            grasps += read.grasps
+            on_read(read.twins)
+        files = {table: sorted(map(str, Path(scratch).glob(f"{table}-*.parquet"))) for table in TABLES}
+        for rows in merged(files, LocalFileSystem(), grasps) if files["twins"] else ():
+            parts.append(write_rows(root, number + len(parts), rows))
+    after = PartList(in_order_of_twins(parts), number + len(parts))
+    after.write(root)
+    sweep(root, after)
+    return Rebuilt(parts, sorted(unreadable))
+
+
+def _first_unused_number(root: DatasetRoot) -> int:
+    """Return a number above those of all files: the old list may be lost, or of another version."""
+    stems = (PurePosixPath(name).stem for name in root.names_below(INDEX))
+    return max((int(stem) + 1 for stem in stems if stem.isdecimal()), default=0)
+
+
+def _read_all(root: DatasetRoot, chunks: list[list[str]], scratch: Path, jobs: int) -> Iterator[_Read]:
+    pool = ProcessPool(max_workers=jobs, context=WorkerContext())
+    try:
+        futures = [pool.schedule(_read, args=(root, chunk, scratch, number)) for number, chunk in enumerate(chunks)]
+        for chunk, future in zip(chunks, futures, strict=True):
+            try:
+                yield future.result()
+            except ProcessExpired as error:
+                raise TwinError(
+                    f"{root.url}: a process died (exit code {error.exitcode}) while it read twins {chunk[0]} to {chunk[-1]}; "
+                    f"run manitwin check {root.url}"
+                ) from error
+        pool.close()
+    finally:
+        pool.stop()
+        pool.join()
+
+
+def _read(root: DatasetRoot, ids: list[str], scratch: Path, number: int) -> _Read:
+    """Write the rows of twins to files in the scratch folder; runs in a worker process."""
+    each = []
+    unreadable = []
+    for twin_id in ids:
+        try:
+            each += list(rows_of_twins(root, [twin_id]))
+        except TwinError as error:
+            unreadable.append(str(error))
+    grasps = sum(len(rows["grasps"]) for rows in each)
+    for table in TABLES:
+        content = parquet(joined(table, [rows[table] for rows in each]))
+        (scratch / f"{table}-{number:06d}.parquet").write_bytes(content)
+    return _Read(len(ids), grasps, unreadable)

@@ -1,0 +1,95 @@
+"""Twins of a data set as a sequence: each is loaded when it is asked for."""
+
+from __future__ import annotations
+
+import operator
+import shutil
+import tempfile
+import weakref
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
+
+from manitwin.twin.dataset_root import DatasetRoot, twin_name
+
+if TYPE_CHECKING:  # SAPIEN and meshes are imported when a twin is loaded
+    from manitwin.twin.loaded_twin import Twin
+
+_SHOWN = 3
+
+
+class Twins(Sequence["Twin"]):
+    """Loaded twins, by their place: a slice is another such sequence, and reads no folder.
+
+    A twin is loaded anew each time that it is asked for; of a URL, its folder is a copy, which is removed with it. ``in``,
+    ``index`` and ``count`` take a twin or its id, and load none. Raises IndexError for a place that there is not, TwinError
+    for a folder that cannot be read.
+    """
+
+    def __init__(self, root: DatasetRoot, ids: Sequence[str]):
+        self._root, self._ids = root, ids
+
+    def ids(self) -> list[str]:
+        """Return the twins' ids, in this order."""
+        return list(self._ids)
+
+    def __repr__(self) -> str:
+        shown = ", ".join(self._ids[:_SHOWN]) + (", ..." if len(self._ids) > _SHOWN else "")
+        return f"Twins({self._root.url!r}, {len(self._ids)}: {shown})"
+
+    def __len__(self) -> int:
+        return len(self._ids)
+
+    @overload
+    def __getitem__(self, place: SupportsIndex) -> Twin: ...
+    @overload
+    def __getitem__(self, place: slice) -> Twins: ...
+    def __getitem__(self, place: SupportsIndex | slice) -> Twin | Twins:
+        if isinstance(place, slice):
+            return Twins(self._root, self._ids[place])
+        try:
+            twin_id = self._ids[operator.index(place)]
+        except IndexError:
+            count = len(self._ids)
+            valid = f"give {-count} to {count - 1}" if count else "there are none"
+            raise IndexError(f"no twin {place} of {count}; {valid}") from None
+        return load_twin(self._root, twin_id)
+
+    def __iter__(self) -> Iterator[Twin]:
+        return (load_twin(self._root, twin_id) for twin_id in self._ids)
+
+    def __reversed__(self) -> Iterator[Twin]:
+        return iter(self[::-1])
+
+    def __contains__(self, twin: object) -> bool:
+        return id_of(twin) in self._ids
+
+    def index(self, twin: Any, start: int = 0, stop: int | None = None) -> int:
+        """Return the first place of a twin, given itself or its id; raises ValueError where it is not among these."""
+        return self._ids.index(id_of(twin), *slice(start, stop).indices(len(self._ids))[:2])
+
+    def count(self, twin: Any) -> int:
+        """Return how often a twin, given itself or its id, is among these."""
+        return self._ids.count(id_of(twin))
+
+
+def id_of(twin: Any) -> str | None:
+    """Return the id of a twin that is given itself or by its id; None for anything else."""
+    return twin if isinstance(twin, str) else getattr(getattr(twin, "record", None), "twin_id", None)
+
+
+def load_twin(root: DatasetRoot, twin_id: str) -> Twin:
+    """Load a twin of a data set; of a URL, from a copy that is removed with it. Raises TwinError."""
+    from manitwin.twin.loaded_twin import Twin
+
+    if root.local is not None:
+        return Twin(root.local / twin_name(twin_id))
+    copy = Path(tempfile.mkdtemp(prefix="manitwin-")) / twin_id
+    try:
+        root.fetch_folder(twin_name(twin_id), copy)
+        twin = Twin(copy)
+    except BaseException:
+        shutil.rmtree(copy.parent, ignore_errors=True)
+        raise
+    weakref.finalize(twin, shutil.rmtree, copy.parent, ignore_errors=True)
+    return twin

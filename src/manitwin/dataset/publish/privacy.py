@@ -1,0 +1,63 @@
+"""What must not leave the house: folders of this machine, and the names of the people in them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from pathlib import Path, PurePosixPath
+
+from manitwin.errors import ManiTwinError, TwinError
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.record import TwinRecord
+from manitwin.twin.store import RECORD
+
+HOME_FOLDER = re.compile(rb"(?<![\w.\-])/(?:home|Users)/[^/\s\"]+/|\b[A-Za-z]:[\\/]+Users[\\/]")
+"""A folder of a person on Linux, macOS or Windows; in a web address a letter stands before the slash."""
+
+_TEXT = (".json", ".txt")
+
+
+def places_of(roots: Iterable[DatasetRoot]) -> tuple[bytes, ...]:
+    """Return the paths of local folders as they would be found in a file, with and without links resolved."""
+    local = [root.local for root in roots if root.local is not None]
+    found = {str(path) for folder in local for path in (folder.absolute(), folder.resolve())}
+    return tuple(sorted(f"{place}/".encode() for place in found if len(Path(place).parts) > 2))
+
+
+def check_source(record: TwinRecord) -> None:
+    """Raise TwinError where a record's source is not a name alone."""
+    file = record.source.file
+    if file != PurePosixPath(file).name or "\\" in file or file in ("", ".", ".."):
+        raise TwinError(f"{record.twin_id}/{RECORD}: source.file is {file!r}, not a file's name; build the twin again")
+
+
+def check_part(twin_id: str, part: str, content: bytes, places: tuple[bytes, ...]) -> None:
+    """Raise TwinError where a part of a twin names a local folder of the data set, or as text a person's folder.
+
+    The source is its author's, byte for byte, and is not searched for people's folders.
+    """
+    words = part.endswith(_TEXT) and not part.startswith("source.")
+    found = _folder_in(content, places, of_people=words)
+    if found is not None:
+        raise TwinError(
+            f"{twin_id}/{part}: names the folder {found.decode(errors='replace')!r} of a machine; "
+            "take it out of the input's name, prompt or attribution and build the twin again"
+        )
+
+
+def check_words(where: str, words: str, places: tuple[bytes, ...], error: type[ManiTwinError]) -> None:
+    """Raise ``error`` where words that are to go out name a local folder of what is published, or a person's folder."""
+    found = _folder_in(words.encode(), places, of_people=True)
+    if found is not None:
+        raise error(
+            f"{where}: names the folder {found.decode(errors='replace')!r} of a machine; take it out of the name, the prompt "
+            "or the attribution that it comes from"
+        )
+
+
+def _folder_in(content: bytes, places: tuple[bytes, ...], *, of_people: bool) -> bytes | None:
+    found = next((place for place in places if place in content), None)
+    if found is None and of_people:
+        match = HOME_FOLDER.search(content)
+        found = match.group() if match else None
+    return found

@@ -1,0 +1,208 @@
+"""The folder or URL that a data set is published to: files appear whole, and an interrupted one is gone on with.
+
+OUT/SHA256SUMS is written last: a publication that has it is whole. Until then OUT/.publish/ holds a receipt of every shard
+that is finished; a shard whose receipt says what is to be in it is not written again.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import Path, PurePosixPath
+from typing import Any, BinaryIO
+
+import pyarrow.parquet as pq
+
+from manitwin.dataset.publish.shard_plan import Shard, check_hub_limits
+from manitwin.dataset.publish.tables import SHARDS_FILE
+from manitwin.errors import UsageError
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.store import canonical_json, sha256_of_file
+
+SUMS = "SHA256SUMS"
+OPEN = ".publish"
+_STARTED = f"{OPEN}/started"
+_INCOMING, _SCRATCH = "incoming-", "scratch-"
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What is published: the ``folders`` that it owns besides ``.publish/``, and the ``sign`` that a finished one has."""
+
+    name: str
+    folders: tuple[str, ...]
+    sign: str
+
+
+TWINS = Kind("twins", ("data", "index", "pictures"), SHARDS_FILE)
+EPISODES = Kind("episodes", ("meta", "data", "videos"), "meta/info.json")
+
+
+class Publication:
+    """Write files below one root and remember their digests.
+
+    Owns: everything below the folders of its kind and ``.publish/`` of the root.
+    """
+
+    def __init__(self, root: DatasetRoot, kind: Kind = TWINS):
+        self.root, self.kind = root, kind
+        self.digests: dict[str, str] = {}
+        self.sizes: dict[str, int] = {}
+        self._receipts: dict[str, dict[str, Any]] = {}
+
+    def refuse_others(self) -> None:
+        """Raise UsageError where something else is there than nothing, or a publication of this kind, interrupted or older."""
+        root = self.root
+        root.fs.invalidate_cache()
+        if root.exists(_STARTED):
+            begun = root.read_bytes(_STARTED).decode() or TWINS.name  # an older version wrote it empty, for twins
+            if begun != self.kind.name:
+                raise UsageError(
+                    f"{root.url}: a publication of {begun} was begun there; give a folder that is new or empty"
+                )
+        elif not self._is_finished() and self._visible_entries():
+            raise UsageError(
+                f"{root.url}: not empty, and no publication of {self.kind.name} by manitwin; give a folder that is new or"
+                " empty"
+            )
+
+    def begin(self) -> None:
+        """Open a new publication, an interrupted one or an older one. Raises UsageError where something else is there."""
+        self.refuse_others()
+        root = self.root
+        if not root.exists(_STARTED):
+            if self.kind == TWINS and self._is_finished():
+                for row in pq.read_table(io.BytesIO(root.read_bytes(SHARDS_FILE))).to_pylist():
+                    self._write_receipt(row)
+            root.write_bytes(_STARTED, self.kind.name.encode())
+        root.remove(SUMS)
+        for name in root.names_below(OPEN):
+            if name.endswith(".json") and PurePosixPath(name).parent == PurePosixPath(OPEN):
+                receipt = json.loads(root.read_bytes(name))
+                self._receipts[receipt["shard"]] = receipt
+            elif name != _STARTED and not name.startswith(f"{OPEN}/{_SCRATCH}"):
+                root.remove(name)  # half a file
+
+    def _is_finished(self) -> bool:
+        return self.root.exists(SUMS) and self.root.exists(self.kind.sign)
+
+    def _visible_entries(self) -> list[str]:
+        path = self.root.path
+        if not self.root.fs.exists(path):
+            return []
+        names = [PurePosixPath(str(entry)).name for entry in self.root.fs.ls(path, detail=False)]
+        return [name for name in names if not name.startswith(".")]
+
+    def has(self, shard: Shard) -> bool:
+        """Tell whether a shard is there with what is to be in it; its digest then counts as written."""
+        receipt = self._receipts.get(shard.name)
+        if receipt is None or receipt["contents_sha256"] != shard.contents_sha256 or not self.root.exists(shard.name):
+            return False
+        if self.root.fs.info(self.root.full(shard.name))["size"] != receipt["bytes"]:
+            return False
+        self.digests[shard.name], self.sizes[shard.name] = receipt["sha256"], receipt["bytes"]
+        return True
+
+    def write_shard(self, shard: Shard, write: Callable[[BinaryIO], None]) -> None:
+        """Write a shard to a temporary file, put it in its place and note that it is there."""
+        receipt = _receipt_name(shard.name)
+        with self._incoming() as scratch:
+            path = scratch / "shard.tar"
+            with path.open("wb") as stream:
+                write(stream)
+                stream.flush()
+                os.fsync(stream.fileno())
+            self.root.remove(receipt)  # what it says of an older shard is true no longer
+            self.put(path, shard.name)
+        self._write_receipt(self.row(shard))
+
+    def row(self, shard: Shard) -> dict[str, Any]:
+        """Return a written shard as a row of the table of shards."""
+        return {
+            "shard": shard.name,
+            "twins": len(shard.twins),
+            "bytes": self.sizes[shard.name],
+            "sha256": self.digests[shard.name],
+            "contents_sha256": shard.contents_sha256,
+        }
+
+    def put(self, path: Path, name: str) -> None:
+        """Take a finished file of the root's own file system to its place."""
+        self.digests[name], self.sizes[name] = sha256_of_file(path), path.stat().st_size
+        self._place(path, name)
+
+    def write(self, name: str, content: bytes) -> None:
+        """Write a small file."""
+        self.root.write_bytes(name, content)
+        self.digests[name], self.sizes[name] = sha256(content).hexdigest(), len(content)
+
+    def finish(self) -> None:
+        """Remove what an older publication had more, and write the digests of all files."""
+        check_hub_limits({**self.sizes, SUMS: 0})
+        for folder in self.kind.folders:
+            for name in self.root.names_below(folder):
+                if name not in self.digests:
+                    self.root.remove(name)
+                    self._remove_empty_folder(name)
+        lines = [f"{digest}  {name}\n" for name, digest in sorted(self.digests.items())]
+        self.root.write_bytes(SUMS, "".join(lines).encode())
+        self.root.remove(OPEN)
+
+    def _remove_empty_folder(self, name: str) -> None:
+        if self.root.local is not None:
+            folder = (self.root.local / name).parent
+            if not any(folder.iterdir()):
+                folder.rmdir()
+
+    @contextmanager
+    def scratch(self) -> Iterator[Path]:
+        """Yield a temporary folder from which files can be ``put``; nothing has to be begun for it.
+
+        Of a local root it is below ``.publish/``: what one that was killed left there goes. A root that was not there
+        before and has nothing in it afterwards goes too.
+        """
+        if self.root.local is None:
+            with tempfile.TemporaryDirectory() as scratch:
+                yield Path(scratch)
+            return
+        opened = self.root.local / OPEN
+        fresh = [each for each in opened.parents if not each.exists()]
+        opened.mkdir(parents=True, exist_ok=True)
+        for left in opened.glob(f"{_SCRATCH}*"):
+            shutil.rmtree(left)
+        try:
+            with tempfile.TemporaryDirectory(prefix=_SCRATCH, dir=opened) as scratch:
+                yield Path(scratch)
+        finally:
+            for folder in (opened, *fresh):
+                if folder.is_dir() and not any(folder.iterdir()):
+                    folder.rmdir()
+
+    @contextmanager
+    def _incoming(self) -> Iterator[Path]:
+        """Yield a temporary folder: on the root's own file system where that is local."""
+        place = None if self.root.local is None else self.root.local / OPEN
+        with tempfile.TemporaryDirectory(prefix=_INCOMING, dir=place) as scratch:
+            yield Path(scratch)
+
+    def _place(self, path: Path, name: str) -> None:
+        if self.root.local is None:
+            self.root.put_file(path, name)
+            return
+        place = self.root.local / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(path, place)
+
+    def _write_receipt(self, row: dict[str, Any]) -> None:
+        self.root.write_bytes(_receipt_name(row["shard"]), canonical_json(row).encode())
+
+
+def _receipt_name(shard: str) -> str:
+    return f"{OPEN}/{PurePosixPath(shard).stem}.json"

@@ -1,0 +1,195 @@
+"""Publish a data set: choose by licence, plan, write shards, tables and card."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from manitwin.dataset.index.part_list import PartList
+from manitwin.dataset.index.tables import parquet
+from manitwin.dataset.publish.card import CardFacts, dataset_card
+from manitwin.dataset.publish.card_statistics import COLUMNS
+from manitwin.dataset.publish.licences import LICENSES_MD, Selection, licenses_page, select, without_attribution
+from manitwin.dataset.publish.listing import tar_bytes_of_twins
+from manitwin.dataset.publish.privacy import places_of
+from manitwin.dataset.publish.publication import Publication
+from manitwin.dataset.publish.shard_plan import HUB_FILE_BYTES, Shard, ShardTwin, plan_shards
+from manitwin.dataset.publish.shards import write_shard
+from manitwin.dataset.publish.tables import (
+    INDEX,
+    PUBLISHED,
+    SHARDS_FILE,
+    parts_of_index,
+    published_rows,
+    rows_of_table,
+    shards_table,
+)
+from manitwin.errors import UsageError
+from manitwin.twin.dataset_root import DatasetRoot, twin_name
+
+SHARD_SIZE_MB = 1000
+"""A shard is what one downloads to look at a category: some hundred twins."""
+
+PICTURES = 3
+PICTURE_FOLDER = "pictures"
+CARD, README = "card.png", "README.md"
+MEGABYTE = 10**6
+
+
+@dataclass(frozen=True)
+class ShardDone:
+    """A shard is in its place: the ``number``-th of ``total``; ``kept`` where it was there already."""
+
+    name: str
+    number: int
+    total: int
+    kept: bool
+
+
+@dataclass(frozen=True)
+class Published:
+    """What went out and what did not.
+
+    ``left_out`` counts accepted twins by licence; ``without_attribution`` those published whose licence asks for it,
+    ``rehearsals`` those left out because a rehearsal server had a part in them.
+    ``rows`` are those of the published tables.
+    """
+
+    twins: int
+    left_out: dict[str, int]
+    rejected: int
+    without_attribution: int
+    shards: int
+    kept_shards: int
+    files: int
+    bytes: int
+    rows: dict[str, int] = field(default_factory=dict)
+    rehearsals: int = 0
+
+
+def publish(
+    dataset: str | Path,
+    out: str | Path,
+    *,
+    license_allow: Iterable[str] | None = None,
+    with_rehearsals: bool = False,
+    shard_size_mb: int = SHARD_SIZE_MB,
+    twins_per_shard: int | None = None,
+    name: str | None = None,
+    on_shard: Callable[[ShardDone], None] = lambda done: None,
+) -> Published:
+    """Write WebDataset shards, Parquet tables, the dataset card, licences and digests of a data set to ``out``.
+
+    ``dataset`` and ``out`` are folders or URLs; the index of the data set must be up to date. ``license_allow`` names the
+    licences that may go out; by default all but ``unknown``. Twins that a rehearsal server (``manitwin fake``) had a part in
+    stay here unless ``with_rehearsals``. Shards hold at most ``shard_size_mb`` (10^6 bytes), or one
+    twin that is larger, and at most ``twins_per_shard`` twins. The same data set gives the same bytes. Interrupted, it can
+    be called again, and finished shards stay. Raises UsageError for wrong arguments, TwinError for a twin that is altered,
+    incomplete or names a folder of this machine.
+    """
+    _check(shard_size_mb, twins_per_shard)
+    source, publication = DatasetRoot(dataset), Publication(DatasetRoot(out))
+    tar_bytes = tar_bytes_of_twins(source)
+    parts = parts_of_index(source, set(tar_bytes))
+    columns = ["twin_id", "revision", "license", "attribution", "category", "seconds", "cpu_seconds", "cost_usd"]
+    columns.append("failed_checks")
+    rows = rows_of_table(source, parts, "twins", columns)
+    selection = select(rows, license_allow, with_rehearsals=with_rehearsals)
+    shards = plan_shards(
+        _shard_twins(rows, tar_bytes, selection), max_bytes=shard_size_mb * MEGABYTE, max_twins=twins_per_shard
+    )
+    title = name or Path(str(out).rstrip("/")).name
+    try:
+        publication.begin()
+        kept = _write_shards(source, publication, shards, on_shard)
+        twins, counts = _write_tables(source, publication, parts, shards, selection)
+        sizes = [publication.sizes[shard.name] for shard in shards]
+        _write_pages(source, publication, CardFacts(title, twins, counts, sizes, _pictures(source, twins)))
+        publication.finish()
+    except OSError as error:
+        raise UsageError(f"{out}: not finished ({error}); mend that and publish again, finished shards stay") from error
+    return Published(
+        twins=len(selection.published),
+        left_out=selection.left_out,
+        rejected=parts.rows("rejections"),
+        without_attribution=len(without_attribution(r for r in rows if r["twin_id"] in selection.published)),
+        shards=len(shards),
+        kept_shards=kept,
+        files=len(publication.sizes) + 1,
+        bytes=sum(publication.sizes.values()),
+        rows=counts,
+        rehearsals=selection.rehearsals,
+    )
+
+
+def _check(shard_size_mb: int, twins_per_shard: int | None) -> None:
+    if not 1 <= shard_size_mb <= HUB_FILE_BYTES // MEGABYTE:
+        raise UsageError(f"--shard-size-mb is {shard_size_mb}; give 1 to {HUB_FILE_BYTES // MEGABYTE}")
+    if twins_per_shard is not None and twins_per_shard < 1:
+        raise UsageError(f"--twins-per-shard is {twins_per_shard}; give 1 or more")
+
+
+def _shard_twins(rows: list[dict[str, Any]], tar_bytes: Mapping[str, int], selection: Selection) -> list[ShardTwin]:
+    return [
+        ShardTwin(
+            twin_id=row["twin_id"],
+            revision=row["revision"],
+            category=row["category"],
+            tar_bytes=tar_bytes[row["twin_id"]],
+            costs=(row["seconds"], row["cpu_seconds"], row["cost_usd"]),
+        )
+        for row in rows
+        if row["twin_id"] in selection.published
+    ]
+
+
+def _write_shards(
+    source: DatasetRoot, publication: Publication, shards: list[Shard], on_shard: Callable[[ShardDone], None]
+) -> int:
+    """Write all shards that are not there yet; returns how many were."""
+    places = places_of([source, publication.root])
+    kept = 0
+    for number, shard in enumerate(shards, 1):
+        there = publication.has(shard)
+        if not there:
+            publication.write_shard(shard, partial(write_shard, root=source, shard=shard, places=places))
+        kept += there
+        on_shard(ShardDone(shard.name, number, len(shards), there))
+    return kept
+
+
+def _write_tables(
+    source: DatasetRoot, publication: Publication, parts: PartList, shards: list[Shard], selection: Selection
+) -> tuple[list[dict[str, Any]], dict[str, int]]:
+    """Write the tables; returns what the card needs of the twins, and the rows of each table."""
+    shard_of = {twin.twin_id: shard.name for shard in shards for twin in shard.twins}
+    counts = {**dict.fromkeys(PUBLISHED, 0), "shards": len(shards)}
+    twins: list[dict[str, Any]] = []
+    for number, rows in enumerate(published_rows(source, parts, shard_of, selection.kept_back)):
+        for table, each in rows.items():
+            publication.write(f"{INDEX}/{table}-{number:05d}.parquet", parquet(each))
+            counts[table] += len(each)
+        twins += rows["twins"].select(list(COLUMNS)).to_pylist()
+    publication.write(SHARDS_FILE, shards_table([publication.row(shard) for shard in shards]))
+    return twins, counts
+
+
+def _write_pages(source: DatasetRoot, publication: Publication, facts: CardFacts) -> None:
+    """Write the pictures that the card shows, the licences and the card."""
+    for picture in facts.pictures:
+        twin_id = Path(picture).stem
+        publication.write(picture, source.read_bytes(f"{twin_name(twin_id)}/{CARD}"))
+    publication.write(LICENSES_MD, licenses_page(facts.name, facts.twins).encode())
+    publication.write(README, dataset_card(facts).encode())
+
+
+def _pictures(source: DatasetRoot, twins: list[dict[str, Any]]) -> list[str]:
+    """Return the pictures to show: of the twins with most verified grasps, each of another category."""
+    best: dict[str, str] = {}
+    for twin in sorted(twins, key=lambda twin: (-twin["verified"], twin["twin_id"])):
+        best.setdefault(twin["category"], twin["twin_id"])
+    shown = [twin_id for twin_id in list(best.values())[:PICTURES] if source.exists(f"{twin_name(twin_id)}/{CARD}")]
+    return [f"{PICTURE_FOLDER}/{twin_id}.png" for twin_id in shown]

@@ -1,0 +1,145 @@
+"""Which twin goes into which shard: by category, in order of ids, within a size and within the hub's limits."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from hashlib import sha256
+from pathlib import PurePosixPath
+
+from manitwin.errors import UsageError
+from manitwin.twin.store import sha256_of_json
+
+HUB_FILES = 100_000
+HUB_FOLDER_ENTRIES = 10_000
+HUB_FILE_BYTES = 20 * 10**9
+"""What a repository should stay below: https://huggingface.co/docs/hub/repositories-recommendations"""
+
+CATEGORY_FOLDERS = 5_000
+"""Categories that get a folder of their own, the largest ones; half of what the hub lets one folder hold."""
+
+SHARED_FOLDER = "various"
+DATA = "data"
+SHARD_FORMAT = 1
+"""Counted up when the members of a shard change: then no shard of an older publication is taken over."""
+
+TAR_BLOCK = 512
+TAR_RECORD = 10_240
+"""POSIX ustar: members begin at blocks, an archive ends at a record (``tarfile.RECORDSIZE``)."""
+
+_SLUG_LENGTH = 64
+
+
+@dataclass(frozen=True)
+class ShardTwin:
+    """A twin that goes out: ``tar_bytes`` is what its members take at most, headers included.
+
+    ``costs`` (seconds, CPU seconds, dollars) stand for its run.json, which its revision does not cover.
+    """
+
+    twin_id: str
+    revision: str
+    category: str
+    tar_bytes: int
+    costs: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Shard:
+    """A tar file and the twins in it, by id."""
+
+    name: str
+    twins: tuple[ShardTwin, ...]
+
+    @property
+    def tar_bytes(self) -> int:
+        """The most that the file takes."""
+        return archive_bytes(sum(twin.tar_bytes for twin in self.twins))
+
+    @property
+    def contents_sha256(self) -> str:
+        """The digest of what is to be in it: equal contents give equal bytes."""
+        return sha256_of_json([SHARD_FORMAT, [(twin.twin_id, twin.revision, twin.costs) for twin in self.twins]])
+
+
+def member_bytes(size: int) -> int:
+    """Return what a file of a size takes in a tar: its header and whole blocks."""
+    return TAR_BLOCK + -(-size // TAR_BLOCK) * TAR_BLOCK
+
+
+def archive_bytes(members: int) -> int:
+    """Return the size of a tar whose members take so many bytes: two empty blocks, then whole records."""
+    return -(-(members + 2 * TAR_BLOCK) // TAR_RECORD) * TAR_RECORD
+
+
+def category_slug(category: str) -> str:
+    """Return a category as a folder's name: lower-case ASCII letters, digits and single hyphens, 64 characters at most.
+
+    A category without any such letter gets a name of its digest. Different spellings of one name share a folder.
+    """
+    ascii_only = unicodedata.normalize("NFKD", category).encode("ascii", "ignore").decode().lower()
+    slug = re.sub(r"[^a-z0-9]+", "-", ascii_only).strip("-")[:_SLUG_LENGTH].rstrip("-")
+    return slug or f"category-{sha256(category.encode()).hexdigest()[:8]}"
+
+
+def plan_shards(
+    twins: Iterable[ShardTwin], *, max_bytes: int, max_twins: int | None = None, folders: int = CATEGORY_FOLDERS
+) -> list[Shard]:
+    """Return the shards of all twins, sorted by name.
+
+    Each category has its own shards, as one wants mugs and not a tenth of everything; only beyond ``folders`` categories
+    do the smallest share those of the folder ``various``. A shard takes no more than ``max_bytes``, unless a single twin
+    does. Raises UsageError where the hub's limits would be broken.
+    """
+    by_folder: dict[str, list[ShardTwin]] = {}
+    for twin in sorted(twins, key=lambda twin: twin.twin_id):
+        by_folder.setdefault(category_slug(twin.category), []).append(twin)
+    largest_first = sorted(by_folder, key=lambda slug: (-len(by_folder[slug]), slug))
+    for slug in largest_first[folders:]:
+        if slug != SHARED_FOLDER:
+            by_folder.setdefault(SHARED_FOLDER, []).extend(by_folder.pop(slug))
+    shards = []
+    for slug, members in sorted(by_folder.items()):
+        members.sort(key=lambda twin: twin.twin_id)
+        for number, group in enumerate(_groups(members, max_bytes, max_twins)):
+            shards.append(Shard(f"{DATA}/{slug}/{slug}-{number:06d}.tar", tuple(group)))
+    check_hub_limits({shard.name: shard.tar_bytes for shard in shards})
+    return shards
+
+
+def _groups(twins: list[ShardTwin], max_bytes: int, max_twins: int | None) -> Iterable[list[ShardTwin]]:
+    group: list[ShardTwin] = []
+    held = 0
+    for twin in twins:
+        full = archive_bytes(held + twin.tar_bytes) > max_bytes or len(group) == max_twins
+        if group and full:
+            yield group
+            group, held = [], 0
+        group.append(twin)
+        held += twin.tar_bytes
+    if group:
+        yield group
+
+
+def check_hub_limits(sizes: dict[str, int]) -> None:
+    """Raise UsageError where files of these names and sizes are more or larger than the hub takes."""
+    if len(sizes) >= HUB_FILES:
+        raise UsageError(f"{len(sizes):,} files, the hub takes fewer than {HUB_FILES:,}; give a larger --shard-size-mb")
+    entries: Counter[PurePosixPath] = Counter()
+    for path in {parent for name in sizes for parent in (PurePosixPath(name), *PurePosixPath(name).parents[:-1])}:
+        entries[path.parent] += 1
+    fullest, count = max(entries.items(), key=lambda item: item[1], default=(PurePosixPath(), 0))
+    if count >= HUB_FOLDER_ENTRIES:
+        raise UsageError(
+            f"{count:,} entries in {fullest}/, the hub takes fewer than {HUB_FOLDER_ENTRIES:,}; "
+            "give a larger --shard-size-mb or --twins-per-shard"
+        )
+    largest = max(sizes, key=lambda name: sizes[name], default="")
+    if largest and sizes[largest] >= HUB_FILE_BYTES:
+        raise UsageError(
+            f"{largest}: {sizes[largest]:,} bytes, the hub takes files below {HUB_FILE_BYTES:,}; "
+            "give a smaller --shard-size-mb"
+        )

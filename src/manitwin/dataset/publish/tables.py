@@ -1,0 +1,83 @@
+"""The tables that go out: those of the index, of the published twins alone, with the shard of each twin."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import pyarrow as pa
+
+from manitwin.dataset.index.merge import file_system, files_of, merged, read_rows
+from manitwin.dataset.index.part_list import PartList, read_part_list
+from manitwin.dataset.index.tables import TABLES, parquet
+from manitwin.errors import UsageError
+from manitwin.twin.dataset_root import DatasetRoot
+
+PUBLISHED = ("twins", "points", "grasps", "placements")
+"""Rejections and costs by stage stay here: they tell of the run, and their words may name files of its machine."""
+
+INDEX = "index"
+SHARDS_FILE = f"{INDEX}/shards-00000.parquet"
+
+SHARDS = pa.schema(
+    [
+        ("shard", pa.string()),
+        ("twins", pa.int32()),
+        ("bytes", pa.int64()),
+        ("sha256", pa.string()),
+        ("contents_sha256", pa.string()),
+    ]
+)
+
+
+def parts_of_index(root: DatasetRoot, finished: set[str]) -> PartList:
+    """Return the parts of a data set's index; raises UsageError where it lacks finished twins or has others."""
+    parts = read_part_list(root)
+    if parts is None or not parts.parts:
+        raise UsageError(f"{root.url}: has no index; run manitwin index {root.url}")
+    files, fs = files_of(root, parts.parts), file_system(root)
+    indexed = {
+        twin_id
+        for table in ("twins", "rejections")
+        for twin_id in read_rows(files, table, fs, columns=["twin_id"])["twin_id"].to_pylist()
+    }
+    if indexed != finished:
+        raise UsageError(
+            f"{root.url}: its index lacks {len(finished - indexed):,} finished twins and has "
+            f"{len(indexed - finished):,} that are gone; run manitwin index {root.url} and mind what it cannot read"
+        )
+    return parts
+
+
+def rows_of_table(root: DatasetRoot, parts: PartList, table: str, columns: list[str]) -> list[dict[str, Any]]:
+    """Return some columns of all rows of a table, in no order."""
+    rows = read_rows(files_of(root, parts.parts), table, file_system(root), columns=columns)
+    found: list[dict[str, Any]] = rows.to_pylist()
+    return found
+
+
+def published_rows(
+    root: DatasetRoot, parts: PartList, shard_of: Mapping[str, str], kept_back: frozenset[str]
+) -> Iterator[dict[str, pa.Table]]:
+    """Yield the rows of the published tables, sorted by twin, about a million grasps at a time.
+
+    ``shard_of`` is the shard of each twin by its id; ``kept_back`` are the accepted twins of the index that stay here.
+    """
+    for rows in merged(files_of(root, parts.parts), file_system(root), parts.rows("grasps"), without=kept_back):
+        twins = rows["twins"]
+        if not len(twins):  # a range of rejected ones
+            continue
+        shards = pa.array([shard_of[twin_id] for twin_id in twins["twin_id"].to_pylist()], pa.string())
+        yield {table: rows[table] for table in PUBLISHED} | {"twins": twins.append_column("shard", shards)}
+
+
+def shards_table(rows: list[dict[str, Any]]) -> bytes:
+    """Return the list of shards as Parquet."""
+    return parquet(pa.Table.from_pylist(rows, schema=SHARDS))
+
+
+def columns_of(table: str) -> list[str]:
+    """Return the names of a published table's columns."""
+    if table == "shards":
+        return list(SHARDS.names)
+    return [*TABLES[table].names, *(["shard"] if table == "twins" else [])]

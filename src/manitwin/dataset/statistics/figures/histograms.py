@@ -1,0 +1,150 @@
+"""Histograms: grasps per object, rates, counts of points, sizes and masses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from manitwin.dataset.statistics.object_queries import MASS_STEPS, SIZE_STEPS
+from manitwin.dataset.statistics.query import Result
+from manitwin.dataset.statistics.style import (
+    BLUE,
+    FULL_IN,
+    GREY,
+    HALF_IN,
+    INK,
+    Figure,
+    canvas,
+    count_axis,
+    logarithmic_axis,
+    plain_number,
+    to_svg,
+)
+
+_HEIGHT_IN = 2.4
+_BIN = 5
+
+
+def grasps_per_object(simulated: Result, verified: Result) -> Figure | None:
+    """Draw how many grasps of an object were simulated and verified."""
+    if not simulated.rows:
+        return None
+    figure, (axis,) = canvas(FULL_IN, _HEIGHT_IN)
+    top = max(row["low"] for row in (*simulated.rows, *verified.rows)) + _BIN
+    edges = np.arange(0, top + _BIN, _BIN)
+    axis.stairs(_heights(simulated, "low", edges[:-1]), edges, fill=True, color=GREY, alpha=0.45, label="simulated")
+    axis.stairs(_heights(verified, "low", edges[:-1]), edges, color=BLUE, linewidth=1.8, label="verified")
+    axis.set_xlim(0, top)
+    axis.set_xlabel("grasps per object")
+    count_axis(axis, "y", "objects")
+    axis.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2, borderaxespad=0.2, handlelength=1)
+    queries = (simulated.query.name, verified.query.name)
+    alt = "Histograms. " + " ".join(
+        f"{label} grasps per object: most often {_mode(r.rows, 'low', 'objects')} to {_mode(r.rows, 'low', 'objects') + _BIN}."
+        for r, label in ((simulated, "Simulated"), (verified, "Verified"))
+    )
+    caption = f"Grasps per object in steps of {_BIN}: simulated, and of these verified."
+    return Figure("grasps_per_object", caption, alt, queries, to_svg(figure, "grasps_per_object", alt))
+
+
+def rates(result: Result) -> Figure | None:
+    """Draw the verification rates of objects."""
+    return _shares(result, "verification_rates", "Verification rate of objects.", "verification rate", "objects", 20)
+
+
+def robustness(result: Result) -> Figure | None:
+    """Draw in what share of perturbed trials verified grasps hold."""
+    return _shares(
+        result,
+        "robustness",
+        "Perturbed trials that a verified grasp holds in.",
+        "share of perturbed trials held",
+        "verified grasps",
+        10,
+    )
+
+
+def counts_per_object(results: Sequence[Result]) -> Figure | None:
+    """Draw how many functional points, grasp points and placements objects have."""
+    if not any(result.rows for result in results):
+        return None
+    figure, axes = canvas(FULL_IN, 2.1, len(results))
+    said = []
+    for axis, result in zip(axes, results, strict=True):
+        label = result.query.name.removesuffix("_histogram").replace("_", " ")
+        numbers = [row["number"] for row in result.rows]
+        axis.bar(numbers, [row["objects"] for row in result.rows], color=BLUE, width=0.7)
+        axis.set_xticks(range(min(numbers), max(numbers) + 1) if numbers else [])
+        axis.set_xlabel(f"{label} per object")
+        count_axis(axis, "y", "objects" if axis is axes[0] else "")
+        said.append(f"{label}: " + ", ".join(f"{row['objects']} with {row['number']}" for row in result.rows))
+    alt = f"Bars of objects by number. {'; '.join(said)}."
+    caption = "Functional points, grasp points and placements per object."
+    queries = tuple(result.query.name for result in results)
+    return Figure("points_per_object", caption, alt, queries, to_svg(figure, "points_per_object", alt))
+
+
+def sizes(result: Result, dimensions: Result) -> Figure | None:
+    """Draw the longest sides on a logarithmic axis."""
+    return _logarithmic(result, dimensions, SIZE_STEPS, "sizes", "longest side", "m")
+
+
+def masses(result: Result, dimensions: Result) -> Figure | None:
+    """Draw the masses on a logarithmic axis."""
+    return _logarithmic(result, dimensions, MASS_STEPS, "masses", "mass", "kg")
+
+
+def _logarithmic(result: Result, dimensions: Result, steps: int, name: str, quantity: str, unit: str) -> Figure | None:
+    if not result.rows:
+        return None
+    figure, (axis,) = canvas(HALF_IN, _HEIGHT_IN)
+    at = np.arange(min(row["step"] for row in result.rows), max(row["step"] for row in result.rows) + 1)
+    edges = 10 ** (np.append(at, at[-1] + 1) / steps)
+    heights = _heights(result, "step", at)
+    axis.bar(edges[:-1], heights, width=np.diff(edges) * 0.92, align="edge", color=BLUE)
+    axis.set_xlim(edges[0] / 1.1, edges[-1] * 1.1)
+    logarithmic_axis(axis, "x", f"{quantity}, {unit}")
+    (row,) = (row for row in dimensions.rows if row["quantity"] == f"{quantity}, {unit}")
+    axis.axvline(row["median"], color=INK, linewidth=1, linestyle=(0, (4, 2)))
+    axis.annotate(
+        f"median {row['median']:.2g} {unit}",
+        (row["median"], 1),
+        (4, 2),
+        xycoords=("data", "axes fraction"),
+        textcoords="offset points",
+    )
+    count_axis(axis, "y", "objects")
+    alt = (
+        f"Histogram of the {quantity} of {row['objects']} objects on a logarithmic axis, from {row['min']:.3g} to "
+        f"{row['max']:.3g} {unit}, median {row['median']:.3g} {unit}."
+    )
+    caption = f"{quantity[0].upper()}{quantity[1:]} of accepted twins, {steps} steps a decade."
+    return Figure(name, caption, alt, (result.query.name,), to_svg(figure, name, alt), half=True)
+
+
+def _shares(result: Result, name: str, caption: str, label: str, what: str, steps: int) -> Figure | None:
+    """Draw a histogram of shares between 0 and 1 in equal steps."""
+    if not result.rows:
+        return None
+    figure, (axis,) = canvas(HALF_IN, _HEIGHT_IN)
+    heights = _heights(result, "step", np.arange(steps))
+    axis.bar(np.arange(steps) / steps, heights, width=0.92 / steps, align="edge", color=BLUE)
+    axis.set_xlim(0, 1)
+    axis.set_xlabel(label)
+    count_axis(axis, "y", what)
+    most = _mode(result.rows, "step", what.split()[-1]) / steps
+    often = f"{plain_number(most)} to {plain_number(most + 1 / steps)}"
+    alt = f"Histogram of the {label} of {sum(heights):,} {what}; most often {often}."
+    return Figure(name, caption, alt, (result.query.name,), to_svg(figure, name, alt), half=True)
+
+
+def _heights(result: Result, key: str, at: np.ndarray) -> list[int]:
+    """Return the counts at the places of a histogram, 0 where the query has no row."""
+    (counted,) = set(result.rows[0]) - {key} if result.rows else {""}
+    found = {row[key]: row[counted] for row in result.rows}
+    return [found.get(int(place), 0) for place in at]
+
+
+def _mode(rows: list[dict[str, int]], key: str, counted: str) -> int:
+    return max(rows, key=lambda row: (row[counted], -row[key]))[key]

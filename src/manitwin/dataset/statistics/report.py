@@ -1,0 +1,183 @@
+"""Ask the queries, draw the figures, and write the report, its figures and its numbers."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from manitwin.dataset.index.near_duplicates import MAX_SHAPE_DISTANCE, MAX_SIZE_RATIO, NearDuplicates
+from manitwin.dataset.statistics import cost_queries as costs
+from manitwin.dataset.statistics import grasp_queries as grasps
+from manitwin.dataset.statistics import object_queries as objects
+from manitwin.dataset.statistics import stage_queries as stages
+from manitwin.dataset.statistics.figures import bars, histograms, masses, words
+from manitwin.dataset.statistics.page import NearPairs, Page, Part, Section
+from manitwin.dataset.statistics.query import Query, Result
+from manitwin.dataset.statistics.style import Figure, drawing
+from manitwin.dataset.statistics.tables import PRELUDE, Tables
+from manitwin.twin.store import canonical_json, write_bytes_atomically
+
+REPORT, NUMBERS, FIGURES = "report.html", "statistics.json", "figures"
+SCHEMA_VERSION = 1
+MOST_PAIRS = 1000
+"""So many pairs of near-duplicates are written, the nearest; the call that finds all is written with them."""
+NO_TWIN = "There is no accepted twin."
+
+QUERIES: tuple[Query, ...] = (
+    *(stages.TOTALS, stages.SUCCESS_BY_STAGE, stages.REJECTIONS_BY_REASON, costs.BESIDE_THE_PAPER),
+    *(grasps.GRASPS_PER_OBJECT, grasps.VERIFICATION_RATE, grasps.BY_GRIPPER, grasps.OUTCOMES, grasps.BY_GRASP_TYPE),
+    *(grasps.ROBUST, grasps.SECOND_ENGINE, grasps.SIMULATED_HISTOGRAM, grasps.VERIFIED_HISTOGRAM),
+    *(grasps.RATE_HISTOGRAM, grasps.ROBUSTNESS_HISTOGRAM),
+    *(objects.POINTS_PER_OBJECT, objects.FUNCTIONAL_LABELS, objects.PLACEMENTS, *objects.COUNT_HISTOGRAMS),
+    *(objects.DIMENSIONS, objects.SIZE_HISTOGRAM, objects.MASS_HISTOGRAM, objects.MASS_SOURCES, objects.MASS_AND_SIZE),
+    *(objects.CATEGORIES, *objects.WORDS),
+    *(costs.COST, costs.COST_BY_STAGE, costs.BACKENDS),
+    *(stages.SOURCES, stages.LICENCES, stages.SAME_SOURCE, stages.FINDINGS, stages.CONFIGURATIONS),
+)
+"""All queries but ``mass_in_prior``, whose priors are those of the categories found."""
+
+
+def collect(tables: Tables) -> dict[str, Result]:
+    """Return the result of every query by its name."""
+    results = {query.name: tables.result(query) for query in QUERIES}
+    found = objects.priors_of(row["category"] for row in results["categories"].rows)
+    against = tables.result(objects.mass_in_prior(found))
+    return {**results, against.query.name: against}
+
+
+def numbers(results: dict[str, Result], near: NearPairs | None) -> dict[str, Any]:
+    """Return what statistics.json holds: every query with its SQL and all its rows."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "prelude": PRELUDE,
+        "queries": {
+            name: {"caption": result.query.caption, "sql": result.query.sql, "rows": result.rows}
+            for name, result in results.items()
+        },
+        "near_duplicates": None if near is None else vars(near),
+    }
+
+
+def write_report(tables: Tables, out: Path, *, title: str, duplicates: NearDuplicates | None = None) -> str:
+    """Write ``out/report.html``, ``out/statistics.json`` and ``out/figures/*.svg``; return the page's first sentence.
+
+    The same tables give the same bytes. Figures of an earlier report that this one does not have are removed.
+    """
+    results = collect(tables)
+    near = None if duplicates is None else _near_pairs(duplicates)
+    with drawing():
+        figures = draw(results)
+    (out / FIGURES).mkdir(parents=True, exist_ok=True)
+    for name, figure in figures.items():
+        place = out / FIGURES / f"{name}.svg"
+        if figure is None:
+            place.unlink(missing_ok=True)
+        else:
+            write_bytes_atomically(place, figure.svg.encode())
+    lead = _lead(results)
+    drawn = {name: result.query for name, result in results.items() if not result.query.columns}
+    page = Page(PRELUDE, drawn).html(title, lead, sections(results, figures, near))
+    write_bytes_atomically(out / NUMBERS, canonical_json(numbers(results, near)).encode())
+    write_bytes_atomically(out / REPORT, page.encode())
+    return lead[0].rstrip(".")
+
+
+def draw(results: dict[str, Result]) -> dict[str, Figure | None]:
+    """Return all figures by name, None where there is nothing to draw."""
+    of = results.__getitem__
+    figures = {
+        "success_by_stage": bars.success_by_stage(of("success_by_stage")),
+        "rejections": bars.rejections(of("rejections_by_reason")),
+        "grasps_per_object": histograms.grasps_per_object(of("simulated_histogram"), of("verified_histogram")),
+        "verification_rates": histograms.rates(of("rate_histogram")),
+        "robustness": histograms.robustness(of("robustness_histogram")),
+        "failed_outcomes": bars.outcomes(of("failed_outcomes")),
+        "points_per_object": histograms.counts_per_object([of(query.name) for query in objects.COUNT_HISTOGRAMS]),
+        "sizes": histograms.sizes(of("size_histogram"), of("dimensions")),
+        "masses": histograms.masses(of("mass_histogram"), of("dimensions")),
+        "mass_and_size": masses.mass_and_size(of("mass_and_size"), of("mass_in_prior")),
+        "mass_by_category": masses.mass_by_category(of("mass_in_prior")),
+        "categories": bars.categories(of("categories")),
+        "cost_by_stage": bars.cost(of("cost_by_stage")),
+    }
+    clouds = {f"words_{a}": words.word_cloud(of(f"words_{a}"), a) for a in objects.ATTRIBUTES}
+    return {**figures, **clouds}
+
+
+def sections(results: dict[str, Result], figures: dict[str, Figure | None], near: NearPairs | None) -> list[Section]:
+    """Return the report's sections with their tables and figures in order."""
+
+    def section(anchor: str, title: str, *parts: str | tuple[str, ...], empty: str = NO_TWIN) -> Section:
+        chosen: list[Part] = []
+        for part in parts:
+            if isinstance(part, tuple):
+                chosen.append(tuple(figure for name in part if (figure := figures[name]) is not None))
+            elif part.startswith("figure:"):
+                figure = figures[part.removeprefix("figure:")]
+                chosen += [figure] if figure else []
+            else:
+                chosen.append(results[part])
+        return Section(anchor, title, empty, tuple(chosen))
+
+    accepted = results["totals"].only["accepted"] > 0
+    about_twins = [
+        section(
+            *("grasps", "Grasps", "grasps_per_object", "figure:grasps_per_object", "verification_rate"),
+            *(("verification_rates", "robustness"), "by_gripper", "figure:failed_outcomes", "failed_outcomes"),
+            *("by_grasp_type", "robust", "second_engine"),
+        ),
+        section(
+            *("points", "Points and placements", "points_per_object", "figure:points_per_object"),
+            *("functional_labels", "placements"),
+        ),
+        section(
+            *("size", "Size and mass", "dimensions", ("sizes", "masses"), "figure:mass_and_size"),
+            *("figure:mass_by_category", "mass_in_prior", "mass_sources"),
+        ),
+        section("categories", "Categories", "figure:categories", "categories"),
+        section("words", "Words", tuple(f"words_{attribute}" for attribute in objects.ATTRIBUTES)),
+    ]
+    origin = section(
+        *("sources", "Sources, licences and provenance", "sources", "licences", "same_source"),
+        empty="Nothing was given.",
+    )
+    rest = section("made", "Findings and configurations", "findings", "configurations", "backends", empty="None.")
+    return [
+        section(
+            *("outcome", "Accepted and rejected", "totals", "figure:success_by_stage", "success_by_stage"),
+            *("figure:rejections", "rejections_by_reason", "beside_the_paper"),
+        ),
+        *(about_twins if accepted else [Section("twins", "Twins", NO_TWIN, ())]),
+        section("cost", "Time and money", "cost", "figure:cost_by_stage", "cost_by_stage"),
+        Section(origin.anchor, origin.title, origin.empty, (*origin.parts, *([near] if near else []))),
+        rest,
+    ]
+
+
+def _near_pairs(duplicates: NearDuplicates) -> NearPairs:
+    twins = {twin_id for pair in duplicates.pairs for twin_id in (pair.first, pair.second)}
+    return NearPairs(
+        nearest=[asdict(pair) for pair in duplicates.pairs[:MOST_PAIRS]],
+        pairs=len(duplicates.pairs),
+        twins=len(twins),
+        found_by=f"manitwin.near_duplicates(Index(DATASET)): shapes at most {MAX_SHAPE_DISTANCE} apart, "
+        f"sizes at most {100 * (MAX_SIZE_RATIO - 1):.0f} %",
+    )
+
+
+def _lead(results: dict[str, Result]) -> list[str]:
+    """Return the report in two sentences."""
+    totals, rate = results["totals"].only, results["verification_rate"].rows
+    if not totals["items"]:
+        return ["No item has ended yet: there is nothing to count."]
+    said = [f"{totals['items']:,} items: {totals['accepted']:,} accepted, {totals['rejected']:,} rejected."]
+    if rate and totals["accepted"]:
+        first = rate[0]
+        share = "" if first["rate"] is None else f" ({100 * first['rate']:.1f} %)"
+        categories = len(results["categories"].rows)
+        said.append(
+            f"The accepted twins are of {categories:,} categories; {first['held']:,} of {first['tried']:,} simulated grasps "
+            f"were verified{share}, {first['held'] / totals['accepted']:.1f} a twin."
+        )
+    return said

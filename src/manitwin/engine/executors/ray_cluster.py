@@ -1,0 +1,194 @@
+"""Do jobs on a Ray cluster: machines come, go and die, and each job comes back once, with an answer or a Failure."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType, TracebackType
+from typing import Any
+
+from manitwin.config import Resource, RunConfig
+from manitwin.engine.executors.ray_head import Head, reachable
+from manitwin.engine.executors.ray_pool import Actor, RayPool, Running
+from manitwin.engine.executors.ray_worker import RayWorker
+from manitwin.engine.jobs import Failure, Job, Reply, WorkerSetup
+from manitwin.engine.stage_parts import StagePart
+from manitwin.errors import UsageError
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.version import installed_version
+
+OVERDUE_EVERY_S = 1.0
+NODES_LOST = 3  # a job under which so many nodes died is taken for the cause
+THREADS: dict[Resource, int] = {"cpu": 1, "gpu": 1, "vlm": 8, "generator": 4}
+"""Jobs at a time in one worker: many where they wait for a service, one where they work."""
+TAKES: dict[Resource, dict[str, float]] = {
+    "cpu": {"num_cpus": 1},
+    "gpu": {"num_cpus": 0, "num_gpus": 1},
+    "vlm": {"num_cpus": 0},
+    "generator": {"num_cpus": 0},
+}
+OBJECT_STORE_BYTES = 80 * 2**20  # about Ray's least: only ids, names and short texts cross
+
+
+class RayExecutor:
+    """Workers on a cluster: one a core, one a GPU, and few with many threads for what waits for a service.
+
+    ``address`` is ``host:port``, or ``auto`` for the cluster of this machine; None starts one here, which ends with ``close``.
+    Where this process is connected to a cluster already, that one is used and left as it is.
+
+    A worker that dies costs the job that it had: died. Of several jobs in its threads none is blamed until it has been alone in
+    a worker that died. A node that dies is nobody's fault: its jobs are unavailable, which is no attempt, unless it
+    is the third one that dies under the same job (one that fills the memory takes its machine along).
+
+    Owns: the connection, the workers, and the cluster that it started.
+    """
+
+    def __init__(self, setup: WorkerSetup, settings: RunConfig, address: str | None = None):
+        """Raises UsageError where Ray is not installed, and Unavailable where no cluster answers."""
+        self._ray = _import_ray()
+        self._settings = settings
+        self._temporary: Path | None = None
+        self._connected = not self._ray.is_initialized()
+        if self._connected:
+            self._connect(address)
+        self._make = self._ray.remote(max_restarts=0, max_task_retries=0)(RayWorker)
+        root = DatasetRoot(setup.root_url)  # a worker's working directory is not the driver's
+        self._setup = self._ray.put(replace(setup, root_url=str(root.local or root.url)))
+        self._version = installed_version()
+        self._pools: dict[tuple[Resource, bool], RayPool] = {}
+        self._nodes_lost: Counter[tuple[Any, ...]] = Counter()
+        self._looked_at = 0.0
+        self._head = Head()
+
+    def __enter__(self) -> RayExecutor:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def slots(self, needs: Resource) -> int:
+        """Return how many jobs of a resource run at a time: the cores and GPUs of the nodes that are there now.
+
+        ``run.cpu`` asks for so many cores, also where they are not there yet: an autoscaler sees it.
+        """
+        if needs == "cpu":
+            return self._settings.cpu or max(1, self._head.total("CPU"))
+        if needs == "gpu":
+            return max(1, self._head.total("GPU"))
+        return self._settings.vlm if needs == "vlm" else self._settings.generator
+
+    def submit(self, ticket: int, job: Job) -> None:
+        """Give a job to the pool of what it needs. Raises Unavailable where the cluster's head is lost."""
+        self._head.check()
+        pool = self._pool(job.needs, alone=False)
+        pool.submit(ticket, job)
+        pool.dispatch(self.slots(job.needs))
+
+    def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
+        """Wait for the next job that ends, and return all that have. Raises Unavailable where the cluster's head is lost."""
+        until = time.monotonic() + timeout_s
+        ended: list[tuple[int, Reply]] = []
+        while True:
+            self._head.check()
+            left_s = 0.0 if ended else max(0.0, until - time.monotonic())
+            for ref in self._ready(left_s):
+                for pool in list(self._pools.values()):
+                    ended += pool.settle(ref)
+            if time.monotonic() - self._looked_at > OVERDUE_EVERY_S:
+                self._looked_at = time.monotonic()
+                for pool in list(self._pools.values()):
+                    ended += pool.overdue()
+            for (needs, alone), pool in self._pools.items():
+                pool.dispatch(1 if alone else self.slots(needs))
+            if ended or time.monotonic() >= until:
+                return ended
+
+    def parts(self) -> dict[int, StagePart]:
+        """Return nothing: what a worker would say on the way is not worth a message to every machine."""
+        return {}
+
+    def close(self) -> None:
+        """Stop the workers and disconnect; a cluster that was started here ends."""
+        self._head.close()
+        if self._head.silent_s < 5.0:  # one that is lost cannot be told, and the workers end with the connection
+            for pool in self._pools.values():
+                pool.close()
+        self._pools.clear()
+        if self._connected:
+            self._ray.shutdown()
+        if self._temporary is not None:
+            shutil.rmtree(self._temporary, ignore_errors=True)
+
+    def _connect(self, address: str | None) -> None:
+        quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
+        if address is not None:
+            self._ray.init(address=reachable(address), **quiet)
+        else:
+            self._temporary = Path(tempfile.mkdtemp(prefix="mt-", dir="/tmp"))  # sockets below it: 107 characters
+            self._ray.init(
+                num_cpus=self._settings.cpu or len(os.sched_getaffinity(0)),
+                include_dashboard=False,
+                object_store_memory=OBJECT_STORE_BYTES,
+                _temp_dir=str(self._temporary),
+                **quiet,
+            )
+        # Ray prints pages on every worker that dies to stdout, whatever it is told; the reason is in the Failure.
+        self._ray._private.worker._worker_logs_enabled = False
+
+    def _ready(self, timeout_s: float) -> list[Any]:
+        refs = [ref for pool in self._pools.values() for ref in pool.refs]
+        wait_s = min(timeout_s, OVERDUE_EVERY_S)
+        if not refs:
+            time.sleep(wait_s)
+            return []
+        first, others = self._ray.wait(refs, num_returns=1, timeout=wait_s)
+        if not first or not others:
+            return list(first)
+        return [*first, *self._ray.wait(others, num_returns=len(others), timeout=0)[0]]
+
+    def _pool(self, needs: Resource, alone: bool) -> RayPool:
+        if (needs, alone) not in self._pools:
+            threads = 1 if alone else THREADS[needs]
+            options = TAKES[needs] | {"max_concurrency": threads, "scheduling_strategy": "SPREAD"}
+            make = self._make.options(**options)
+            self._pools[needs, alone] = RayPool(
+                threads,
+                lambda: make.remote(self._setup, self._version),
+                self._head.has_lost,
+                self._blame,
+                self._settings.stage_timeout_s,
+            )
+        return self._pools[needs, alone]
+
+    def _blame(self, running: Running, actor: Actor, together: int) -> Reply:
+        """Return what a job's end says whose worker or node died; None where it is to be done again, alone."""
+        job, cause = running.job, actor.cause
+        if actor.death == "unreachable":
+            return Failure("unavailable", f"its worker did not answer any more: {cause}")
+        if actor.death == "node":
+            what = (type(job), getattr(job, "number", None), getattr(job, "stage", None))
+            self._nodes_lost[what] += 1
+            if self._nodes_lost[what] < NODES_LOST:
+                return Failure("unavailable", f"the node that worked on it died ({cause})")
+            return Failure("died", f"{NODES_LOST} nodes died while they worked on it ({cause})")
+        if together > 1:
+            self._pool(job.needs, alone=True).submit(running.ticket, job)
+            return None
+        return Failure("died", f"the worker process died ({cause})")
+
+
+def _import_ray() -> ModuleType:
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    try:
+        import ray
+        import ray.util.scheduling_strategies
+    except ImportError as error:
+        raise UsageError("Ray is not installed; `pip install manitwin[ray]`, or run with --executor local") from error
+    return ray

@@ -1,0 +1,254 @@
+"""The workers of one kind on a cluster: Ray actors, made when needed, replaced when they die, with the jobs they have.
+
+Why actors for everything, and not Ray tasks: of a task nobody knows where it runs. On a machine that vanished without closing
+its connections a task never ends (measured with Ray 2.60: the node was declared dead after 64 s, the task still open), it
+cannot be told when it began, nor which crashed process was its own. An actor has a node, a process, and one job a thread.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from manitwin.engine.executors.ray_worker import last_words
+from manitwin.engine.jobs import Failure, Job, Reply
+from manitwin.errors import Unavailable
+
+JOBS_A_WORKER = 2000  # then a fresh one: what native code leaks stays bounded
+START_PATIENCE_S = 120.0
+FAILED_STARTS = 5  # in a row: then it is the installation, not a node that died meanwhile
+CAUSE_CHARACTERS = 300
+
+Death = Literal["node", "worker", "unreachable"]
+Ended = list[tuple[int, Reply]]
+
+
+@dataclass
+class Running:
+    """A job on a worker."""
+
+    ticket: int
+    job: Job
+    since: float
+
+
+@dataclass
+class Actor:
+    """One worker process; without a node it is still starting, and one that ``leaves`` gets no more jobs."""
+
+    handle: Any
+    node: str = ""
+    stack: str = ""
+    jobs: dict[Any, Running] = field(default_factory=dict)
+    done: int = 0
+    leaves: bool = False
+    cause: str = ""
+    death: Death = "worker"
+
+
+class RayPool:
+    """Workers with so many threads each, and the jobs that wait for one.
+
+    ``start`` makes an actor; ``blame`` turns a job whose worker or node died into a reply, or None to have it done again.
+    """
+
+    def __init__(
+        self,
+        threads: int,
+        start: Callable[[], Any],
+        has_lost: Callable[[str], bool],
+        blame: Callable[[Running, Actor, int], Reply],
+        timeout_s: float,
+    ):
+        self._threads, self._start, self._has_lost, self._blame = threads, start, has_lost, blame
+        self._timeout_s = timeout_s
+        self._backlog: deque[tuple[int, Job]] = deque()
+        self._actors: list[Actor] = []
+        self._of: dict[Any, Actor] = {}
+        self._inquests: set[Any] = set()
+        self._failed_starts = 0
+        self._stalled_since: float | None = None
+
+    @property
+    def refs(self) -> list[Any]:
+        """What Ray is to be asked for."""
+        return list(self._of)
+
+    def submit(self, ticket: int, job: Job) -> None:
+        """Have a job done."""
+        self._backlog.append((ticket, job))
+
+    def dispatch(self, size: int) -> None:
+        """Give waiting jobs to free workers, and start workers while there are fewer than jobs and ``size``."""
+        if not self._backlog:
+            return
+        for actor in self._actors:
+            while self._backlog and actor.node and not actor.leaves and len(actor.jobs) < self._threads:
+                ticket, job = self._backlog.popleft()
+                ref = actor.handle.do.remote(job)
+                actor.jobs[ref] = Running(ticket, job, time.monotonic())
+                self._of[ref] = actor
+        staying = [actor for actor in self._actors if not actor.leaves]
+        coming = sum(self._threads for actor in staying if not actor.node)
+        workers = len(staying)
+        while coming < len(self._backlog) and workers * self._threads < size:
+            actor = Actor(self._start())
+            self._actors.append(actor)
+            self._of[actor.handle.where.remote()] = actor
+            coming, workers = coming + self._threads, workers + 1
+
+    def settle(self, ref: Any) -> Ended:
+        """Take note of something that Ray has an answer to; returns the jobs that ended by it."""
+        import ray
+
+        actor = self._of.pop(ref, None)
+        if actor is None:  # of a worker that died meanwhile
+            return []
+        if ref in self._inquests:
+            self._inquests.discard(ref)
+            return self._buried(actor, self._verdict(actor, ref))
+        try:
+            answer = ray.get(ref)
+        except ray.exceptions.RayTaskError as error:  # of a job: what cannot be sent, say; the worker lives
+            answer = Failure("error", _line(error.cause if error.cause is not None else error))
+        except ray.exceptions.RayError as error:
+            return self._died(actor, error)
+        if ref not in actor.jobs:
+            actor.node, actor.stack = answer
+            self._failed_starts = 0
+            return []
+        return self._done(actor, ref, answer)
+
+    def overdue(self) -> Ended:
+        """Give up jobs that take too long, workers on nodes that are gone, and waiting for workers that do not come."""
+        now, ended = time.monotonic(), Ended()
+        for actor in list(self._actors):
+            if actor.node and self._has_lost(actor.node):
+                actor.cause = "its node died"
+                self._forget(actor)
+                ended += self._buried(actor, "node")
+                continue
+            for ref, running in list(actor.jobs.items()):
+                if now - running.since > self._timeout_s:
+                    ended.append((running.ticket, self._too_long()))
+                    del actor.jobs[ref], self._of[ref]
+                    actor.leaves = True  # with the thread that hangs; what its other threads do may end
+            self._dismiss(actor)
+        for ref in list(self._inquests):
+            if self._has_lost(self._of[ref].node):  # and can no more be asked
+                self._inquests.discard(ref)
+                ended += self._buried(self._of.pop(ref), "node")
+        return ended + self._stalled(now)
+
+    def close(self) -> None:
+        """Stop all workers."""
+        for actor in list(self._actors):
+            self._forget(actor)
+        self._backlog.clear()
+
+    def _done(self, actor: Actor, ref: Any, answer: Reply) -> Ended:
+        running = actor.jobs.pop(ref)
+        actor.done += 1
+        actor.leaves = actor.leaves or actor.done >= JOBS_A_WORKER
+        self._dismiss(actor)
+        return [(running.ticket, answer)]
+
+    def _dismiss(self, actor: Actor) -> None:
+        if actor.leaves and not actor.jobs and actor in self._actors:
+            self._forget(actor)
+
+    def _forget(self, actor: Actor) -> None:
+        import ray
+
+        ray.kill(actor.handle)
+        self._actors.remove(actor)
+        self._of = {ref: of for ref, of in self._of.items() if of is not actor}
+
+    def _died(self, actor: Actor, error: Exception) -> Ended:
+        """Save what a worker still answered, and have its node asked what it left: no answer is one, too."""
+        import ray
+
+        ended = Ended()
+        for ref in list(actor.jobs):
+            try:
+                ended += self._done(actor, ref, ray.get(ref, timeout=0))
+            except ray.exceptions.RayError:  # its fate is decided below
+                continue
+        actor.cause = _cause(error)
+        actor.death = "unreachable" if isinstance(error, ray.exceptions.ActorUnavailableError) else "worker"
+        if actor in self._actors:
+            self._forget(actor)
+        if not actor.node:
+            return ended + self._failed_start(actor)
+        on_its_node: Any = ray.util.scheduling_strategies.NodeAffinitySchedulingStrategy(actor.node, soft=False)
+        ask = ray.remote(num_cpus=0, max_retries=0, scheduling_strategy=on_its_node)(last_words)
+        ref = ask.remote(actor.stack)
+        self._of[ref] = actor
+        self._inquests.add(ref)
+        return ended
+
+    def _failed_start(self, actor: Actor) -> Ended:
+        self._failed_starts += 1
+        if self._failed_starts >= FAILED_STARTS:
+            raise Unavailable(
+                f"the cluster's workers cannot be started: {actor.cause}; "
+                "the same manitwin and Python must be installed on every node"
+            )
+        return []
+
+    def _verdict(self, actor: Actor, ref: Any) -> Death:
+        import ray
+
+        try:
+            words = ray.get(ref)
+        except ray.exceptions.RayTaskError as error:
+            actor.cause += f"; its stack cannot be read: {_line(error)}"
+            return actor.death
+        except ray.exceptions.RayError:  # nobody there to be asked
+            return "node"
+        if words:
+            actor.cause = words
+            return "worker"
+        return actor.death
+
+    def _buried(self, actor: Actor, death: Death) -> Ended:
+        actor.death = death
+        ended, together = Ended(), len(actor.jobs)
+        for running in actor.jobs.values():
+            reply = self._blame(running, actor, together)
+            if reply is not None:
+                ended.append((running.ticket, reply))
+        actor.jobs.clear()
+        return ended
+
+    def _too_long(self) -> Failure:
+        return Failure("timeout", f"took longer than run.stage_timeout_s = {self._timeout_s:g} s")
+
+    def _stalled(self, now: float) -> Ended:
+        """Tell waiting jobs that no worker has come for them, say because no node has a GPU."""
+        if not self._backlog or any(actor.node for actor in self._actors):
+            self._stalled_since = None
+        elif self._stalled_since is None:
+            self._stalled_since = now
+        elif now - self._stalled_since > START_PATIENCE_S:
+            self._stalled_since = None
+            why = f"no worker could be started on the Ray cluster in {START_PATIENCE_S:g} s; `ray status` says what is free"
+            ended: Ended = [(ticket, Failure("unavailable", why)) for ticket, _ in self._backlog]
+            self._backlog.clear()
+            return ended
+        return []
+
+
+def _line(error: BaseException) -> str:
+    return " ".join(f"{type(error).__name__}: {error}".split())[:CAUSE_CHARACTERS]
+
+
+def _cause(error: Exception) -> str:
+    """Return the line of a report on a dead actor that says why."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    why = [line for line in lines if line.startswith(("The actor is dead because", "The actor died because"))]
+    raised = [line for line in lines[1:] if "Error: " in line]
+    return " ".join((raised[-1:] or why or lines[:1] or [type(error).__name__])[0].split())[:CAUSE_CHARACTERS]

@@ -1,0 +1,63 @@
+"""Remember which job was submitted for which request, so that a crash does not pay for it twice."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Protocol
+
+from manitwin.twin.dataset_root import DatasetRoot
+
+
+class JobMemory(Protocol):
+    """Job ids by the digest of what was asked."""
+
+    def recall(self, request: str) -> str | None:
+        """Return the job that was submitted for a request, None where there is none."""
+        ...
+
+    def note(self, request: str, job_id: str) -> None:
+        """Keep a job's id; it is there for the next process once this returns."""
+        ...
+
+    def forget(self, request: str) -> None:
+        """Drop a job that came to nothing."""
+        ...
+
+
+@dataclass(frozen=True)
+class RootJobMemory:
+    """One small file a request below ``name`` of a data set's root, local or at a URL."""
+
+    root: DatasetRoot
+    name: str
+
+    def recall(self, request: str) -> str | None:
+        """Return the job that was submitted for a request, None where there is none."""
+        place = self._place(request)
+        return str(json.loads(self.root.read_bytes(place))["job_id"]) if self.root.exists(place) else None
+
+    def note(self, request: str, job_id: str) -> None:
+        """Keep a job's id; it is there for the next process once this returns."""
+        self.root.write_bytes(self._place(request), json.dumps({"job_id": job_id}).encode())
+
+    def forget(self, request: str) -> None:
+        """Drop a job that came to nothing."""
+        self.root.remove(self._place(request))
+
+    def _place(self, request: str) -> str:
+        return f"{self.name}/{request}.json"
+
+
+class NoMemory:
+    """For generators whose jobs end with the process."""
+
+    def recall(self, request: str) -> str | None:
+        """Return None."""
+        return None
+
+    def note(self, request: str, job_id: str) -> None:
+        """Keep nothing."""
+
+    def forget(self, request: str) -> None:
+        """Drop nothing."""

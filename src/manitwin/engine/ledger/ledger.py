@@ -1,0 +1,298 @@
+"""Read and write a ledger."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from manitwin.engine.ledger.lock import hold_lock, is_written, lock_file
+from manitwin.engine.ledger.migrations import migrate
+from manitwin.engine.stage import Item
+from manitwin.errors import BackendError, UsageError
+
+ItemState = Literal["open", "accepted", "rejected", "failed", "duplicate"]
+StageState = Literal["running", "done", "rejected", "waiting", "failed"]
+ITEM_STATES = ("open", "accepted", "rejected", "failed", "duplicate")
+LEDGER = "ledger.sqlite"
+
+
+class LedgerFull(BackendError):
+    """The disk has no room for another row: what was not committed is lost, and found again by the next run."""
+
+
+@dataclass(frozen=True)
+class OpenItem:
+    """An item that has not ended, with how often each of its stages was tried."""
+
+    number: int
+    item: Item
+    attempts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class StageRow:
+    """What the ledger keeps of one stage of one item."""
+
+    stage: str
+    key: str | None
+    state: StageState
+    attempts: int
+    seconds: float
+    cpu_seconds: float
+    cost_usd: float
+    error: str | None
+
+
+class Ledger:
+    """One ledger file, open for writing by one process at a time.
+
+    Owns: the connection and the lock. Changes are kept together until ``commit``.
+    """
+
+    def __init__(self, path: Path):
+        """Open or make a ledger; raises UsageError where another run holds it."""
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.path = path
+        self._lock = hold_lock(path)
+        self._new = not path.exists()
+        self.connection = sqlite3.connect(path, isolation_level=None)
+        self.connection.execute("PRAGMA journal_mode = WAL")
+        self.connection.execute(
+            "PRAGMA synchronous = NORMAL"
+        )  # a power cut may lose the last rows, which are found again
+        try:
+            migrate(self.connection, str(path))
+        except BaseException:
+            self.connection.close()
+            self._lock.close()
+            raise
+        self.connection.execute("BEGIN")
+
+    def commit(self) -> None:
+        """Make everything since the last commit permanent."""
+        try:
+            self.connection.execute("COMMIT")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_FULL:
+                raise
+            if self.connection.in_transaction:  # SQLite may have rolled back by itself
+                self.connection.execute("ROLLBACK")
+            raise LedgerFull(f"{self.path}: {error}") from error
+        finally:
+            if not self.connection.in_transaction:
+                self.connection.execute("BEGIN")
+
+    def close(self, remove_new: bool = False) -> None:
+        """Commit and give the ledger free; ``remove_new``: one that was made here and got no items is removed before."""
+        removed = False
+        try:
+            self.commit()
+            removed = remove_new and self._new and not self.connection.execute("SELECT 1 FROM items").fetchone()
+            self.connection.execute("ROLLBACK")
+        finally:
+            self.connection.close()
+            if removed:  # while the lock is held: nobody else can have made or filled it
+                self.path.unlink()
+                lock_file(self.path).unlink()
+            self._lock.close()
+
+    def add_items(self, items: Iterable[Item]) -> tuple[int, int]:
+        """Add items that are not there yet, in order, all or none; returns how many were given and how many are new."""
+        given, before = 0, self.connection.total_changes
+        self.commit()
+        try:
+            for item in items:
+                text = json.dumps(_fields(item), sort_keys=True)
+                self.connection.execute("INSERT OR IGNORE INTO items (item) VALUES (?)", (text,))
+                given += 1
+        except BaseException:
+            self.connection.execute("ROLLBACK")
+            self.connection.execute("BEGIN")
+            raise
+        self.commit()
+        return given, self.connection.total_changes - before
+
+    def begin_run(self, recipe_sha256: str) -> int:
+        """Note the begin of a run: what an earlier one left running was cut off, which is nobody's failed attempt.
+
+        Items that ended under another recipe are opened again, their attempts forgotten.
+        """
+        run = self.connection.execute(
+            "INSERT INTO runs (started_at, recipe_sha256) VALUES (?, ?)", (time.time(), recipe_sha256)
+        ).lastrowid
+        self.connection.execute(
+            "UPDATE stages SET state = 'waiting', attempts = max(attempts - 1, 0) WHERE state = 'running'"
+        )
+        ended_otherwise = self.connection.execute(
+            "SELECT number FROM items WHERE state NOT IN ('open', 'duplicate') AND recipe_sha256 <> ?", (recipe_sha256,)
+        ).fetchall()
+        self.reopen(number for (number,) in ended_otherwise)
+        return int(run or 0)
+
+    def end_run(self, run: int, how: str) -> None:
+        """Note how a run ended."""
+        self.connection.execute("UPDATE runs SET ended_at = ?, ended_how = ? WHERE run = ?", (time.time(), how, run))
+        self.commit()
+
+    def next_open(self, after: int, count: int) -> list[OpenItem]:
+        """Return the next open items behind a number, in order."""
+        rows = self.connection.execute(
+            "SELECT number, item FROM items WHERE state = 'open' AND number > ? ORDER BY number LIMIT ?", (after, count)
+        ).fetchall()
+        return [OpenItem(number, Item(**json.loads(item)), self._attempts(number)) for number, item in rows]
+
+    def item(self, number: int) -> Item:
+        """Return an item as it was given."""
+        (text,) = self.connection.execute("SELECT item FROM items WHERE number = ?", (number,)).fetchone()
+        return Item(**json.loads(text))
+
+    def _attempts(self, number: int) -> dict[str, int]:
+        rows = self.connection.execute(
+            "SELECT stage, attempts FROM stages WHERE number = ? AND state <> 'done'", (number,)
+        )
+        return dict(rows)
+
+    def identify(self, number: int, twin_id: str, kind: str) -> int | None:
+        """Note whose twin an item is; where another item makes the same twin, end this one and return the other's number."""
+        first = self.connection.execute(
+            "SELECT number FROM items WHERE twin_id = ? AND state <> 'duplicate' AND number <> ?", (twin_id, number)
+        ).fetchone()
+        if first is None:
+            self.connection.execute("UPDATE items SET twin_id = ?, kind = ? WHERE number = ?", (twin_id, kind, number))
+            return None
+        self.connection.execute(
+            "UPDATE items SET twin_id = ?, kind = ?, state = 'duplicate', detail = ?, ended_at = ? WHERE number = ?",
+            (twin_id, kind, f"the same input as item {first[0]}", time.time(), number),
+        )
+        return int(first[0])
+
+    def stage_started(self, number: int, stage: str, attempts: int) -> None:
+        """Note that a stage is given to a worker."""
+        self.connection.execute(
+            "INSERT INTO stages (number, stage, state, attempts, at) VALUES (?, ?, 'running', ?, ?)"
+            " ON CONFLICT DO UPDATE SET state = 'running', attempts = excluded.attempts, at = excluded.at",
+            (number, stage, attempts, time.time()),
+        )
+
+    def stage_ended(
+        self,
+        number: int,
+        stage: str,
+        state: StageState,
+        *,
+        attempts: int,
+        key: str | None = None,
+        ran: bool = False,
+        seconds: float = 0.0,
+        cpu_seconds: float = 0.0,
+        cost_usd: float = 0.0,
+        error: str | None = None,
+    ) -> None:
+        """Note how a stage ended: done (``ran`` now, or found), rejected, waiting for a service, or failed for good."""
+        self.connection.execute(
+            "INSERT INTO stages (number, stage, key, state, attempts, runs, seconds, cpu_seconds, cost_usd, error, at)"
+            " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?) ON CONFLICT DO UPDATE SET key = excluded.key,"
+            " state = excluded.state, attempts = excluded.attempts, runs = runs + excluded.runs,"
+            " seconds = excluded.seconds, cpu_seconds = excluded.cpu_seconds, cost_usd = excluded.cost_usd,"
+            " error = excluded.error, at = excluded.at",
+            (number, stage, key, state, attempts, int(ran), seconds, cpu_seconds, cost_usd, error, time.time()),
+        )
+
+    def item_ended(
+        self,
+        number: int,
+        state: ItemState,
+        *,
+        recipe_sha256: str,
+        reason: str | None = None,
+        detail: str = "",
+        revision: str | None = None,
+    ) -> None:
+        """Note how an item ended; a twin of a new revision is to be indexed again."""
+        self.connection.execute(
+            "UPDATE items SET state = ?, reason = ?, detail = ?, recipe_sha256 = ?, ended_at = ?,"
+            " indexed = CASE WHEN revision IS ? THEN indexed ELSE 0 END, revision = ? WHERE number = ?",
+            (state, reason, detail, recipe_sha256, time.time(), revision, revision, number),
+        )
+
+    def reopen(self, numbers: Iterable[int]) -> int:
+        """Open ended items again, their attempts forgotten; returns how many."""
+        count = 0
+        for number in numbers:
+            self.connection.execute("UPDATE items SET state = 'open' WHERE number = ?", (number,))
+            self.connection.execute("DELETE FROM stages WHERE number = ? AND state <> 'done'", (number,))
+            count += 1
+        self.commit()
+        return count
+
+    def revised(self, twin_id: str, revision: str) -> None:
+        """Note that a finished twin was amended; it is to be indexed again."""
+        self.connection.execute(
+            "UPDATE items SET revision = ?, indexed = 0 WHERE twin_id = ? AND state = 'accepted'", (revision, twin_id)
+        )
+
+    def counts(self) -> dict[str, int]:
+        """Return the number of items by state."""
+        return dict(self.connection.execute("SELECT state, count(*) FROM items GROUP BY state"))
+
+    def totals(self, recipe_sha256: str) -> tuple[int, int]:
+        """Return how many items there are, and how many are open, or to be opened again under this recipe."""
+        row = self.connection.execute(
+            "SELECT count(*), coalesce(sum(state = 'open' OR (state <> 'duplicate' AND recipe_sha256 <> ?)), 0) FROM items",
+            (recipe_sha256,),
+        ).fetchone()
+        return int(row[0]), int(row[1])
+
+    def not_indexed(self, count: int) -> list[str]:
+        """Return ids of finished twins that no table has yet."""
+        rows = self.connection.execute(
+            "SELECT twin_id FROM items WHERE indexed = 0 AND state IN ('accepted', 'rejected') AND revision IS NOT NULL"
+            " ORDER BY number LIMIT ?",
+            (count,),
+        )
+        return [twin_id for (twin_id,) in rows]
+
+    def indexed(self, twin_ids: Iterable[str]) -> None:
+        """Note that the tables have these twins."""
+        self.connection.executemany("UPDATE items SET indexed = 1 WHERE twin_id = ?", ((i,) for i in twin_ids))
+
+
+def _fields(item: Item) -> dict[str, Any]:
+    """Return an item's fields as the ledger keeps them; of those that came later, only what is said: old rows stay equal."""
+    fields = asdict(item)
+    return fields if item.given is not None else {name: value for name, value in fields.items() if name != "given"}
+
+
+@contextmanager
+def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
+    """Open a ledger for reading, also while a run writes it; raises UsageError where there is none.
+
+    Nothing is left beside one that no run writes: SQLite's reader of a write-ahead log makes files there and does not remove
+    them, so where that log holds nothing it is told to leave it alone (https://sqlite.org/uri.html, ``immutable``). What
+    watches a ledger opens it anew each time: a run that begins meanwhile is not seen through such a connection.
+    """
+    if not path.is_file():
+        raise UsageError(f"{path}: no ledger; `manitwin run MANIFEST -o DATASET` makes one")
+    log = path.with_name(f"{path.name}-wal")
+    at_rest = not is_written(path) and (not log.is_file() or log.stat().st_size == 0)
+    connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro{'&immutable=1' if at_rest else ''}", uri=True)
+    connection.row_factory = sqlite3.Row
+    try:
+        yield connection
+    finally:
+        connection.close()
+
+
+def stage_rows(connection: sqlite3.Connection, number: int) -> list[StageRow]:
+    """Return the stages of one item in the order in which they were last touched."""
+    columns = "stage, key, state, attempts, seconds, cpu_seconds, cost_usd, error"
+    rows: list[Any] = connection.execute(
+        f"SELECT {columns} FROM stages WHERE number = ? ORDER BY at", (number,)
+    ).fetchall()
+    return [StageRow(**dict(zip(columns.split(", "), row, strict=True))) for row in rows]

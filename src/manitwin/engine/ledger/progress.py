@@ -1,0 +1,141 @@
+"""What a ledger says of a run: how far it is, how fast, what it cost, and what became of one item."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+import time
+from dataclasses import dataclass
+
+from manitwin.engine.ledger.ledger import ITEM_STATES, StageRow, stage_rows
+from manitwin.engine.stage_order import place_in_pipeline
+from manitwin.errors import UsageError
+
+RATE_OVER_S = 600.0
+
+
+@dataclass(frozen=True)
+class StageProgress:
+    """One stage over all items; seconds are the mean of those that ran it."""
+
+    stage: str
+    done: int
+    running: int
+    waiting: int
+    rejected: int
+    failed: int
+    mean_seconds: float
+    mean_cpu_seconds: float
+    cost_usd: float
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a data set stands. ``items_per_hour`` is of the last ten minutes of work, None before anything ended."""
+
+    items: dict[str, int]
+    stages: list[StageProgress]
+    rejected_by_reason: dict[str, int]
+    failed_by_reason: dict[str, int]
+    items_per_hour: float | None
+    left_s: float | None
+    cost_usd: float
+    cpu_seconds: float
+    last_run: str
+
+
+@dataclass(frozen=True)
+class ItemStory:
+    """All that the ledger knows of one item."""
+
+    number: int
+    item: dict[str, str | None]
+    twin_id: str | None
+    state: str
+    reason: str | None
+    detail: str
+    indexed: bool
+    stages: list[StageRow]
+
+
+def read_progress(connection: sqlite3.Connection, at_work: bool, now: float | None = None) -> Progress:
+    """Count everything; the ledger may be written at the same time: ``at_work`` tells whether it is."""
+    now = time.time() if now is None else now
+    states = dict.fromkeys(ITEM_STATES, 0)
+    states |= dict(connection.execute("SELECT state, count(*) FROM items GROUP BY state").fetchall())
+    stages = _stages(connection)
+    run = connection.execute("SELECT * FROM runs ORDER BY run DESC LIMIT 1").fetchone()
+    rate = _rate(connection, run, now)
+    return Progress(
+        items=states,
+        stages=stages,
+        rejected_by_reason=_by_reason(connection, "rejected"),
+        failed_by_reason=_by_reason(connection, "failed"),
+        items_per_hour=rate,
+        left_s=states["open"] / rate * 3600 if rate else None,
+        cost_usd=sum((stage.cost_usd for stage in stages), 0.0),
+        cpu_seconds=sum((stage.mean_cpu_seconds * (stage.done + stage.rejected) for stage in stages), 0.0),
+        last_run="none" if run is None else run["ended_how"] or ("at work" if at_work else "cut off"),
+    )
+
+
+def _stages(connection: sqlite3.Connection) -> list[StageProgress]:
+    rows = connection.execute(
+        "SELECT stage, sum(state = 'done') AS done, sum(state = 'running') AS running,"
+        " sum(state = 'waiting') AS waiting, sum(state = 'rejected') AS rejected, sum(state = 'failed') AS failed,"
+        " coalesce(avg(nullif(seconds, 0)), 0.0) AS mean_seconds,"
+        " coalesce(avg(nullif(cpu_seconds, 0)), 0.0) AS mean_cpu_seconds, sum(cost_usd) AS cost_usd"
+        " FROM stages GROUP BY stage ORDER BY count(*) DESC, min(at), stage"
+    )
+    # stages of another recipe stay in the order of the query: no item comes to a stage before it was at those before
+    return sorted((StageProgress(**dict(row)) for row in rows), key=lambda stage: place_in_pipeline(stage.stage))
+
+
+def _by_reason(connection: sqlite3.Connection, state: str) -> dict[str, int]:
+    rows = connection.execute(
+        "SELECT reason, count(*) FROM items WHERE state = ? GROUP BY reason ORDER BY 2 DESC, 1", (state,)
+    )
+    return {row[0] or "unknown": row[1] for row in rows}
+
+
+def _rate(connection: sqlite3.Connection, run: sqlite3.Row | None, now: float) -> float | None:
+    if run is None:
+        return None
+    until = run["ended_at"] or now
+    since = max(run["started_at"], until - RATE_OVER_S)
+    (ended,) = connection.execute(
+        "SELECT count(*) FROM items WHERE state <> 'open' AND ended_at BETWEEN ? AND ?", (since, until)
+    ).fetchone()
+    return 3600 * ended / (until - since) if ended and until > since else None
+
+
+def read_story(connection: sqlite3.Connection, which: str) -> ItemStory:
+    """Return what is known of an item, given by its number, (the begin of) its twin's id, or a part of its file's name.
+
+    Raises UsageError where none or several are meant.
+    """
+    columns = "number, item, twin_id, state, reason, detail, indexed"
+    for condition, value in (
+        ("number = ?", which if which.isdigit() and len(which) < 16 else None),
+        ("twin_id GLOB ? || '*'", which if set(which) <= set("0123456789abcdef") else None),
+        ("instr(item, ?) > 0", json.dumps(which)[1:-1]),
+    ):
+        if value is None:
+            continue
+        rows = connection.execute(f"SELECT {columns} FROM items WHERE {condition} LIMIT 6", (value,)).fetchall()
+        if len(rows) > 1:
+            near = "; ".join(
+                f"{row['number']} {row['twin_id'] or ''} {_given(json.loads(row['item']))}" for row in rows
+            )
+            raise UsageError(f"{which}: several items are meant: {near}; give one's number or id")
+        if rows:
+            row = rows[0]
+            return ItemStory(
+                row["number"], json.loads(row["item"]), row["twin_id"], row["state"], row["reason"], row["detail"],
+                bool(row["indexed"]), stage_rows(connection, row["number"]),
+            )  # fmt: skip
+    raise UsageError(f"{which}: no such item; give its number, its twin's id, or a part of its file's name")
+
+
+def _given(item: dict[str, str | None]) -> str:
+    return str(item.get("file") or item.get("text") or "")

@@ -1,0 +1,141 @@
+"""What a stage is, and the handle on a twin in the making that it works on.
+
+Artifacts have names. A bare word (``physical``) is a field: JSON. A name with a suffix (``solid.npz``) is a file, one that
+ends in ``/`` (``views/``) a folder. Each is written by exactly one stage and read by those that declare it; a name in
+``reads`` that ends in ``?`` is read where it is there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from dataclasses import field as dataclass_field
+from pathlib import Path
+from typing import Any, Literal, Protocol, runtime_checkable
+
+from pydantic import BaseModel
+
+from manitwin.config import Resource
+from manitwin.engine.job_memory import JobMemory, NoMemory
+from manitwin.errors import ManiTwinError
+
+
+def is_field(name: str) -> bool:
+    """Tell a field (JSON) from a file or folder artifact by its name."""
+    return not name.endswith("/") and "." not in name
+
+
+@dataclass(frozen=True)
+class Item:
+    """One input as the user gave it.
+
+    ``file`` is an absolute path, or None where ``text`` is given. ``units`` and ``up`` are what the user said ('auto': unsaid).
+    ``given`` is the import.json beside an imported mesh: what another tool says of it.
+    """
+
+    file: str | None
+    text: str | None = None
+    name: str | None = None
+    units: Literal["m", "cm", "mm", "auto"] = "auto"
+    up: Literal["y", "z", "auto"] = "auto"
+    license: str | None = None
+    attribution: str | None = None
+    given: str | None = None
+
+
+@dataclass
+class Draft:
+    """A twin in the making: fields and paths with their digests, by artifact name. Cheap to send to another process.
+
+    ``jobs`` remembers what was asked of services that are paid by the job. ``rehearsed`` are the stages, among those whose
+    results are here and those that these were made of, whose backend was a rehearsal server (``manitwin fake``).
+    """
+
+    twin_id: str
+    item: Item
+    seed: int
+    fields: dict[str, Any] = dataclass_field(default_factory=dict)
+    paths: dict[str, Path] = dataclass_field(default_factory=dict)
+    digests: dict[str, str] = dataclass_field(default_factory=dict)
+    jobs: JobMemory = dataclass_field(default_factory=NoMemory)
+    rehearsed: set[str] = dataclass_field(default_factory=set)
+
+    def names(self) -> set[str]:
+        """Return the names of all artifacts that are there."""
+        return self.fields.keys() | self.paths.keys()
+
+    def field(self, name: str) -> Any:
+        """Return the JSON value of a field artifact; raises ManiTwinError where no stage has written it."""
+        if name not in self.fields:
+            raise ManiTwinError(
+                f"no stage has written field {name!r}; there are: {', '.join(sorted(self.fields)) or 'none'}"
+            )
+        return self.fields[name]
+
+    def path(self, name: str) -> Path:
+        """Return the path of a file or folder artifact; raises ManiTwinError where no stage has written it."""
+        if name not in self.paths:
+            raise ManiTwinError(f"no stage has written {name!r}; there are: {', '.join(sorted(self.paths)) or 'none'}")
+        return self.paths[name]
+
+
+@runtime_checkable
+class Stage(Protocol):
+    """One step of the paper.
+
+    ``run`` writes its files below ``folder`` under their artifact names, and returns its fields. It may raise ``Rejected``.
+    It is a pure function of what it ``reads``, ``settings``, ``backend``, ``model``, ``draft.item`` and ``draft.seed``.
+    """
+
+    @property
+    def name(self) -> str:
+        """The stage's name, and that of its folder."""
+        ...
+
+    @property
+    def version(self) -> str:
+        """Raised whenever the same inputs give another result."""
+        ...
+
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """The artifacts that decide its result."""
+        ...
+
+    @property
+    def writes(self) -> tuple[str, ...]:
+        """The artifacts that it makes."""
+        ...
+
+    @property
+    def needs(self) -> Resource:
+        """What it runs on."""
+        ...
+
+    @property
+    def settings(self) -> BaseModel:
+        """The stage's own slice of the configuration."""
+        ...
+
+    @property
+    def backend(self) -> str:
+        """Which backend does the work."""
+        ...
+
+    @property
+    def model(self) -> str | None:
+        """Which model, gripper or weights the backend uses."""
+        ...
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Do the step."""
+        ...
+
+
+@runtime_checkable
+class PaidStage(Protocol):
+    """A stage that services charge for."""
+
+    @property
+    def expected_usd(self) -> float:
+        """About what it costs."""
+        ...

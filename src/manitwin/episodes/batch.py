@@ -1,0 +1,149 @@
+"""What one worker does at a time: some episodes of one object, or in one scene; and what it leaves."""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from manitwin.engine.stage import Item
+from manitwin.errors import EpisodesError, UsageError
+from manitwin.twin.store import sha256_of_json
+
+BATCHES = "batches"
+BATCH_RECORD = "batch.json"
+BATCH_SCHEMA_VERSION = 1
+REMEDY_OF_REPEATS = "an older version made these in steps; make the episodes again in a new folder"
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Some episodes of a twin on a table, or of a scene, by their numbers in the whole: ``count`` from ``first`` in steps."""
+
+    robot: str
+    first: int
+    count: int
+    twin_id: str | None = None
+    scene_id: str | None = None
+    step: int = 1
+
+    @property
+    def numbers(self) -> range:
+        """The numbers of its episodes."""
+        return range(self.first, self.first + self.count * self.step, self.step)
+
+    @property
+    def of(self) -> str:
+        """The id of its twin, or of its scene."""
+        return self.twin_id or self.scene_id or ""
+
+    @property
+    def batch_id(self) -> str:
+        """An id by what is asked."""
+        return sha256_of_json(self._said())[:16]
+
+    def item(self) -> Item:
+        """Return the batch as an item of a run."""
+        return Item(file=None, text=json.dumps(self._said(), sort_keys=True))
+
+    @classmethod
+    def of_item(cls, item: Item) -> Batch:
+        """Return the batch that an item asks for."""
+        return cls(**json.loads(item.text or ""))
+
+    def _said(self) -> dict[str, Any]:
+        """Return its fields; ``step`` only where it is not 1, so that batches of older versions keep their ids."""
+        fields = asdict(self)
+        return fields if self.step != 1 else {name: value for name, value in fields.items() if name != "step"}
+
+
+def batches(
+    robot: str,
+    episodes: int,
+    size: int,
+    *,
+    twin_ids: Sequence[str] = (),
+    scene_ids: Sequence[str] = (),
+    there: Iterable[Batch] = (),
+) -> list[Batch]:
+    """Return the batches that are missing to ``episodes``: each number goes to what has the fewest episodes until then.
+
+    So a number has the same twin or scene, and the same seed, whether episodes are made in one go or in steps. ``there`` are
+    the batches that there are; none of their numbers comes again. Raises UsageError where two of them have a number in common.
+    Batches go round, so that a run that is stopped has some of every twin.
+    """
+    kind, ids = ("twin_id", twin_ids) if twin_ids else ("scene_id", scene_ids)
+    counts, taken = dict.fromkeys(ids, 0), set[int]()
+    for batch in there:
+        if not taken.isdisjoint(batch.numbers):
+            raise UsageError(f"batch {batch.batch_id} repeats episodes of another one; {REMEDY_OF_REPEATS}")
+        taken.update(batch.numbers)
+        if batch.of in counts:
+            counts[batch.of] += batch.count
+    fewest = [(count, place, each) for place, (each, count) in enumerate(counts.items())]
+    heapq.heapify(fewest)
+    numbers: dict[str, list[int]] = {each: [] for each in ids}
+    free = (number for number in itertools.count() if number not in taken)
+    for number in itertools.islice(free, max(0, episodes - len(taken))):
+        count, place, each = fewest[0]
+        heapq.heapreplace(fewest, (count + 1, place, each))
+        numbers[each].append(number)
+    dealt = [
+        [Batch(robot, run[0], len(run), step=run.step, **{kind: each}) for run in _runs(given, size)]
+        for each, given in numbers.items()
+    ]
+    rounds = itertools.zip_longest(*dealt)
+    return [batch for each_round in rounds for batch in each_round if batch is not None]
+
+
+def _runs(numbers: Sequence[int], size: int) -> Iterator[range]:
+    """Cut rising numbers into runs of equal steps, each of ``size`` at most; the step of a single number is 1."""
+    start = 0
+    while start < len(numbers):
+        step = numbers[start + 1] - numbers[start] if start + 1 < len(numbers) and size > 1 else 1
+        end = start + 1
+        while end < len(numbers) and end - start < size and numbers[end] - numbers[end - 1] == step:
+            end += 1
+        if end - start == 1:
+            step = 1
+        yield range(numbers[start], numbers[end - 1] + 1, step)
+        start = end
+
+
+class BatchRecord(BaseModel):
+    """``batch.json``: what the batch was, what became of its attempts, and the digests of its files.
+
+    ``twins`` has the ids of all twins that were set up in it, with the revisions that they had then.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    schema_version: int
+    batch_id: str
+    config_sha256: str
+    revision: str
+    twins: dict[str, str]
+    attempted: int
+    planned: int
+    succeeded: int
+    kept: int
+    files: dict[str, str]
+
+
+def read_batch(folder: Path) -> BatchRecord:
+    """Read the record of a finished batch; raises EpisodesError where it cannot be read."""
+    path = folder / BATCH_RECORD
+    try:
+        return BatchRecord.model_validate_json(path.read_bytes())
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "the whole"
+        raise EpisodesError(f"{path}: {where}: {first['msg']}; run manitwin trajectories again") from error
+    except OSError as error:
+        raise EpisodesError(f"{path}: cannot be read ({error}); run manitwin trajectories again") from error

@@ -1,0 +1,109 @@
+"""Make of a run's batches what people load: one table of attempts, a LeRobot data set, and a ManiSkill file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from manitwin.episodes.attempts_table import ATTEMPTS, merge_attempts, read_attempts
+from manitwin.episodes.batch import BATCH_RECORD, BATCHES, REMEDY_OF_REPEATS
+from manitwin.episodes.episodes_stage import EPISODES
+from manitwin.episodes.hdf5_file import EpisodeFile
+from manitwin.episodes.hdf5_merge import merge_episodes
+from manitwin.episodes.lerobot.write import write_lerobot
+from manitwin.episodes.stored_episode import StoredEpisode
+from manitwin.errors import EpisodesError, UsageError, choose_from
+
+LEROBOT, MANISKILL = "lerobot", "maniskill"
+FORMATS = (LEROBOT, MANISKILL)
+
+
+@dataclass(frozen=True)
+class AttemptTotals:
+    """All attempts of a run; ``without_success`` are the twins that no episode succeeded with."""
+
+    attempted: int
+    planned: int
+    succeeded: int
+    kept: int
+    outcomes: dict[str, int]
+    without_success: list[str]
+
+
+@dataclass(frozen=True)
+class Collected:
+    """What a person reads at a run's end, and the numbers in it."""
+
+    lines: list[str]
+    totals: AttemptTotals
+
+
+def chosen_formats(text: str) -> list[str]:
+    """Return the formats of a list by commas; raises UsageError naming those that there are."""
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    for name in names:
+        if name not in FORMATS:
+            raise UsageError(choose_from("format", name, FORMATS))
+    return names
+
+
+def batch_folders(out: Path) -> list[Path]:
+    """Return the finished batches of a run, by the numbers of their episodes.
+
+    Raises UsageError where there are none, EpisodesError where two have an episode of the same number: both drew with one seed.
+    """
+    folders = [path.parent for path in sorted((out / BATCHES).glob(f"*/*/{BATCH_RECORD}"))]
+    if not folders:
+        raise UsageError(f"{out}: no episodes there; `manitwin trajectories` makes some")
+    of, first = dict[str, Path](), dict[Path, str]()
+    for folder in folders:
+        for attempt in read_attempts(folder / ATTEMPTS):
+            number = attempt.episode_id.rpartition("-")[2]
+            other = of.setdefault(number, folder)
+            if other != folder:
+                raise EpisodesError(f"{folder}: repeats episode {number} of {other}; {REMEDY_OF_REPEATS}")
+            first[folder] = min(number, first.get(folder, number))
+    return sorted(folders, key=lambda folder: first.get(folder, ""))
+
+
+def stored_episodes(folders: Iterable[Path]) -> Iterator[StoredEpisode]:
+    """Yield the kept episodes of batches, one at a time."""
+    for folder in folders:
+        with EpisodeFile(folder / EPISODES) as file:
+            yield from file
+
+
+def collect(out: Path, formats: list[str]) -> Collected:
+    """Write the table of attempts and the data sets of the kept episodes; each appears whole or not at all."""
+    folders = batch_folders(out)
+    _, kept = merge_attempts([folder / ATTEMPTS for folder in folders], out / ATTEMPTS)
+    if MANISKILL in formats:
+        merge_episodes([folder / EPISODES for folder in folders], out / MANISKILL)
+    if LEROBOT in formats and kept:
+        write_lerobot(stored_episodes(folders), out / LEROBOT)
+    return _collected(out)
+
+
+def _collected(out: Path) -> Collected:
+    outcomes, by_twin = Counter[str](), dict[str, Counter[str]]()
+    planned = succeeded = 0
+    names = dict[str, str]()
+    for attempt in read_attempts(out / ATTEMPTS):
+        outcomes[attempt.outcome] += 1
+        planned, succeeded = planned + attempt.planned, succeeded + attempt.succeeded
+        by_twin.setdefault(attempt.twin_id, Counter())["succeeded" if attempt.succeeded else "failed"] += 1
+        names[attempt.twin_id] = attempt.category
+    attempted, kept = outcomes.total(), outcomes["kept"]
+    lines = [
+        f"{attempted} attempted, {planned} planned and executed, {succeeded} succeeded"
+        f" ({succeeded / max(1, planned):.1%} of the executed), {kept} kept"
+    ]
+    failed = ", ".join(f"{count} {outcome}" for outcome, count in sorted(outcomes.items()) if outcome != "kept")
+    lines.append(f"not kept: {failed or 'none'}")
+    dead = sorted(twin_id for twin_id, counts in by_twin.items() if not counts["succeeded"])
+    if dead:
+        lines.append("no success with: " + ", ".join(f"{each} {names[each]}" for each in dead))
+    totals = AttemptTotals(attempted, planned, succeeded, kept, dict(sorted(outcomes.items())), dead)
+    return Collected(lines, totals)

@@ -1,0 +1,108 @@
+"""Who touches whom in an episode: the fingers the target, the target its support, and the robot what it should not."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from sapien import physx
+
+from manitwin.episodes.planning.problem import Phase
+
+IN_HAND = frozenset({Phase.CLOSE, Phase.LIFT, Phase.CARRY, Phase.LOWER, Phase.OPEN})
+
+
+class Role(IntEnum):
+    """What a body is in an episode; the robot's parts come first."""
+
+    PLUS_FINGER = 0
+    MINUS_FINGER = 1
+    HAND = 2
+    ARM = 3
+    TARGET = 4
+    OTHER = 5
+    FURNITURE = 6
+
+
+@dataclass(frozen=True)
+class Touches:
+    """How hard each finger presses on the target, and whether something else carries it."""
+
+    finger_forces_n: tuple[float, float]
+    on_support: bool
+
+
+class ContactReader:
+    """Reads the contacts of the last step."""
+
+    def __init__(
+        self,
+        system: physx.PhysxCpuSystem,
+        bodies: Iterable[tuple[physx.PhysxBaseComponent, str, Role]],
+        max_contact_force_n: float,
+    ):
+        """Take every body with its name and role."""
+        self._system, self._max_impulse = system, max_contact_force_n * system.timestep
+        self._roles: dict[physx.PhysxBaseComponent, Role] = {}
+        self._names: dict[physx.PhysxBaseComponent, str] = {}
+        for component, name, role in bodies:
+            self._roles[component], self._names[component] = role, name
+
+    def read(self) -> Sequence[physx.PhysxContact]:
+        """Return the contacts of the last step, of which the others tell; expensive where many hulls stand on a table."""
+        contacts: Sequence[physx.PhysxContact] = self._system.get_contacts()
+        return contacts
+
+    def touches(self, contacts: Iterable[physx.PhysxContact]) -> Touches:
+        """Return what touches the target."""
+        impulses = [np.zeros(3), np.zeros(3)]
+        on_support = False
+        for contact in contacts:
+            one, two = contact.bodies
+            first, second = self._roles[one], self._roles[two]
+            if first != Role.TARGET and second != Role.TARGET:
+                continue
+            if first > Role.TARGET or second > Role.TARGET:
+                on_support = on_support or any(point.impulse.any() for point in contact.points)
+            elif first <= Role.MINUS_FINGER:
+                impulses[first] += _impulse(contact)
+            elif second <= Role.MINUS_FINGER:
+                impulses[second] -= _impulse(contact)
+        plus_n, minus_n = (float(np.linalg.norm(impulse)) / self._system.timestep for impulse in impulses)
+        return Touches((plus_n, minus_n), on_support)
+
+    def unplanned(self, contacts: Iterable[physx.PhysxContact], phase: Phase) -> set[tuple[str, str]]:
+        """Return the names of what touches with more than the allowed force and should not, the robot's part first."""
+        impulses: dict[tuple[str, str], np.ndarray] = {}
+        forbidden = _FORBIDDEN_IN_HAND if phase in IN_HAND else _FORBIDDEN
+        for contact in contacts:
+            first, second = contact.bodies
+            if not forbidden[self._roles[first]][self._roles[second]]:
+                continue
+            sign = 1.0
+            if self._roles[first] > self._roles[second]:
+                first, second, sign = second, first, -1.0
+            pair = self._names[first], self._names[second]
+            impulses[pair] = impulses.get(pair, 0.0) + sign * _impulse(contact)
+        return {pair for pair, impulse in impulses.items() if np.linalg.norm(impulse) > self._max_impulse}
+
+
+def _forbidden(in_hand: bool) -> list[list[bool]]:
+    """Return, for two roles in either order, whether they must not touch: a table, as it is asked for every contact."""
+
+    def is_forbidden(part: Role, other: Role) -> bool:
+        if part >= Role.TARGET or other < Role.TARGET:
+            return False
+        return other > Role.TARGET or part == Role.ARM or (part == Role.HAND and not in_hand)
+
+    return [[is_forbidden(min(one, two), max(one, two)) for two in Role] for one in Role]
+
+
+_FORBIDDEN, _FORBIDDEN_IN_HAND = _forbidden(False), _forbidden(True)
+
+
+def _impulse(contact: physx.PhysxContact) -> np.ndarray:
+    """Return the impulse ``(3,)`` on the contact's first body."""
+    return sum((point.impulse for point in contact.points), start=np.zeros(3))

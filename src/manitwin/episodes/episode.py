@@ -1,0 +1,254 @@
+"""One pick-and-place episode: plan, execute in physics, re-plan from what is measured, judge (``reference/planning.md`` 6)."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+
+from manitwin.episodes.execution import FRAME_S, Execution
+from manitwin.episodes.outcome import (
+    PlacementErrors,
+    is_at_rest,
+    is_disturbed,
+    moved_m,
+    placement_errors,
+    placement_outcome,
+    turned_rad,
+)
+from manitwin.episodes.planning.problem import Grasp, Motion, PickPlacePlan, PickPlaceProblem, PlanFailure, PlanReport
+from manitwin.episodes.recording import Recording
+from manitwin.episodes.world import EpisodeWorld
+from manitwin.geometry.poses import inverse, transform_points
+from manitwin.physics.sapien.shape_pool import ShapePool
+from manitwin.physics.trial import TrialSettings
+from manitwin.robots.robot import Robot
+from manitwin.scenes.app_config import EpisodeSettings
+
+SETTLE_S = 0.05  # between looks at whether a start has come to rest
+SMALL_SLIP_M, SMALL_SLIP_RAD = 0.004, np.radians(2.0)  # a fifth of what a placement may be off: no reason to give up
+LEAST_LIFT_SHARE = 0.5  # of what the hand rose: less, and the object was left behind
+
+
+class Planner(Protocol):
+    """What an episode wants of a planner (``planning.pick_place.PickPlacePlanner``)."""
+
+    def plan(self, problem: PickPlaceProblem) -> PlanReport:
+        """Plan all of it."""
+        ...
+
+    def plan_place(
+        self, problem: PickPlaceProblem, plan: PickPlacePlan, joint_positions_rad: np.ndarray,
+        gripper_to_object_measured: np.ndarray, goal: np.ndarray, with_carry: bool,
+    ) -> tuple[Motion | None, Motion, Motion] | None:  # fmt: skip
+        """Plan carry, lower and retreat again."""
+        ...
+
+    def tip_pose(self, q: np.ndarray) -> np.ndarray:
+        """Return the pose ``(4, 4)`` of the grasp frame in the world."""
+        ...
+
+
+@dataclass
+class EpisodeFacts:
+    """What became of an episode: the part of an ``Attempt`` that the execution knows. Times are CPU seconds."""
+
+    outcome: str = "no_plan"
+    grasp: Grasp | None = None
+    grasps_tried: int = 0
+    plan_failures: Counter[PlanFailure] = field(default_factory=Counter)
+    errors: PlacementErrors | None = None
+    slip_m: float | None = None
+    turned_in_hand_rad: float | None = None
+    length_s: float | None = None
+    unplanned: tuple[tuple[str, str], ...] = ()
+    replans: Counter[str] = field(default_factory=Counter)
+    planning_s: float = 0.0
+    simulation_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class _Placement:
+    """The motions that place an object which is in the hand as ``gripper_to_object`` says."""
+
+    gripper_to_object: np.ndarray
+    carry: Motion | None
+    lower: Motion
+    retreat: Motion
+
+
+class _Ended(Exception):
+    """The episode ends here, with its outcome."""
+
+
+def run_episode(
+    problem: PickPlaceProblem, planner: Planner, robot: Robot, settings: EpisodeSettings, pool: ShapePool
+) -> tuple[EpisodeFacts, Recording | None]:
+    """Run one episode and return what became of it, and its recording where it was executed.
+
+    The objects settle first, and the plan is made from where they came to rest. The same arguments give the same bytes.
+    """
+    return _Episode(problem, planner, robot, settings, pool).run()
+
+
+class _Episode:
+    def __init__(
+        self, problem: PickPlaceProblem, planner: Planner, robot: Robot, settings: EpisodeSettings, pool: ShapePool
+    ):
+        self.problem, self.planner, self.robot, self.settings, self.pool = problem, planner, robot, settings, pool
+        self.goal_object_to_world = problem.goal_object_to_world
+        self.facts = EpisodeFacts()
+
+    def run(self) -> tuple[EpisodeFacts, Recording | None]:
+        start = time.process_time()
+        recording, closing = None, self._closing()
+        with EpisodeWorld(self.robot, self.problem, self.settings, self.pool, closing.force_n) as world:
+            if not self._settle(world):
+                self.facts.outcome = "unsettled"
+            elif plan := self._plan(world):
+                execution = Execution(world, self.robot, closing, self.planner.tip_pose)
+                try:
+                    self._execute(plan, execution)
+                    self._judge(world, execution)
+                except _Ended as end:
+                    self.facts.outcome = str(end)
+                self.facts.length_s = execution.length_s
+                self.facts.unplanned = tuple(sorted(execution.unplanned))
+                recording = execution.recording()
+                del execution
+        self.facts.simulation_s = time.process_time() - start - self.facts.planning_s
+        return self.facts, recording
+
+    def _settle(self, world: EpisodeWorld) -> bool:
+        """Let the objects come to rest and make the problem that of where they are; False where one does not stand."""
+        settings, looks = self.settings, 0
+        for _ in range(round(settings.max_settle_s / SETTLE_S)):
+            world.step(round(SETTLE_S / settings.timestep_s))
+            looks = looks + 1 if world.is_still() else 0
+            if looks >= 2:
+                break
+        rested = [
+            replace(placed, object_to_world=world.object_to_world(number)) for number, placed in enumerate(world.placed)
+        ]
+        for before, after in zip(world.placed, rested, strict=True):
+            moved = moved_m(before.object_to_world, after.object_to_world, before.body.center_of_mass_m)
+            turned = turned_rad(before.object_to_world, after.object_to_world)
+            if moved > settings.max_start_m or turned > np.radians(settings.max_start_deg):
+                return False
+        self.problem = replace(
+            self.problem,
+            target=rested[world.target],
+            goal_object_to_world=_raised(self.goal_object_to_world, settings.release_height_m),
+            obstacles=tuple(placed for number, placed in enumerate(rested) if number != world.target),
+        )
+        self.rested = rested
+        return True
+
+    def _plan(self, world: EpisodeWorld) -> PickPlacePlan | None:
+        start = time.process_time()
+        report = self.planner.plan(self.problem)
+        self.facts.planning_s += time.process_time() - start
+        self.facts.grasps_tried, self.facts.plan_failures = report.tried, report.failures
+        self.facts.grasp = report.plan.grasp if report.plan else None
+        return report.plan
+
+    def _closing(self) -> TrialSettings:
+        gripper, settings = self.robot.gripper, self.settings
+        force_n = gripper.force_n if settings.closing_force_n is None else settings.closing_force_n
+        return TrialSettings(
+            force_n,
+            gripper.finger_friction,
+            timestep_s=settings.timestep_s,
+            steps_per_frame=max(1, round(FRAME_S / settings.timestep_s)),
+        )
+
+    def _execute(self, plan: PickPlacePlan, execution: Execution) -> None:
+        """Pick and place; raises _Ended where the object is lost or cannot be placed."""
+        execution.follow(plan.reach)
+        execution.follow(plan.approach)
+        execution.close()
+        closed_height_m = self._height_m(execution)
+        hand_height_m = self.planner.tip_pose(execution.commanded_rad)[2, 3]
+        execution.follow(plan.lift)
+        rise_m = self.planner.tip_pose(execution.commanded_rad)[2, 3] - hand_height_m
+        if self._height_m(execution) - closed_height_m < LEAST_LIFT_SHARE * rise_m:
+            raise _Ended("not_lifted")
+        placement = _Placement(plan.gripper_to_object, plan.carry, plan.lower, plan.retreat)
+        placement = self._placed_anew(plan, execution, with_carry=True) or placement
+        self.facts.replans["after_lift" if placement.carry is not plan.carry else "after_lift_failed"] += 1
+        if placement.carry is not None:
+            execution.follow(placement.carry)
+        self._check_held(execution)
+        placement = self._placed_late(plan, execution, placement)
+        if placement.carry is not None:
+            execution.follow(placement.carry)
+        execution.follow(placement.lower)
+        self._check_held(execution)
+        self._measure_slip(plan, execution)
+        execution.open()
+        execution.follow(placement.retreat)
+
+    def _placed_anew(self, plan: PickPlacePlan, execution: Execution, *, with_carry: bool) -> _Placement | None:
+        """Plan the placement from the pose in the hand."""
+        start, measured = time.process_time(), execution.gripper_to_object()
+        found = self.planner.plan_place(
+            self.problem, plan, execution.commanded_rad, measured, self.problem.goal_object_to_world, with_carry
+        )
+        self.facts.planning_s += time.process_time() - start
+        return None if found is None else _Placement(measured, *found)
+
+    def _placed_late(self, plan: PickPlacePlan, execution: Execution, before: _Placement) -> _Placement:
+        """Plan the lowering anew, by another way where it does not work from here; what was planned ``before`` serves too
+        where the object has moved little in the hand since. Raises _Ended where nothing does."""
+        self._measure_slip(plan, execution)
+        for with_carry in (False, True):
+            found = self._placed_anew(plan, execution, with_carry=with_carry)
+            if found is not None:
+                self.facts.replans["late_with_carry" if with_carry else "late"] += 1
+                return found
+        expected, measured = inverse(before.gripper_to_object), inverse(execution.gripper_to_object())
+        center = self.problem.target.body.center_of_mass_m
+        if moved_m(expected, measured, center) > SMALL_SLIP_M or turned_rad(expected, measured) > SMALL_SLIP_RAD:
+            raise _Ended("replan_failed")
+        self.facts.replans["late_not_needed"] += 1
+        return replace(before, carry=None)
+
+    def _height_m(self, execution: Execution) -> float:
+        center = self.problem.target.body.center_of_mass_m[None]
+        return float(transform_points(execution.target_to_world(), center)[0, 2])
+
+    def _check_held(self, execution: Execution) -> None:
+        if not min(execution.touches.finger_forces_n) > 0:
+            raise _Ended("dropped")
+
+    def _measure_slip(self, plan: PickPlacePlan, execution: Execution) -> None:
+        planned, measured = inverse(plan.gripper_to_object), inverse(execution.gripper_to_object())
+        self.facts.slip_m = moved_m(planned, measured, self.problem.target.body.center_of_mass_m)
+        self.facts.turned_in_hand_rad = turned_rad(planned, measured)
+
+    def _judge(self, world: EpisodeWorld, execution: Execution) -> None:
+        settings, body = self.settings, self.problem.target.body
+        last = execution.rest(round(settings.max_rest_s / settings.timestep_s))
+        errors = placement_errors(execution.target_to_world(), self.goal_object_to_world, body.center_of_mass_m)
+        released = max(execution.touches.finger_forces_n) == 0
+        self.facts.errors = errors
+        at_rest = is_at_rest(last, body.center_of_mass_m, settings)
+        failure = placement_outcome(errors, at_rest=at_rest, released=released, settings=settings)
+        if failure is None and any(
+            is_disturbed(placed.object_to_world, world.object_to_world(number), placed.body.center_of_mass_m, settings)
+            for number, placed in enumerate(self.rested)
+            if number != world.target
+        ):
+            failure = "disturbed"
+        if failure in (None, "disturbed") and execution.unplanned:
+            failure = "unplanned_contact"
+        self.facts.outcome = failure or "kept"
+
+
+def _raised(pose: np.ndarray, height_m: float) -> np.ndarray:
+    raised = np.array(pose, float)
+    raised[2, 3] += height_m
+    return raised

@@ -1,0 +1,257 @@
+"""The stage that makes a batch: set up, plan and execute one episode after the other, and write what came of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manitwin.config import Resource
+from manitwin.engine.stage import Draft
+from manitwin.engine.stage_parts import tell_part
+from manitwin.episodes.attempt import Attempt
+from manitwin.episodes.attempts_table import ATTEMPTS, write_attempts
+from manitwin.episodes.batch import Batch
+from manitwin.episodes.episode import EpisodeFacts, run_episode
+from manitwin.episodes.hdf5_file import write_episodes
+from manitwin.episodes.instructions import episode_instructions
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.problem import PickPlaceProblem
+from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode, recorded_robot
+from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
+from manitwin.episodes.tasks import Placeable, Room, Task, free_goal, sample_task
+from manitwin.physics.sapien.shape_pool import ShapePool
+from manitwin.robots.load import load_robot
+from manitwin.robots.robot import Robot
+from manitwin.scenes.app_config import TrajectoriesConfig
+from manitwin.scenes.layouts.furniture import make_furniture
+from manitwin.scenes.layouts.looks import make_lights
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
+from manitwin.scenes.loaded_scene import Scene, furniture_boxes
+from manitwin.scenes.scene import Furniture, Light
+from manitwin.scenes.scene_folders import scene_name
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.twin_source import TwinSource
+
+EPISODES = "episodes.h5"
+KEPT_TWINS = 256
+
+
+@dataclass(frozen=True)
+class _Setting:
+    """An episode before it is planned: the task on its furniture, and the scene that it is of, if any."""
+
+    task: Task
+    furniture: Furniture
+    ambient: tuple[float, float, float]
+    lights: tuple[Light, ...]
+    scene_id: str | None = None
+
+
+class EpisodesStage:
+    """Make the episodes of a batch. Each draws from a generator of its own, by the run's seed and its number in the whole."""
+
+    name = "episodes"
+    version = "1"
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = (EPISODES, ATTEMPTS, "batch")
+    needs: Resource = "cpu"
+    backend = "sapien"
+
+    def __init__(self, settings: TrajectoriesConfig, dataset: str, scenes: str | None):
+        """Take the configuration, and where twins and scenes are read from."""
+        self.settings, self.dataset, self.scenes = settings, dataset, scenes
+        self._placeable = lru_cache(KEPT_TWINS)(self._read_placeable)
+        self._twin = lru_cache(KEPT_TWINS)(self._read_twin)
+        self._grasps = lru_cache(KEPT_TWINS)(self._read_grasps)
+
+    @property
+    def model(self) -> str:
+        """The robot and the digest of its definition."""
+        return f"{self._robot.name}:{self._robot.sha256[:12]}"
+
+    @cached_property
+    def _robot(self) -> Robot:
+        return load_robot(self.settings.robot)
+
+    @cached_property
+    def _planner(self) -> PickPlacePlanner:
+        return PickPlacePlanner(self._robot, timestep_s=self.settings.episode.timestep_s)
+
+    @cached_property
+    def _shapes(self) -> ShapePool:
+        return ShapePool()
+
+    @cached_property
+    def _source(self) -> TwinSource:
+        return TwinSource(self.dataset)
+
+    @property
+    def _pool(self) -> Pool:
+        return pool_of(self.dataset)
+
+    @cached_property
+    def _pool_twins(self) -> dict[str, PoolTwin]:
+        return {twin.twin_id: twin for twin in self._pool.twins}
+
+    def _read_placeable(self, twin_id: str) -> Placeable:
+        return Placeable.of(self._pool, self._pool_twins[twin_id])
+
+    def _read_twin(self, twin_id: str) -> Twin:
+        return self._source.twin(twin_id)
+
+    def _read_grasps(self, twin_id: str) -> dict[str, TargetGrasp]:
+        return {each.grasp.grasp_id: each for each in usable_grasps(self._twin(twin_id), self._robot.gripper)}
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Make the batch that the item asks for."""
+        batch = Batch.of_item(draft.item)
+        attempts: list[Attempt] = []
+        twins: dict[str, str] = {}
+        write_episodes(folder / EPISODES, self._episodes(draft, batch, attempts, twins))
+        write_attempts(folder / ATTEMPTS, attempts)
+        counts = {
+            "attempted": len(attempts),
+            "planned": sum(attempt.planned for attempt in attempts),
+            "succeeded": sum(attempt.succeeded for attempt in attempts),
+            "kept": sum(attempt.outcome == "kept" for attempt in attempts),
+        }
+        return {"batch": {"twins": dict(sorted(twins.items())), **counts}}
+
+    def _episodes(
+        self, draft: Draft, batch: Batch, attempts: list[Attempt], twins: dict[str, str]
+    ) -> Iterator[StoredEpisode]:
+        """Yield those that are kept, one at a time; all attempts are added to ``attempts``."""
+        for number in batch.numbers:
+            words = np.random.SeedSequence([draft.seed, number]).generate_state(2)
+            setting = self._setting(batch, np.random.default_rng(words))
+            stored = self._attempt(batch, number, int(words[0]), setting)
+            attempts.append(stored.attempt if isinstance(stored, StoredEpisode) else stored)
+            tell_part(len(attempts), batch.count, "episodes")
+            if setting is not None:
+                twins.update({o.twin_id: self._twin(o.twin_id).record.revision for o in setting.task.objects})
+            if isinstance(stored, StoredEpisode):
+                yield stored
+
+    def _setting(self, batch: Batch, rng: np.random.Generator) -> _Setting | None:
+        workspace = self._robot.workspace
+        if batch.twin_id is not None:
+            pool = self._pool.twins
+
+            def other() -> Placeable:
+                while True:
+                    twin = pool[int(rng.integers(len(pool)))]
+                    if twin.twin_id != batch.twin_id or len(pool) == 1:
+                        return self._placeable(twin.twin_id)
+
+            furniture, (ambient, lights) = make_furniture("table", rng), make_lights(rng)
+            room = Room(workspace, furniture.supports[0])
+            task = sample_task(self._placeable(batch.twin_id), other, self.settings.others, room, rng)
+            return None if task is None else _Setting(task, furniture, ambient, lights)
+        assert batch.scene_id is not None and self.scenes is not None
+        scene = Scene.read(Path(self.scenes) / scene_name(batch.scene_id), self.dataset)
+        objects, record = tuple(scene.placed_objects()), scene.record
+        supporting = {each.supported_by for each in record.objects}
+        able = [
+            number
+            for number, each in enumerate(record.objects)
+            if each.name not in supporting
+            and workspace.min_radius_m <= np.hypot(*each.position_m[:2]) <= workspace.max_radius_m
+            and self._twin(each.twin_id).record.grasps is not None
+        ]
+        supports = {support.name: support for support in record.furniture.supports}
+        for target in rng.permutation(able):
+            room = Room(workspace, supports[record.objects[int(target)].surface])
+            goal = free_goal(objects, int(target), room, rng)
+            if goal is not None:
+                task = Task(objects, int(target), goal)
+                return _Setting(task, record.furniture, record.ambient, record.lights, batch.scene_id)
+        return None
+
+    def _attempt(self, batch: Batch, number: int, seed: int, setting: _Setting | None) -> Attempt | StoredEpisode:
+        episode_id = f"{batch.batch_id}-{number:08d}"
+        if setting is None:
+            return _attempt(
+                episode_id, self._robot, batch.twin_id or "", "", batch.scene_id, seed, 0, EpisodeFacts("no_room")
+            )
+        task = setting.task
+        target = task.objects[task.target]
+        twin = self._twin(target.twin_id)
+        assert twin.record.language is not None
+        grasps = self._grasps(target.twin_id)
+        problem = PickPlaceProblem(
+            target=target,
+            goal_object_to_world=task.goal_object_to_world,
+            grasps=tuple(each.grasp for each in shuffled(grasps.values(), np.random.default_rng([seed, 1]))),
+            obstacles=tuple(each for place, each in enumerate(task.objects) if place != task.target),
+            static_boxes=tuple(furniture_boxes(setting.furniture)),
+            seed=seed,
+        )
+        facts, recording = run_episode(problem, self._planner, self._robot, self.settings.episode, self._shapes)
+        spoken = episode_instructions(
+            twin.record.language,
+            target.object_to_world[:3, 3],
+            task.goal_object_to_world[:3, 3],
+            seed=seed,
+            others=[self._language(o.twin_id) for o in problem.obstacles],
+        )
+        attempt = _attempt(
+            episode_id, self._robot, target.twin_id, twin.record.language.category, setting.scene_id, seed,
+            len(problem.obstacles), facts, grasps.get(facts.grasp.grasp_id) if facts.grasp else None, spoken,
+        )  # fmt: skip
+        if attempt.outcome != "kept" or recording is None:
+            return attempt
+        objects = tuple(RecordedObject(each.name, each.twin_id) for each in sorted(task.objects, key=lambda o: o.name))
+        said = {
+            "goal_object_to_world": task.goal_object_to_world.tolist(),
+            "furniture": setting.furniture.model_dump(mode="json"),
+            "ambient": list(setting.ambient),
+            "lights": [light.model_dump(mode="json") for light in setting.lights],
+            "twin_revision": twin.record.revision,
+        }
+        return StoredEpisode(attempt, recording, recorded_robot(self._robot), objects, said)
+
+    def _language(self, twin_id: str) -> Any:
+        return self._twin(twin_id).record.language
+
+
+def _attempt(
+    episode_id: str,
+    robot: Robot,
+    twin_id: str,
+    category: str,
+    scene_id: str | None,
+    seed: int,
+    others: int,
+    facts: EpisodeFacts,
+    grasp: TargetGrasp | None = None,
+    instructions: tuple[str, ...] = (),
+) -> Attempt:
+    errors = facts.errors
+    return Attempt(
+        episode_id=episode_id,
+        robot=robot.name,
+        skill="pick_place",
+        twin_id=twin_id,
+        category=category,
+        scene_id=scene_id,
+        seed=seed,
+        others=others,
+        outcome=facts.outcome,
+        grasp_id=grasp.grasp.grasp_id if grasp else None,
+        grasp_type=grasp.grasp_type if grasp else None,
+        transferred=grasp.transferred if grasp else False,
+        grasps_tried=facts.grasps_tried,
+        plan_failures=json.dumps(dict(sorted(facts.plan_failures.items()))),
+        position_error_m=errors.position_error_m if errors else None,
+        tilt_rad=errors.tilt_rad if errors else None,
+        yaw_error_rad=errors.yaw_error_rad if errors else None,
+        slip_m=facts.slip_m,
+        length_s=facts.length_s,
+        instructions=instructions,
+    )

@@ -1,0 +1,163 @@
+"""Carrying out a plan in physics, step by step, with the recorder looking on 20 times a second."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from sapien import physx
+
+from manitwin.episodes.planning.problem import Motion, Phase
+from manitwin.episodes.recorder import Recorder
+from manitwin.episodes.recording import RATE_HZ, Recording
+from manitwin.episodes.world import EpisodeWorld
+from manitwin.geometry.poses import inverse
+from manitwin.physics.shared_target import SharedTarget
+from manitwin.physics.trial import TrialSettings
+from manitwin.robots.robot import Robot
+
+STILL_ROWS, REST_ROWS = 5, 10  # 0.25 s and 0.5 s
+FRAME_S = 1 / 60  # between two looks at how hard the hand presses
+STEADY_FRAMES = 6  # the hand presses for so long before it moves on
+PRESSING_SHARE = 0.98  # of the closing force, at which the target has come as far as it goes
+OPENING_S = 0.1  # after the pads have parted, before the hand withdraws
+# Nine touches of fingers and table lasted 12 to 25 ms: looking at the recorded rows alone, every 50 ms, missed 4 of them.
+WATCH_S = 0.0125
+TRACKING_S = 0.05  # after a motion, for the arm to come to rest
+
+
+class Execution:
+    """Moves the robot of a world and records what happens; ``tip_pose`` is the forward kinematics of commanded joints."""
+
+    def __init__(
+        self, world: EpisodeWorld, robot: Robot, closing: TrialSettings, tip_pose: Callable[[np.ndarray], np.ndarray]
+    ):
+        """Record the first state. Raises ValueError where the timestep does not fit the rate of recording."""
+        self._world, self._robot, self._closing, self._tip_pose = world, robot, closing, tip_pose
+        self._steps_per_row = round(1 / RATE_HZ / closing.timestep_s)
+        if abs(self._steps_per_row * closing.timestep_s * RATE_HZ - 1) > 1e-9:
+            raise ValueError(
+                f"a timestep of {closing.timestep_s:g} s does not divide the {1 / RATE_HZ:g} s between two rows"
+            )
+        self._steps_per_look = max(1, int(WATCH_S / closing.timestep_s + 1e-9))
+        self.commanded_rad = np.array(robot.home_rad, float)
+        self._opening_target_m = robot.gripper.opening_m
+        self._shared = SharedTarget(robot.gripper.opening_m, closing)
+        self._presses = False
+        self.steps = 0
+        self.unplanned: set[tuple[str, str]] = set()
+        self._unplanned_since_row = False
+        self.touches = world.contacts.touches(world.contacts.read())
+        self._recorder = Recorder(world, self.touches)
+
+    @property
+    def length_s(self) -> float:
+        """The time since the first state."""
+        return self.steps * self._closing.timestep_s
+
+    def recording(self) -> Recording:
+        """Return what was recorded so far."""
+        return self._recorder.recording(self._tip_pose)
+
+    def follow(self, motion: Motion) -> None:
+        """Move the arm along a motion and wait until it has come to rest."""
+        robot = self._world.robot
+        for positions, velocities in zip(motion.positions_rad, motion.velocities_rad_s, strict=True):
+            # the drives pull to where the arm is to be in the middle of the step, or it would run ahead of its targets
+            robot.set_targets(positions - velocities * (self._closing.timestep_s / 2), velocities)
+            self.commanded_rad = positions
+            self._advance(motion.phase)
+        robot.set_targets(self.commanded_rad, np.zeros_like(self.commanded_rad))
+        self.wait(motion.phase, self._steps(TRACKING_S))
+
+    def wait(self, phase: Phase, steps: int) -> None:
+        """Stay where the robot is told to be."""
+        for _ in range(steps):
+            self._advance(phase)
+
+    def close(self) -> None:
+        """Close the hand until it presses; from then on it keeps pressing with the closing force, whatever gives way."""
+        self._world.expect_load(True)
+        self._presses, closing, steady = True, self._closing, 0
+        for _ in range(round(closing.close_time_s / closing.frame_s)):
+            self.wait(Phase.CLOSE, closing.steps_per_frame)
+            steady = steady + 1 if self._pressing_n() > PRESSING_SHARE * closing.force_n else 0
+            if steady > STEADY_FRAMES:
+                break
+
+    def open(self) -> None:
+        """Open the hand at the closing speed."""
+        self._presses = False
+        closing, full_m = self._closing, self._robot.gripper.opening_m
+        opening_m = max(self._opening_target_m, 0.0)
+        while opening_m < full_m:
+            opening_m = min(full_m, opening_m + 2 * closing.close_speed_m_s * closing.frame_s)
+            self._tell_opening(opening_m)
+            self.wait(Phase.OPEN, closing.steps_per_frame)
+        self.wait(Phase.OPEN, self._steps(OPENING_S))
+        self._world.expect_load(False)
+
+    def target_to_world(self) -> np.ndarray:
+        """Return the target's pose ``(4, 4)``."""
+        return self._world.object_to_world(self._world.target)
+
+    def gripper_to_object(self) -> np.ndarray:
+        """Return the hand where the joints are told to be, in the object's frame: what the arm sags by counts as in the hand."""
+        return inverse(self.target_to_world()) @ self._tip_pose(self.commanded_rad)
+
+    def rest(self, max_steps: int) -> list[np.ndarray]:
+        """Stay until nothing has moved for a quarter of a second; returns the target's poses ``(4, 4)`` at the last rows."""
+        looks, poses = 0, deque([self.target_to_world()], maxlen=REST_ROWS)
+        for _ in range(max_steps // self._steps_per_row):
+            self.wait(Phase.REST, self._steps_per_row - self.steps % self._steps_per_row)
+            poses.append(self.target_to_world())
+            looks = looks + 1 if self._world.is_still() else 0
+            if looks >= STILL_ROWS:
+                break
+        return list(poses)
+
+    def _steps(self, time_s: float) -> int:
+        return round(time_s / self._closing.timestep_s)
+
+    def _tell_opening(self, opening_m: float) -> None:
+        self._opening_target_m = opening_m
+        self._world.robot.set_opening_target(opening_m)
+
+    def _pressing_n(self) -> float:
+        opening_m = self._world.robot.opening_m()
+        return (opening_m - self._opening_target_m) / 2 * self._closing.finger_stiffness_n_m
+
+    def _advance(self, phase: Phase) -> None:
+        if self._presses and self.steps % self._closing.steps_per_frame == 0:
+            self._tell_opening(2 * self._shared.move_on(self._world.robot.opening_m() / 2))
+        ends_row = (self.steps + 1) % self._steps_per_row == 0
+        before = self._world.robot.joint_positions() if ends_row else None
+        self._world.step()
+        self.steps += 1
+        if before is not None or self.steps % self._steps_per_look == 0:
+            contacts = self._world.contacts.read()
+            self._watch(phase, contacts)
+            if before is not None:
+                self._record(phase, before, contacts)
+
+    def _watch(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
+        unplanned = self._world.contacts.unplanned(contacts, phase)
+        self.unplanned.update(unplanned)
+        self._unplanned_since_row = self._unplanned_since_row or bool(unplanned)
+
+    def _record(
+        self, phase: Phase, joint_positions_before_rad: np.ndarray, contacts: Sequence[physx.PhysxContact]
+    ) -> None:
+        """Add a row. Speeds are those of the last step: PhysX's are those at its end, where stiff drives have slowed down."""
+        velocities = (self._world.robot.joint_positions() - joint_positions_before_rad) / self._closing.timestep_s
+        self.touches = self._world.contacts.touches(contacts)
+        self._recorder.add(
+            self.commanded_rad,
+            self._opening_target_m,
+            phase,
+            velocities,
+            self.touches,
+            unplanned=self._unplanned_since_row,
+        )
+        self._unplanned_since_row = False

@@ -1,0 +1,232 @@
+"""Recorded episodes as HDF5 in the layout of ManiSkill's demonstrations, and back.
+
+Source: ManiSkill's docs/source/user_guide/datasets/demos.md, mani_skill/utils/wrappers/record.py (groups and types) and
+mani_skill/utils/structs/articulation.py (a state is pose, velocities of the root, joint positions, joint velocities).
+docs/episodes.md says every data set. Read by h5py alone; HDF5 1.10 or later. The same episodes give the same bytes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+
+from manitwin.episodes.action_deltas import joint_delta, tip_delta
+from manitwin.episodes.beside import file_beside
+from manitwin.episodes.recording import RATE_HZ, Recording
+from manitwin.episodes.stored_episode import (
+    RecordedObject,
+    StoredEpisode,
+    attempt_from,
+    robot_from,
+    to_json,
+)
+from manitwin.errors import EpisodesError
+
+LIBVER = ("v110", "v110")
+"""Small groups and single chunks take no index: a fifth less than the oldest format (measured, 29 arrays an episode)."""
+
+EPISODE = "episode"
+"""The attribute of a trajectory's group that holds what is no array, as JSON."""
+
+EXTRA = "manitwin"
+"""The group of what ManiSkill has no place for."""
+
+_KINDS: dict[str, type] = {"phase": np.uint8, "target_on_support": bool, "unplanned_contact": bool}
+"""All other arrays are float32."""
+
+_COMPRESSED_BYTES = 512
+"""Smaller arrays are stored as they are: they would not get smaller."""
+
+
+def write_episodes(path: Path, episodes: Iterable[StoredEpisode]) -> int:
+    """Write episodes as ``traj_0``, ``traj_1``, ... and return how many; the file appears whole or not at all.
+
+    Raises EpisodesError for a recording whose arrays do not fit together or are not finite.
+    """
+    count = 0
+    with file_beside(path) as beside, h5py.File(beside, "w", libver=LIBVER) as file:
+        for count, episode in enumerate(episodes, start=1):
+            _write(file.create_group(f"traj_{count - 1}"), episode)
+    return count
+
+
+class EpisodeFile:
+    """The episodes of a file, read one at a time.
+
+    Raises EpisodesError where there is no such file, or its groups are not ``traj_0`` to ``traj_<n - 1>``.
+    """
+
+    def __init__(self, path: Path):
+        self.path = path
+        try:
+            self.file = h5py.File(path, "r")
+        except OSError as error:
+            raise EpisodesError(f"{path}: no HDF5 file that can be read ({error}); write the episodes again") from error
+        self.count = len(self.file)
+        missing = next((i for i in range(self.count) if f"traj_{i}" not in self.file), None)
+        if missing is not None:
+            self.file.close()
+            raise EpisodesError(f"{path}: {self.count} groups, but no traj_{missing}; write the episodes again")
+
+    def __enter__(self) -> EpisodeFile:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.file.close()
+
+    def __len__(self) -> int:
+        return self.count
+
+    def __iter__(self) -> Iterator[StoredEpisode]:
+        return (self[number] for number in range(self.count))
+
+    def __getitem__(self, number: int) -> StoredEpisode:
+        if not 0 <= number < self.count:
+            raise IndexError(f"{self.path} has {self.count} episodes, not number {number}")
+        return _read(self.file[f"traj_{number}"], f"{self.path}: traj_{number}")
+
+    def said(self, number: int) -> dict[str, Any]:
+        """Return what is no array of an episode: ``attempt, robot, objects, target, facts``."""
+        return said_of(self.file[f"traj_{number}"], f"{self.path}: traj_{number}")
+
+
+def said_of(group: h5py.Group, where: str) -> dict[str, Any]:
+    """Return the JSON of a trajectory's group; raises EpisodesError where it has none."""
+    if EPISODE not in group.attrs:
+        raise EpisodesError(
+            f"{where}: no attribute {EPISODE!r}, so this package did not write it; give a file of its own"
+        )
+    said: dict[str, Any] = json.loads(bytes(group.attrs[EPISODE]))
+    return said
+
+
+def _write(group: h5py.Group, episode: StoredEpisode) -> None:
+    recording = checked(episode)
+    steps, opening = recording.steps, recording.gripper_opening_m[:, None]
+    positions = np.hstack([recording.joint_positions_rad, opening / 2, opening / 2])
+    finger_speeds = np.append(np.diff(recording.gripper_opening_m) * np.float32(RATE_HZ / 2), np.float32(0))[:, None]
+    velocities = np.hstack([recording.joint_velocities_rad_s, finger_speeds, finger_speeds])
+    base = np.zeros((steps + 1, 13), np.float32)
+    base[:, 3] = 1
+    ended = np.arange(steps) == steps - 1
+    target = recording.target
+    poses = np.concatenate([recording.object_positions_m, recording.object_quaternions_wxyz], axis=2)
+    states = np.concatenate(
+        [poses, recording.object_linear_velocities_m_s, recording.object_angular_velocities_rad_s], axis=2
+    )
+    group.attrs[EPISODE] = np.bytes_(to_json(episode).encode())
+    arrays: dict[str, np.ndarray] = {
+        "obs/agent/qpos": positions,
+        "obs/agent/qvel": velocities,
+        "obs/extra/tcp_pose": np.hstack([recording.tip_position_m, recording.tip_quaternion_wxyz]),
+        "obs/extra/obj_pose": poses[:, target],
+        "actions": np.hstack([recording.action_joint_positions_rad, recording.action_gripper_opening_m[:, None]]),
+        "terminated": ended,
+        "truncated": np.zeros(steps, bool),
+        "success": ended & episode.attempt.succeeded,
+        **{f"env_states/actors/{thing.name}": states[:, i] for i, thing in enumerate(episode.objects)},
+        f"env_states/articulations/{episode.robot.name}": np.hstack([base, positions, velocities]),
+        f"{EXTRA}/phase": recording.phase,
+        f"{EXTRA}/finger_forces_n": recording.finger_forces_n,
+        f"{EXTRA}/target_on_support": recording.target_on_support,
+        f"{EXTRA}/unplanned_contact": recording.unplanned_contact,
+        f"{EXTRA}/action_tip_pose": np.hstack([recording.action_tip_position_m, recording.action_tip_quaternion_wxyz]),
+        f"{EXTRA}/action_joint_delta": joint_delta(recording),
+        f"{EXTRA}/action_tip_delta": tip_delta(recording),
+    }
+    for name, array in arrays.items():
+        packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "chunks": array.shape}
+        group.create_dataset(
+            name, data=array, track_times=False, **(packing if array.nbytes > _COMPRESSED_BYTES else {})
+        )
+
+
+def _read(group: h5py.Group, where: str) -> StoredEpisode:
+    said = said_of(group, where)
+    robot, objects = robot_from(said["robot"]), tuple(RecordedObject(**thing) for thing in said["objects"])
+    arm = len(robot.arm_joints)
+    try:
+        # (T + 1, objects, 13): with no objects there would be no target, so there is always one
+        states = np.stack([group[f"env_states/actors/{thing.name}"][:] for thing in objects], axis=1)
+        positions, velocities = group["obs/agent/qpos"][:], group["obs/agent/qvel"][:]
+        tip, action_tip = group["obs/extra/tcp_pose"][:], group[f"{EXTRA}/action_tip_pose"][:]
+        actions = group["actions"][:]
+        extra = {
+            name: group[f"{EXTRA}/{name}"][:]
+            for name in ("phase", "finger_forces_n", "target_on_support", "unplanned_contact")
+        }
+    except KeyError as error:
+        raise EpisodesError(f"{where}: a data set is missing ({error}); write the episodes again") from error
+    recording = Recording(
+        target=said["target"],
+        joint_positions_rad=positions[:, :arm],
+        joint_velocities_rad_s=velocities[:, :arm],
+        gripper_opening_m=2 * positions[:, arm],
+        tip_position_m=tip[:, :3],
+        tip_quaternion_wxyz=tip[:, 3:],
+        object_positions_m=states[..., :3],
+        object_quaternions_wxyz=states[..., 3:7],
+        object_linear_velocities_m_s=states[..., 7:10],
+        object_angular_velocities_rad_s=states[..., 10:],
+        action_joint_positions_rad=actions[:, :arm],
+        action_gripper_opening_m=actions[:, arm],
+        action_tip_position_m=action_tip[:, :3],
+        action_tip_quaternion_wxyz=action_tip[:, 3:],
+        **extra,
+    )
+    return StoredEpisode(attempt_from(said["attempt"]), recording, robot, objects, said["facts"])
+
+
+def checked(episode: StoredEpisode) -> Recording:
+    """Return the recording with the types of the file: float32, phases uint8, flags bool.
+
+    Raises EpisodesError where shapes do not fit together, a number is not finite, or the target is none of the objects.
+    """
+    recording, name = episode.recording, episode.attempt.episode_id
+    steps, arm, things = recording.steps, len(episode.robot.arm_joints), len(episode.objects)
+    if steps == 0 or not 0 <= recording.target < things:
+        raise EpisodesError(
+            f"episode {name}: {steps} steps, target {recording.target} of {things} objects; record it again"
+        )
+    arrays: dict[str, Any] = {}
+    for entry in fields(Recording):
+        if entry.name == "target":
+            continue
+        array = np.asarray(getattr(recording, entry.name))
+        rows = steps if entry.name.startswith("action_") or entry.name == "phase" else steps + 1
+        shape = (rows, *_widths(arm, things).get(entry.name, ()))
+        if array.shape != shape:
+            raise EpisodesError(
+                f"episode {name}: {entry.name} has the shape {array.shape}, not {shape}; record it again"
+            )
+        kind = _KINDS.get(entry.name, np.float32)
+        if kind is np.float32 and not np.isfinite(array).all():
+            raise EpisodesError(f"episode {name}: {entry.name} is not finite; record it again")
+        arrays[entry.name] = array.astype(kind)
+    return Recording(target=recording.target, **arrays)
+
+
+def _widths(arm: int, things: int) -> dict[str, tuple[int, ...]]:
+    return {
+        "joint_positions_rad": (arm,),
+        "joint_velocities_rad_s": (arm,),
+        "tip_position_m": (3,),
+        "tip_quaternion_wxyz": (4,),
+        "object_positions_m": (things, 3),
+        "object_quaternions_wxyz": (things, 4),
+        "object_linear_velocities_m_s": (things, 3),
+        "object_angular_velocities_rad_s": (things, 3),
+        "finger_forces_n": (2,),
+        "action_joint_positions_rad": (arm,),
+        "action_tip_position_m": (3,),
+        "action_tip_quaternion_wxyz": (4,),
+    }

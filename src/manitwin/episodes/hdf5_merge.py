@@ -1,0 +1,103 @@
+"""Many files of episodes as one, with the JSON that ManiSkill keeps beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+import h5py
+
+from manitwin.episodes.beside import file_beside
+from manitwin.episodes.hdf5_file import LIBVER, EpisodeFile
+from manitwin.episodes.recording import RATE_HZ
+from manitwin.episodes.stored_episode import attempt_from
+from manitwin.errors import EpisodesError
+
+TRAJECTORIES, METADATA = "trajectory.h5", "trajectory.json"
+
+ENVIRONMENT = "manitwin/PickPlace"
+"""The ``env_id``: no environment of ManiSkill has this name. The states can be set and read; the task cannot be made there."""
+
+CONTROL_MODE = "pd_joint_pos"
+"""Targets of joint positions, as ManiSkill calls it; in radians and metres, not scaled to [-1, 1]."""
+
+
+def merge_episodes(files: Iterable[Path], folder: Path) -> int:
+    """Write ``trajectory.h5`` and ``trajectory.json`` of all episodes of all files in order; return how many.
+
+    Groups are copied as they are and numbered without gaps; one episode's metadata is in memory at a time. Each of the two
+    files appears whole or not at all, the JSON last. Raises EpisodesError for a file that cannot be read.
+    """
+    count, longest, robots = 0, 0, dict[str, Any]()
+    with file_beside(folder / METADATA) as metadata, metadata.open("w", encoding="ascii", newline="\n") as text:
+        with (
+            file_beside(folder / TRAJECTORIES) as merged,
+            h5py.File(merged, "w", libver=LIBVER) as target,
+            _listed(text, "episodes") as write,
+        ):
+            for path in files:
+                with EpisodeFile(path) as source:
+                    for number in range(len(source)):
+                        said, group = source.said(number), source.file[f"traj_{number}"]
+                        steps = len(group["actions"])
+                        source.file.copy(group, target, name=f"traj_{count}")
+                        write(_row(count, steps, said))
+                        _note(robots, said["robot"], path)
+                        longest, count = max(longest, steps), count + 1
+        text.write(f',\n"env_info": {_line(_environment(robots, longest))},\n')
+        text.write('"source_type": "motionplanning",\n"source_desc": "planned and simulated by manitwin"\n}\n')
+    return count
+
+
+def _row(number: int, steps: int, said: dict[str, Any]) -> dict[str, Any]:
+    attempt = attempt_from(said["attempt"])
+    return {
+        "episode_id": number,
+        "episode_seed": attempt.seed,
+        "control_mode": CONTROL_MODE,
+        "elapsed_steps": steps,
+        "reset_kwargs": {"seed": attempt.seed, "options": {}},
+        "success": attempt.succeeded,
+        "fail": not attempt.succeeded,
+        "robot": said["robot"]["name"],
+        "objects": said["objects"],
+        "target": said["target"],
+        "attempt": said["attempt"],
+        "facts": said["facts"],
+    }
+
+
+def _note(robots: dict[str, Any], robot: dict[str, Any], path: Path) -> None:
+    """Keep each robot once; raises EpisodesError for two different ones of one name."""
+    if robots.setdefault(robot["name"], robot) != robot:
+        raise EpisodesError(
+            f"{path}: its robot {robot['name']!r} is not the one that other files call so (its digest or limits differ);"
+            " run one of the two under another name"
+        )
+
+
+def _environment(robots: dict[str, Any], longest: int) -> dict[str, Any]:
+    settings = {"control_mode": CONTROL_MODE, "obs_mode": "state_dict", "control_freq": RATE_HZ, "robots": robots}
+    return {"env_id": ENVIRONMENT, "env_kwargs": settings, "max_episode_steps": longest}
+
+
+def _line(value: Any) -> str:
+    return json.dumps(value, sort_keys=True, allow_nan=False)
+
+
+@contextmanager
+def _listed(text: TextIO, name: str) -> Iterator[Any]:
+    """Open a JSON object with a list in it, one entry a line; the object stays open for what follows."""
+    text.write(f'{{\n"{name}": [')
+    entries = 0
+
+    def write(entry: Any) -> None:
+        nonlocal entries
+        text.write(f"{',' if entries else ''}\n{_line(entry)}")
+        entries += 1
+
+    yield write
+    text.write("\n]")

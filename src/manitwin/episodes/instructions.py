@@ -1,0 +1,98 @@
+"""What a person would tell the robot to do: one episode in several phrasings, from its twin's words and the way it goes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from manitwin.episodes.naming import Name, names_of
+from manitwin.errors import UsageError
+from manitwin.models.annotators.words import article
+from manitwin.twin.record import Language
+
+TEMPLATES = (
+    "pick up {the} and put {it} down {where}",
+    "grasp {the} and place {it} {where}",
+    "move {the} {where}",
+    "take {the} and set {it} down {where}",
+    "lift {the}, carry {it} over and put {it} down {where}",
+    "grab {the} and bring {it} {where}",
+    "{the} should be {where}: move {it} there",
+    "find {the}, pick {it} up and place {it} {where}",
+    "{there} in front of you; move {it} {where}",
+    "please put {the} {where}",
+)
+"""Every template is used once before any is used again."""
+
+WITH_DISTANCE = "move {the} about {distance} cm {side}"
+"""Joins the templates where the way is along one axis and 5 cm or more."""
+
+_DISTANCE_STEP_M, _NOWHERE_M = 0.05, 0.01
+_OCTANT = np.pi / 8
+_FARTHER = ("farther away from the robot", "away from the robot")
+_CLOSER = ("closer to the robot", "towards the robot")
+_LEFT = ("further to the left", "to the left")
+_RIGHT = ("further to the right", "to the right")
+
+
+def episode_instructions(
+    language: Language,
+    start_position_m: np.ndarray,
+    goal_position_m: np.ndarray,
+    *,
+    seed: int,
+    count: int = 6,
+    others: Sequence[Language] = (),
+) -> tuple[str, ...]:
+    """Return ``count`` different instructions in English to move an object from start to goal ``(3,)``, world frame.
+
+    Left and right are as the robot sees them, which looks along +X. What the twin does not know is not said. A name that
+    fits one of the ``others`` in the scene too is left out where another tells them apart; where none does, the most
+    particular one is used. The same arguments give the same words. Raises UsageError for a count below 1 or above what
+    the templates give.
+    """
+    names = names_of(language, others)
+    way = np.asarray(goal_position_m, float)[:2] - np.asarray(start_position_m, float)[:2]
+    where, along = _direction(way)
+    distance_cm = round(100 * _DISTANCE_STEP_M * round(float(np.linalg.norm(way)) / _DISTANCE_STEP_M))
+    templates = [*TEMPLATES, *([WITH_DISTANCE] if along is not None and distance_cm else [])]
+    rng = np.random.default_rng(seed)
+    templates = [templates[i] for i in rng.permutation(len(templates))]
+    names = [names[i] for i in rng.permutation(len(names))]
+    most = len(templates) * len(names)
+    if not 1 <= count <= most:
+        raise UsageError(f"{count} instructions of one episode; give 1 to {most}")
+    said: dict[str, None] = {}
+    for round_number in range(len(names)):
+        for place, template in enumerate(templates):
+            name = names[(place + round_number) % len(names)]
+            said[_filled(template, name, where, along, distance_cm)] = None
+            if len(said) == count:
+                return tuple(said)
+    raise AssertionError(f"{most} pairs of templates and names give only {len(said)} instructions")
+
+
+def _filled(template: str, name: Name, where: str, along: str | None, distance_cm: int) -> str:
+    if not name.plural:
+        there = f"there is {article(name.words)} {name.words}"
+    elif name.in_pairs:
+        there = f"there is a pair of {name.words}"
+    else:
+        there = f"there are some {name.words}"
+    it = "them" if name.plural else "it"
+    return template.format(the=f"the {name.words}", it=it, there=there, where=where, side=along, distance=distance_cm)
+
+
+def _direction(way: np.ndarray) -> tuple[str, str | None]:
+    """Return where a way ``(2,)`` leads, and the same to go with a distance; the latter is None for a way across."""
+    if np.linalg.norm(way) < _NOWHERE_M:
+        return "in the same place", None
+    angle = float(np.arctan2(way[1], way[0]))
+    forward = None if abs(abs(angle) - np.pi / 2) < _OCTANT else _FARTHER if abs(angle) < np.pi / 2 else _CLOSER
+    sideways = None if min(abs(angle), np.pi - abs(angle)) < _OCTANT else _LEFT if angle > 0 else _RIGHT
+    if forward is None or sideways is None:
+        only = forward or sideways
+        assert only is not None  # an angle is within an octant of at most one of the two axes
+        return only
+    return f"{sideways[0]} and {forward[0]}", None

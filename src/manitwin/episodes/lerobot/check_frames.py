@@ -1,0 +1,163 @@
+"""Check the data files of a LeRobotDataset against the rows of its episodes, and its statistics against both."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from manitwin.episodes.lerobot.columns import arrays_of
+from manitwin.episodes.lerobot.layout import STATISTICS, TIMESTAMP_TOLERANCE_S, place_of
+from manitwin.errors import EpisodesError
+
+_REMEDY = "write the set again"
+_ROUNDING = 1e-6
+"""Of a statistic against its numbers, relative to their size."""
+
+
+EpisodeStatistics = dict[str, np.ndarray]
+"""``min, max, mean (N, ...)`` and ``count (N, 1)`` of a feature in each of N episodes."""
+
+
+def statistics_of(path: Path, table: pa.Table, name: str, feature: dict[str, Any]) -> EpisodeStatistics:
+    """Return what the rows of a file of episodes say of a feature; raises EpisodesError for lists of another length."""
+    result = {}
+    for kind in ("min", "max", "mean", "count"):
+        shape = (1,) if kind == "count" else _shape(feature)
+        flat = table[f"stats/{name}/{kind}"].combine_chunks()
+        while pa.types.is_list(flat.type):
+            flat = flat.flatten()
+        if flat.null_count or len(flat) != len(table) * int(np.prod(shape)):
+            raise EpisodesError(f"{path}: stats/{name}/{kind} has not {shape} numbers in each row; {_REMEDY}")
+        result[kind] = flat.to_numpy(zero_copy_only=False).astype(np.float64).reshape(len(table), *shape)
+    return result
+
+
+def _shape(feature: dict[str, Any]) -> tuple[int, ...]:
+    return (3, 1, 1) if feature["dtype"] == "video" else tuple(feature["shape"])
+
+
+def checked_frames(
+    root: Path,
+    info: dict[str, Any],
+    tasks: Sequence[str],
+    rows: Sequence[dict[str, Any]],
+    statistics: dict[str, EpisodeStatistics],
+) -> Iterator[int]:
+    """Yield the number of frames of each data file once it is checked; raises EpisodesError."""
+    files = sorted((root / "data").glob("*/*.parquet"))
+    by_file: dict[tuple[int, int], list[dict[str, Any]]] = {}
+    for row in rows:
+        by_file.setdefault((row["data/chunk_index"], row["data/file_index"]), []).append(row)
+    wanted = [root / info["data_path"].format(chunk_index=chunk, file_index=file) for chunk, file in by_file]
+    if files != wanted or list(by_file) != [place_of(number) for number in range(len(files))]:
+        odd = sorted(set(files) ^ set(wanted)) or files or [root / "data"]
+        raise EpisodesError(f"{odd[0]}: the data files are not those that the episodes name, in their order; {_REMEDY}")
+    features = {name: f for name, f in info["features"].items() if f["dtype"] != "video"}
+    for path, episodes in zip(files, by_file.values(), strict=True):
+        table = _table(path, features)
+        if len(table) != sum(row["length"] for row in episodes):
+            raise EpisodesError(f"{path}: {len(table)} frames, its episodes have another number; {_REMEDY}")
+        begin = 0
+        for row in episodes:
+            told = {
+                name: {kind: v[row["episode_index"]] for kind, v in each.items()} for name, each in statistics.items()
+            }
+            _check_episode(path, table.slice(begin, row["length"]), features, row, told, tasks, info["fps"])
+            begin += row["length"]
+        yield len(table)
+
+
+def _table(path: Path, features: dict[str, dict[str, Any]]) -> pa.Table:
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowInvalid) as error:
+        raise EpisodesError(f"{path}: no Parquet file that can be read ({error}); {_REMEDY}") from error
+    if set(table.column_names) != set(features):
+        odd = sorted(set(table.column_names) ^ set(features))
+        raise EpisodesError(f"{path}: the column {odd[0]} is not in both the file and info.json; {_REMEDY}")
+    for name, feature in features.items():
+        value = pa.bool_() if feature["dtype"] == "bool" else pa.type_for_alias(feature["dtype"])
+        width = feature["shape"][0]
+        kind = table.schema.field(name).type
+        right = kind == value if width == 1 else pa.types.is_fixed_size_list(kind) and kind.list_size == width
+        if not right or (width > 1 and kind.value_type != value):
+            raise EpisodesError(f"{path}: {name} is of type {kind}, info.json says {width} x {value}; {_REMEDY}")
+        if table[name].null_count:
+            raise EpisodesError(f"{path}: {name} has empty cells; {_REMEDY}")
+    return table
+
+
+def _check_episode(
+    path: Path,
+    table: pa.Table,
+    features: dict[str, dict[str, Any]],
+    row: dict[str, Any],
+    statistics: dict[str, EpisodeStatistics],
+    tasks: Sequence[str],
+    fps: int,
+) -> None:
+    where = f"{path}: episode {row['episode_index']}"
+    frames = arrays_of(table, features)
+    number = np.arange(row["length"])
+    for name, right in (
+        ("episode_index", np.full_like(number, row["episode_index"])),
+        ("index", row["dataset_from_index"] + number),
+        ("frame_index", number),
+    ):
+        if not np.array_equal(frames[name], right):
+            raise EpisodesError(f"{where}: {name} does not count as the episode's row says; {_REMEDY}")
+    late = np.abs(frames["timestamp"] - number / fps).max()
+    if not late <= TIMESTAMP_TOLERANCE_S:
+        raise EpisodesError(f"{where}: a timestamp is {late:.4g} s off frame_index / fps; {_REMEDY}")
+    used = np.unique(frames["task_index"])
+    if used[0] < 0 or used[-1] >= len(tasks) or not {tasks[i] for i in used} <= set(row["tasks"]):
+        raise EpisodesError(f"{where}: task_index {used.tolist()} is none of its tasks; {_REMEDY}")
+    if "next.done" in frames and not np.array_equal(frames["next.done"], number == number[-1]):
+        raise EpisodesError(f"{where}: next.done is not true at the last frame alone; {_REMEDY}")
+    for name, array in frames.items():
+        values = np.asarray(array, np.float64).reshape(len(number), -1)
+        if not np.isfinite(values).all():
+            raise EpisodesError(f"{where}: {name} is not finite; {_REMEDY}")
+        told = statistics[name]
+        right_count = told["count"].tolist() == [len(number)]
+        ends = _close(told["min"], values.min(0)) and _close(told["max"], values.max(0))
+        if not right_count or not ends or not _close(told["mean"], values.mean(0)):
+            raise EpisodesError(f"{where}: its statistics of {name} are not those of its frames; {_REMEDY}")
+
+
+def check_statistics(path: Path, features: dict[str, dict[str, Any]], statistics: dict[str, EpisodeStatistics]) -> None:
+    """Check that stats.json has all features, and says of them what the episodes' statistics say together."""
+    try:
+        stats: dict[str, dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise EpisodesError(f"{path}: no JSON that can be read ({error}); {_REMEDY}") from error
+    for name, feature in features.items():
+        if name not in stats or set(stats[name]) != set(STATISTICS):
+            raise EpisodesError(f"{path}: not all statistics of {name} are there; {_REMEDY}")
+        shape = _shape(feature)
+        told = {kind: np.array(value, float) for kind, value in stats[name].items()}
+        wrong = [kind for kind, value in told.items() if value.shape != ((1,) if kind == "count" else shape)]
+        if wrong:
+            raise EpisodesError(
+                f"{path}: {wrong[0]} of {name} has the shape {told[wrong[0]].shape}, not {shape}; {_REMEDY}"
+            )
+        each = statistics[name]
+        weights = each["count"].reshape(-1, *([1] * len(shape)))
+        mean = (each["mean"] * weights).sum(0) / weights.sum()
+        together = _close(told["min"], each["min"].min(0)) and _close(told["max"], each["max"].max(0))
+        if not together or not _close(told["mean"], mean) or told["count"][0] != each["count"].sum():
+            raise EpisodesError(f"{path}: the statistics of {name} are not those of the episodes together; {_REMEDY}")
+        order = [told[kind] for kind in ("min", "q01", "q10", "q50", "q90", "q99", "max")]
+        if any((later < earlier - _ROUNDING * (1 + np.abs(earlier))).any() for earlier, later in pairwise(order)):
+            raise EpisodesError(f"{path}: the quantiles of {name} are not in order; {_REMEDY}")
+
+
+def _close(one: np.ndarray, other: np.ndarray) -> bool:
+    return one.shape == other.shape and bool((np.abs(one - other) <= _ROUNDING * (1 + np.abs(other))).all())

@@ -1,0 +1,114 @@
+"""What a frame holds: one table of features for a robot, and an episode's frames as arrays."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from manitwin.episodes.action_deltas import joint_delta, tip_delta
+from manitwin.episodes.lerobot.layout import DEFAULT_FEATURES
+from manitwin.episodes.recording import RATE_HZ
+from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode
+
+OPENING = "gripper_opening_m"
+_POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
+_TWIST = ("dx_m", "dy_m", "dz_m", "rx_rad", "ry_rad", "rz_rad")
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A feature of LeRobot: ``names`` of its numbers, None for a single one."""
+
+    name: str
+    dtype: str
+    names: tuple[str, ...] | None = None
+
+    @property
+    def width(self) -> int:
+        """How many numbers a frame has."""
+        return 1 if self.names is None else len(self.names)
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """The entry of info.json."""
+        return {"dtype": self.dtype, "shape": [self.width], "names": None if self.names is None else list(self.names)}
+
+    @property
+    def arrow(self) -> pa.DataType:
+        """The column's type."""
+        value = pa.bool_() if self.dtype == "bool" else pa.type_for_alias(self.dtype)
+        return value if self.names is None else pa.list_(value, self.width)
+
+
+def features_of(robot: RecordedRobot) -> tuple[Feature, ...]:
+    """Return the features of a robot's episodes in the order of the columns."""
+    joints = robot.arm_joints
+    return (
+        Feature("observation.state", "float32", (*joints, OPENING)),
+        Feature("observation.velocity", "float32", joints),
+        Feature("observation.tip_pose", "float32", _POSE),
+        Feature("observation.target_pose", "float32", _POSE),
+        Feature("action", "float32", (*joints, OPENING)),
+        Feature("action.joint_delta", "float32", (*joints, OPENING)),
+        Feature("action.tip_delta", "float32", (*_TWIST, OPENING)),
+        Feature("next.success", "bool"),
+        Feature("next.done", "bool"),
+        Feature("phase", "int64"),
+        *(Feature(name, dtype) for name, dtype in DEFAULT_FEATURES.items()),
+    )
+
+
+def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task_index: int) -> dict[str, np.ndarray]:
+    """Return an episode's features as arrays ``(T, width)``, single numbers ``(T,)``.
+
+    Frame t is state t and the action given in it; the state after the last action is no frame.
+    """
+    recording = episode.recording
+    steps, now = recording.steps, slice(0, recording.steps)
+    number, last = np.arange(steps), np.arange(steps) == recording.steps - 1
+    state = np.hstack([recording.joint_positions_rad, recording.gripper_opening_m[:, None]])
+    target = recording.target
+    poses = [recording.object_positions_m[now, target], recording.object_quaternions_wxyz[now, target]]
+    return {
+        "observation.state": state[now],
+        "observation.velocity": recording.joint_velocities_rad_s[now],
+        "observation.tip_pose": np.hstack([recording.tip_position_m, recording.tip_quaternion_wxyz])[now],
+        "observation.target_pose": np.hstack(poses),
+        "action": np.hstack([recording.action_joint_positions_rad, recording.action_gripper_opening_m[:, None]]),
+        "action.joint_delta": joint_delta(recording),
+        "action.tip_delta": tip_delta(recording),
+        "next.success": last & episode.attempt.succeeded,
+        "next.done": last,
+        "phase": recording.phase.astype(np.int64),
+        "timestamp": (number / RATE_HZ).astype(np.float32),
+        "frame_index": number,
+        "episode_index": np.full(steps, episode_index),
+        "index": first_index + number,
+        "task_index": np.full(steps, task_index),
+    }
+
+
+def schema_of(features: tuple[Feature, ...]) -> pa.Schema:
+    """Return the columns of the data files, with the metadata that Hugging Face's ``datasets`` reads types from."""
+    told = {
+        f.name: {"dtype": f.dtype, "_type": "Value"}
+        if f.names is None
+        else {"feature": {"dtype": f.dtype, "_type": "Value"}, "length": f.width, "_type": "Sequence"}
+        for f in features
+    }
+    metadata = {"huggingface": json.dumps({"info": {"features": told}})}
+    return pa.schema([(f.name, f.arrow) for f in features], metadata=metadata)
+
+
+def table_of(frames: dict[str, np.ndarray], features: tuple[Feature, ...], schema: pa.Schema) -> pa.Table:
+    """Return an episode's frames as rows."""
+    columns = []
+    for feature in features:
+        array = frames[feature.name]
+        flat = pa.array(np.ascontiguousarray(array).ravel())
+        columns.append(flat if feature.names is None else pa.FixedSizeListArray.from_arrays(flat, feature.width))
+    return pa.Table.from_arrays(columns, schema=schema)

@@ -1,0 +1,198 @@
+"""Read a LeRobotDataset v3.0 without LeRobot, and check all that its loader relies on and does not look at.
+
+A gap in the numbers of episodes shifts every later video, frames outside their episode's rows become another's, and timestamps
+off the grid of frames fail in the middle of a training: each is an error here that names the file.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from manitwin.episodes.lerobot.check_frames import (
+    EpisodeStatistics,
+    check_statistics,
+    checked_frames,
+    statistics_of,
+)
+from manitwin.episodes.lerobot.check_videos import check_videos
+from manitwin.episodes.lerobot.columns import arrays_of
+from manitwin.episodes.lerobot.layout import (
+    DEFAULT_FEATURES,
+    EPISODES_PATH,
+    INFO,
+    STATISTICS,
+    STATS,
+    TASKS,
+    VERSION,
+    place_of,
+)
+from manitwin.errors import EpisodesError
+
+_REMEDY = "write the set again"
+_INFO: dict[str, type] = {
+    **dict.fromkeys(("codebase_version", "robot_type", "data_path"), str),
+    **dict.fromkeys(("total_episodes", "total_frames", "total_tasks", "chunks_size", "fps"), int),
+    **dict.fromkeys(("data_files_size_in_mb", "video_files_size_in_mb"), int),
+    **dict.fromkeys(("splits", "features"), dict),
+}
+_NUMBERS = (
+    *("episode_index", "length", "data/chunk_index", "data/file_index", "dataset_from_index", "dataset_to_index"),
+    *("meta/episodes/chunk_index", "meta/episodes/file_index"),
+)
+
+
+@dataclass(frozen=True)
+class LeRobotSet:
+    """A data set whose layout is sound: ``tasks`` by ``task_index``; ``episodes`` are rows without their statistics."""
+
+    root: Path
+    info: dict[str, Any]
+    tasks: tuple[str, ...]
+    episodes: tuple[dict[str, Any], ...]
+
+    @property
+    def features(self) -> dict[str, dict[str, Any]]:
+        """The features by name, as info.json has them."""
+        features: dict[str, dict[str, Any]] = self.info["features"]
+        return features
+
+    def frames(self, episode_index: int) -> dict[str, np.ndarray]:
+        """Return an episode's features as arrays ``(T, width)``, single numbers ``(T,)``; no pictures."""
+        row = self.episodes[episode_index]
+        path = self.root / self.info["data_path"].format(
+            chunk_index=row["data/chunk_index"], file_index=row["data/file_index"]
+        )
+        where = [("episode_index", "=", episode_index)]
+        return arrays_of(pq.read_table(path, filters=where), self.features)
+
+
+def read_lerobot(root: Path, *, decode_videos: bool = False) -> LeRobotSet:
+    """Read and check a data set, one data file in memory at a time.
+
+    Videos are checked by their headers, with ``decode_videos`` by decoding every frame. Raises EpisodesError with the file,
+    the cause and the remedy for the first thing that is not as the layout has it.
+    """
+    info = _info(root)
+    tasks = _tasks(root / TASKS, info["total_tasks"])
+    episodes, statistics = _episodes(root, info, set(tasks))
+    found = LeRobotSet(root, info, tasks, episodes)
+    frames = 0
+    for count in checked_frames(root, info, tasks, episodes, statistics):
+        frames += count
+    if frames != info["total_frames"]:
+        raise _wrong(root / INFO, f"total_frames is {info['total_frames']}, but there are {frames}")
+    check_statistics(root / STATS, info["features"], statistics)
+    check_videos(root, info, episodes, decode=decode_videos)
+    return found
+
+
+def _wrong(path: Path, cause: str) -> EpisodesError:
+    return EpisodesError(f"{path}: {cause}; {_REMEDY}")
+
+
+def _info(root: Path) -> dict[str, Any]:
+    path = root / INFO
+    try:
+        info: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise _wrong(path, f"no JSON that can be read ({error})") from error
+    for name, kind in _INFO.items():
+        if type(info.get(name)) is not kind:
+            raise _wrong(path, f"{name} is {info.get(name)!r}, not of type {kind.__name__}")
+    if info["codebase_version"] != VERSION:
+        raise _wrong(path, f"codebase_version is {info['codebase_version']}, this reads {VERSION}")
+    if info["fps"] < 1 or info["total_episodes"] < 1 or info["splits"] != {"train": f"0:{info['total_episodes']}"}:
+        raise _wrong(path, f"fps {info['fps']}, {info['total_episodes']} episodes, splits {info['splits']}")
+    for name, feature in info["features"].items():
+        _check_feature(path, name, feature)
+    for name, dtype in DEFAULT_FEATURES.items():
+        feature = info["features"].get(name)
+        if feature is None or feature["dtype"] != dtype or feature["shape"] != [1]:
+            raise _wrong(path, f"the feature {name} is {feature}, not one number of type {dtype}")
+    return info
+
+
+def _check_feature(path: Path, name: str, feature: dict[str, Any]) -> None:
+    shape: Any = feature.get("shape")
+    names: Any = feature.get("names")
+    whole = isinstance(shape, list) and all(isinstance(n, int) and n > 0 for n in shape)
+    if "/" in name or "dtype" not in feature or not whole:
+        raise _wrong(path, f"the feature {name!r} is {feature}")
+    if feature["dtype"] == "video":
+        if len(shape) != 3 or names != ["height", "width", "channels"] or shape[2] != 3:
+            raise _wrong(path, f"the video {name} has the shape {shape} and names {names}, not height, width, channels")
+    elif len(shape) != 1 or (names is not None and len(names) != shape[0]):
+        raise _wrong(path, f"the feature {name} has the shape {shape} and {len(names or [])} names")
+
+
+def _tasks(path: Path, total: int) -> tuple[str, ...]:
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowInvalid) as error:
+        raise _wrong(path, f"no Parquet file that can be read ({error})") from error
+    told = json.loads((table.schema.metadata or {}).get(b"pandas", b"{}"))
+    if told.get("index_columns") != ["task"] or {"task", "task_index"} - set(table.column_names):
+        raise _wrong(path, "its pandas index is not 'task', by which LeRobot looks tasks up")
+    tasks: list[str] = table["task"].to_pylist()
+    if table["task_index"].to_pylist() != list(range(len(tasks))) or len(tasks) != total:
+        raise _wrong(path, f"task_index does not count from 0 to {total - 1} in order")
+    if len(set(tasks)) != len(tasks) or not all(tasks):
+        raise _wrong(path, "a task is empty or there twice")
+    return tuple(tasks)
+
+
+def _episode_tables(root: Path) -> Iterator[tuple[Path, int, pa.Table]]:
+    files = sorted((root / "meta" / "episodes").glob("*/*.parquet"))
+    for number, path in enumerate(files):
+        chunk, file = place_of(number)
+        if path != root / EPISODES_PATH.format(chunk_index=chunk, file_index=file):
+            raise _wrong(path, f"the {number + 1}th file of episodes should be chunk {chunk}, file {file}")
+        yield path, number, pq.read_table(path)
+
+
+def _episodes(
+    root: Path, info: dict[str, Any], tasks: set[str]
+) -> tuple[tuple[dict[str, Any], ...], dict[str, EpisodeStatistics]]:
+    needed = [*_NUMBERS, "tasks", *(f"stats/{feature}/{name}" for feature in info["features"] for name in STATISTICS)]
+    statistics: dict[str, list[EpisodeStatistics]] = {name: [] for name in info["features"]}
+    rows: list[dict[str, Any]] = []
+    end = 0
+    for path, number, table in _episode_tables(root):
+        missing = [name for name in needed if name not in table.column_names]
+        if missing:
+            raise _wrong(path, f"has no column {missing[0]}")
+        for name, feature in info["features"].items():
+            statistics[name].append(statistics_of(path, table, name, feature))
+        for row in table.select([name for name in table.column_names if not name.startswith("stats/")]).to_pylist():
+            where = f"episode {row['episode_index']}"
+            if row["episode_index"] != len(rows):
+                raise _wrong(
+                    path, f"{where} stands where episode {len(rows)} should be: LeRobot finds episodes by their place"
+                )
+            if (row["meta/episodes/chunk_index"], row["meta/episodes/file_index"]) != place_of(number):
+                raise _wrong(path, f"{where} says that it is in another file")
+            if row["dataset_from_index"] != end or row["dataset_to_index"] - end != row["length"] or row["length"] < 1:
+                raise _wrong(
+                    path,
+                    f"{where} has {row['length']} frames from {row['dataset_from_index']} to {row['dataset_to_index']},"
+                    f" the one before ends at {end}",
+                )
+            if not row["tasks"] or not set(row["tasks"]) <= tasks:
+                raise _wrong(path, f"{where} has the tasks {row['tasks']}, which are not all in {TASKS}")
+            end = row["dataset_to_index"]
+            rows.append(row)
+    if len(rows) != info["total_episodes"]:
+        raise _wrong(root / INFO, f"total_episodes is {info['total_episodes']}, but there are {len(rows)}")
+    together = {
+        name: {kind: np.concatenate([each[kind] for each in files]) for kind in files[0]}
+        for name, files in statistics.items()
+    }
+    return tuple(rows), together

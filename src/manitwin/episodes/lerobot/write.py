@@ -1,0 +1,229 @@
+"""Write episodes as a LeRobotDataset v3.0. Source: see ``layout``; docs/episodes.md says every feature."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from manitwin.episodes.beside import folder_beside
+from manitwin.episodes.lerobot.episode_rows import EpisodeRows
+from manitwin.episodes.lerobot.feature_statistics import Pooled, episode_statistics, quantiles_of_files
+from manitwin.episodes.lerobot.features import Feature, features_of, frames_of, schema_of, table_of
+from manitwin.episodes.lerobot.layout import (
+    CHUNKS_SIZE,
+    DATA_FILES_SIZE_IN_MB,
+    DATA_PATH,
+    INFO,
+    STATS,
+    TASKS,
+    VERSION,
+    VIDEO_FILES_SIZE_IN_MB,
+    VIDEO_PATH,
+    place_of,
+    write_json,
+)
+from manitwin.episodes.lerobot.videos import CameraVideos, VideoColumns
+from manitwin.episodes.recording import RATE_HZ
+from manitwin.episodes.stored_episode import StoredEpisode
+from manitwin.errors import EpisodesError
+
+
+@dataclass(frozen=True)
+class Written:
+    """What a set holds."""
+
+    episodes: int
+    frames: int
+    tasks: int
+
+
+def write_lerobot(
+    episodes: Iterable[StoredEpisode],
+    place: Path,
+    *,
+    seed: int = 0,
+    data_files_size_in_mb: int = DATA_FILES_SIZE_IN_MB,
+    videos: Sequence[CameraVideos] = (),
+) -> Written:
+    """Write the episodes of one robot as a data set, numbered as they come; it appears whole or not at all.
+
+    Every instruction is a task; ``seed`` and the episode's id choose the one that its frames have. With ``videos`` each
+    episode must have pictures of every camera. One episode is in memory at a time. The same episodes give the same bytes.
+    Raises EpisodesError for no episode, several robots, an episode without instructions, and pictures that do not fit.
+    """
+    with folder_beside(place) as root:
+        writer: _Set | None = None
+        with ExitStack() as stack:
+            for episode in episodes:
+                if writer is None:
+                    columns = [VideoColumns(camera, root) for camera in videos]
+                    writer = stack.enter_context(_Set(root, episode, seed, data_files_size_in_mb, columns))
+                writer.add(episode)
+        if writer is None:
+            raise EpisodesError(f"{place}: no episode, and LeRobot reads no empty set; keep at least one episode")
+        writer.describe()
+        return Written(writer.rows.count, writer.frames, len(writer.tasks))
+
+
+class _Set:
+    """A data set while it is written."""
+
+    def __init__(
+        self, root: Path, first: StoredEpisode, seed: int, data_files_size_in_mb: int, videos: list[VideoColumns]
+    ):
+        self.root, self.robot, self.seed, self.videos = root, first.robot, seed, videos
+        self.features: tuple[Feature, ...] = features_of(first.robot)
+        self.schema = schema_of(self.features)
+        self.data = _DataFiles(root, self.schema, data_files_size_in_mb)
+        self.size_mb = data_files_size_in_mb
+        keys = [column.key for column in videos]
+        self.rows = EpisodeRows(root, self.features, keys, data_files_size_in_mb)
+        self.tasks: dict[str, int] = {}
+        self.frames = 0
+        self.pooled: dict[str, Pooled] = {}
+        self.picture_quantiles: dict[str, Any] = {}
+
+    def __enter__(self) -> _Set:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.data.close()
+        self.rows.close()
+
+    def add(self, episode: StoredEpisode) -> None:
+        """Write an episode's frames and its row."""
+        attempt, steps = episode.attempt, episode.recording.steps
+        if episode.robot != self.robot:
+            raise EpisodesError(
+                f"episode {attempt.episode_id}: robot {episode.robot.name}, the set's is {self.robot.name}; one set a robot"
+            )
+        tasks = list(dict.fromkeys(attempt.instructions))
+        if not tasks:
+            raise EpisodesError(f"episode {attempt.episode_id}: no instruction, and LeRobot needs a task; run it again")
+        for task in tasks:
+            self.tasks.setdefault(task, len(self.tasks))
+        chosen = self.tasks[_chosen(tasks, self.seed, attempt.episode_id)]
+        frames = frames_of(episode, self.rows.count, self.frames, chosen)
+        chunk, file = self.data.write(table_of(frames, self.features, self.schema))
+        statistics = episode_statistics(frames)
+        row: dict[str, Any] = {
+            "episode_index": self.rows.count,
+            "tasks": tasks,
+            "length": steps,
+            "data/chunk_index": chunk,
+            "data/file_index": file,
+            "dataset_from_index": self.frames,
+            "dataset_to_index": self.frames + steps,
+        }
+        for column in self.videos:
+            more, statistics[column.key] = column.row(attempt.episode_id, steps)
+            row |= more
+        self.rows.write(row, attempt, statistics)
+        for name, of_episode in statistics.items():
+            if name in self.pooled:
+                self.pooled[name].add(of_episode)
+            else:
+                self.pooled[name] = Pooled(of_episode)
+        self.frames += steps
+
+    def describe(self) -> None:
+        """Write what tells of the whole set, info.json last."""
+        quantiles = quantiles_of_files(self.data.files, self.features, self.pooled)
+        quantiles |= {column.key: self.rows.mean_quantiles(column.key) for column in self.videos}
+        write_json(self.root / STATS, {n: pooled.statistics(quantiles[n]) for n, pooled in self.pooled.items()})
+        _write_tasks(self.root / TASKS, list(self.tasks))
+        info = {
+            "codebase_version": VERSION,
+            "robot_type": self.robot.name,
+            "total_episodes": self.rows.count,
+            "total_frames": self.frames,
+            "total_tasks": len(self.tasks),
+            "chunks_size": CHUNKS_SIZE,
+            "data_files_size_in_mb": self.size_mb,
+            "video_files_size_in_mb": VIDEO_FILES_SIZE_IN_MB,
+            "fps": RATE_HZ,
+            "splits": {"train": f"0:{self.rows.count}"},
+            "data_path": DATA_PATH,
+            "video_path": VIDEO_PATH if self.videos else None,
+            "features": {
+                **{feature.name: feature.info for feature in self.features},
+                **{column.key: column.info for column in self.videos},
+            },
+        }
+        write_json(self.root / INFO, info)
+
+
+def _chosen(tasks: Sequence[str], seed: int, episode_id: str) -> str:
+    digest = hashlib.sha256(f"{seed}:{episode_id}".encode()).digest()
+    return tasks[int.from_bytes(digest[:8]) % len(tasks)]
+
+
+class _DataFiles:
+    """Data files: a row group an episode; a new file before one would get larger than it may."""
+
+    def __init__(self, root: Path, schema: pa.Schema, size_mb: int):
+        self.root, self.schema, self.most_bytes = root, schema, size_mb << 20
+        self.files: list[Path] = []
+        self._stream: Any = None
+        self._writer: Any = None
+        self._episodes = 0
+
+    def write(self, table: pa.Table) -> tuple[int, int]:
+        """Write an episode and return the chunk and file that it is in."""
+        if self._writer is not None:
+            size = self._stream.tell()
+            if size + size / self._episodes > self.most_bytes:
+                self.close()
+        if self._writer is None:
+            chunk, file = place_of(len(self.files))
+            path = self.root / DATA_PATH.format(chunk_index=chunk, file_index=file)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._stream = path.open("wb")
+            self._writer = pq.ParquetWriter(self._stream, self.schema, compression="snappy", version="2.6")
+            self.files.append(path)
+            self._episodes = 0
+        self._writer.write_table(table)
+        self._episodes += 1
+        return place_of(len(self.files) - 1)
+
+    def close(self) -> None:
+        """Finish the file that is open."""
+        if self._writer is not None:
+            self._writer.close()
+            self._stream.close()
+            self._writer = None
+
+
+def _write_tasks(path: Path, tasks: list[str]) -> None:
+    """Write the tasks as pandas would: their words are the index, which LeRobot looks tasks up by."""
+    table = pa.table({"task_index": pa.array(range(len(tasks)), pa.int64()), "task": pa.array(tasks, pa.string())})
+    told = {
+        "index_columns": ["task"],
+        "column_indexes": [
+            {
+                "name": None,
+                "field_name": None,
+                "pandas_type": "unicode",
+                "numpy_type": "object",
+                "metadata": {"encoding": "UTF-8"},
+            }
+        ],
+        "columns": [
+            {"name": n, "field_name": n, "pandas_type": kind, "numpy_type": numpy_type, "metadata": None}
+            for n, kind, numpy_type in (("task_index", "int64", "int64"), ("task", "unicode", "object"))
+        ],
+        "creator": {"library": "pyarrow", "version": pa.__version__},
+        "pandas_version": "2.2.0",
+    }
+    path.parent.mkdir(parents=True, exist_ok=True)
+    pq.write_table(
+        table.replace_schema_metadata({"pandas": json.dumps(told)}), path, compression="snappy", version="2.6"
+    )

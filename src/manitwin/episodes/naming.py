@@ -1,0 +1,178 @@
+"""What an object may be called in an instruction: "mug", "red mug", "mug for holding hot drinks"."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from manitwin.models.annotators.priors import lookup, normalised
+from manitwin.models.annotators.words import joined
+from manitwin.twin.record import Language
+
+NAMELESS = "object"
+"""What a thing is called that nobody has named."""
+
+_UNSAID = re.compile(r"\b(?:unknown|unclear|unspecified|unidentified|various|none|not|n/?a)\b", re.IGNORECASE)
+_PLAIN = re.compile(r"[a-z]+(?:[ -][a-z]+)*")
+_SIZES = frozenset(
+    ("tiny", "small", "little", "large", "big", "long", "short", "medium-sized", "palm-sized", "hand-sized")
+)
+_ADJECTIVES = {"wood": "wooden", "wool": "woollen"}
+_OF_ONE_MATERIAL = frozenset(
+    (
+        *("aluminium", "aluminum", "bamboo", "brass", "canvas", "cardboard", "ceramic", "copper"),
+        *("cork", "cotton", "fabric", "foam", "glass", "iron", "leather", "metal"),
+        *("nylon", "paper", "plastic", "porcelain", "rubber", "silicone", "silver", "steel"),
+        *("stone", "textile", "titanium", "wax", "wicker", "wood", "wool"),
+    )
+)
+_SINGULAR_IN_S = frozenset(("lens", "thermos", "gas", "canvas", "atlas"))
+_FINITE_VERB = re.compile(r"\b(?:is|are|was|has|have|sits|stands|lies|can|features|shows|appears|looks)\b")
+_CAPTION_WORDS = 8
+_COLORS = 2
+
+
+@dataclass(frozen=True)
+class Name:
+    """What stands behind "the"; ``in_pairs``: one of them is a pair. ``uses`` are the attributes that it tells."""
+
+    words: str
+    plural: bool
+    in_pairs: bool
+    uses: frozenset[str]
+
+
+@dataclass(frozen=True)
+class _Told:
+    """The parts of a twin's words that can be said; None where there is nothing to say."""
+
+    noun: str
+    plural: bool
+    in_pairs: bool
+    color: str | None
+    material: str | None
+    size: str | None
+    use: str | None
+    part: str | None
+    caption: str | None
+
+
+def names_of(language: Language, others: Sequence[Language] = ()) -> list[Name]:
+    """Return the names of an object, the plainest first; those that fit one of the others too only where all do."""
+    told = _told(language)
+    names = _names(told)
+    beside = [_told(other) for other in others]
+    own = [name for name in names if not any(_fits(name, told, other) for other in beside)]
+    if own:
+        return own
+    most = max(len(name.uses) for name in names)
+    return [name for name in names if len(name.uses) == most]
+
+
+def _names(told: _Told) -> list[Name]:
+    ways: list[tuple[str | None, tuple[str, ...]]] = [
+        (told.noun, ()),
+        (_before(told, "color"), ("color",)),
+        (_before(told, "material"), ("material",)),
+        (_before(told, "color", "material"), ("color", "material")),
+        (_before(told, "size"), ("size",)),
+        (_before(told, "size", "color"), ("size", "color")),
+        (told.use and f"{told.noun} for {told.use}", ("use",)),
+        (told.part and f"{told.noun} with {told.part}", ("part",)),
+        (told.caption, ("caption",)),
+    ]
+    named: dict[str, Name] = {}
+    for words, uses in ways:
+        if words:
+            named.setdefault(words, Name(words, told.plural, told.in_pairs, frozenset(uses)))
+    return list(named.values())
+
+
+def _before(told: _Told, *attributes: str) -> str | None:
+    """Return the noun behind attributes; None where one of them cannot be said."""
+    said = [getattr(told, attribute) for attribute in attributes]
+    return None if None in said else " ".join([*said, told.noun])
+
+
+def _fits(name: Name, told: _Told, other: _Told) -> bool:
+    """Whether a name could mean another object too."""
+    if other.noun != told.noun and told.noun != NAMELESS:
+        return False
+    return all(getattr(other, attribute) == getattr(told, attribute) for attribute in name.uses)
+
+
+def _told(language: Language) -> _Told:
+    category = normalised(language.category).removeprefix("pair of ")
+    prior = lookup(category)
+    if not _PLAIN.fullmatch(category) or _UNSAID.search(category):
+        category, prior = NAMELESS, None
+    counter = prior.counter if prior is not None else None
+    in_pairs = counter == "pair of"
+    plural = in_pairs or (counter is None and _is_plural(category))
+    noun = category if in_pairs or counter is None or counter in category else f"{counter} {category}"
+    edible = prior is not None and prior.surface == "food skin"
+    return _Told(
+        noun=noun,
+        plural=plural,
+        in_pairs=in_pairs,
+        color=_color(language.color),
+        material=None if edible else _material(language.material, noun),
+        size=next((word for word in re.split(r"[,;] *| +", language.size.lower()) if word in _SIZES), None),
+        use=None if edible else _use(language.function),
+        part=_part(language.shape),
+        caption=_caption((language.caption, *language.captions), noun),
+    )
+
+
+def _is_plural(noun: str) -> bool:
+    head = re.split(r" (?:of|with|for|in) ", noun, maxsplit=1)[0].split()[-1]
+    return head.endswith("s") and not head.endswith(("ss", "us", "is")) and head not in _SINGULAR_IN_S
+
+
+def _color(text: str) -> str | None:
+    """Return "dark grey and gold" of "dark grey (69 %), gold (25 %)"."""
+    pieces = [piece.strip() for piece in re.sub(r"\([^)]*\)", "", text.lower()).split(",")]
+    plain = [p for p in pieces if _PLAIN.fullmatch(p) and not _UNSAID.search(p) and len(p.split()) <= 3]
+    return joined(plain[:_COLORS]) if plain and not _UNSAID.search(text) else None
+
+
+def _material(text: str, noun: str) -> str | None:
+    """Return the adjective of a single material; None for a mixture, a doubt, or what the noun says itself."""
+    words = text.lower().split()
+    if not words or len(words) > 2 or words[-1] not in _OF_ONE_MATERIAL or not _PLAIN.fullmatch(" ".join(words)):
+        return None
+    if _UNSAID.search(text) or set(words) & set(noun.split()):
+        return None
+    return " ".join([*words[:-1], _ADJECTIVES.get(words[-1], words[-1])])
+
+
+def _use(text: str) -> str | None:
+    line = re.sub(r"^(?:used )?for ", "", text.lower().strip().rstrip("."))
+    if (
+        _UNSAID.search(line)
+        or not re.match(r"[a-z-]+ing\b", line)
+        or line.startswith("being ")
+        or len(line.split()) > 8
+    ):
+        return None
+    return line if re.fullmatch(r"[a-z]+(?:,? [a-z]+|-[a-z]+)*", line) else None
+
+
+def _part(text: str) -> str | None:
+    """Return "a side handle" of "cylindrical with a side handle, flat"."""
+    found = re.search(r"\bwith ((?:an?|one|two|three|four|[a-z]+) [a-z ]+?)\s*(?:,|;|\.|$)", text.lower())
+    if found is None or _UNSAID.search(text) or len(found[1].split()) > 5:
+        return None
+    return found[1]
+
+
+def _caption(captions: Sequence[str], noun: str) -> str | None:
+    """Return the first caption that is a short name with the noun in it and no sentence."""
+    for text in captions:
+        line = re.sub(r"^(?:an?|the)\s+", "", text.strip().rstrip(".").lower())
+        plain = re.fullmatch(r"[a-z]+(?:,? [a-z]+|-[a-z]+)*", line) and len(line.split()) <= _CAPTION_WORDS
+        starts = re.match(r"(?:an?|the)\s", text.strip(), re.IGNORECASE)
+        if plain and starts and line.endswith(noun) and not _FINITE_VERB.search(line) and not _UNSAID.search(line):
+            return None if " pair of " in f" {line} " else line
+    return None

@@ -1,0 +1,86 @@
+"""The poses that a grasp can be tried in, and what forbids one whatever the arm does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.episodes.planning.hand_room import HandRoom
+from manitwin.episodes.planning.known_poses import KnownPoses
+from manitwin.episodes.planning.line_ends import HALF_TURN, LineEnds
+from manitwin.episodes.planning.problem import Phase, PlanFailure
+from manitwin.episodes.planning.problem_world import ProblemWorld
+from manitwin.episodes.planning.settings import PlannerSettings
+
+TURNS = np.array([np.eye(4), HALF_TURN])
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A pose ``gripper_to_object (4, 4)`` of the grasp number ``index``, or why the hand alone cannot be there."""
+
+    index: int
+    gripper_to_object: np.ndarray
+    failure: PlanFailure | None
+
+
+class Candidates:
+    """Looks at the hand alone; cheap beside anything that moves the arm."""
+
+    def __init__(self, room: HandRoom, known: KnownPoses, settings: PlannerSettings):
+        """Take what is known of the hand and of the arm's reach."""
+        self._room, self._known, self._settings = room, known, settings
+        self._ends = LineEnds(settings)
+
+    def of(self, world: ProblemWorld) -> Iterator[Candidate]:
+        """Yield both turns of each grasp."""
+        grasps = world.problem.grasps
+        if not grasps:
+            return
+        poses = np.array([grasp.gripper_to_object for grasp in grasps])[:, None] @ TURNS
+        at_start = self._without_room(world, world.problem.target.object_to_world @ poses)
+        at_goal = self._without_room(world, world.goal_object_to_world @ poses)
+        for index in range(len(grasps)):
+            for turn in range(len(TURNS)):
+                failure: PlanFailure | None = None
+                if at_start[index, turn]:
+                    failure = "approach_blocked"
+                elif at_goal[index, turn]:
+                    failure = "lower_blocked"
+                else:
+                    failure = self.first_look(world, poses[index, turn])
+                yield Candidate(index, poses[index, turn], failure)
+
+    def _without_room(self, world: ProblemWorld, gripper_to_world: np.ndarray) -> np.ndarray:
+        flat = gripper_to_world.reshape(-1, 4, 4)
+        inside = self._room.is_inside(flat, world.problem.static_boxes, self._settings.clearance_m)
+        return inside.reshape(gripper_to_world.shape[:2])
+
+    def first_look(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
+        """Return what forbids a pose: the reach, or the hand at the ends of its lines. The world holds the target by it."""
+        world.hold(gripper_to_object)
+        failure = self.look_at_approach(world, gripper_to_object)
+        if failure is not None:
+            return failure
+        grasped = world.problem.target.object_to_world @ gripper_to_object
+        if not world.is_hand_free(Phase.LIFT, grasped, self._ends.above(grasped)):
+            return "lift_blocked"
+        placed = world.goal_object_to_world @ gripper_to_object
+        if self._known.out_of_reach(placed):
+            return "place_unreachable"
+        if not world.is_hand_free(Phase.LOWER, placed, self._ends.above(placed)):
+            return "lower_blocked"
+        if not world.is_hand_free(Phase.RETREAT, placed, self._ends.before(placed)):
+            return "retreat_blocked"
+        return None
+
+    def look_at_approach(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
+        """Return what forbids to approach a pose: the reach, or the hand at either end of the line."""
+        grasped = world.problem.target.object_to_world @ gripper_to_object
+        if self._known.out_of_reach(grasped):
+            return "outside_workspace"
+        if not world.is_hand_free(Phase.APPROACH, grasped, self._ends.before(grasped)):
+            return "approach_blocked"
+        return None

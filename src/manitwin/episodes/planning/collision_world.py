@@ -1,0 +1,148 @@
+"""Which configurations of a body are free, phase by phase; the target is in the world twice and never rebuilt."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from manitwin.episodes.planning.free_segment import bisection_places
+from manitwin.episodes.planning.joint_paths import JointPath
+from manitwin.episodes.planning.kinematic_body import KinematicBody, broad_phase
+from manitwin.episodes.planning.libraries import pin
+from manitwin.episodes.planning.obstacle_shapes import ObstacleShapes, pose_of
+from manitwin.episodes.planning.problem import Phase
+
+ACTIVE = (Phase.REACH, Phase.APPROACH, Phase.LIFT, Phase.CARRY, Phase.LOWER, Phase.RETREAT)
+HELD = (Phase.LIFT, Phase.CARRY, Phase.LOWER)
+
+
+class CollisionWorld:
+    """A body among obstacles, and the target twice: where it stands, and in the hand.
+
+    What may touch: in the phases that hold the target, the hand and the target, and the target and what bears it; in
+    RETREAT, the opening hand and the target. In all else every pair keeps its clearance; a robot's own links only must not
+    overlap. Bounding boxes go first: with five objects around, the plain loop over all pairs doubles a plan's time.
+    """
+
+    def __init__(self, body: KinematicBody, obstacles: ObstacleShapes, *, margin_m: float, clearance_m: float):
+        """Build all shapes and pairs; ``margin_m`` is kept in REACH and CARRY, ``clearance_m`` on the lines."""
+        self._body, self._obstacles = body, obstacles
+        self._margin_m, self._clearance_m = margin_m, clearance_m
+        self._model, self._data = body.model, body.model.createData()
+        self._geometry = body.geometry.clone()
+        robot = range(body.geometry.ngeoms)
+        statics = [self._add(s.name, 0, s.pose, s.shape) for s in obstacles.statics]
+        standing = [self._add(f"target {i}", 0, obstacles.start, s) for i, s in enumerate(obstacles.target_hulls)]
+        whole = self._add("target", 0, obstacles.start, obstacles.target_whole)
+        self._standing = [*standing, whole]
+        self._held = [self._add(f"held {i}", body.joint, obstacles.start, s) for i, s in enumerate(obstacles.carried)]
+        self._pairs = _Pairs(self._geometry.ngeoms, body, robot, statics, standing, whole, self._held)
+        self._geometry.setCollisionPairs(self._pairs.ever(), True)
+        self._collision = self._geometry.createData()
+        self._manager = broad_phase(self._model, self._geometry, self._collision)
+        self._entered: tuple[Phase, float] | None = None
+
+    def _add(self, name: str, joint: int, pose: Any, shape: Any) -> int:
+        return int(self._geometry.addGeometryObject(pin.GeometryObject(name, joint, pose, shape)))
+
+    def hold(self, gripper_to_object: np.ndarray) -> None:
+        """Put the held copy of the target where a grasp ``(4, 4)`` has it."""
+        placement = self._body.gripper_to_joint * pose_of(gripper_to_object).inverse()
+        for index in self._held:
+            self._geometry.geometryObjects[index].placement = placement
+
+    def enter(self, phase: Phase, margin_m: float | None = None) -> None:
+        """Test from now on what a phase forbids, with its own margin or with another."""
+        if margin_m is None:
+            margin_m = self._margin_m if phase in (Phase.REACH, Phase.CARRY) else self._clearance_m
+        if self._entered == (phase, margin_m):
+            return
+        self._entered = (phase, margin_m)
+        stands_at = self._obstacles.goal if phase is Phase.RETREAT else self._obstacles.start
+        for index in self._standing:
+            self._geometry.geometryObjects[index].placement = stands_at
+        active, margins = self._pairs.of(phase, margin_m, self._obstacles)
+        self._collision.setActiveCollisionPairs(self._geometry, active, True)
+        self._collision.setSecurityMargins(self._geometry, margins, True, True)
+
+    def is_free(self, configuration: np.ndarray) -> bool:
+        """Tell whether nothing touches that must not, in the phase that was entered last."""
+        return not pin.computeCollisions(self._model, self._data, self._manager, configuration, True)
+
+    def touching(self, configuration: np.ndarray) -> list[tuple[str, str]]:
+        """Return the names of the shapes that come too near to each other."""
+        pin.computeCollisions(self._model, self._data, self._geometry, self._collision, configuration, False)
+        return [
+            (self._geometry.geometryObjects[pair.first].name, self._geometry.geometryObjects[pair.second].name)
+            for k, pair in enumerate(self._geometry.collisionPairs)
+            if self._collision.activeCollisionPairs[k] and self._collision.collisionResults[k].isCollision()
+        ]
+
+
+class _Pairs:
+    """Which pairs of shapes each phase tests, as upper triangles over all shapes."""
+
+    def __init__(
+        self,
+        count: int,
+        body: KinematicBody,
+        robot: range,
+        statics: list[int],
+        standing: list[int],
+        whole: int,
+        held: list[int],
+    ):
+        joints = [int(shape.parentJoint) for shape in body.geometry.geometryObjects]
+        self._statics, self._held = statics, held
+        moving = [i for i in robot if joints[i] > 0]
+        rest = [i for i in robot if i not in body.touching]
+        clear_of_held = [i for i in rest if joints[i] < body.joint]
+
+        def between(first: list[int], second: list[int]) -> np.ndarray:
+            result = np.zeros((count, count), dtype=bool)
+            result[np.ix_(first, second)] = True
+            return result
+
+        self._own = np.zeros((count, count), dtype=bool)
+        for pair in body.geometry.collisionPairs:
+            self._own[pair.first, pair.second] = True
+        robot_statics = between(moving, statics)
+        hand_target = between(sorted(body.touching), standing)
+        rest_target = between([i for i in rest if joints[i] > 0], [whole])
+        held_all = between(statics, held) | between(clear_of_held, held)
+        common = self._own | robot_statics
+        self._of_phase = {
+            Phase.REACH: common | hand_target | rest_target,
+            Phase.APPROACH: common | hand_target | rest_target,
+            Phase.LIFT: common | held_all,
+            Phase.CARRY: common | held_all,
+            Phase.LOWER: common | held_all,
+            Phase.RETREAT: common | rest_target,
+        }
+        self._hand_target = hand_target
+        self._margins: dict[tuple[Phase, float], np.ndarray] = {}
+
+    def ever(self) -> np.ndarray:
+        """Return the pairs that any phase tests."""
+        return np.logical_or.reduce(list(self._of_phase.values()))
+
+    def of(self, phase: Phase, margin_m: float, obstacles: ObstacleShapes) -> tuple[np.ndarray, np.ndarray]:
+        """Return a phase's pairs and the clearance of each."""
+        key = (phase, margin_m)
+        if key not in self._margins:
+            margins = np.where(self._own, 0.0, margin_m)
+            if phase is Phase.APPROACH:
+                margins[self._hand_target] = 0.0
+            for index, static in zip(self._statics, obstacles.statics, strict=True):
+                allowance = {Phase.LIFT: static.start_allowance_m, Phase.LOWER: static.goal_allowance_m}.get(phase)
+                if allowance is not None:
+                    margins[index, self._held] = allowance
+            self._margins[key] = margins
+        return self._of_phase[phase], self._margins[key]
+
+
+def is_path_free(world: CollisionWorld, path: JointPath, count: int) -> bool:
+    """Tell whether a path over [0, 1] is free at ``count + 1`` even places; the ends and the middle go first."""
+    places = np.array((0.0, *bisection_places(count)))
+    return all(world.is_free(configuration) for configuration in path(places))

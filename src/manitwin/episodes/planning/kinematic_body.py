@@ -1,0 +1,118 @@
+"""A robot's arm, or its hand alone, as pinocchio and coal take it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from lxml import etree  # type: ignore[import-untyped]
+
+from manitwin.episodes.planning.convex_shapes import convex_hull, corners_of
+from manitwin.episodes.planning.libraries import coal, pin
+from manitwin.robots.robot import Robot
+
+TURN_RAD = 2 * np.pi
+
+
+@dataclass(frozen=True)
+class KinematicBody:
+    """A model, its convex collision shapes with the pairs to be tested, and the joint that the gripper is fixed to.
+
+    ``gripper_to_joint`` is the pose of the twin's grasp frame in the frame of ``joint``. ``touching`` are the shapes that
+    may touch the target when they hold it.
+    """
+
+    model: Any
+    geometry: Any
+    joint: int
+    gripper_to_joint: Any
+    touching: frozenset[int]
+
+
+def arm_of(robot: Robot) -> KinematicBody:
+    """Build the arm with its fingers open; joints are ``robot.arm_joints`` in their order."""
+    urdf = _without_continuous_joints(robot.urdf)
+    model = pin.buildModelFromXML(urdf)
+    geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, None, [])
+    configuration = pin.neutral(model)
+    for name in robot.finger_joints:
+        configuration[model.joints[model.getJointId(name)].idx_q] = robot.gripper.opening_m / 2
+    locked = [i for i in range(1, model.njoints) if model.names[i] not in robot.arm_joints]
+    model, geometry = pin.buildReducedModel(model, geometry, locked, configuration)
+    tip = model.frames[model.getFrameId(robot.tip_link)]
+    shapes = _convex_shapes(geometry, model, robot.finger_links)
+    geometry = pin.GeometryModel()
+    for shape in shapes:
+        geometry.addGeometryObject(shape)
+    links = [model.frames[shape.parentFrame].name for shape in shapes]
+    disabled = {frozenset(pair) for pair in robot.disabled_pairs}
+    for i in range(len(shapes)):
+        for j in range(i + 1, len(shapes)):
+            apart = shapes[i].parentJoint != shapes[j].parentJoint
+            if apart and frozenset((links[i], links[j])) not in disabled:
+                geometry.addCollisionPair(pin.CollisionPair(i, j))
+    holding = {*robot.hand_links, *robot.finger_links}
+    return KinematicBody(
+        model=model,
+        geometry=geometry,
+        joint=tip.parentJoint,
+        gripper_to_joint=tip.placement * pin.SE3(np.ascontiguousarray(robot.gripper_to_tip)),
+        touching=frozenset(i for i, link in enumerate(links) if link in holding),
+    )
+
+
+def floating_hand_of(arm: KinematicBody) -> KinematicBody:
+    """Return what moves with the gripper as a body of its own; its configuration is the grasp frame's pose, quaternion xyzw."""
+    model = pin.Model()
+    joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "gripper")
+    geometry, touching = pin.GeometryModel(), set()
+    joint_to_gripper = arm.gripper_to_joint.inverse()
+    for i, shape in enumerate(arm.geometry.geometryObjects):
+        if shape.parentJoint == arm.joint:
+            placement = joint_to_gripper * shape.placement
+            index = geometry.addGeometryObject(pin.GeometryObject(shape.name, joint, placement, shape.geometry))
+            if i in arm.touching:
+                touching.add(index)
+    return KinematicBody(model, geometry, joint, pin.SE3.Identity(), frozenset(touching))
+
+
+def broad_phase(model: Any, geometry: Any, data: Any) -> Any:
+    """Return coal's sweep and prune over the shapes: with a few dozen of them, the fastest of its managers."""
+    return pin.BroadPhaseManager_SSaPCollisionManager(model, geometry, data)
+
+
+def _without_continuous_joints(urdf: str) -> str:
+    """Give joints without limits one turn to either side, so that each has one coordinate."""
+    root = etree.fromstring(urdf.encode(), etree.XMLParser(remove_comments=True))
+    for joint in root.iter("joint"):
+        if joint.get("type") == "continuous":
+            joint.set("type", "revolute")
+            limit = joint.find("limit")
+            if limit is None:
+                limit = etree.SubElement(joint, "limit", effort="1000", velocity="10")
+            limit.set("lower", str(-TURN_RAD))
+            limit.set("upper", str(TURN_RAD))
+    return etree.tostring(root, encoding="unicode")
+
+
+def _convex_shapes(geometry: Any, model: Any, finger_links: tuple[str, str]) -> list[Any]:
+    """Return the shapes with their meshes' hulls, and each finger as the one hull of its pieces."""
+    shapes: list[Any] = []
+    fingers: dict[str, list[Any]] = {link: [] for link in finger_links}
+    for shape in geometry.geometryObjects:
+        if isinstance(shape.geometry, coal.BVHModelBase):
+            shape.geometry.buildConvexHull(True, "Qt")
+            shape.geometry = shape.geometry.convex
+        link = model.frames[shape.parentFrame].name
+        (fingers[link] if link in fingers and corners_of(shape) is not None else shapes).append(shape)
+    for link, pieces in fingers.items():
+        if len(pieces) == 1:
+            shapes += pieces
+        elif pieces:
+            corners = np.concatenate([corners_of(piece) for piece in pieces])
+            first = pieces[0]
+            shapes.append(
+                pin.GeometryObject(link, first.parentJoint, first.parentFrame, pin.SE3.Identity(), convex_hull(corners))
+            )
+    return shapes

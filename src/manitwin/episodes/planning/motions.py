@@ -1,0 +1,123 @@
+"""Motions of one kind each: the gripper on a straight line, or the arm from one configuration to another around things."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from manitwin.episodes.planning.arm_kinematics import ArmKinematics
+from manitwin.episodes.planning.collision_world import CollisionWorld, is_path_free
+from manitwin.episodes.planning.free_segment import is_segment_free
+from manitwin.episodes.planning.joint_paths import JointPath, JointSegment
+from manitwin.episodes.planning.problem import Motion, Phase, PlanFailure
+from manitwin.episodes.planning.rest_to_rest import time_rest_to_rest
+from manitwin.episodes.planning.rrt_connect import rrt_connect
+from manitwin.episodes.planning.settings import PlannerSettings
+from manitwin.episodes.planning.smoothing import round_corners, shortcut
+from manitwin.episodes.planning.straight_line import straight_line
+from manitwin.episodes.planning.time_optimal import time_optimal
+from manitwin.robots.robot import Robot
+
+CORNER_RADII_RAD = (0.4, 0.2, 0.1, 0.03)
+
+
+class Motions:
+    """Plans and times single motions of an arm; each is checked as finely as it is executed."""
+
+    def __init__(self, robot: Robot, arm: ArmKinematics, timestep_s: float, settings: PlannerSettings):
+        """Take the limits of ``robot``."""
+        self._arm, self._timestep_s, self._settings = arm, timestep_s, settings
+        self._velocity_limits = np.asarray(robot.velocity_limits_rad_s, float)
+        self._acceleration_limits = np.asarray(robot.acceleration_limits_rad_s2, float)
+
+    def line(
+        self, world: CollisionWorld, phase: Phase, start: np.ndarray, end_to_world: np.ndarray
+    ) -> CubicSpline | None:
+        """Return the path of a straight line of the gripper that is free in a phase, or None."""
+        path = straight_line(self._arm, start, end_to_world)
+        if path is None:
+            return None
+        world.enter(phase)
+        way_m = float(np.linalg.norm(end_to_world[:3, 3] - self._arm.gripper_pose(start)[:3, 3]))
+        knots = path(path.x)
+        turned_rad = float(np.linalg.norm(np.diff(knots, axis=0), axis=1).sum())
+        steps = max(way_m / self._settings.check_step_m, turned_rad / self._settings.check_step_rad, 1.0)
+        return path if is_path_free(world, path, int(np.ceil(steps))) else None
+
+    def timed(self, phase: Phase, path: JointPath, *, backwards: bool = False) -> Motion:
+        """Time a path from rest to rest, from its end to its start where it was found ``backwards``."""
+        positions, velocities = time_rest_to_rest(
+            path, self._velocity_limits, self._acceleration_limits, self._timestep_s
+        )
+        if backwards:
+            positions, velocities = positions[::-1].copy(), -velocities[::-1]
+        return Motion(phase, positions, velocities)
+
+    def free(
+        self, world: CollisionWorld, phase: Phase, start: np.ndarray, goal: np.ndarray, rng: np.random.Generator
+    ) -> Motion | PlanFailure:
+        """Return a motion around things with the largest margin that start and goal allow, or why there is none."""
+        margin_m = self._largest_margin_m(world, phase, start, goal)
+        if margin_m is None:
+            return "no_path"
+        world.enter(phase, margin_m)
+        if is_segment_free(start, goal, world.is_free, self._settings.check_step_rad):
+            return self.timed(phase, JointSegment(start, goal))
+        waypoints = rrt_connect(
+            start,
+            goal,
+            world.is_free,
+            (self._arm.lower, self._arm.upper),
+            rng,
+            extension_rad=self._settings.extension_rad,
+            check_step_rad=self._settings.search_step_rad,
+            iterations=self._settings.iterations,
+        )
+        if waypoints is None:
+            return "no_path"
+        waypoints = shortcut(
+            waypoints,
+            world.is_free,
+            rng,
+            tries=self._settings.shortcuts,
+            check_step_rad=self._settings.search_step_rad,
+        )
+        world.enter(phase, max(margin_m / 2, min(margin_m, self._settings.clearance_m)))
+        return self._smooth(world, phase, waypoints) or "no_time_parameterization"
+
+    def _largest_margin_m(
+        self, world: CollisionWorld, phase: Phase, start: np.ndarray, goal: np.ndarray
+    ) -> float | None:
+        clearance_m = self._settings.clearance_m
+        for margin_m in (self._settings.margin_m, (self._settings.margin_m + clearance_m) / 2, clearance_m, 0.0):
+            world.enter(phase, margin_m)
+            if world.is_free(start) and world.is_free(goal):
+                return margin_m
+        return None
+
+    def _smooth(self, world: CollisionWorld, phase: Phase, waypoints: np.ndarray) -> Motion | None:
+        """Return the motion with the widest corners that is free, stopping at the waypoints where none is."""
+        step_rad = self._settings.check_step_rad
+        for radius_rad in CORNER_RADII_RAD if len(waypoints) > 2 else ():
+            timed = time_optimal(
+                round_corners(waypoints, radius_rad), self._velocity_limits, self._acceleration_limits, self._timestep_s
+            )
+            if timed is not None and self._arm.within_limits(timed[0]) and _is_free(world, timed[0], step_rad):
+                return Motion(phase, *timed)
+        pieces = []
+        for start, end in pairwise(waypoints):
+            if not is_segment_free(start, end, world.is_free, step_rad):
+                return None
+            pieces.append(self.timed(phase, JointSegment(start, end)))
+        positions = [pieces[0].positions_rad[:1], *(piece.positions_rad[1:] for piece in pieces)]
+        velocities = [pieces[0].velocities_rad_s[:1], *(piece.velocities_rad_s[1:] for piece in pieces)]
+        return Motion(phase, np.concatenate(positions), np.concatenate(velocities))
+
+
+def _is_free(world: CollisionWorld, positions: np.ndarray, step_rad: float) -> bool:
+    """Tell whether a sampled motion ``(T, n)`` is free, looked at every ``step_rad`` of its way."""
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
+    looked_at = np.unique(np.searchsorted(way, np.arange(0, way[-1] + step_rad, step_rad)).clip(max=len(way) - 1))
+    return all(world.is_free(position) for position in positions[looked_at])

@@ -1,0 +1,115 @@
+"""What stands around the robot in one problem, as convex shapes: which of them are merged, and which bear the target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from manitwin.episodes.planning.convex_shapes import BodyShapes, ShapeStore
+from manitwin.episodes.planning.libraries import coal, pin
+from manitwin.episodes.planning.problem import PickPlaceProblem
+
+BEARING_GAP_M = 0.003  # what is no further than this, and overlaps by no more, bears the target: they touch on purpose
+SINK_M = 0.002  # by how much deeper than it stands the target may go while it is lifted off or set down
+HAND_REACH_M = 0.06  # what is nearer to the target than this comes between hand and target
+
+
+@dataclass(frozen=True)
+class StaticShape:
+    """A shape that does not move, with the clearance (m) that the held target keeps at its start and at its goal.
+
+    ``start_allowance_m`` is negative where the shape bears the target: so deep may it go. None: what the phase asks for.
+    """
+
+    name: str
+    shape: Any
+    pose: Any
+    start_allowance_m: float | None
+    goal_allowance_m: float | None
+
+
+@dataclass(frozen=True)
+class ObstacleShapes:
+    """The shapes of a problem: static ones; the target's own hulls, its common hull, and the shapes that it is carried as."""
+
+    statics: tuple[StaticShape, ...]
+    target_hulls: tuple[Any, ...]
+    target_whole: Any
+    carried: tuple[Any, ...]
+    start: Any
+    goal: Any
+
+
+def obstacle_shapes(
+    problem: PickPlaceProblem, goal_object_to_world: np.ndarray, store: ShapeStore, margin_m: float
+) -> ObstacleShapes:
+    """Stand each object as one hull where nothing is lost by it, else as its own hulls.
+
+    Nothing is lost where the one hull stays ``margin_m`` away from the target at start and goal, and is as good as solid
+    or out of the hand's way.
+    """
+    target = store(problem.target.body)
+    start, goal = pose_of(problem.target.object_to_world), pose_of(goal_object_to_world)
+    placed: list[tuple[str, Any, Any]] = []
+    for box in problem.static_boxes:
+        shape = coal.Box(2 * np.asarray(box.half_extents_m, float))
+        shape.computeLocalAABB()
+        placed.append((box.name, shape, pose_of(box.box_to_world)))
+    for obstacle in problem.obstacles:
+        shapes, pose = store(obstacle.body), pose_of(obstacle.object_to_world)
+        gap = min(_gap_m(shapes, pose, target, start), _gap_m(shapes, pose, target, goal))
+        merged = gap > HAND_REACH_M or (gap > margin_m and shapes.is_solid)
+        placed += [(obstacle.name, shape, pose) for shape in ((shapes.whole,) if merged else shapes.hulls)]
+    at_start = [signed_distance_m(target.whole, start, shape, pose) for _, shape, pose in placed]
+    at_goal = [signed_distance_m(target.whole, goal, shape, pose) for _, shape, pose in placed]
+    carried = (target.whole,)
+    if min([*at_start, *at_goal], default=0.0) < -SINK_M:
+        carried = target.hulls
+        at_start = [_least_m(carried, start, shape, pose) for _, shape, pose in placed]
+        at_goal = [_least_m(carried, goal, shape, pose) for _, shape, pose in placed]
+    statics = tuple(
+        StaticShape(name, shape, pose, _allowance_m(before), _allowance_m(after))
+        for (name, shape, pose), before, after in zip(placed, at_start, at_goal, strict=True)
+    )
+    return ObstacleShapes(statics, target.hulls, target.whole, carried, start, goal)
+
+
+def pose_of(matrix: np.ndarray) -> Any:
+    """Return a pose ``(4, 4)`` as pinocchio's."""
+    return pin.SE3(np.ascontiguousarray(matrix, float))
+
+
+def signed_distance_m(first: Any, first_pose: Any, second: Any, second_pose: Any) -> float:
+    """Return how far two convex shapes are apart; negative is how deep they overlap."""
+    return float(
+        coal.distance(
+            first,
+            _transform(first_pose),
+            second,
+            _transform(second_pose),
+            coal.DistanceRequest(),
+            coal.DistanceResult(),
+        )
+    )
+
+
+def _transform(pose: Any) -> Any:
+    return coal.Transform3s(pose.rotation, pose.translation)
+
+
+def _gap_m(obstacle: BodyShapes, pose: Any, target: BodyShapes, target_pose: Any) -> float:
+    """Return the distance of the common hulls, or a lower bound of it that is larger than any that matters."""
+    bound = float(np.linalg.norm(pose.translation - target_pose.translation)) - obstacle.radius_m - target.radius_m
+    if bound > HAND_REACH_M:
+        return bound
+    return signed_distance_m(obstacle.whole, pose, target.whole, target_pose)
+
+
+def _least_m(shapes: tuple[Any, ...], shapes_pose: Any, other: Any, other_pose: Any) -> float:
+    return min(signed_distance_m(shape, shapes_pose, other, other_pose) for shape in shapes)
+
+
+def _allowance_m(distance_m: float) -> float | None:
+    return min(distance_m, 0.0) - SINK_M if abs(distance_m) < BEARING_GAP_M else None

@@ -1,0 +1,67 @@
+"""Putting down what is in the hand: carry, lower, let go, retreat."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.episodes.planning.arm_kinematics import ArmKinematics
+from manitwin.episodes.planning.arm_solutions import ArmSolutions
+from manitwin.episodes.planning.line_ends import LineEnds
+from manitwin.episodes.planning.motions import Motions
+from manitwin.episodes.planning.problem import Motion, Phase, PlanFailure
+from manitwin.episodes.planning.problem_world import ProblemWorld
+from manitwin.episodes.planning.stages import later
+
+Placement = tuple[Motion | None, Motion, Motion]
+"""Carry (None where the arm is above the goal already), lower and retreat."""
+
+
+class PlacementPlanner:
+    """Plans a placement backwards: first where the object is let go, then the way there."""
+
+    def __init__(self, arm: ArmKinematics, solutions: ArmSolutions, motions: Motions, ends: LineEnds):
+        """Take what plans single motions."""
+        self._arm, self._solutions, self._motions, self._ends = arm, solutions, motions, ends
+
+    def plan(
+        self, world: ProblemWorld, start: np.ndarray, gripper_to_world: np.ndarray, rng: np.random.Generator
+    ) -> Placement | PlanFailure:
+        """Plan from a configuration to where the gripper lets go of what it holds; or tell the latest stage that failed."""
+        solutions, converged = self._solutions.of(world.arm, Phase.LOWER, gripper_to_world, start)
+        failure: PlanFailure = "lower_blocked" if converged else "place_unreachable"
+        for at_goal in solutions:
+            outcome = self._plan_to(world, start, at_goal, rng)
+            if isinstance(outcome, tuple):
+                return outcome
+            failure = later(failure, outcome)
+        return failure
+
+    def plan_from_above(
+        self, world: ProblemWorld, start: np.ndarray, gripper_to_world: np.ndarray
+    ) -> Placement | PlanFailure:
+        """Lower on the straight line from where the arm is."""
+        lower = self._motions.line(world.arm, Phase.LOWER, start, gripper_to_world)
+        if lower is None:
+            return "lower_blocked"
+        lowered = self._motions.timed(Phase.LOWER, lower)
+        retreat = self._retreat(world, lowered.positions_rad[-1])
+        return (None, lowered, retreat) if isinstance(retreat, Motion) else retreat
+
+    def _plan_to(
+        self, world: ProblemWorld, start: np.ndarray, at_goal: np.ndarray, rng: np.random.Generator
+    ) -> Placement | PlanFailure:
+        above = self._ends.above(self._arm.gripper_pose(at_goal))
+        lower = self._motions.line(world.arm, Phase.LOWER, at_goal, above)
+        if lower is None:
+            return "lower_blocked"
+        retreat = self._retreat(world, at_goal)
+        if not isinstance(retreat, Motion):
+            return retreat
+        lowered = self._motions.timed(Phase.LOWER, lower, backwards=True)
+        carry = self._motions.free(world.arm, Phase.CARRY, start, lowered.positions_rad[0], rng)
+        return (carry, lowered, retreat) if isinstance(carry, Motion) else carry
+
+    def _retreat(self, world: ProblemWorld, at_goal: np.ndarray) -> Motion | PlanFailure:
+        before = self._ends.before(self._arm.gripper_pose(at_goal))
+        retreat = self._motions.line(world.arm, Phase.RETREAT, at_goal, before)
+        return "retreat_blocked" if retreat is None else self._motions.timed(Phase.RETREAT, retreat)

@@ -1,0 +1,60 @@
+"""Timing from rest to rest by a trapezoid of speed over the path, exact for straight joint segments."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.episodes.planning.joint_paths import JointPath, JointSegment
+
+ACCELERATING_SHARES = (0.5, 0.4, 0.3, 0.22, 0.15, 0.1, 0.06, 0.03)
+LOOKED_AT = 41
+BETWEEN_LOOKS = 0.01  # longer by this, for what lies between the places that are looked at
+
+
+def trapezoid(share: float | np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return place and speed on [0, 1] at moments of [0, 1], speeding up and slowing down for a ``share`` each."""
+    peak = 1 / (1 - share)
+    first, last = moments**2 / (2 * share), (1 - moments) ** 2 / (2 * share)
+    place = np.where(
+        moments < share, peak * first, np.where(moments > 1 - share, 1 - peak * last, peak * (moments - share / 2))
+    )
+    speed = peak * np.minimum(np.minimum(moments / share, (1 - moments) / share), 1.0)
+    return place, speed
+
+
+def time_rest_to_rest(
+    path: JointPath, velocity_limits: np.ndarray, acceleration_limits: np.ndarray, timestep_s: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions and velocities ``(T, n)`` at every timestep, at rest at both ends, within the limits (rad/s, rad/s2).
+
+    On a segment of joint space the trapezoid is the fastest there is: its duration is the larger of V / (1 - f) and
+    sqrt(A / (f (1 - f))) for the share f of speeding up, V and A the largest ratios of the joints' ways to their limits.
+    On other paths the fastest of a few shares is taken, whose duration follows from the path's derivatives.
+    """
+    if isinstance(path, JointSegment):
+        way = np.abs(path.end - path.start)
+        v, a = float((way / velocity_limits).max()), float((way / acceleration_limits).max())
+        share = min(0.5, a / (v**2 + a)) if a > 0 else 0.5
+        duration_s = max(v / (1 - share), float(np.sqrt(a / (share * (1 - share)))))
+    else:
+        duration_s, share = _fastest(path, velocity_limits, acceleration_limits)
+    steps = max(1, int(np.ceil(duration_s / timestep_s - 1e-9)))
+    places, speeds = trapezoid(share, np.arange(steps + 1) / steps)
+    positions = path(places)
+    velocities = path(places, 1) * (speeds / (steps * timestep_s))[:, None]
+    return np.ascontiguousarray(positions), velocities
+
+
+def _fastest(path: JointPath, velocity_limits: np.ndarray, acceleration_limits: np.ndarray) -> tuple[float, float]:
+    """Return the least duration at which speeds and accelerations keep to the limits, and its share of speeding up."""
+    moments, shares = np.linspace(0, 1, LOOKED_AT), np.array(ACCELERATING_SHARES)[:, None]
+    place, speed = trapezoid(shares, moments)
+    slope, bend = path(place, 1), path(place, 2) * (speed**2)[..., None]
+    change = slope / (shares * (1 - shares))[..., None]
+    up, down = (moments <= shares)[..., None], (moments >= 1 - shares)[..., None]
+    largest = np.maximum(np.abs(bend + up * change), np.abs(bend - down * change))
+    largest = np.maximum(largest, np.abs(bend)) / acceleration_limits
+    fastest = (np.abs(slope) * speed[..., None] / velocity_limits).max((1, 2))
+    durations_s = np.maximum(fastest, np.sqrt(largest.max((1, 2)))) * (1 + BETWEEN_LOOKS)
+    best = int(durations_s.argmin())
+    return float(durations_s[best]), ACCELERATING_SHARES[best]

@@ -1,0 +1,173 @@
+"""Publish episodes: choose by licence, write the LeRobot layout without the others, check it, and put it in its place."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from manitwin.dataset.publish.licences import LICENSES_MD, licenses_page, without_attribution
+from manitwin.dataset.publish.privacy import check_words, places_of
+from manitwin.dataset.publish.publication import EPISODES, Publication
+from manitwin.episodes.attempt import Attempt
+from manitwin.episodes.attempts_table import ATTEMPTS, merge_attempts, read_attempts, write_attempts
+from manitwin.episodes.collect import batch_folders, stored_episodes
+from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
+from manitwin.episodes.lerobot.write import write_lerobot
+from manitwin.episodes.publication.card import (
+    ATTEMPTS_FILE,
+    OF_EPISODES,
+    TWINS_FILE,
+    EpisodesCard,
+    episodes_card,
+)
+from manitwin.episodes.publication.choose import Chosen, choose_episodes
+from manitwin.episodes.publication.films import films_of
+from manitwin.episodes.publication.success import success_of
+from manitwin.episodes.stored_episode import StoredEpisode
+from manitwin.errors import EpisodesError, UsageError
+from manitwin.pipeline.dataset_run import CONFIG
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.version import installed_version
+
+README = "README.md"
+TWINS_SCHEMA = pa.schema(
+    [
+        *((name, pa.string()) for name in ("twin_id", "category", "license", "attribution", "source_sha256")),
+        ("revisions", pa.list_(pa.string())),
+        ("episodes", pa.list_(pa.int64())),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class PublishedEpisodes:
+    """What went out and what did not; ``left_out`` counts kept episodes by the licences that keep them here.
+
+    ``rehearsals`` are those left out because a rehearsal server had a part in one of their twins.
+    """
+
+    episodes: int
+    frames: int
+    twins: int
+    left_out: dict[str, int]
+    without_attribution: int
+    files: int
+    bytes: int
+    rehearsals: int = 0
+
+
+def publish_episodes(
+    episodes: str | Path,
+    out: str | Path,
+    *,
+    license_allow: Iterable[str] | None = None,
+    with_rehearsals: bool = False,
+    twins: str | Path | None = None,
+    name: str | None = None,
+) -> PublishedEpisodes:
+    """Write a LeRobotDataset v3.0 with a card, licences, attempts and digests to ``out``, a folder or URL.
+
+    An episode goes out where the licences of all its objects may: those of ``license_allow``, or all that are known; one
+    of a twin that a rehearsal server (``manitwin fake``) had a part in only ``with_rehearsals``. Of the others no row, no
+    picture and no statistic is written. ``twins`` names where the twins are now, None: where they were as the episodes
+    were made. The same episodes give the same bytes. Raises UsageError for wrong arguments and twins that are gone,
+    EpisodesError for episodes that cannot be read or name a folder of this machine.
+    """
+    episodes = Path(episodes)
+    said = _configuration(episodes)
+    source = TwinSource(said["dataset"] if twins is None else twins)
+    batches, title = batch_folders(episodes), name or Path(str(out).rstrip("/")).name
+    chosen = choose_episodes(
+        batches, read_attempts(episodes / ATTEMPTS), source, license_allow, with_rehearsals=with_rehearsals
+    )
+    publication = Publication(DatasetRoot(out), EPISODES)
+    publication.refuse_others()
+    try:
+        with publication.scratch() as scratch:
+            made = scratch / "made"
+            films = films_of(episodes, batches, chosen.index_of.keys(), scratch / "films")
+            write_lerobot(_chosen_episodes(batches, chosen), made, videos=films)
+            checked = read_lerobot(made)
+            _write_tables(episodes, chosen, made)
+            rows = pq.read_metadata(made / ATTEMPTS_FILE).num_rows
+            pages = _pages(title, checked, chosen, _success_attempts(episodes, chosen), rows, said)
+            places = places_of([DatasetRoot(episodes), source.root, publication.root])
+            for page, words in {**pages, "meta/tasks.parquet": "\n".join(checked.tasks)}.items():
+                check_words(page, words, places, EpisodesError)
+            publication.begin()
+            for path in sorted(path for path in made.rglob("*") if path.is_file()):
+                publication.put(path, path.relative_to(made).as_posix())
+        for page, words in pages.items():
+            publication.write(page, words.encode())
+        publication.finish()
+    except OSError as error:
+        raise UsageError(f"{out}: not finished ({error}); mend that and publish again") from error
+    return PublishedEpisodes(
+        episodes=checked.info["total_episodes"],
+        frames=checked.info["total_frames"],
+        twins=len(chosen.twins),
+        left_out=chosen.left_out,
+        without_attribution=len(without_attribution([asdict(twin) for twin in chosen.twins])),
+        files=len(publication.sizes) + 1,
+        bytes=sum(publication.sizes.values()),
+        rehearsals=chosen.rehearsals,
+    )
+
+
+def _configuration(episodes: Path) -> dict[str, Any]:
+    if not (episodes / ATTEMPTS).is_file():
+        raise UsageError(
+            f"{episodes}: no {ATTEMPTS}, so this is no folder of finished episodes; run manitwin trajectories"
+        )
+    try:
+        said: dict[str, Any] = json.loads((episodes / CONFIG).read_bytes())
+    except (OSError, ValueError) as error:
+        raise EpisodesError(
+            f"{episodes}/{CONFIG}: cannot be read ({error}); run manitwin trajectories again"
+        ) from error
+    return said
+
+
+def _chosen_episodes(batches: list[Path], chosen: Chosen) -> Iterator[StoredEpisode]:
+    return (each for each in stored_episodes(batches) if each.attempt.episode_id in chosen.index_of)
+
+
+def _success_attempts(episodes: Path, chosen: Chosen) -> Iterator[Attempt]:
+    return (attempt for attempt in read_attempts(episodes / ATTEMPTS) if chosen.tells_of(attempt))
+
+
+def _write_tables(episodes: Path, chosen: Chosen, made: Path) -> None:
+    """Write the attempts that go out, numbered as the episodes are, and the twins."""
+    unnumbered = made / f".{ATTEMPTS_FILE}"
+    write_attempts(unnumbered, (each for each in read_attempts(episodes / ATTEMPTS) if chosen.publishes(each)))
+    merge_attempts([unnumbered], made / ATTEMPTS_FILE)
+    unnumbered.unlink()
+    twins = pa.Table.from_pylist([asdict(twin) for twin in chosen.twins], schema=TWINS_SCHEMA)
+    pq.write_table(twins, made / TWINS_FILE, compression="zstd", version="2.6")
+
+
+def _pages(
+    title: str, checked: LeRobotSet, chosen: Chosen, attempts: Iterator[Attempt], rows: int, said: dict[str, Any]
+) -> dict[str, str]:
+    made_of = {"objects": f"data set {Path(said['dataset']).name}"}
+    if said["scenes"]:
+        made_of["scenes"] = f"layouts {Path(said['scenes']).name}"
+    made_of |= {
+        "other objects": "those of the scenes" if said["scenes"] else str(said["others"]),
+        "skill": said["skill"],
+        "seed": str(said["seed"]),
+        "kept where the object ended within": f"{1000 * said['episode']['max_placed_m']:g} mm and "
+        f"{said['episode']['max_tilt_deg']:g} degrees of its goal",
+        "twins": f"in the revisions that {TWINS_FILE} names",
+        "published with": f"manitwin {installed_version()}",
+    }
+    facts = EpisodesCard(title, checked.info, chosen.twins, success_of(attempts), chosen.left_out, rows, made_of)
+    licences = licenses_page(title, [asdict(twin) for twin in chosen.twins], introduction=OF_EPISODES)
+    return {LICENSES_MD: licences, README: episodes_card(facts)}

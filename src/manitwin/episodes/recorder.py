@@ -1,0 +1,109 @@
+"""The states and actions of an episode, gathered 20 times a second while it runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from manitwin.episodes.contacts import Touches
+from manitwin.episodes.planning.problem import Phase
+from manitwin.episodes.recording import Recording
+from manitwin.episodes.world import EpisodeWorld
+from manitwin.geometry.poses import quaternion_wxyz
+
+
+class _State(NamedTuple):
+    joint_positions_rad: np.ndarray
+    joint_velocities_rad_s: np.ndarray
+    gripper_opening_m: float
+    tip_to_world: np.ndarray
+    object_positions_m: list[np.ndarray]
+    object_quaternions_wxyz: list[np.ndarray]
+    object_linear_velocities_m_s: list[np.ndarray]
+    object_angular_velocities_rad_s: list[np.ndarray]
+
+
+class _Action(NamedTuple):
+    joint_positions_rad: np.ndarray
+    gripper_opening_m: float
+    phase: Phase
+
+
+class Recorder:
+    """Takes a first state, then an action and the state that it led to at a time."""
+
+    def __init__(self, world: EpisodeWorld, touches: Touches):
+        """Take the first state."""
+        self._world = world
+        self._states: list[_State] = [self._state(np.zeros(len(world.robot.robot.arm_joints)))]
+        self._touches, self._unplanned, self._actions = [touches], [False], list[_Action]()
+
+    def add(
+        self,
+        joint_positions_rad: np.ndarray,
+        gripper_opening_m: float,
+        phase: Phase,
+        joint_velocities_rad_s: np.ndarray,
+        touches: Touches,
+        *,
+        unplanned: bool,
+    ) -> None:
+        """Add what the controllers were told, and the state that it led to: the world's as it is, and the arm's speeds."""
+        self._actions.append(_Action(joint_positions_rad, gripper_opening_m, phase))
+        self._states.append(self._state(joint_velocities_rad_s))
+        self._touches.append(touches)
+        self._unplanned.append(unplanned)
+
+    def recording(self, tip_pose: Callable[[np.ndarray], np.ndarray]) -> Recording:
+        """Return what was recorded; ``tip_pose`` is the forward kinematics. Quaternions never change their sign on the way."""
+        told = _columns(self._actions)
+        states = _columns(self._states)
+        tips, told_tips = (
+            np.array(states.pop("tip_to_world")),
+            np.array([tip_pose(q) for q in told["joint_positions_rad"]]),
+        )
+        object_quaternions = _continuous(np.array(states.pop("object_quaternions_wxyz")))
+        tip_quaternions = _continuous(quaternion_wxyz(tips[:, :3, :3]))
+        told_quaternions = _continuous(np.concatenate([tip_quaternions[:1], quaternion_wxyz(told_tips[:, :3, :3])]))
+        return Recording(
+            target=self._world.target,
+            **{name: np.array(values, np.float32) for name, values in states.items()},
+            object_quaternions_wxyz=object_quaternions.astype(np.float32),
+            tip_position_m=tips[:, :3, 3].astype(np.float32),
+            tip_quaternion_wxyz=tip_quaternions.astype(np.float32),
+            finger_forces_n=np.array([touches.finger_forces_n for touches in self._touches], np.float32),
+            target_on_support=np.array([touches.on_support for touches in self._touches]),
+            unplanned_contact=np.array(self._unplanned),
+            action_joint_positions_rad=np.array(told["joint_positions_rad"], np.float32),
+            action_gripper_opening_m=np.array(told["gripper_opening_m"], np.float32),
+            action_tip_position_m=told_tips[:, :3, 3].astype(np.float32),
+            action_tip_quaternion_wxyz=told_quaternions[1:].astype(np.float32),
+            phase=np.array(told["phase"], np.uint8),
+        )
+
+    def _state(self, joint_velocities_rad_s: np.ndarray) -> _State:
+        robot, bodies = self._world.robot, self._world.bodies
+        poses = [body.entity_pose for body in bodies]
+        return _State(
+            joint_positions_rad=robot.joint_positions(),
+            joint_velocities_rad_s=joint_velocities_rad_s,
+            gripper_opening_m=robot.opening_m(),
+            tip_to_world=robot.gripper_pose(),
+            object_positions_m=[pose.p for pose in poses],
+            object_quaternions_wxyz=[pose.q for pose in poses],
+            object_linear_velocities_m_s=[body.linear_velocity for body in bodies],
+            object_angular_velocities_rad_s=[body.angular_velocity for body in bodies],
+        )
+
+
+def _columns(rows: Sequence[_State] | Sequence[_Action]) -> dict[str, list[Any]]:
+    return {name: list(values) for name, values in zip(rows[0]._fields, zip(*rows, strict=True), strict=True)}
+
+
+def _continuous(quaternions: np.ndarray) -> np.ndarray:
+    """Choose the sign of quaternions ``(T, ..., 4)`` that is nearest to the row before, the first one's as it is."""
+    dots = np.sum(quaternions[1:] * quaternions[:-1], axis=-1, keepdims=True)
+    flips = np.cumprod(np.where(dots < 0, -1.0, 1.0), axis=0)
+    return np.concatenate([quaternions[:1], quaternions[1:] * flips])

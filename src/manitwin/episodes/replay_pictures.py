@@ -1,0 +1,119 @@
+"""Pictures of a recorded episode: its states are shown again, nothing is simulated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+import trimesh
+
+from manitwin.episodes.cameras import NamedCamera
+from manitwin.episodes.recording import Recording
+from manitwin.episodes.robot_visuals import link_drawables, link_poses
+from manitwin.errors import UsageError
+from manitwin.formats.glb import read_glb
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.render.drawable import Drawable, drawable
+from manitwin.render.scene_lighting import STUDIO, Lighting
+from manitwin.render.scene_renderer import SceneFrame, SceneRenderer
+from manitwin.robots.robot import Robot
+from manitwin.scenes.furniture_pictures import add_furniture
+from manitwin.scenes.scene import Furniture, SurfaceBox
+
+TOLERANCE_M = 0.0004  # of simplified surfaces: a third of a pixel's width at 1 m in a picture of 640 pixels
+TABLE = Furniture(
+    kind="table",
+    support_height_m=0.0,
+    boxes=(SurfaceBox(name="table", center_m=(0.4, 0.0, -0.02), half_extents_m=(0.65, 0.7, 0.02), material="wood"),),
+)
+"""What an episode without a scene stands on."""
+
+
+@lru_cache(maxsize=64)
+def twin_drawable(folder: Path) -> Drawable:
+    """Return a twin's looks, simplified for small pictures; kept for the next call. Raises InputError."""
+    return drawable(read_glb(folder / "visual.glb"), tolerance_m=TOLERANCE_M)
+
+
+class Replay:
+    """A robot, objects and furniture, uploaded once, that recordings are shown with. Close it, or use a ``with`` statement.
+
+    ``objects`` are those of the recording, in its order: ready to be drawn (``twin_drawable``), or their visual parts in
+    their own frames.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        objects: Sequence[Drawable | Sequence[trimesh.Trimesh]],
+        *,
+        furniture: Furniture = TABLE,
+        lighting: Lighting = STUDIO,
+        seed: int = 0,
+    ) -> None:
+        """Upload everything; ``seed`` chooses the furniture's textures. Raises RendererMissing, AssetError, UsageError."""
+        self._robot = robot
+        self._renderer = SceneRenderer(lighting)
+        self._objects = [f"object_{index:02d}" for index in range(len(objects))]
+        for name, thing in zip(self._objects, objects, strict=True):
+            ready = thing if isinstance(thing, Drawable) else drawable(thing, tolerance_m=TOLERANCE_M)
+            self._renderer.add(name, ready)
+        links = link_drawables(robot, tolerance_m=TOLERANCE_M)
+        self._links = list(links)
+        for link, visual in links.items():
+            self._renderer.add(f"{robot.name}/{link}", visual)
+        add_furniture(self._renderer, furniture, seed=seed)
+
+    def __enter__(self) -> Replay:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Give back what the driver holds."""
+        self._renderer.close()
+
+    @property
+    def ids(self) -> dict[str, int]:
+        """The ids in the pictures: objects first, then ``robot/link``, then furniture."""
+        return self._renderer.ids
+
+    def frames(
+        self,
+        recording: Recording,
+        cameras: Sequence[NamedCamera],
+        *,
+        width_px: int,
+        height_px: int,
+        every: int = 1,
+        geometry: bool = False,
+    ) -> Iterator[list[SceneFrame]]:
+        """Yield the pictures of all cameras at states 0, ``every``, 2 ``every`` and so on, of the T + 1 that there are.
+
+        With ``geometry``, depth, normals and ids come too. Raises UsageError where the recording has other objects.
+        """
+        count = recording.object_positions_m.shape[1]
+        if count != len(self._objects):
+            raise UsageError(
+                f"the recording has {count} objects, the replay {len(self._objects)}; give those of the episode"
+            )
+        for state in range(0, recording.steps + 1, every):
+            hand = self._show(recording, state)
+            placed = [camera.placed(hand, width_px, height_px) for camera in cameras]
+            yield self._renderer.render(placed, geometry=geometry)
+
+    def _show(self, recording: Recording, state: int) -> np.ndarray:
+        """Move everything to where it is at a state; returns the hand's ``gripper_to_world (4, 4)``."""
+        rotations = rotation_from_quaternion_wxyz(recording.object_quaternions_wxyz[state])
+        for name, rotation, position in zip(self._objects, rotations, recording.object_positions_m[state], strict=True):
+            self._renderer.set_pose(name, transform(rotation, position))
+        poses = link_poses(self._robot, recording.joint_positions_rad[state], float(recording.gripper_opening_m[state]))
+        for link in self._links:
+            self._renderer.set_pose(f"{self._robot.name}/{link}", poses[link])
+        return poses[self._robot.tip_link] @ self._robot.gripper_to_tip

@@ -1,0 +1,105 @@
+"""Retire grasps that fail end to end: the trial of one hand in free space does not see tables, long carries, or neighbours."""
+
+from __future__ import annotations
+
+import io
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import groupby
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from manitwin.engine.ledger.ledger import LEDGER, Ledger
+from manitwin.episodes.attempt import EXECUTION_FAILURES, Attempt
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.store import amend
+from manitwin.twin.twin_source import TwinSource
+
+GRASPS = "grasps.parquet"
+
+
+@dataclass(frozen=True)
+class Retirement:
+    """A grasp that is to be used no more: how often it was executed with its own gripper, and how that failed."""
+
+    twin_id: str
+    grasp_id: str
+    executed: int
+    outcomes: dict[str, int]
+
+    @property
+    def failed(self) -> int:
+        """How many executions failed."""
+        return sum(self.outcomes.values())
+
+
+def find_retirements(attempts: Iterable[Attempt], *, failed_share: float) -> list[Retirement]:
+    """Return the grasps of which more than ``failed_share`` of the executions failed, in order of twin and grasp.
+
+    Transferred grasps do not count: they say nothing of the gripper that a grasp was verified for.
+    """
+    executed: Counter[tuple[str, str]] = Counter()
+    failed: dict[tuple[str, str], Counter[str]] = {}
+    for attempt in attempts:
+        if not attempt.planned or attempt.transferred or attempt.grasp_id is None:
+            continue
+        key = attempt.twin_id, attempt.grasp_id
+        executed[key] += 1
+        if attempt.outcome in EXECUTION_FAILURES:
+            failed.setdefault(key, Counter())[attempt.outcome] += 1
+    return [
+        Retirement(*key, executed[key], dict(sorted(outcomes.items())))
+        for key, outcomes in sorted(failed.items())
+        if outcomes.total() > failed_share * executed[key]
+    ]
+
+
+def retire(twins: TwinSource, found: Iterable[Retirement]) -> int:
+    """Mark grasps as retired in their twins' tables; returns how many were not so before.
+
+    A data set's ledger and index follow. Raises UsageError for a data set at a URL, whose twins are copies here, or where a
+    run is at work on it.
+    """
+    by_twin = {twin_id: {each.grasp_id for each in group} for twin_id, group in _by_twin(found)}
+    count, revised = 0, {}
+    for twin_id, grasp_ids in by_twin.items():
+        folder = twins.folder(twin_id)
+        table = pq.read_table(folder / GRASPS)
+        before = table["retired"].to_pylist()
+        after = [was or grasp in grasp_ids for was, grasp in zip(before, table["grasp_id"].to_pylist(), strict=True)]
+        fresh = sum(after) - sum(before)
+        if fresh:
+            count += fresh
+            revised[twin_id] = amend(folder, {GRASPS: _with_column(table, "retired", after)}).revision
+    if revised and not twins.flat and twins.root.exists(LEDGER):
+        _follow(twins.root, revised)
+    return count
+
+
+def _by_twin(found: Iterable[Retirement]) -> Iterator[tuple[str, Iterator[Retirement]]]:
+    return groupby(sorted(found, key=lambda each: each.twin_id), key=lambda each: each.twin_id)
+
+
+def _with_column(table: pa.Table, name: str, values: list[bool]) -> bytes:
+    at = table.schema.get_field_index(name)
+    stream = io.BytesIO()
+    pq.write_table(table.set_column(at, table.schema.field(at), pa.array(values, pa.bool_())), stream)
+    return stream.getvalue()
+
+
+def _follow(root: DatasetRoot, revisions: dict[str, str]) -> None:
+    """Have the ledger and the index say what the folders say."""
+    from manitwin.dataset.index.parts import write_part  # takes a second to import
+
+    assert root.local is not None
+    ledger = Ledger(root.local / LEDGER)
+    try:
+        for twin_id, revision in revisions.items():
+            ledger.revised(twin_id, revision)
+        if root.exists("index"):
+            write_part(root, revisions)
+            ledger.indexed(revisions)
+    finally:
+        ledger.close()

@@ -1,0 +1,144 @@
+"""Make many episodes: the engine's run over batches, and what is made of them at its end."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from manitwin.engine.events import ItemEnded, OnStage
+from manitwin.engine.ledger.ledger import read_ledger
+from manitwin.engine.stage import Item
+from manitwin.episodes.attempts_table import ATTEMPTS, read_attempts
+from manitwin.episodes.batch import Batch, batches
+from manitwin.episodes.recipe import EpisodesRecipe
+from manitwin.episodes.retirement import Retirement, find_retirements, retire
+from manitwin.errors import UsageError
+from manitwin.pipeline.dataset_run import CONFIG, ExecutorName, RunReport, drive, local_ledger
+from manitwin.robots.load import load_robot
+from manitwin.scenes.app_config import TrajectoriesConfig
+from manitwin.scenes.earlier_settings import check_settings
+from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.scene_file import read_scene
+from manitwin.scenes.scene_folders import SCENES, scene_ids, scene_name
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.twin_source import TwinSource
+
+KIND = "trajectories"
+DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "run", "batch", "retire_failed_share"))
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where episodes come from: a data set of twins, and scenes of them or none."""
+
+    dataset: str
+    scenes: str | None
+
+    @classmethod
+    def of(cls, place: str | Path, twins: str | Path | None = None) -> Source:
+        """Tell scenes from twins; raises UsageError for what is neither, and for scenes whose twins are gone.
+
+        ``twins`` names where those of the scenes are now, None: where they were as the layouts were made.
+        """
+        root = DatasetRoot(place)
+        path = root.absolute()
+        if root.exists(SCENES) and root.exists(CONFIG):
+            said = json.loads(root.read_bytes(CONFIG))
+            if "dataset" not in said:
+                raise UsageError(
+                    f"{place}/{CONFIG}: does not say whose twins these scenes are of; make the layouts again"
+                )
+            dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
+            _check_twins(dataset, Path(path))
+            return cls(dataset, path)
+        if twins is not None:
+            raise UsageError(f"{place}: holds no scenes, whose twins could be elsewhere; leave --twins out")
+        return cls(path, None)
+
+
+def _check_twins(dataset: str, scenes: Path) -> None:
+    """Raise UsageError where twins of the scenes are not there: every batch with one of them would fail."""
+    source = TwinSource(dataset)
+    named = {
+        each.twin_id for scene_id in scene_ids(scenes) for each in read_scene(scenes / scene_name(scene_id)).objects
+    }
+    source.check(named)
+
+
+def _check_out(out: DatasetRoot, source: Source) -> None:
+    """Raise UsageError where a folder has episodes of scenes and is to get some of twins alone, or the other way."""
+    if not out.exists(CONFIG):
+        return
+    said = json.loads(out.read_bytes(CONFIG))
+    if "scenes" in said and (said["scenes"] is None) != (source.scenes is None):
+        raise UsageError(
+            f"{out.url}: its episodes are of {said['scenes'] or said['dataset']}; give another folder for those of"
+            f" {source.scenes or source.dataset}"
+        )
+
+
+def make_episodes(
+    place: str | Path,
+    out: str | Path,
+    count: int,
+    config: TrajectoriesConfig,
+    *,
+    twins: str | Path | None = None,
+    executor: ExecutorName = "local",
+    address: str | None = None,
+    on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_stage: OnStage = lambda event: None,
+    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+) -> RunReport:
+    """Attempt ``count`` episodes with the twins, or in the scenes, of a place; those that are there stay.
+
+    ``twins`` names where the twins of scenes are now, None: where they were as the layouts were made.
+    ``count`` is how many there are at the end; where there are as many already, none is made.
+    Raises UsageError for a place without twins or scenes, an unknown robot, an ``out`` that has episodes of
+    scenes where twins are given or the other way, or made with other settings, or where another run is at work there.
+    """
+    if count < 1:
+        raise UsageError(f"{count} episodes; ask for 1 or more")
+    robot, source, root = load_robot(config.robot), Source.of(place, twins), DatasetRoot(out)
+    _check_out(root, source)
+    configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
+    check_settings(root, configuration, free=DECIDE_NO_EPISODE, made="batches of episodes")
+    there = _batches_there(root)
+    try:
+        if source.scenes is None:
+            twin_ids = [twin.twin_id for twin in pool_of(source.dataset).twins]
+            deal = batches(robot.name, count, config.batch, twin_ids=twin_ids, there=there)
+        else:
+            deal = batches(robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)), there=there)
+    except UsageError as error:
+        raise UsageError(f"{root.url}: {error}") from error
+    report = drive(
+        EpisodesRecipe(config, source.dataset, source.scenes), (batch.item() for batch in deal), root, config.run,
+        configuration=configuration, executor=executor, address=address, on_start=on_start, on_stage=on_stage,
+        on_ended=on_ended,
+    )  # fmt: skip
+    before = sum(batch.count for batch in there)
+    if before > count:
+        report.remarks.append(f"{before} episodes are there already, more than the {count} asked for; none was added")
+    elif before:
+        report.remarks.append(f"{before} of {count} episodes were there already")
+    return report
+
+
+def _batches_there(root: DatasetRoot) -> list[Batch]:
+    """Return the batches that earlier runs at a root were to make."""
+    path = local_ledger(root)
+    if not path.is_file():
+        return []
+    with read_ledger(path) as ledger:
+        rows = ledger.execute("SELECT item FROM items WHERE state <> 'duplicate' ORDER BY number")
+        return [Batch.of_item(Item(**json.loads(text))) for (text,) in rows]
+
+
+def retire_failing(out: Path) -> tuple[list[Retirement], int]:
+    """Retire the grasps that a finished run says fail; returns them, and how many were not retired before."""
+    said = json.loads((out / CONFIG).read_bytes())
+    found = find_retirements(read_attempts(out / ATTEMPTS), failed_share=said["retire_failed_share"])
+    return found, retire(TwinSource(said["dataset"]), found)

@@ -1,0 +1,97 @@
+"""An episode as it is stored: what was attempted, what was recorded, and by which robot with which objects."""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ElementTree
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from manitwin.episodes.attempt import Attempt
+from manitwin.episodes.recording import Recording
+from manitwin.errors import EpisodesError
+from manitwin.robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class RecordedRobot:
+    """A robot by name and digest, with the names and limits of its joints; the arm's in the order of the recorded arrays."""
+
+    name: str
+    sha256: str
+    arm_joints: tuple[str, ...]
+    finger_joints: tuple[str, ...]
+    lower_rad: tuple[float, ...]
+    upper_rad: tuple[float, ...]
+    velocity_limits_rad_s: tuple[float, ...]
+    max_opening_m: float
+
+
+@dataclass(frozen=True)
+class RecordedObject:
+    """An object of the scene: its name there, and whose twin it is."""
+
+    name: str
+    twin_id: str
+
+
+@dataclass(frozen=True)
+class StoredEpisode:
+    """An attempt with its recording; ``objects`` in the recording's order.
+
+    ``facts`` is JSON of whatever else is to be known of it: the goal, the grasp, versions, settings.
+    """
+
+    attempt: Attempt
+    recording: Recording
+    robot: RecordedRobot
+    objects: tuple[RecordedObject, ...]
+    facts: dict[str, Any] = field(default_factory=dict)
+
+
+def recorded_robot(robot: Robot) -> RecordedRobot:
+    """Return what is stored of a robot; the limits of its joints are those of its URDF."""
+    limits = {
+        joint.get("name"): (float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0)))
+        for joint in ElementTree.fromstring(robot.urdf).iter("joint")
+        if (limit := joint.find("limit")) is not None
+    }
+    arm = [limits[name] for name in robot.arm_joints]
+    return RecordedRobot(
+        name=robot.name,
+        sha256=robot.sha256,
+        arm_joints=tuple(robot.arm_joints),
+        finger_joints=tuple(robot.finger_joints),
+        lower_rad=tuple(low for low, _ in arm),
+        upper_rad=tuple(high for _, high in arm),
+        velocity_limits_rad_s=tuple(float(limit) for limit in robot.velocity_limits_rad_s),
+        max_opening_m=float(robot.gripper.opening_m),
+    )
+
+
+def to_json(episode: StoredEpisode) -> str:
+    """Return all of an episode but its arrays as one line of JSON, the same text for equal values."""
+    said = {
+        "attempt": asdict(episode.attempt),
+        "robot": asdict(episode.robot),
+        "objects": [asdict(thing) for thing in episode.objects],
+        "target": episode.recording.target,
+        "facts": episode.facts,
+    }
+    return json.dumps(said, sort_keys=True, allow_nan=False, separators=(",", ":"))
+
+
+def attempt_from(said: dict[str, Any]) -> Attempt:
+    """Return the attempt of a dict with its fields; raises EpisodesError where one is missing or unknown."""
+    try:
+        return Attempt(**{**said, "instructions": tuple(said["instructions"])})
+    except (TypeError, KeyError) as error:
+        raise EpisodesError(
+            f"an attempt with other fields than this version's ({error}); run the episodes again"
+        ) from error
+
+
+def robot_from(said: dict[str, Any]) -> RecordedRobot:
+    """Return the robot of a dict with its fields."""
+    fields: dict[str, Any] = {n: tuple(value) if isinstance(value, list) else value for n, value in said.items()}
+    return RecordedRobot(**fields)

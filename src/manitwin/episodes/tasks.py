@@ -1,0 +1,168 @@
+"""Where an episode begins and ends: random poses on a table in front of a robot, with or without other objects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from manitwin.geometry.footprints import footprint, separation_m
+from manitwin.geometry.placed_object import PlacedObject
+from manitwin.geometry.poses import inverse, transform, transform_points
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.robots.robot import Workspace
+from manitwin.scenes.layouts.pool import Pool, PoolTwin
+from manitwin.scenes.scene import SupportRegion
+
+MIN_MOVE_M = 0.15
+"""The shortest way from start to goal, as in the measured study (reference: planning)."""
+MIN_GAP_M = 0.03
+"""Between the footprints of two objects: room for a finger."""
+OTHERS_RADIUS_FACTOR = 1.2
+OTHERS_ANGLE_FACTOR = 1.4
+"""How much farther than the target the others may stand: what is beyond the arm's reach is in nobody's way."""
+POSES_TRIED, OTHERS_TRIED = 200, 20
+
+
+@dataclass(frozen=True)
+class Placeable:
+    """A twin as it is set down: its body and the settled placement ``object_to_plane (4, 4)`` that it is used in."""
+
+    twin_id: str
+    body: RigidBody
+    object_to_plane: np.ndarray
+
+    @classmethod
+    def of(cls, pool: Pool, twin: PoolTwin) -> Placeable:
+        """Take the most probable settled placement, an upright one where there is one."""
+        best = max(twin.poses, key=lambda pose: (pose.upright, pose.probability))
+        return cls(twin.twin_id, pool.body(twin.twin_id).body, best.object_to_plane)
+
+    @cached_property
+    def footprint(self) -> np.ndarray:
+        """The corners ``(K, 2)`` of what it covers of the plane, in the placement's frame."""
+        return footprint(transform_points(self.object_to_plane, np.concatenate(self.body.hulls)))
+
+    def at(self, plane_to_world: np.ndarray) -> np.ndarray:
+        """Return the object's pose where the placement's frame is at a pose."""
+        return plane_to_world @ self.object_to_plane
+
+
+@dataclass(frozen=True)
+class Task:
+    """Objects at rest, and where one of them is to go: ``objects[target]`` to ``goal_object_to_world``."""
+
+    objects: tuple[PlacedObject, ...]
+    target: int
+    goal_object_to_world: np.ndarray
+
+
+@dataclass(frozen=True)
+class Room:
+    """Where objects may be put: in a robot's workspace, and wholly on a level surface."""
+
+    workspace: Workspace
+    support: SupportRegion
+
+    def wider(self) -> Room:
+        """Return the room for things that nobody has to reach."""
+        workspace = self.workspace
+        wide = Workspace(
+            workspace.min_radius_m,
+            workspace.max_radius_m * OTHERS_RADIUS_FACTOR,
+            workspace.half_angle_rad * OTHERS_ANGLE_FACTOR,
+        )
+        return Room(wide, self.support)
+
+    def draw(self, corners: np.ndarray, taken: Sequence[np.ndarray], rng: np.random.Generator) -> np.ndarray | None:
+        """Draw a pose for a footprint ``(K, 2)`` that is free of those that are ``taken``; None where none was found."""
+        for _ in range(POSES_TRIED):
+            pose = _pose(self.workspace, rng)
+            if self._holds(_at(corners, pose)) and _clear(_at(corners, pose), taken):
+                return pose
+        return None
+
+    def _holds(self, corners: np.ndarray) -> bool:
+        inside = np.abs(corners - self.support.center_m) <= self.support.half_extents_m
+        # nothing may stand in the arm's foot, whatever its centre's distance
+        clear_of_base = np.linalg.norm(corners, axis=1).min() > self.workspace.min_radius_m / 2
+        return bool(inside.all() and clear_of_base)
+
+
+def sample_task(
+    target: Placeable, others: Callable[[], Placeable], count: int, room: Room, rng: np.random.Generator
+) -> Task | None:
+    """Draw start and goal of a target in a room on the table z = 0, and ``count`` drawn ``others`` around.
+
+    Neither start nor goal is nearer than ``MIN_GAP_M`` to another object. None: no room was found.
+    """
+    for _ in range(OTHERS_TRIED):
+        start = room.draw(target.footprint, [], rng)
+        goal = None if start is None else _elsewhere(target.footprint, start[:2, 3], [], room, rng)
+        if start is None or goal is None:
+            continue
+        around = _others(others, count, [_at(target.footprint, pose) for pose in (start, goal)], room.wider(), rng)
+        if around is not None:
+            first = PlacedObject("object_00", target.twin_id, target.body, target.at(start))
+            return Task((first, *around), 0, target.at(goal))
+    return None
+
+
+def free_goal(objects: Sequence[PlacedObject], target: int, room: Room, rng: np.random.Generator) -> np.ndarray | None:
+    """Draw a free pose for ``objects[target]`` on its surface, turned about Z alone; None: no room."""
+    moved = objects[target]
+    hulls = np.concatenate(moved.body.hulls)
+    here = moved.object_to_world
+    center = transform(translation=np.array([here[0, 3], here[1, 3], 0.0]))
+    object_to_plane = inverse(center) @ here
+    object_to_plane[2, 3] += room.support.height_m - float(transform_points(here, hulls)[:, 2].min())
+    corners = footprint(transform_points(object_to_plane, hulls))
+    taken = [
+        footprint(transform_points(other.object_to_world, np.concatenate(other.body.hulls)))
+        for number, other in enumerate(objects)
+        if number != target
+    ]
+    pose = _elsewhere(corners, here[:2, 3], taken, room, rng)
+    return None if pose is None else pose @ object_to_plane
+
+
+def _elsewhere(
+    corners: np.ndarray, here_m: np.ndarray, taken: Sequence[np.ndarray], room: Room, rng: np.random.Generator
+) -> np.ndarray | None:
+    for _ in range(POSES_TRIED):
+        pose = room.draw(corners, taken, rng)
+        if pose is None or np.linalg.norm(pose[:2, 3] - here_m) >= MIN_MOVE_M:
+            return pose
+    return None
+
+
+def _others(
+    others: Callable[[], Placeable], count: int, kept_free: list[np.ndarray], room: Room, rng: np.random.Generator
+) -> list[PlacedObject] | None:
+    taken, placed = list(kept_free), []
+    for number in range(count):
+        other = others()
+        pose = room.draw(other.footprint, taken, rng)
+        if pose is None:
+            return None
+        taken.append(_at(other.footprint, pose))
+        placed.append(PlacedObject(f"object_{number + 1:02d}", other.twin_id, other.body, other.at(pose)))
+    return placed
+
+
+def _pose(workspace: Workspace, rng: np.random.Generator) -> np.ndarray:
+    radius = np.sqrt(rng.uniform(workspace.min_radius_m**2, workspace.max_radius_m**2))  # even over the area
+    angle, yaw = rng.uniform(-workspace.half_angle_rad, workspace.half_angle_rad), rng.uniform(-np.pi, np.pi)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turn = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1.0]])
+    return transform(turn, np.array([radius * np.cos(angle), radius * np.sin(angle), 0.0]))
+
+
+def _at(corners: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    return corners @ pose[:2, :2].T + pose[:2, 3]
+
+
+def _clear(corners: np.ndarray, taken: Sequence[np.ndarray]) -> bool:
+    return all(separation_m(corners, other) >= MIN_GAP_M for other in taken)

@@ -1,0 +1,1 @@
+"""Files of meshes, pictures and documents: read safely, written."""

@@ -1,0 +1,212 @@
+"""Visual parts as a binary glTF 2.0 file, and back: the same parts give the same bytes."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import struct
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.formats.meshes.gltf import read_gltf
+from manitwin.formats.meshes.source import MeshLimits, MeshSource
+from manitwin.formats.meshes.textures import bake_transform, make_part, material_of, normals_of, uv_of
+from manitwin.geometry.poses import GLTF_TO_OBJECT, OBJECT_TO_GLTF
+from manitwin.geometry.seams import close_seams, has_three_places
+
+_FLOAT, _UINT16, _UINT32 = 5126, 5123, 5125  # glTF 2.0, section 3.6.2.2
+_ARRAY_BUFFER, _ELEMENT_BUFFER = 34962, 34963
+_COLOR_QUALITY = 90  # visually lossless for photographs, about a fifth of a PNG
+_DATA_QUALITY = 95  # normals and roughness are numbers: coarser steps show as facets in highlights
+
+
+def write_glb(parts: list[trimesh.Trimesh], *, max_texture_size: int = 2048) -> bytes:
+    """Return visual parts in the object frame (Z-up, metres) as a Y-up GLB.
+
+    Keeps names, normals, texture coordinates and the PBR material of each part. Textures are scaled down to
+    ``max_texture_size`` pixels on the longer side; opaque ones become JPEG, those with an alpha that counts PNG.
+    Seams of texture and creases are closed by triangles without area (``geometry.seams``): a part that is a closed solid
+    stays one for tools that look at indices.
+    Source: glTF 2.0 specification, Khronos Group 2021.
+    """
+    document = _Document(max_texture_size)
+    for index, part in enumerate(parts):
+        document.add(part, str(part.metadata.get("name") or f"part_{index:02d}"))
+    return document.data()
+
+
+def read_glb(path: Path, *, limits: MeshLimits | None = None) -> list[trimesh.Trimesh]:
+    """Read the parts of a GLB into the object frame (Z-up, metres); raises InputError as ``read_mesh`` does.
+
+    Triangles without area that close seams are left out again.
+    """
+    parts = read_gltf(MeshSource(path, limits or MeshLimits()), binary=True)
+    return [bake_transform(_without_seam_faces(part), GLTF_TO_OBJECT) for part in parts]
+
+
+def _without_seam_faces(part: trimesh.Trimesh) -> trimesh.Trimesh:
+    keep = has_three_places(np.asarray(part.vertices), np.asarray(part.faces))
+    if keep.all():
+        return part
+    return make_part(
+        part.vertices,
+        part.faces[keep],
+        material=material_of(part),
+        name=str(part.metadata["name"]),
+        uv=uv_of(part),
+        normals=normals_of(part),
+    )
+
+
+class _Document:
+    """A glTF document in the making: its JSON tables and its one buffer."""
+
+    def __init__(self, max_texture_size: int):
+        self._max_texture_size = max_texture_size
+        self._tables: dict[str, list[dict[str, Any]]] = {}
+        self._chunks: list[bytes] = []
+        self._length = 0
+        self._known: dict[str, int] = {}
+
+    def add(self, part: trimesh.Trimesh, name: str) -> None:
+        """Append a part as a mesh of one primitive under a node of its own."""
+        turned = bake_transform(part, OBJECT_TO_GLTF)
+        positions = np.asarray(turned.vertices, dtype="<f4")  # what is one place is decided as it will be read
+        source, faces = close_seams(positions, np.asarray(turned.faces))
+        attributes = {
+            "POSITION": self._vectors(positions[source], bounds=True),
+            "NORMAL": self._vectors(_unit_normals(turned)[source]),
+        }
+        uv = uv_of(part)
+        if uv is not None:
+            attributes["TEXCOORD_0"] = self._vectors(np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])[source])
+        primitive = {
+            "attributes": attributes,
+            "indices": self._indices(faces, len(source)),
+            "material": self._material(material_of(part)),
+            "mode": 4,
+        }
+        mesh = self._append("meshes", {"name": name, "primitives": [primitive]})
+        self._append("nodes", {"name": name, "mesh": mesh})
+
+    def data(self) -> bytes:
+        """Return the GLB container."""
+        nodes = list(range(len(self._tables.get("nodes", []))))
+        tree: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "manitwin"},
+            "scene": 0,
+            "scenes": [{"nodes": nodes} if nodes else {}],
+            **self._tables,
+        }
+        if self._length:
+            tree["buffers"] = [{"byteLength": self._length}]
+        text = json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        binary = b"".join(self._chunks)
+        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+        if binary:
+            chunks += struct.pack("<II", len(binary), 0x004E4942) + binary
+        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+    def _append(self, table: str, entry: dict[str, Any]) -> int:
+        entries = self._tables.setdefault(table, [])
+        entries.append(entry)
+        return len(entries) - 1
+
+    def _view(self, data: bytes, target: int | None = None) -> int:
+        view: dict[str, Any] = {"buffer": 0, "byteOffset": self._length, "byteLength": len(data)}
+        if target is not None:
+            view["target"] = target
+        padded = data + b"\0" * (-len(data) % 4)
+        self._chunks.append(padded)
+        self._length += len(padded)
+        return self._append("bufferViews", view)
+
+    def _vectors(self, rows: np.ndarray, bounds: bool = False) -> int:
+        values = np.ascontiguousarray(rows, dtype="<f4")
+        accessor: dict[str, Any] = {
+            "bufferView": self._view(values.tobytes(), _ARRAY_BUFFER),
+            "componentType": _FLOAT,
+            "count": len(values),
+            "type": f"VEC{values.shape[1]}",
+        }
+        if bounds:
+            accessor |= {"min": values.min(0).tolist(), "max": values.max(0).tolist()}
+        return self._append("accessors", accessor)
+
+    def _indices(self, faces: np.ndarray, vertices: int) -> int:
+        # 65535 itself is the restart value of 16-bit indices
+        kind, dtype = (_UINT16, "<u2") if vertices < 65535 else (_UINT32, "<u4")
+        view = self._view(np.ascontiguousarray(faces, dtype=dtype).tobytes(), _ELEMENT_BUFFER)
+        return self._append(
+            "accessors", {"bufferView": view, "componentType": kind, "count": int(faces.size), "type": "SCALAR"}
+        )
+
+    def _material(self, material: PBRMaterial) -> int:
+        factor = np.asarray(material.baseColorFactor) / 255
+        mode = material.alphaMode or "OPAQUE"
+        pbr: dict[str, Any] = {
+            "baseColorFactor": [round(float(c), 6) for c in factor],
+            "metallicFactor": float(material.metallicFactor),
+            "roughnessFactor": float(material.roughnessFactor),
+        }
+        entry: dict[str, Any] = {"name": material.name or "material", "pbrMetallicRoughness": pbr, "alphaMode": mode}
+        if material.doubleSided:
+            entry["doubleSided"] = True
+        if mode == "MASK" and material.alphaCutoff is not None:
+            entry["alphaCutoff"] = float(material.alphaCutoff)
+        if material.baseColorTexture is not None:
+            pbr["baseColorTexture"] = {"index": self._texture(material.baseColorTexture, "color", mode != "OPAQUE")}
+        if material.metallicRoughnessTexture is not None:
+            pbr["metallicRoughnessTexture"] = {"index": self._texture(material.metallicRoughnessTexture, "data", False)}
+        if material.normalTexture is not None:
+            entry["normalTexture"] = {"index": self._texture(material.normalTexture, "data", False)}
+        key = "material:" + json.dumps(entry, sort_keys=True)
+        if key not in self._known:
+            self._known[key] = self._append("materials", entry)
+        return self._known[key]
+
+    def _texture(self, image: Image.Image, kind: Literal["color", "data"], with_alpha: bool) -> int:
+        digest = hashlib.sha256(image.tobytes()).hexdigest()
+        key = f"texture:{kind}:{with_alpha}:{image.mode}:{image.size}:{digest}"
+        if key not in self._known:
+            data, mime = _encoded(_fitted(image, self._max_texture_size), kind, with_alpha)
+            source = self._append("images", {"bufferView": self._view(data), "mimeType": mime})
+            self._known[key] = self._append("textures", {"source": source})
+        return self._known[key]
+
+
+def _fitted(image: Image.Image, longest: int) -> Image.Image:
+    """Return the image with at most ``longest`` pixels on its longer side."""
+    over = max(image.size) / longest
+    if over <= 1:
+        return image
+    if over.is_integer() and all(side % int(over) == 0 for side in image.size):
+        return image.reduce(int(over))  # a plain mean, many times faster than a filter
+    width, height = (max(round(side / over), 1) for side in image.size)
+    return image.resize((width, height), Image.Resampling.LANCZOS)
+
+
+def _encoded(image: Image.Image, kind: Literal["color", "data"], with_alpha: bool) -> tuple[bytes, str]:
+    stream = io.BytesIO()
+    if with_alpha and image.mode == "RGBA":
+        image.save(stream, "PNG", compress_level=6)
+        return stream.getvalue(), "image/png"
+    quality = _COLOR_QUALITY if kind == "color" else _DATA_QUALITY
+    # no chroma subsampling: texture seams and painted vertex colours have edges that it smears
+    image.convert("RGB").save(stream, "JPEG", quality=quality, subsampling=0)
+    return stream.getvalue(), "image/jpeg"
+
+
+def _unit_normals(part: trimesh.Trimesh) -> np.ndarray:
+    """Return vertex normals ``(V, 3)`` that are all unit vectors, as glTF demands; +Z where no face gives one."""
+    normals = np.array(part.vertex_normals, dtype=np.float64)
+    lengths = np.linalg.norm(normals, axis=1)
+    normals[lengths < 1e-6] = (0.0, 0.0, 1.0)
+    return normals / np.where(lengths < 1e-6, 1.0, lengths)[:, None]

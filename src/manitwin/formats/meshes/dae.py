@@ -1,0 +1,160 @@
+"""COLLADA 1.4 meshes (.dae)."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import collada
+import numpy as np
+import trimesh
+from lxml import etree  # type: ignore[import-untyped]
+from PIL import Image
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.textures import bake_transform, decode_texture, make_part, pbr_material
+from manitwin.formats.meshes.vertex_colors import color_by_corner
+
+_REMEDY = "export it again, or as glTF 2.0"
+_MAX_PARTS = 20_000
+
+
+def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
+    """Read a COLLADA file: parts with node transforms baked, its unit in metres, its up axis 'x' | 'y' | 'z'.
+
+    A file without <unit> or <up_axis> gives None for them. Raises InputError ``unreadable``,
+    ``animated`` (skinned meshes).
+    """
+    data = source.data()
+    unit_m, up, skinned = _inspect(data, source)
+    if skinned:
+        raise source.refused("animated", "the mesh is bound to a skeleton", "apply the pose and export a still mesh")
+    try:
+        document = collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
+        parts = _parts(document, source)
+    except collada.common.DaeError as error:
+        raise source.unreadable(f"its COLLADA is broken ({str(error)[:100]})", _REMEDY) from error
+    return parts, unit_m, up
+
+
+def _inspect(data: bytes, source: MeshSource) -> tuple[float | None, str | None, bool]:
+    """Return unit, up axis and whether it is skinned; refuse XML with a document type, which can expand without end."""
+    try:
+        parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=True)
+        root = etree.fromstring(data, parser)
+    except etree.XMLSyntaxError as error:
+        raise source.unreadable(f"its XML is broken ({str(error)[:80]})", _REMEDY) from error
+    if root.getroottree().docinfo.internalDTD is not None:
+        raise source.unreadable("its XML declares a document type, which is not read", _REMEDY)
+    if etree.QName(root).localname != "COLLADA":
+        raise source.unreadable("its XML is no COLLADA document", _REMEDY)
+    unit_m, up = None, None
+    for element in root.iterfind("./{*}asset/{*}unit"):
+        try:
+            unit_m = float(element.get("meter", "1"))
+        except ValueError:
+            source.find("its <unit> is broken and was not used")
+    for element in root.iterfind("./{*}asset/{*}up_axis"):
+        up = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}.get((element.text or "").strip())
+    if unit_m is not None and not (np.isfinite(unit_m) and unit_m > 0):
+        unit_m = None
+    if _instances(root) > _MAX_PARTS:
+        raise source.unreadable(f"its nodes stand for more than {_MAX_PARTS} parts", "merge them before exporting")
+    return unit_m, up, root.find(".//{*}instance_controller") is not None
+
+
+def _instances(root: etree._Element) -> int:
+    """Count the nodes that instances of instances stand for without walking them: a short file can ask for billions."""
+    nodes = {node.get("id"): node for node in root.iter("{*}node") if node.get("id")}
+    counts: dict[etree._Element, int] = {}
+    open_nodes: set[etree._Element] = set()
+
+    def count(element: etree._Element) -> int:
+        if element not in counts:
+            if element in open_nodes:
+                return _MAX_PARTS + 1  # a node inside itself
+            open_nodes.add(element)
+            total = 1
+            for child in element.iterchildren("{*}node", "{*}instance_node"):
+                name = etree.QName(child).localname
+                target = child if name == "node" else nodes.get((child.get("url") or "").removeprefix("#"))
+                total += 0 if target is None else count(target)
+            open_nodes.discard(element)
+            counts[element] = min(total, _MAX_PARTS + 1)
+        return counts[element]
+
+    return sum(count(scene) for scene in root.iter("{*}visual_scene"))
+
+
+def _parts(document: Any, source: MeshSource) -> list[trimesh.Trimesh]:
+    if document.scene is None:
+        raise source.unreadable("it has no visual scene", _REMEDY)
+    textures: dict[str, Image.Image | None] = {}
+    materials: dict[int, PBRMaterial] = {}
+    parts: list[trimesh.Trimesh] = []
+    faces = 0
+    for bound in document.scene.objects("geometry"):
+        for primitive in bound.original.primitives:
+            triangles = primitive.triangleset() if hasattr(primitive, "triangleset") else primitive
+            if not isinstance(triangles, collada.triangleset.TriangleSet) or triangles.vertex_index is None:
+                source.find("points or lines in it were left out")
+                continue
+            if len(parts) >= _MAX_PARTS:
+                raise source.unreadable(f"more than {_MAX_PARTS} parts", "merge them before exporting")
+            faces += len(triangles.vertex_index)
+            source.check_faces(faces)
+            node = bound.materialnodebysymbol.get(triangles.material)
+            material = node.target if node is not None else None
+            if id(material) not in materials:
+                materials[id(material)] = _material(material, textures, source)
+            part = _part(triangles, materials[id(material)], bound.original.id, source)
+            parts.append(bake_transform(part, np.asarray(bound.matrix, dtype=np.float64)))
+    return parts
+
+
+def _part(triangles: Any, material: PBRMaterial, name: str, source: MeshSource) -> trimesh.Trimesh:
+    order = np.asarray(triangles.vertex_index, dtype=np.int64).reshape(-1)
+    unused = np.zeros_like(order)
+    uv = triangles.texcoordset[0] if len(triangles.texcoordset) else None
+    uv_order = unused if uv is None else np.asarray(triangles.texcoord_indexset[0], dtype=np.int64).reshape(-1)
+    normals = triangles.normal if triangles.normal_index is not None else None
+    normal_order = unused if normals is None else np.asarray(triangles.normal_index, dtype=np.int64).reshape(-1)
+    rows, inverse = np.unique(np.stack([order, uv_order, normal_order], axis=1), axis=0, return_inverse=True)
+    part = make_part(
+        np.asarray(triangles.vertex)[rows[:, 0]],
+        inverse.reshape(-1, 3),
+        material=material,
+        name=name or "mesh",
+        uv=None if uv is None else np.asarray(uv)[rows[:, 1], :2],
+        normals=None if normals is None else np.asarray(normals)[rows[:, 2]],
+    )
+    colors = triangles.sources.get("COLOR")
+    if not colors or material.baseColorTexture is not None:
+        return part
+    offset, data = colors[0][0], np.asarray(colors[0][4].data)
+    by_corner = data[np.asarray(triangles.index)[:, :, offset], :3]
+    return color_by_corner(part, np.round(np.clip(by_corner, 0, 1) * 255).astype(np.uint8), source)
+
+
+def _material(material: Any, textures: dict[str, Image.Image | None], source: MeshSource) -> PBRMaterial:
+    effect = getattr(material, "effect", None)
+    if effect is None:
+        return pbr_material(base_color=(0.8, 0.8, 0.8))
+    texture: Image.Image | None = None
+    color: tuple[float, ...] = (1.0, 1.0, 1.0)
+    if isinstance(effect.diffuse, collada.material.Map):
+        path = effect.diffuse.sampler.surface.image.path
+        if path not in textures:
+            data = source.sibling(path.removeprefix("./"), "texture")
+            textures[path] = None if data is None else decode_texture(data, path, source)
+        texture = textures[path]
+    elif effect.diffuse is not None:
+        color = tuple(float(c) for c in effect.diffuse[:3])
+    shininess = effect.shininess if isinstance(effect.shininess, int | float) else 0.0
+    return pbr_material(
+        material.id,
+        base_color=color,
+        roughness=(2 / (max(float(shininess), 0.0) + 2)) ** 0.25,
+        base_color_texture=texture,
+    )

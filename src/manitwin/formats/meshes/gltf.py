@@ -1,0 +1,222 @@
+"""Meshes of glTF 2.0 documents, as .glb and as .gltf with files beside it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from manitwin.formats.meshes.gltf_accessors import Accessors, split_glb
+from manitwin.formats.meshes.gltf_materials import GltfMaterials, transformed_uv
+from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.textures import bake_transform, linear_to_srgb, make_part
+from manitwin.formats.meshes.vertex_colors import color_by_corner
+
+# required extensions that change nothing of the geometry, or that are understood here
+_KNOWN_REQUIRED = (
+    "KHR_texture_",
+    "KHR_materials_",
+    "KHR_mesh_quantization",
+    "KHR_lights_punctual",
+    "EXT_texture_webp",
+    "KHR_xmp",
+)
+_MAX_PARTS = 20_000
+
+
+def read_gltf(source: MeshSource, binary: bool) -> list[trimesh.Trimesh]:
+    """Read the default scene of a glTF 2.0 document into parts in its own frame (metres, Y-up), node transforms baked.
+
+    Raises InputError: ``unreadable``, ``animated`` (skinned meshes).
+    """
+    data = source.data()
+    text, chunk = split_glb(data, source) if binary else (data, None)
+    tree = _parse(text, source)
+    _check_document(tree, source)
+    accessors = Accessors(tree, chunk, source)
+    materials = GltfMaterials(tree, accessors, source)
+    reader = _Primitives(tree, accessors, materials, source)
+    parts: list[trimesh.Trimesh] = []
+    faces = 0
+    for mesh_index, matrix in _instances(tree, source):
+        for part in reader.parts(mesh_index):
+            faces += len(part.faces)
+            source.check_faces(faces)
+            if len(parts) >= _MAX_PARTS:
+                raise source.unreadable(f"more than {_MAX_PARTS} parts", "merge them before exporting")
+            parts.append(bake_transform(part, matrix))
+    return parts
+
+
+def _parse(text: bytes, source: MeshSource) -> dict[str, Any]:
+    try:
+        tree = json.loads(text.decode("utf-8-sig").rstrip("\0 "))
+    except (ValueError, RecursionError) as error:
+        raise source.unreadable(f"its JSON is broken ({str(error)[:80]})", "download or export it again") from error
+    if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
+        raise source.unreadable("its JSON is no glTF document", "export it as glTF 2.0")
+    return tree
+
+
+def _check_document(tree: dict[str, Any], source: MeshSource) -> None:
+    version = str(tree["asset"].get("version", ""))
+    if not version.startswith("2"):
+        raise source.unreadable(f"glTF version {version[:10]!r}, only 2 is read", "export it as glTF 2.0")
+    for table in (
+        "accessors",
+        "bufferViews",
+        "buffers",
+        "meshes",
+        "nodes",
+        "scenes",
+        "materials",
+        "textures",
+        "images",
+    ):
+        if not isinstance(tree.get(table, []), list) or not all(
+            isinstance(entry, dict) for entry in tree.get(table, [])
+        ):
+            raise source.unreadable(f"{table!r} is no list of objects", "export it again as glTF 2.0")
+    unknown = [str(e) for e in tree.get("extensionsRequired", []) if not str(e).startswith(_KNOWN_REQUIRED)]
+    if unknown:
+        raise source.unreadable(
+            f"it requires {', '.join(unknown)[:120]}", "export it without compression or extensions"
+        )
+    if tree.get("skins"):
+        raise source.refused("animated", "the mesh is bound to a skeleton", "apply the pose and export a still mesh")
+    if tree.get("animations"):
+        source.find("the file is animated; its rest pose was taken")
+
+
+def _instances(tree: dict[str, Any], source: MeshSource) -> Iterator[tuple[Any, np.ndarray]]:
+    """Yield every mesh of the default scene with its node's transform to the scene ``(4, 4)``."""
+    nodes = tree.get("nodes", [])
+    scenes = tree.get("scenes", [])
+    default = tree.get("scene", 0)
+    if scenes and isinstance(default, int) and 0 <= default < len(scenes):
+        roots = list(scenes[default].get("nodes", []))
+    else:
+        children = {child for node in nodes for child in node.get("children", [])}
+        roots = [index for index in range(len(nodes)) if index not in children]
+    stack = [(root, np.eye(4)) for root in reversed(roots)]
+    seen: set[Any] = set()
+    while stack:
+        index, parent = stack.pop()
+        if not isinstance(index, int) or not 0 <= index < len(nodes) or index in seen:
+            # section 3.5.2: nodes form strict trees; anything else would never end
+            raise source.unreadable("its nodes form no tree", "export it again")
+        seen.add(index)
+        node = nodes[index]
+        matrix = parent @ _local_matrix(node, source)
+        if "mesh" in node:
+            yield node["mesh"], matrix
+        stack.extend((child, matrix) for child in reversed(node.get("children", [])))
+
+
+def _local_matrix(node: dict[str, Any], source: MeshSource) -> np.ndarray:
+    try:
+        if "matrix" in node:
+            return np.asarray(node["matrix"], dtype=np.float64).reshape(4, 4).T
+        matrix = np.eye(4)
+        rotation = Rotation.from_quat(np.asarray(node.get("rotation", (0, 0, 0, 1)), dtype=np.float64)).as_matrix()
+        matrix[:3, :3] = rotation * np.asarray(node.get("scale", (1, 1, 1)), dtype=np.float64).reshape(3)
+        matrix[:3, 3] = np.asarray(node.get("translation", (0, 0, 0)), dtype=np.float64).reshape(3)
+        return matrix
+    except (ValueError, TypeError) as error:
+        raise source.unreadable("a node's transform is broken", "export it again") from error
+
+
+class _Primitives:
+    """The parts of a mesh by its index, built once for all of its instances."""
+
+    def __init__(self, tree: dict[str, Any], accessors: Accessors, materials: GltfMaterials, source: MeshSource):
+        self._tree, self._accessors, self._materials, self._source = tree, accessors, materials, source
+        self._parts: dict[int, list[trimesh.Trimesh]] = {}
+
+    def parts(self, index: Any) -> list[trimesh.Trimesh]:
+        meshes = self._tree.get("meshes", [])
+        if not isinstance(index, int) or not 0 <= index < len(meshes):
+            raise self._source.unreadable(f"a node names mesh {str(index)[:20]}, which is not there", "export it again")
+        if index not in self._parts:
+            name = str(meshes[index].get("name") or f"mesh_{index}")
+            built = [self._part(primitive, name) for primitive in meshes[index].get("primitives", [])]
+            self._parts[index] = [part for part in built if part is not None]
+        return self._parts[index]
+
+    def _part(self, primitive: dict[str, Any], name: str) -> trimesh.Trimesh | None:
+        mode = primitive.get("mode", 4)
+        if mode not in (4, 5, 6):
+            self._source.find("points or lines in it were left out")
+            return None
+        if primitive.get("targets"):
+            self._source.find("it has morph targets; its base shape was taken")
+        attributes = primitive.get("attributes", {})
+        vertices = self._rows(attributes, "POSITION", 3)
+        if vertices is None:
+            raise self._source.unreadable("a mesh has no positions", "export it again")
+        faces = self._faces(primitive, len(vertices), mode)
+        info = self._materials.base_texture(primitive.get("material"))
+        material = self._materials.material(primitive.get("material"))
+        uv = self._rows(attributes, f"TEXCOORD_{info.get('texCoord', 0)}", 2, len(vertices))
+        if uv is not None:
+            uv = transformed_uv(uv.astype(np.float64), info)
+            uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])  # to the origin at the lower left
+        part = make_part(
+            vertices,
+            faces,
+            material=material,
+            name=name,
+            uv=uv,
+            normals=self._rows(attributes, "NORMAL", 3, len(vertices)),
+        )
+        colors = self._colors(attributes, len(vertices))
+        if colors is None or material.baseColorTexture is not None:
+            return part
+        return color_by_corner(part, colors[part.faces], self._source)
+
+    def _faces(self, primitive: dict[str, Any], count: int, mode: int) -> np.ndarray:
+        order = (
+            np.arange(count)
+            if "indices" not in primitive
+            else self._accessors.array(primitive["indices"])[:, 0].astype(np.int64)
+        )
+        if len(order) and int(order.max()) >= count:
+            raise self._source.unreadable("a face names a vertex that is not there", "export it again")
+        if mode == 4:
+            faces = order[: len(order) // 3 * 3].reshape(-1, 3)
+        elif mode == 5:
+            faces = (
+                np.stack([order[:-2], order[1:-1], order[2:]], axis=1)
+                if len(order) >= 3
+                else np.empty((0, 3), np.int64)
+            )
+            faces[1::2] = faces[1::2, [1, 0, 2]]
+        else:
+            faces = (
+                np.stack([order[1:-1], order[2:], np.full(max(len(order) - 2, 0), order[0])], axis=1)
+                if len(order) >= 3
+                else order[:0].reshape(0, 3)
+            )
+        self._source.check_faces(len(faces))
+        return faces
+
+    def _rows(self, attributes: dict[str, Any], name: str, columns: int, count: int | None = None) -> np.ndarray | None:
+        if name not in attributes:
+            return None
+        rows = self._accessors.array(attributes[name])
+        if rows.shape[1] < columns or (count is not None and len(rows) != count):
+            raise self._source.unreadable(f"{name} does not fit the mesh", "export it again")
+        return rows[:, :columns]
+
+    def _colors(self, attributes: dict[str, Any], count: int) -> np.ndarray | None:
+        colors = self._rows(attributes, "COLOR_0", 3, count)
+        if colors is None:
+            return None
+        if colors.dtype.kind in "iu":  # integers that do not say normalized are meant so all the same
+            colors = colors / np.iinfo(colors.dtype).max
+        # section 3.7.2.1: COLOR_0 is linear, textures are sRGB
+        return np.round(linear_to_srgb(np.clip(colors.astype(np.float64), 0, 1)) * 255).astype(np.uint8)

@@ -1,0 +1,187 @@
+"""Wavefront OBJ meshes with their material libraries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import trimesh
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.formats.meshes.mtl import read_mtl
+from manitwin.formats.meshes.plain_obj import plain_triangles
+from manitwin.formats.meshes.polygons import triangle_fans
+from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.textures import make_part, material_of, pbr_material
+from manitwin.formats.meshes.vertex_colors import color_by_corner
+
+DEFAULT_COLOR = (0.8, 0.8, 0.8)
+
+
+@dataclass
+class _Group:
+    """The faces of one material: per polygon its corner count, per corner its 0-based v, vt and vn index (-1: none)."""
+
+    sizes: list[int] = field(default_factory=list)
+    corners: list[tuple[int, int, int]] = field(default_factory=list)
+
+
+@dataclass
+class _Document:
+    positions: list[str] = field(default_factory=list)
+    uv: list[str] = field(default_factory=list)
+    normals: list[str] = field(default_factory=list)
+    groups: dict[str, _Group] = field(default_factory=dict)
+    libraries: list[str] = field(default_factory=list)
+
+
+def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
+    """Read an OBJ into one part a material; polygons of any size are cut into fans of triangles.
+
+    Raises InputError ``unreadable`` naming the line where the text is broken.
+    """
+    text = source.data().decode("utf-8", errors="replace")
+    plain = plain_triangles(text)
+    if plain is not None:
+        source.check_faces(len(plain[1]))
+        return [make_part(*plain, material=pbr_material(None, base_color=DEFAULT_COLOR), name="mesh")]
+    document = _parse(text, source)
+    positions = _table(document.positions, 3, "v", source)
+    uv = _table(document.uv, 2, "vt", source)
+    normals = _table(document.normals, 3, "vn", source)
+    colors = _vertex_colors(document.positions)
+    materials = _materials(document, source)
+    parts = []
+    for name, group in document.groups.items():
+        faces, corners = _unique_corners(group, (len(positions), len(uv), len(normals)), source)
+        part = make_part(
+            positions[corners[:, 0]],
+            faces,
+            material=materials.get(name) or pbr_material(name or None, base_color=DEFAULT_COLOR),
+            name=name or "mesh",
+            uv=uv[corners[:, 1]] if len(uv) and corners[:, 1].min() >= 0 else None,
+            normals=normals[corners[:, 2]] if len(normals) and corners[:, 2].min() >= 0 else None,
+        )
+        if colors is not None and material_of(part).baseColorTexture is None:
+            part = color_by_corner(part, colors[corners[:, 0]][part.faces], source)
+        parts.append(part)
+    if not parts and len(positions):
+        raise source.refused(
+            "no_faces", f"{len(positions)} vertices and no faces", "export the surface, not a point cloud"
+        )
+    return parts
+
+
+def _parse(text: str, source: MeshSource) -> _Document:
+    document = _Document()
+    group: _Group | None = None
+    material = ""
+    corner_cache: dict[str, tuple[int, int, int]] = {}
+    triangles = 0
+    for number, line in enumerate(text.replace("\\\r\n", " ").replace("\\\n", " ").splitlines(), start=1):
+        words = line.split(None, 1)
+        if not words:
+            continue
+        keyword, rest = words[0], words[1] if len(words) > 1 else ""
+        if keyword == "v":
+            document.positions.append(rest)
+        elif keyword == "vt":
+            document.uv.append(rest if len(rest.split(None, 1)) > 1 else f"{rest} 0")
+        elif keyword == "vn":
+            document.normals.append(rest)
+        elif keyword == "f":
+            if group is None:
+                group = document.groups.setdefault(material, _Group())
+            try:
+                corners = [corner_cache.get(word) or _corner(word, document, corner_cache) for word in rest.split()]
+            except ValueError as error:
+                raise source.unreadable(f"line {number} is no face: {line[:60]!r}", "export it again") from error
+            if len(corners) < 3:
+                continue  # a point or a line written as a face
+            triangles += len(corners) - 2
+            source.check_faces(triangles)
+            group.sizes.append(len(corners))
+            group.corners.extend(corners)
+        elif keyword == "usemtl":
+            material = rest.strip()
+            group = None
+        elif keyword == "mtllib" and rest:
+            document.libraries.append(rest.strip())
+    return document
+
+
+def _corner(word: str, document: _Document, cache: dict[str, tuple[int, int, int]]) -> tuple[int, int, int]:
+    """Return the 0-based indices of ``v/vt/vn``; negative numbers count back from the last line so far."""
+    fields = word.split("/")
+    counts = (len(document.positions), len(document.uv), len(document.normals))
+    indices = [-1, -1, -1]
+    relative = False
+    for i, text in enumerate(fields[:3]):
+        if text == "" and i > 0:
+            continue
+        value = int(text)
+        if value == 0 or value < -counts[i]:
+            raise ValueError(word)
+        relative = relative or value < 0
+        indices[i] = value - 1 if value > 0 else counts[i] + value
+    corner = (indices[0], indices[1], indices[2])
+    if not relative:
+        cache[word] = corner
+    return corner
+
+
+def _unique_corners(group: _Group, counts: tuple[int, int, int], source: MeshSource) -> tuple[np.ndarray, np.ndarray]:
+    """Return triangles ``(F, 3)`` into unique ``(v, vt, vn)`` rows ``(V, 3)``."""
+    rows = np.asarray(group.corners, dtype=np.int64)
+    for column, (count, what) in enumerate(zip(counts, ("vertex", "texture coordinate", "normal"), strict=True)):
+        if rows[:, column].max() >= count:
+            raise source.unreadable(
+                f"a face names {what} {rows[:, column].max() + 1} of {count}",
+                "the file is cut short or broken; export it again",
+            )
+    # one integer a corner sorts much faster than rows
+    key = (rows[:, 0] * (counts[1] + 1) + rows[:, 1] + 1) * (counts[2] + 1) + rows[:, 2] + 1
+    _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
+    fans, _ = triangle_fans(np.asarray(group.sizes))
+    return inverse[fans], rows[first]
+
+
+def _table(lines: list[str], columns: int, keyword: str, source: MeshSource) -> np.ndarray:
+    try:
+        return _numbers(lines, range(columns))
+    except ValueError as error:
+        raise source.unreadable(f"a {keyword!r} line does not hold {columns} numbers", "export it again") from error
+
+
+def _numbers(lines: list[str], columns: Sequence[int]) -> np.ndarray:
+    """Return these columns of lines of numbers, ``(lines, columns)``; raises ValueError where one is short or no number."""
+    if not lines:
+        return np.empty((0, len(columns)))
+    if not all(lines):
+        raise ValueError("an empty line")  # which loadtxt would pass over
+    return np.loadtxt(lines, comments=None, usecols=columns, ndmin=2)
+
+
+def _vertex_colors(lines: list[str]) -> np.ndarray | None:
+    """Return the ``(V, 3) uint8`` sRGB colours that some programs write behind positions, or None."""
+    if not lines:
+        return None
+    try:
+        colors = _numbers(lines, (3, 4, 5))
+    except ValueError:
+        return None
+    scale = 255.0 if np.nanmax(colors) <= 1.0 else 1.0
+    return np.clip(np.round(np.nan_to_num(colors) * scale), 0, 255).astype(np.uint8)
+
+
+def _materials(document: _Document, source: MeshSource) -> dict[str, PBRMaterial]:
+    materials: dict[str, PBRMaterial] = {}
+    for library in dict.fromkeys(document.libraries):
+        data = source.sibling(library, "material library")
+        if data is not None:
+            materials = read_mtl(data.decode("utf-8", errors="replace"), source) | materials
+    missing = [name for name in document.groups if name and name not in materials]
+    if materials and missing:
+        source.find(f"material {missing[0]!r} is in no material library; shown grey")
+    return materials

@@ -1,0 +1,165 @@
+"""Textures and materials of meshes, brought to the metallic-roughness model of glTF 2.0."""
+
+from __future__ import annotations
+
+import io
+import struct
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.formats.meshes.source import MeshSource
+
+# what real asset packs use; decoders for other formats of Pillow are not reached from untrusted files
+TEXTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
+# what Pillow's decoders raise for broken files
+_DECODER_ERRORS = (
+    OSError,
+    ValueError,
+    SyntaxError,
+    EOFError,
+    IndexError,
+    KeyError,
+    TypeError,
+    struct.error,
+    Image.DecompressionBombError,
+    Image.DecompressionBombWarning,
+)
+
+
+def decode_texture(data: bytes, name: str, source: MeshSource) -> Image.Image | None:
+    """Decode a texture to mode RGB or RGBA, or return None with a finding where it cannot be read or is too large."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            image: Image.Image = Image.open(io.BytesIO(data), formats=TEXTURE_FORMATS)
+            if image.width * image.height > source.limits.max_texture_pixels:
+                source.find(
+                    f"texture {name!r} of {image.width} x {image.height} pixels is over the limit and was left out"
+                )
+                return None
+            if not source.limits.decode_textures:
+                return image
+            image.load()
+    except _DECODER_ERRORS as error:
+        source.find(f"texture {name!r} cannot be decoded and was left out ({' '.join(str(error).split())[:100]})")
+        return None
+    if image.mode in ("I", "I;16", "I;16B", "I;16L"):
+        # 16-bit grey: Pillow's own conversion clips
+        image = Image.fromarray((np.asarray(image).astype(np.uint32) >> 8).astype(np.uint8))
+    has_alpha = image.mode in ("RGBA", "LA", "PA") or "transparency" in image.info
+    return image.convert("RGBA" if has_alpha else "RGB")
+
+
+def pbr_material(
+    name: str | None = None,
+    *,
+    base_color: Sequence[float] = (1.0, 1.0, 1.0, 1.0),
+    metallic: float = 0.0,
+    roughness: float = 0.8,
+    base_color_texture: Image.Image | None = None,
+    metallic_roughness_texture: Image.Image | None = None,
+    normal_texture: Image.Image | None = None,
+    alpha_mode: str | None = None,
+    alpha_cutoff: float | None = None,
+    double_sided: bool = False,
+) -> PBRMaterial:
+    """Build a material whose factors are all explicit; ``base_color`` is linear RGB or RGBA in 0..1 (kept to 1/255)."""
+    rgba = np.ones(4)
+    rgba[: len(base_color)] = base_color
+    if alpha_mode is None:
+        rgba[3] = 1.0  # glTF 2.0, section 3.9.4: opaque materials ignore alpha, but not every engine does
+    return PBRMaterial(
+        name=name,
+        baseColorFactor=np.round(np.clip(np.nan_to_num(rgba, nan=1.0), 0, 1) * 255).astype(np.uint8),
+        metallicFactor=float(np.clip(metallic, 0, 1)),
+        roughnessFactor=float(np.clip(roughness, 0, 1)),
+        baseColorTexture=base_color_texture,
+        metallicRoughnessTexture=metallic_roughness_texture,
+        normalTexture=normal_texture,
+        alphaMode=alpha_mode,
+        alphaCutoff=alpha_cutoff,
+        doubleSided=double_sided,
+    )
+
+
+def make_part(
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    *,
+    material: PBRMaterial,
+    name: str,
+    uv: np.ndarray | None = None,
+    normals: np.ndarray | None = None,
+) -> trimesh.Trimesh:
+    """Build one visual part.
+
+    ``vertices`` (V, 3), ``faces`` (F, 3), ``uv`` (V, 2) with the origin at the lower left as trimesh has it,
+    ``normals`` (V, 3) or None; normals that are not unit vectors are dropped.
+    """
+    part = trimesh.Trimesh(
+        vertices=np.asarray(vertices, dtype=np.float64), faces=np.asarray(faces, dtype=np.int64), process=False
+    )
+    if normals is not None and len(normals) == len(vertices) and np.isfinite(normals).all():
+        lengths = np.linalg.norm(normals, axis=1)
+        if len(lengths) and lengths.min() > 0.5:
+            unit = np.asarray(normals, dtype=np.float64) / lengths[:, None]
+            part.vertex_normals = unit  # type: ignore[method-assign]
+    part.visual = TextureVisuals(uv=None if uv is None else np.asarray(uv, dtype=np.float64), material=material)
+    part.metadata["name"] = name
+    return part
+
+
+def material_of(part: trimesh.Trimesh) -> PBRMaterial:
+    """Return a part's material; raises TypeError for a mesh that is no visual part."""
+    material = getattr(part.visual, "material", None)
+    if not isinstance(material, PBRMaterial):
+        raise TypeError(f"a visual part has a PBRMaterial, not {type(material).__name__}")
+    return material
+
+
+def uv_of(part: trimesh.Trimesh) -> np.ndarray | None:
+    """Return a part's texture coordinates ``(V, 2)``, origin at the lower left, or None."""
+    uv = getattr(part.visual, "uv", None)
+    return None if uv is None else np.asarray(uv)
+
+
+def normals_of(part: trimesh.Trimesh) -> np.ndarray | None:
+    """Return the vertex normals ``(V, 3)`` that a part came with, or None where trimesh would compute them."""
+    return np.asarray(part.vertex_normals) if "vertex_normals" in part._cache else None
+
+
+def bake_transform(part: trimesh.Trimesh, matrix: np.ndarray) -> trimesh.Trimesh:
+    """Return the part under an affine transform ``(4, 4)``; one that mirrors turns the winding over."""
+    if np.allclose(matrix, np.eye(4), rtol=0, atol=0):
+        return part
+    linear = matrix[:3, :3]
+    determinant = float(np.linalg.det(linear))
+    normals = normals_of(part)
+    if normals is not None and determinant != 0:
+        # normals go with the inverse transpose; its sign does not follow a mirror, so no flip is due here
+        normals = normals @ np.linalg.inv(linear)
+        normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    return make_part(
+        part.vertices @ linear.T + matrix[:3, 3],
+        part.faces[:, ::-1] if determinant < 0 else part.faces,
+        material=material_of(part),
+        name=part.metadata["name"],
+        uv=uv_of(part),
+        normals=normals,
+    )
+
+
+def srgb_to_linear(values: np.ndarray) -> np.ndarray:
+    """Convert sRGB values in 0..1 to linear ones (IEC 61966-2-1)."""
+    return np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+
+
+def linear_to_srgb(values: np.ndarray) -> np.ndarray:
+    """Convert linear values in 0..1 to sRGB ones (IEC 61966-2-1)."""
+    return np.where(values <= 0.0031308, values * 12.92, 1.055 * np.maximum(values, 0.0031308) ** (1 / 2.4) - 0.055)

@@ -1,0 +1,209 @@
+"""USDZ meshes (Universal Scene Description packages) with UsdPreviewSurface materials."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from pxr import Tf, Usd, UsdGeom, UsdShade
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.errors import InputError
+from manitwin.formats.meshes.polygons import triangle_fans
+from manitwin.formats.meshes.source import MeshLimits, MeshSource
+from manitwin.formats.meshes.textures import bake_transform, make_part
+from manitwin.formats.meshes.usdz_archive import UsdzArchive
+from manitwin.formats.meshes.usdz_materials import PreviewSurfaces
+from manitwin.formats.meshes.vertex_colors import color_by_corner
+
+_MAX_PARTS = 20_000
+_UV_NAMES = ("st", "st0", "st_0", "UVMap", "uv", "map1", "Texture_uv")
+
+MAX_MEMORY_BYTES = 8 << 30
+OUT_OF_MEMORY = 3
+"""The exit status of a rehearsal that wanted more."""
+
+
+def read_usdz(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
+    """Read all visible meshes of a USDZ package: parts with transforms baked, unit in metres, up axis 'y' | 'z'.
+
+    A stage that does not say its unit is in centimetres (USD's fallback), which is told as None. Raises InputError
+    ``unreadable``, ``animated`` (skinned meshes, value clips).
+    """
+    archive = UsdzArchive(source)
+    if archive.root is None:
+        raise source.unreadable("its first member is no USD layer", "pack it with usdzip")
+    _rehearse(source)
+    return _composed(archive, source)
+
+
+def _rehearse(source: MeshSource) -> None:
+    """Read the file in a process of its own first: USD aborts the whole process on some broken layers."""
+    command = [sys.executable, "-P", "-m", "manitwin.formats.meshes.usdz", str(source.path)]
+    rehearsal = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    if rehearsal.returncode < 0 or rehearsal.returncode == OUT_OF_MEMORY:
+        raise source.unreadable("its USD is so broken that the USD library crashes on it", "export it again")
+
+
+def _composed(archive: UsdzArchive, source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
+    archive.check_layers()
+    try:
+        return _read(Usd.Stage.Open(str(source.path)), archive, source)
+    except Tf.ErrorException as error:
+        raise source.unreadable("its USD is broken", "export it again") from error
+
+
+def _read(
+    stage: Usd.Stage, archive: UsdzArchive, source: MeshSource
+) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
+    unit_m = UsdGeom.GetStageMetersPerUnit(stage) if UsdGeom.StageHasAuthoredMetersPerUnit(stage) else None
+    if unit_m is not None and not (np.isfinite(unit_m) and unit_m > 0):
+        source.find(f"its metersPerUnit is {unit_m} and was not used")
+        unit_m = None
+    up = "z" if UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z else "y"
+    return _parts(stage, archive, source), unit_m, up
+
+
+def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[trimesh.Trimesh]:
+    surfaces = PreviewSurfaces(archive, source)
+    transforms = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+    parts: list[trimesh.Trimesh] = []
+    faces = 0
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
+        if prim.HasAPI("SkelBindingAPI") and prim.IsA(UsdGeom.Mesh):
+            raise source.refused(
+                "animated", "the mesh is bound to a skeleton", "apply the pose and export a still mesh"
+            )
+        if not prim.IsA(UsdGeom.Mesh):
+            if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer):
+                source.find(f"{prim.GetTypeName()} prims in it were left out: only meshes are read")
+            continue
+        imageable = UsdGeom.Imageable(prim)
+        if imageable.ComputeVisibility() == UsdGeom.Tokens.invisible or imageable.ComputePurpose() in (
+            "guide",
+            "proxy",
+        ):
+            source.find("hidden, guide or proxy meshes in it were left out")
+            continue
+        matrix = np.array(transforms.GetLocalToWorldTransform(prim)).T  # USD multiplies rows
+        for part in mesh_parts(UsdGeom.Mesh(prim), surfaces, source):
+            faces += len(part.faces)
+            source.check_faces(faces)
+            if len(parts) >= _MAX_PARTS:
+                raise source.unreadable(f"more than {_MAX_PARTS} parts", "merge them before exporting")
+            parts.append(bake_transform(part, matrix))
+    return parts
+
+
+def mesh_parts(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, source: MeshSource) -> list[trimesh.Trimesh]:
+    """Return a mesh prim as one part a material subset."""
+    points = _value(mesh.GetPointsAttr())
+    sizes = _value(mesh.GetFaceVertexCountsAttr())
+    indices = _value(mesh.GetFaceVertexIndicesAttr())
+    if points is None or sizes is None or indices is None or len(sizes) == 0:
+        return []
+    points, sizes, indices = np.asarray(points, np.float64), np.asarray(sizes, np.int64), np.asarray(indices, np.int64)
+    if (
+        sizes.min() < 0
+        or sizes.sum() != len(indices)
+        or (len(indices) and (indices.min() < 0 or indices.max() >= len(points)))
+    ):
+        raise source.unreadable(f"the faces of {mesh.GetPath()} do not match its points", "export it again")
+    for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr()):
+        if attribute.ValueMightBeTimeVarying():
+            source.find("the file is animated; its first frame was taken")
+    corners, owner = triangle_fans(sizes)
+    if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
+        corners = corners[:, ::-1]
+    uv = _uv(mesh, indices, len(points), len(sizes))
+    colors = _display_colors(mesh, indices, sizes)
+    parts = []
+    for material, chosen in _subsets(mesh, surfaces, len(sizes)):
+        flat = corners[chosen[owner]].reshape(-1)
+        if not len(flat):
+            continue
+        # corners that share a point and a texture coordinate share a vertex
+        keys = [indices[flat].astype(np.float64)[:, None]] + ([] if uv is None else [uv[flat]])
+        _, first, inverse = np.unique(np.hstack(keys), axis=0, return_index=True, return_inverse=True)
+        part = make_part(
+            points[indices[flat][first]],
+            inverse.reshape(-1, 3),
+            material=material,
+            name=mesh.GetPrim().GetName(),
+            uv=None if uv is None else uv[flat][first],
+        )
+        if colors is not None and material.name is None:
+            part = color_by_corner(part, colors[flat].reshape(-1, 3, 3), source)
+        parts.append(part)
+    return parts
+
+
+def _subsets(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, count: int) -> list[tuple[PBRMaterial, np.ndarray]]:
+    """Return every material of the mesh with a mask ``(count,)`` of its polygons."""
+    rest = np.ones(count, dtype=bool)
+    result = []
+    for subset in UsdGeom.Subset.GetGeomSubsets(mesh, UsdGeom.Tokens.face, UsdShade.Tokens.materialBind):
+        chosen = np.zeros(count, dtype=bool)
+        members = np.asarray(_value(subset.GetIndicesAttr()) or [], dtype=np.int64)
+        chosen[members[(members >= 0) & (members < count)]] = True
+        chosen &= rest
+        rest &= ~chosen
+        result.append((surfaces.of(subset.GetPrim()), chosen))
+    return [*result, (surfaces.of(mesh.GetPrim()), rest)]
+
+
+def _uv(mesh: UsdGeom.Mesh, indices: np.ndarray, points: int, polygons: int) -> np.ndarray | None:
+    """Return texture coordinates by corner ``(C, 2)``, origin at the lower left as USD has it."""
+    api = UsdGeom.PrimvarsAPI(mesh)
+    named = [api.GetPrimvar(name) for name in _UV_NAMES]
+    typed = [
+        p for p in api.GetPrimvarsWithValues() if str(p.GetTypeName()) in ("texCoord2f[]", "texCoord2d[]", "float2[]")
+    ]
+    for primvar in [p for p in named if p and p.HasValue()] + typed:
+        values = primvar.ComputeFlattened(Usd.TimeCode.EarliestTime())
+        if values is None:
+            continue
+        uv = np.asarray(values, np.float64).reshape(-1, 2)
+        if primvar.GetInterpolation() == UsdGeom.Tokens.faceVarying and len(uv) == len(indices):
+            return uv
+        if primvar.GetInterpolation() in (UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying) and len(uv) == points:
+            return uv[indices]
+    return None
+
+
+def _display_colors(mesh: UsdGeom.Mesh, indices: np.ndarray, sizes: np.ndarray) -> np.ndarray | None:
+    """Return displayColor by corner ``(C, 3) uint8`` sRGB, or None."""
+    primvar = mesh.GetDisplayColorPrimvar()
+    values = primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()) if primvar and primvar.HasValue() else None
+    if values is None or len(values) == 0:
+        return None
+    linear = np.asarray(values, np.float64).reshape(-1, 3)
+    colors = np.round(np.asarray(PreviewSurfaces.to_srgb(linear)) * 255).astype(np.uint8)
+    if len(colors) == 1:
+        return np.repeat(colors, len(indices), axis=0)
+    if len(colors) == len(indices):
+        return colors
+    if len(colors) == len(sizes) and primvar.GetInterpolation() == UsdGeom.Tokens.uniform:
+        return np.repeat(colors, sizes, axis=0)
+    return colors[indices] if len(colors) > indices.max() else None
+
+
+def _value(attribute: Usd.Attribute) -> Any:
+    return attribute.Get(Usd.TimeCode.EarliestTime())
+
+
+if __name__ == "__main__":
+    # a broken file of a kilobyte can ask for tens of gigabytes
+    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
+    rehearsed = MeshSource(Path(sys.argv[1]), MeshLimits())
+    try:
+        _composed(UsdzArchive(rehearsed), rehearsed)
+    except InputError as refusal:
+        print(refusal)
+    except MemoryError:
+        sys.exit(OUT_OF_MEMORY)

@@ -1,0 +1,167 @@
+"""What a file really is, by its content: names lie."""
+
+from __future__ import annotations
+
+import json
+import re
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from manitwin.errors import InputError
+from manitwin.formats.not_read import NOT_READ
+
+IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "avif")
+MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz")
+
+_HEAD_BYTES = 65536
+_OBJ_KEYWORDS = frozenset(
+    {"v", "vt", "vn", "vp", "f", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "cstype", "deg"}
+)
+_NUMBER = re.compile(rb"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|^[+-]?(nan|inf)", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Sniffed:
+    """What a file is: its kind, and its format by content (of IMAGE_FORMATS or MESH_FORMATS, or ``heif``)."""
+
+    kind: Literal["image", "mesh"]
+    format: str
+
+
+def sniff(path: Path) -> Sniffed:
+    """Tell what a file is from its bytes; its name is not believed, and only says what a file is that is neither.
+
+    Raises InputError: ``unreadable`` (no such file, or no permission), ``empty`` (zero bytes), ``wrong_type`` (neither
+    an image nor a mesh).
+    """
+    try:
+        size = path.stat().st_size
+        with path.open("rb") as stream:
+            head = stream.read(_HEAD_BYTES)
+    except OSError as error:
+        raise InputError("unreadable", f"{path.name}: {error.strerror or error}; check the path") from error
+    not_read = NOT_READ.get(path.suffix.lower())
+    if size == 0 and not_read is None:
+        raise InputError("empty", f"{path.name}: the file has zero bytes; export or download it again")
+    image = image_format(head)
+    if image is not None:
+        return Sniffed("image", image)
+    mesh = _mesh_format(head, size, path)
+    if mesh is not None:
+        return Sniffed("mesh", mesh)
+    if not_read is not None:
+        raise InputError("wrong_type", f"{path.name}: {not_read}")
+    raise InputError(
+        "wrong_type",
+        f"{path.name}: holds {_describe(head)}, neither an image ({', '.join(IMAGE_FORMATS)})"
+        f" nor a mesh ({', '.join(MESH_FORMATS)})",
+    )
+
+
+def image_format(head: bytes) -> str | None:
+    """Return the image format that a file's first 64 bytes show, one of IMAGE_FORMATS or ``heif``, or None."""
+    if head.startswith(b"\x89PNG\r\n\x1a\n"):
+        return "png"
+    if head.startswith(b"\xff\xd8\xff"):
+        return "jpeg"
+    if head[:6] in (b"GIF87a", b"GIF89a"):
+        return "gif"
+    if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
+        return "webp"
+    if head[:4] in (b"II*\0", b"MM\0*"):
+        return "tiff"
+    # BITMAPFILEHEADER: the two reserved words at 6 are zero
+    if head[:2] == b"BM" and head[6:10] == b"\0\0\0\0":
+        return "bmp"
+    if head[4:8] == b"ftyp":
+        # ISO/IEC 23008-12: mif1 is any image of the family, and the compatible brands say which
+        brands = {head[8:12], *(head[at : at + 4] for at in range(16, min(int.from_bytes(head[:4], "big"), 64), 4))}
+        if brands & {b"avif", b"avis"}:
+            return "avif"
+        if brands & {b"heic", b"heix", b"hevc", b"heim", b"heis", b"mif1", b"msf1"}:
+            return "heif"
+    return None
+
+
+def _mesh_format(head: bytes, size: int, path: Path) -> str | None:
+    if head.startswith(b"glTF"):
+        return "glb"
+    if re.match(rb"ply\r?\n", head):
+        return "ply"
+    if head.startswith(b"PK\x03\x04") and _is_usdz(path):
+        return "usdz"
+    # a binary STL has no magic: 80 free bytes, a count, 50 bytes a triangle; its free bytes may even begin with "solid"
+    if size >= 84 and size == 84 + 50 * int.from_bytes(head[80:84], "little"):
+        return "stl"
+    text = _text(head)
+    if text is None:
+        # a binary STL that was cut short still has the zero padding or "STL" in its 80 free bytes
+        return "stl" if size >= 84 and path.suffix.lower() == ".stl" else None
+    start = text.lstrip("\ufeff \t\r\n")
+    if re.match(r"solid\b", start, re.IGNORECASE) and re.search(r"\bfacet\b|\bendsolid\b", start, re.IGNORECASE):
+        return "stl"
+    if start.startswith("<") and re.search(r"<(\w+:)?COLLADA[\s>]", start):
+        return "dae"
+    if start.startswith("{") and _is_gltf(path, start):
+        return "gltf"
+    return "obj" if _is_obj(start, complete=size <= _HEAD_BYTES) else None
+
+
+def _is_usdz(path: Path) -> bool:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            names = archive.namelist()
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        # cut short: a stored archive names its first member in its first bytes
+        with path.open("rb") as stream:
+            names = [stream.read(512)[30:].split(b"\0")[0].decode("latin-1")[:256]]
+        return re.search(r"\.usd[ac]?", names[0], re.IGNORECASE) is not None
+    return bool(names) and names[0].lower().endswith((".usd", ".usda", ".usdc"))
+
+
+def _is_gltf(path: Path, start: str) -> bool:
+    # "asset" may come last in a long file; the whole is only parsed where the head does not settle it
+    if re.search(r'"asset"\s*:', start) and re.search(r'"(accessors|meshes|nodes|buffers|scenes)"\s*:', start):
+        return True
+    try:
+        tree = json.loads(path.read_bytes())
+    except (ValueError, RecursionError):
+        # cut short: still named by what only glTF has
+        return re.search(r'"bufferViews?"\s*:', start) is not None
+    return isinstance(tree, dict) and isinstance(tree.get("asset"), dict) and "version" in tree["asset"]
+
+
+def _is_obj(text: str, complete: bool) -> bool:
+    lines = text.splitlines() if complete else text.splitlines()[:-1]
+    words = [line.split() for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    known = [w for w in words if w[0] in _OBJ_KEYWORDS]
+    if len(known) < 0.9 * len(words):
+        return False
+    return any(w[0] == "v" and len(w) >= 4 and all(_NUMBER.match(n.encode()) for n in w[1:4]) for w in known)
+
+
+def _text(head: bytes) -> str | None:
+    for encoding in ("utf-16", "utf-8") if head[:2] in (b"\xff\xfe", b"\xfe\xff") else ("utf-8",):
+        try:
+            return head.decode(encoding)
+        except UnicodeDecodeError as error:
+            # a character cut at the end of the head is no reason to say binary
+            if error.start >= len(head) - 4 and len(head) == _HEAD_BYTES:
+                return head[: error.start].decode(encoding)
+    printable = sum(byte >= 32 or byte in (9, 10, 13) for byte in head)
+    return head.decode("latin-1") if printable > 0.99 * len(head) else None
+
+
+def _describe(head: bytes) -> str:
+    text = _text(head)
+    if text is not None and "\0" not in text:
+        return "plain text"
+    if head.startswith(b"PK"):
+        return "a ZIP archive"
+    if head.startswith(b"%PDF"):
+        return "a PDF document"
+    if head.startswith((b"PXR-USDC", b"#usda")):
+        return "a bare USD layer (pack it as .usdz)"
+    return "unknown binary data"

@@ -1,0 +1,104 @@
+"""The rehearsal servers by name: what they are started with, and what a client has to be told."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from manitwin.errors import UsageError, choose_from
+from manitwin.models.fakes.faults import Faults
+from manitwin.models.fakes.message_server import MessageServer
+from manitwin.models.fakes.server import FakeServer
+
+
+@dataclass(frozen=True)
+class Rehearsal:
+    """A server that can be rehearsed with.
+
+    ``option`` is the command line's for such a backend, ``spec`` what to give there (``{url}``: the server's address), and
+    ``key_variable`` where its client looks for a key (None: it has none).
+    """
+
+    target: str
+    option: str
+    spec: str
+    key_variable: str | None = None
+
+    @property
+    def factory(self) -> Callable[..., Any]:
+        """The class of the server."""
+        module, _, attribute = self.target.partition(":")
+        return getattr(import_module(module), attribute)
+
+
+# A vendor's own key goes to the vendor's host only: that of another server of VLMs is in another variable.
+REHEARSALS = {
+    "openai": Rehearsal(
+        "manitwin.models.fakes.openai_chat:FakeOpenAi", "--vlm", "openai:rehearsal@{url}/v1", "MANITWIN_VLM_KEY"
+    ),
+    "anthropic": Rehearsal(
+        "manitwin.models.fakes.anthropic_messages:FakeAnthropic",
+        "--vlm",
+        "anthropic:rehearsal@{url}",
+        "MANITWIN_VLM_KEY",
+    ),
+    "rodin": Rehearsal("manitwin.models.fakes.rodin:FakeRodin", "--generator", "rodin@{url}/api/v2", "RODIN_API_KEY"),
+    "tripo": Rehearsal(
+        "manitwin.models.fakes.tripo:FakeTripo", "--generator", "tripo@{url}/v2/openapi", "TRIPO_API_KEY"
+    ),
+    "meshy": Rehearsal("manitwin.models.fakes.meshy:FakeMeshy", "--generator", "meshy@{url}", "MESHY_API_KEY"),
+    "hunyuan3d": Rehearsal("manitwin.models.fakes.hunyuan3d:FakeHunyuan3d", "--generator", "hunyuan3d@{url}"),
+    "fal": Rehearsal("manitwin.models.fakes.fal:FakeFal", "--generator", "fal@{url}", "FAL_KEY"),
+    "graspgen": Rehearsal("manitwin.models.fakes.graspgen:FakeGraspGen", "--grasper", "graspgen@{url}"),
+    "graspgenx": Rehearsal("manitwin.models.fakes.graspgenx:FakeGraspGenX", "--grasper", "graspgenx@{url}"),
+}
+
+
+@dataclass(frozen=True)
+class Serving:
+    """A server that runs: where, with which key (None: it asks for none), and what to give a build."""
+
+    url: str
+    key: str | None
+    option: str
+    spec: str
+    key_variable: str | None
+
+
+@contextmanager
+def serving(
+    name: str, *, port: int = 0, faults: Faults | None = None, key: str | None = None, polls: int | None = None
+) -> Iterator[Serving]:
+    """Serve ``name`` on this machine while the context lasts; raises UsageError for what it cannot be started with.
+
+    ``polls`` is how often a job is looked at before it is done.
+    """
+    if name not in REHEARSALS:
+        raise UsageError(choose_from("server", name, REHEARSALS))
+    rehearsal = REHEARSALS[name]
+    factory = rehearsal.factory
+    takes = inspect.signature(factory).parameters
+    given: dict[str, Any] = {"faults": faults or Faults()}
+    if polls is not None and "polls" not in takes:
+        raise UsageError(f"{name} has no jobs to look at: leave --polls out")
+    if key is not None and rehearsal.key_variable is None:
+        raise UsageError(f"{name} asks for no key: leave --key out")
+    given |= {word: value for word, value in (("key", key), ("polls", polls)) if value is not None}
+    if rehearsal.key_variable is not None and key is None:
+        key = takes["key"].default
+    with _server(factory, given, port) as server:
+        spec = rehearsal.spec.format(url=server.url)
+        yield Serving(server.url, key, rehearsal.option, spec, rehearsal.key_variable)
+
+
+def _server(factory: Callable[..., Any], given: dict[str, Any], port: int) -> MessageServer | FakeServer:
+    if "port" in inspect.signature(factory).parameters:  # a server by itself, not a service for one
+        return factory(**given, port=port)
+    try:
+        return FakeServer(factory(**given), port)
+    except OSError as error:
+        raise UsageError(f"port {port} cannot be used: {error}; give another with --port") from error

@@ -1,0 +1,1 @@
+"""Rigid-body simulation: trials of grasps, robustness, settling."""

@@ -1,0 +1,1 @@
+"""MuJoCo: the second, independent engine."""

@@ -1,0 +1,58 @@
+"""Let a body come to rest on a plane in MuJoCo: what stays put there and in SAPIEN does not owe it to one solver.
+
+Contacts are as soft as MuJoCo's default, for that is what a scene has into which a twin is loaded. A round body that lies on
+a narrow facet of its hulls stays on stiff contacts (5 ms) and rolls off on these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from manitwin.geometry.poses import quaternion_wxyz, transform, transform_points
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics.mujoco.body import OBJECT, SOFT_SOLREF, add_object, contact_parameters
+from manitwin.physics.sapien.settle import Settled
+
+TIMESTEP_S = 0.002
+PLANE_HALF_SIZE_M = 10.0
+STILL_M_S, STILL_RAD_S = 1e-3, 1e-2
+
+
+def settle_on_plane_in_mujoco(
+    body: RigidBody, object_to_plane: Sequence[np.ndarray], *, drop_m: float, seconds: float
+) -> list[Settled]:
+    """Release a body ``drop_m`` above the plane z = 0 in each of several poses (4x4), and see where it comes to rest."""
+    if not len(object_to_plane):
+        return []
+    model = _model(body)
+    return [_settle(model, body, np.asarray(pose), drop_m, seconds) for pose in object_to_plane]
+
+
+def _model(body: RigidBody) -> mujoco.MjModel:
+    spec = mujoco.MjSpec()
+    spec.option.timestep, spec.option.integrator = TIMESTEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    contact = contact_parameters(body.friction_static, SOFT_SOLREF)
+    size = [PLANE_HALF_SIZE_M, PLANE_HALF_SIZE_M, 0.1]
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=size, contype=1, conaffinity=2, **contact)
+    add_object(spec, body, contact)
+    return spec.compile()
+
+
+def _settle(model: mujoco.MjModel, body: RigidBody, pose: np.ndarray, drop_m: float, seconds: float) -> Settled:
+    data = mujoco.MjData(model)
+    address = model.joint(OBJECT).qposadr[0]
+    data.qpos[address : address + 3] = pose[:3, 3] + [0, 0, drop_m]
+    data.qpos[address + 3 : address + 7] = quaternion_wxyz(pose[:3, :3])
+    mujoco.mj_step(model, data, round(seconds / TIMESTEP_S))
+    number = model.body(OBJECT).id
+    end = transform(data.xmat[number].reshape(3, 3), data.xpos[number])
+    before, after = (transform_points(p, body.center_of_mass_m[None])[0] for p in (pose, end))
+    cosine = (np.trace(end[:3, :3] @ pose[:3, :3].T) - 1) / 2
+    speed = data.qvel[model.joint(OBJECT).dofadr[0] :][:6]
+    still = np.linalg.norm(speed[:3]) < STILL_M_S and np.linalg.norm(speed[3:]) < STILL_RAD_S
+    turned = float(np.arccos(np.clip(cosine, -1, 1)))
+    return Settled(end, float(np.linalg.norm(after - before)), turned, bool(still))

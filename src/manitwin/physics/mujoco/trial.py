@@ -1,0 +1,162 @@
+"""The grasp trial in MuJoCo: a second opinion by another contact model, on the same hulls, masses and friction.
+
+The settings are frozen: the share of grasps that hold can be moved from 12 to 96 % by them. Implicit integration at 2 ms,
+elliptic cones with an impedance ratio of 10, torsional friction (condim 4), contacts of 5 ms, and five no-slip iterations
+against the creep of soft contacts (MuJoCo manual, "Computation", section on slip; chosen once on 40 grasps of other objects).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from manitwin.geometry.poses import inverse, quaternion_wxyz
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics.mujoco.body import OBJECT, STIFF_SOLREF, add_object, contact_parameters
+from manitwin.physics.shared_target import SharedTarget
+from manitwin.physics.trial import TrialResult, TrialSettings
+from manitwin.physics.trial_phases import HandContacts, run_phases
+from manitwin.robots.grippers.gripper import Gripper, of_kind
+from manitwin.robots.grippers.parallel import ParallelGripper
+
+TIMESTEP_S, STEPS_PER_FRAME = 0.002, 8
+IMPEDANCE_RATIO, NO_SLIP_ITERATIONS = 10.0, 5
+FINGER_MASS_KG = 0.1
+MET_M = -0.001  # contacts and finger stops are soft: of 50 N they give half a millimetre on each side
+MAX_DRIVE_FORCE = 4.0  # as a multiple of the closing force: it never cuts the closing force itself
+FINGERS = ("finger_plus", "finger_minus")
+
+
+class MujocoTrial:
+    """Try grasps one by one in MuJoCo on the CPU."""
+
+    name = "mujoco"
+
+    def run(
+        self,
+        body: RigidBody,
+        gripper: Gripper,
+        gripper_to_object: np.ndarray,
+        settings: TrialSettings,
+        joints_rad: np.ndarray | None = None,
+    ) -> list[TrialResult]:
+        """Try the grasps ``gripper_to_object (N, 4, 4)``; of ``settings``, the engine's own numbers are the frozen ones."""
+        if not len(gripper_to_object):
+            return []
+        settings, hand = frozen(settings), of_kind(gripper, ParallelGripper)
+        model = _model(body, hand, settings)
+        results = []
+        for object_to_hand in (inverse(pose) for pose in gripper_to_object):
+            scene = _Scene(model, hand, object_to_hand, settings)
+            results.append(run_phases(scene, object_to_hand[:3, :3], settings))
+        return results
+
+
+def frozen(settings: TrialSettings) -> TrialSettings:
+    """Return the settings with MuJoCo's step: the same protocol, the same time allowed."""
+    most_s = settings.max_steps * settings.timestep_s
+    return replace(
+        settings,
+        timestep_s=TIMESTEP_S,
+        steps_per_frame=STEPS_PER_FRAME,
+        max_steps=math.ceil(most_s / TIMESTEP_S),
+    )
+
+
+class _Scene:
+    """One grasp in one scene; its frame is the hand's. The load is the scene's gravity, which the fingers do not feel."""
+
+    def __init__(
+        self, model: mujoco.MjModel, gripper: ParallelGripper, object_to_hand: np.ndarray, settings: TrialSettings
+    ):
+        self.model, self.data = model, mujoco.MjData(model)
+        self.target = SharedTarget(gripper.opening_m, settings, MET_M)
+        self.object = model.body(OBJECT).id
+        self.fingers = [model.body(name).id for name in FINGERS]
+        self.joints = [model.joint(name).qposadr[0] for name in FINGERS]
+        free = model.joint(OBJECT).qposadr[0]
+        self.data.qpos[self.joints] = self.data.ctrl[:] = gripper.opening_m / 2
+        self.data.qpos[free : free + 3] = object_to_hand[:3, 3]
+        self.data.qpos[free + 3 : free + 7] = quaternion_wxyz(object_to_hand[:3, :3])
+
+    def advance(self, loads_m_s2: np.ndarray) -> None:
+        """Take one step for each row of accelerations ``(N, 3)``."""
+        model, data, gravity = self.model, self.data, self.model.opt.gravity
+        for load in loads_m_s2:
+            gravity[:] = load
+            mujoco.mj_step(model, data)
+
+    def squeeze(self) -> None:
+        """Move the fingers' shared target on."""
+        self.data.ctrl[:] = self.target.move_on(float(self.data.qpos[self.joints].mean()))
+
+    def contacts(self) -> HandContacts:
+        """Return how hard the +X and the -X finger press inwards, and the deepest overlap with the hand."""
+        forces, deepest, wrench = [0.0, 0.0], 0.0, np.zeros(6)
+        for index, contact in enumerate(self.data.contact):
+            bodies = self.model.geom_bodyid[list(contact.geom)]
+            if self.object not in bodies:
+                continue
+            deepest = max(deepest, -float(contact.dist))
+            towards_object = 1 if bodies[1] == self.object else -1  # the normal points from the first to the second
+            for side, finger in enumerate(self.fingers):
+                if finger in bodies:
+                    mujoco.mj_contactForce(self.model, self.data, index, wrench)
+                    push_x = towards_object * float(contact.frame[0] * wrench[0])
+                    forces[side] += push_x * (-1, 1)[side]
+        return HandContacts((forces[0], forces[1]), deepest)
+
+    def object_rotation(self) -> np.ndarray:
+        """Return the object's rotation in the hand's frame."""
+        return self.data.xmat[self.object].reshape(3, 3).copy()
+
+    def center_of_mass_m(self) -> np.ndarray:
+        """Return the object's centre of mass in the hand's frame."""
+        return self.data.xipos[self.object].copy()
+
+
+def _model(body: RigidBody, gripper: ParallelGripper, settings: TrialSettings) -> mujoco.MjModel:
+    """Compile hand and object once; contacts take the mean friction, as in SAPIEN (MuJoCo's own rule is the maximum)."""
+    spec = mujoco.MjSpec()
+    option = spec.option
+    option.timestep, option.integrator = settings.timestep_s, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPEDANCE_RATIO
+    option.noslip_iterations = NO_SLIP_ITERATIONS
+    contact = contact_parameters((settings.finger_friction + body.friction_static) / 2, STIFF_SOLREF)
+    _add_hand(spec, gripper, settings, contact)
+    add_object(spec, body, contact)
+    return spec.compile()
+
+
+def _add_hand(
+    spec: mujoco.MjSpec, gripper: ParallelGripper, settings: TrialSettings, contact: dict[str, object]
+) -> None:
+    boxes, first, count = gripper.boxes(0.0), len(gripper.palm_boxes), len(gripper.finger_boxes)
+    bodies = [(spec.worldbody, boxes[:first])]
+    for side, name in enumerate(FINGERS):
+        finger = spec.worldbody.add_body(name=name, gravcomp=1)
+        finger.mass, finger.inertia, finger.explicitinertial = FINGER_MASS_KG, [1e-4] * 3, True
+        joint = finger.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=[(1, -1)[side], 0, 0])
+        joint.range, joint.limited = [0.0, gripper.opening_m / 2], True
+        start = first + side * count
+        bodies.append((finger, boxes[start : start + count]))
+        drive = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+        drive.gaintype, drive.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
+        drive.gainprm[0] = settings.finger_stiffness_n_m
+        drive.biasprm[1:3] = [-settings.finger_stiffness_n_m, -settings.finger_damping_n_s_m]
+        limit_n = MAX_DRIVE_FORCE * settings.force_n
+        drive.forcerange, drive.forcelimited = [-limit_n, limit_n], True
+    for holder, some in bodies:
+        for box_to_gripper, half_extents_m in some:
+            holder.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_BOX,
+                pos=box_to_gripper[:3, 3],
+                quat=quaternion_wxyz(box_to_gripper[:3, :3]),
+                size=half_extents_m,
+                contype=1,
+                conaffinity=2,
+                **contact,
+            )

@@ -1,0 +1,1 @@
+"""SAPIEN (PhysX): scenes, bodies, hands, trials."""

@@ -1,0 +1,42 @@
+"""PhysX systems of SAPIEN with settings of their own, whatever the process-wide configuration says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import numpy as np
+import sapien
+from sapien import physx
+
+from manitwin.physics.trial import GRAVITY_M_S2
+
+
+@contextmanager
+def scene_config(**values: object) -> Iterator[None]:
+    """Set SAPIEN's process-wide scene configuration, from which a new system is made, and set it back."""
+    before = physx.get_scene_config()
+    kept = {name: getattr(before, name) for name in values}
+    config = physx.get_scene_config()
+    for name, value in values.items():
+        setattr(config, name, value)
+    physx.set_scene_config(config)
+    try:
+        yield
+    finally:
+        for name, value in kept.items():
+            setattr(config, name, value)
+        physx.set_scene_config(config)
+
+
+def system_with_gravity(timestep_s: float) -> physx.PhysxCpuSystem:
+    """Return a system whose gravity points down along Z."""
+    with scene_config(gravity=np.array([0, 0, -GRAVITY_M_S2], np.float32)):
+        system = physx.PhysxCpuSystem()
+    system.timestep = timestep_s
+    return system
+
+
+def scene_with_gravity(timestep_s: float) -> sapien.Scene:
+    """Return a scene of such a system alone."""
+    return sapien.Scene([system_with_gravity(timestep_s)])

@@ -1,0 +1,77 @@
+"""The grasp trial of a parallel gripper in SAPIEN 3: two fingers that share one target."""
+
+from __future__ import annotations
+
+import numpy as np
+from sapien import physx
+
+from manitwin.geometry.poses import inverse
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics.kept_for_hulls import KeptForHulls
+from manitwin.physics.sapien.body import hull_shapes
+from manitwin.physics.sapien.hand import FixedHand
+from manitwin.physics.sapien.scene import HandScene
+from manitwin.physics.trial import TrialResult, TrialSettings
+from manitwin.physics.trial_phases import run_phases
+from manitwin.robots.grippers.gripper import Gripper, of_kind
+from manitwin.robots.grippers.hand_reach import HandReach
+from manitwin.robots.grippers.parallel import ParallelGripper
+
+REACH_MARGIN_M = 0.015  # hulls farther than this from the closing hand are left out
+# A trial counts only where none of them came this near whenever it was looked: the contact offset of 2 mm, and what the
+# object may do between two looks.
+LOOK_MARGIN_M = 0.005
+
+
+class SapienTrial:
+    """Try grasps one by one in SAPIEN on the CPU."""
+
+    name = "sapien"
+
+    def __init__(self) -> None:
+        self._shapes, self._reach = KeptForHulls(hull_shapes), KeptForHulls(HandReach)
+
+    def run(
+        self,
+        body: RigidBody,
+        gripper: Gripper,
+        gripper_to_object: np.ndarray,
+        settings: TrialSettings,
+        joints_rad: np.ndarray | None = None,
+    ) -> list[TrialResult]:
+        """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order."""
+        hand = of_kind(gripper, ParallelGripper)
+        shapes, reach = self._shapes(body.hulls), self._reach(body.hulls)
+        return [_try_one(body, shapes, reach, hand, inverse(pose), settings) for pose in gripper_to_object]
+
+
+def _try_one(
+    body: RigidBody,
+    shapes: list[physx.PhysxCollisionShapeConvexMesh],
+    reach: HandReach,
+    gripper: ParallelGripper,
+    object_to_hand: np.ndarray,
+    settings: TrialSettings,
+) -> TrialResult:
+    """Try a grasp on the hulls that the hand can reach; where the object turned others towards it, on all."""
+    gaps = reach.gaps_m(gripper, object_to_hand[None])[0]
+    near = gaps <= REACH_MARGIN_M
+    if not near.any():
+        return TrialResult("misses", 0.0, 0.0, 0.0, (0.0, 0.0), 0)  # nothing to simulate: nothing touches the object
+
+    def simulate(some: np.ndarray) -> tuple[TrialResult, np.ndarray]:
+        """Return what became of the object with some of its shapes, and the poses at which it was looked at."""
+        chosen = [shape for shape, is_in in zip(shapes, some, strict=True) if is_in]
+        scene = HandScene(body, chosen, object_to_hand, settings, lambda scene: FixedHand(scene, gripper, settings))
+        return run_phases(scene, object_to_hand[:3, :3], settings), np.array(scene.looks)
+
+    result, looks = simulate(near)
+    if near.all() or _stayed_out(reach, gaps, gripper, looks):
+        return result
+    return simulate(np.ones_like(near))[0]
+
+
+def _stayed_out(reach: HandReach, gaps: np.ndarray, gripper: ParallelGripper, looks: np.ndarray) -> bool:
+    """Tell whether no hull that was left out came near the hand in any look ``(P, 4, 4)``; the cheap bound goes first."""
+    unsure = (gaps > REACH_MARGIN_M) & (gaps - reach.motions_m(looks) <= LOOK_MARGIN_M)
+    return not unsure.any() or not (reach.of(unsure).gaps_m(gripper, looks) <= LOOK_MARGIN_M).any()

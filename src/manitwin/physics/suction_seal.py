@@ -1,0 +1,86 @@
+"""Does a suction cup seal on the surface under it?
+
+The lip's ring is projected onto the surface along the approach, and how far the cup must deform to follow it is bounded:
+the idea of Dex-Net 3.0's quasi-static spring model (Mahler et al., ICRA 2018, section IV-A), with bounds in the units of
+a cup's data sheet (tilt of the bellows, bending of the lip, angle) instead of one strain for all springs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.robots.grippers.suction import SuctionGripper
+
+RING_POINTS = 32  # 3 mm apart on a lip of 15 mm radius: narrower gaps are not seen
+INNER_RINGS = ((1, 0.0), (8, 1 / 3), (12, 2 / 3))  # number of points, share of the lip's radius
+
+
+@dataclass(frozen=True)
+class Seal:
+    """What N cups meet: whether they seal, and the centre (m) and the normal into the object of the plane of the lip.
+
+    Centre and normal are in the object frame, and those of the lip at rest where it does not seal. ``advance_m`` is how
+    much farther than planned the cup is pushed along its approach to meet the surface.
+    """
+
+    sealed: np.ndarray
+    advance_m: np.ndarray
+    center_m: np.ndarray
+    inward: np.ndarray
+
+
+def seal(gripper: SuctionGripper, gripper_to_object: np.ndarray, surface: RayCaster) -> Seal:
+    """Project the lips of grasps ``(N, 4, 4)`` onto the surface and tell which of them seal."""
+    count, rotation = len(gripper_to_object), gripper_to_object[:, :3, :3]
+    angle = 2 * np.pi * np.arange(RING_POINTS) / RING_POINTS
+    circle = np.column_stack([np.cos(angle), np.sin(angle)])
+    depth_m, normals = _project(gripper, gripper_to_object, surface, gripper.lip_radius_m * circle)
+    hit = np.isfinite(depth_m).all(1)
+    ring_m = np.where(hit[:, None], depth_m, 0.0)
+    # the best plane: mean and first harmonic of the depths around the ring
+    middle_m = ring_m.mean(1)
+    slope_m = 2 / RING_POINTS * ring_m @ circle
+    bent_m = ring_m - middle_m[:, None] - slope_m @ circle.T
+    inward = np.column_stack([-slope_m / gripper.lip_radius_m, np.ones(count)])
+    inward /= np.linalg.norm(inward, axis=1)[:, None]
+    inward = np.einsum("nij,nj->ni", rotation, inward)
+    step_m = np.abs(bent_m - np.roll(bent_m, 1, axis=1)).max(1)
+    spacing_m = 2 * gripper.lip_radius_m * np.sin(np.pi / RING_POINTS)
+    facing = -np.einsum("nki,ni->nk", normals, inward)
+    sealed = (
+        hit
+        & (np.abs(middle_m) <= gripper.reach_m)
+        & (np.hypot(*slope_m.T) <= gripper.lip_radius_m * np.tan(gripper.max_tilt_rad))
+        & (np.ptp(bent_m, axis=1) <= gripper.lip_travel_m)
+        & (step_m <= spacing_m * np.tan(gripper.max_surface_angle_rad))  # a step that no ray's normal shows
+        & (facing.min(1) >= np.cos(gripper.max_surface_angle_rad))
+    )
+    inner = np.concatenate([gripper.lip_radius_m * share * _spread(number) for number, share in INNER_RINGS])
+    inside_m, _ = _project(gripper, gripper_to_object, surface, inner)
+    sealed &= (inside_m >= ring_m.min(1)[:, None] - gripper.ceiling_m).all(1)
+    sealed &= (inside_m <= ring_m.max(1)[:, None] + gripper.ceiling_m).all(1)
+    advance_m = np.where(sealed, middle_m, 0.0)
+    center_m = gripper_to_object[:, :3, 3] + (gripper.tip_depth_m + advance_m)[:, None] * rotation[:, :, 2]
+    return Seal(sealed, advance_m, center_m, np.where(sealed[:, None], inward, rotation[:, :, 2]))
+
+
+def _spread(number: int) -> np.ndarray:
+    angle = 2 * np.pi * np.arange(number) / number
+    return np.column_stack([np.cos(angle), np.sin(angle)])
+
+
+def _project(
+    gripper: SuctionGripper, gripper_to_object: np.ndarray, surface: RayCaster, offsets_m: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the depth ``(N, K)`` below the lip's plane (inf: nothing) and the normals ``(N, K, 3)`` under points of it."""
+    rotation, origin = gripper_to_object[:, :3, :3], gripper_to_object[:, :3, 3]
+    behind_m = gripper.reach_m + gripper.ceiling_m  # rays begin where a bump may reach
+    local = np.column_stack([offsets_m, np.full(len(offsets_m), gripper.tip_depth_m - behind_m)])
+    starts = np.einsum("nij,kj->nki", rotation, local) + origin[:, None]
+    along = np.repeat(rotation[:, None, :, 2], len(local), axis=1)
+    distance_m, face = surface.first_hits(starts.reshape(-1, 3), along.reshape(-1, 3))
+    normals = np.where(face[:, None] >= 0, surface.face_normals[face], 0.0)
+    return (distance_m - behind_m).reshape(along.shape[:2]), normals.reshape(along.shape)

@@ -1,0 +1,126 @@
+"""The grasp trial of a suction cup, in closed form: no solver, nothing to converge.
+
+A sealed object is as one with the cup, so what the lip must carry along the path follows from Newton and Euler: the
+object's weight and inertial force at its centre of mass. The bellows' own spring is left out. Where the lip lets go, the
+object moves on freely.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.geometry.poses import inverse
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics.hull_surface import union_surface
+from manitwin.physics.kept_for_hulls import KeptForHulls
+from manitwin.physics.suction_load import lip_load
+from manitwin.physics.suction_seal import seal
+from manitwin.physics.trial import TrialResult, TrialSettings
+from manitwin.physics.trial_phases import HandContacts, run_phases
+from manitwin.robots.grippers.gripper import Gripper, of_kind
+from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.suction import SuctionGripper
+
+
+class SuctionTrial:
+    """Try grasps of a suction cup one by one, exactly."""
+
+    name = "statics"
+
+    def __init__(self) -> None:
+        self._collision = KeptForHulls(HandCollision)
+
+    def run(
+        self,
+        body: RigidBody,
+        gripper: Gripper,
+        gripper_to_object: np.ndarray,
+        settings: TrialSettings,
+        joints_rad: np.ndarray | None = None,
+    ) -> list[TrialResult]:
+        """Try the grasps ``gripper_to_object (N, 4, 4)``; the vacuum's force is ``settings.force_n``.
+
+        The cup seals on the body's ``surface``, and on its hulls where it has none.
+        """
+        surface = RayCaster(union_surface(body.hulls)) if body.surface is None else body.surface
+        cup = of_kind(gripper, SuctionGripper)
+        found = seal(cup, gripper_to_object, surface)
+        pressed_on = gripper_to_object.copy()
+        pressed_on[:, :3, 3] += found.advance_m[:, None] * pressed_on[:, :3, 2]
+        overlaps = self._collision(body.hulls).overlaps(cup, pressed_on, opening_m=cup.opening_m, clearance_m=0.0)
+        results = []
+        for number, pose in enumerate(gripper_to_object):
+            object_to_hand = inverse(pose)
+            scene = _Scene(
+                body,
+                cup,
+                object_to_hand,
+                settings,
+                sealed=bool(found.sealed[number]),
+                overlaps=bool(overlaps[number]),
+                lip_center_m=object_to_hand[:3, :3] @ found.center_m[number] + object_to_hand[:3, 3],
+                inward=object_to_hand[:3, :3] @ found.inward[number],
+            )
+            results.append(run_phases(scene, object_to_hand[:3, :3], settings))
+        return results
+
+
+class _Scene:
+    """One cup and one object; the frame is the hand's."""
+
+    def __init__(
+        self,
+        body: RigidBody,
+        gripper: SuctionGripper,
+        object_to_hand: np.ndarray,
+        settings: TrialSettings,
+        *,
+        sealed: bool,
+        overlaps: bool,
+        lip_center_m: np.ndarray,
+        inward: np.ndarray,
+    ):
+        self.settings, self.mass_kg, self.lip_radius_m = settings, body.mass_kg, gripper.lip_radius_m
+        self.friction = (settings.finger_friction + body.friction_static) / 2
+        self.sealed, self.overlaps, self.inward = sealed, overlaps, inward
+        self.rotation = object_to_hand[:3, :3]
+        self.center_m = self.rotation @ body.center_of_mass_m + object_to_hand[:3, 3]
+        self.arm_m = self.center_m - lip_center_m
+        self.on, self.velocity_m_s = False, np.zeros(3)
+
+    def advance(self, loads_m_s2: np.ndarray) -> None:
+        """Take one step for each row of accelerations ``(N, 3)``: the lip carries them, or the object moves freely."""
+        if self.on:
+            share = lip_load(
+                self.mass_kg * loads_m_s2,
+                np.broadcast_to(self.arm_m, loads_m_s2.shape),
+                np.broadcast_to(self.inward, loads_m_s2.shape),
+                vacuum_force_n=self.settings.force_n,
+                friction=self.friction,
+                lip_radius_m=self.lip_radius_m,
+            )
+            beyond = np.flatnonzero(share > 1)
+            if not len(beyond):
+                return
+            self.on, loads_m_s2 = False, loads_m_s2[beyond[0] :]
+        step_s = self.settings.timestep_s
+        velocity_m_s = self.velocity_m_s + step_s * np.cumsum(loads_m_s2, axis=0)
+        self.center_m = self.center_m + step_s * velocity_m_s.sum(0)
+        self.velocity_m_s = velocity_m_s[-1]
+
+    def squeeze(self) -> None:
+        """Switch the vacuum on."""
+        self.on = self.sealed
+
+    def contacts(self) -> HandContacts:
+        """Return how hard the lip presses unloaded; where the gripper's body is in the object, it is there without end."""
+        return HandContacts((self.settings.force_n if self.on else 0.0,), np.inf if self.overlaps else 0.0)
+
+    def object_rotation(self) -> np.ndarray:
+        """Return the object's rotation in the hand's frame."""
+        return self.rotation
+
+    def center_of_mass_m(self) -> np.ndarray:
+        """Return the object's centre of mass in the hand's frame."""
+        return self.center_m

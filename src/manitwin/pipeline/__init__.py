@@ -1,0 +1,1 @@
+"""The paper's pipeline: one module a stage, and the recipe that lists them."""

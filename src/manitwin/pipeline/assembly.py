@@ -1,0 +1,144 @@
+"""Put a finished twin folder together, accepted or rejected."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manitwin.engine.stage import Draft, Stage
+from manitwin.engine.stage_runner import StageCost
+from manitwin.errors import Rejected
+from manitwin.formats.source_files import pack_source
+from manitwin.geometry.hulls.reduction import hull_to_obj
+from manitwin.pipeline.quality import rehearsal_checks
+from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
+from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
+from manitwin.twin.version import installed_version
+
+
+def assemble(
+    draft: Draft,
+    *,
+    kind: str,
+    stages: list[Stage],
+    costs: dict[str, StageCost],
+    config_sha256: str,
+    rejected: Rejected | None,
+    rejecting_stage: str | None,
+    fresh: Path,
+) -> TwinRecord:
+    """Write the twin's folder at ``fresh``, to be renamed into place; returns its record.
+
+    ``stages`` are those that ran, the rejecting one included. Where ``rejected`` is given, only the source and the reason
+    are kept.
+    """
+    shutil.rmtree(fresh, ignore_errors=True)
+    fresh.mkdir(parents=True)
+    source = _write_source(draft, kind, fresh)
+    record: dict[str, Any] = {
+        "twin_id": draft.twin_id,
+        "name": draft.item.name,
+        "status": "rejected" if rejected else "accepted",
+        "rejection": _rejection(rejected, rejecting_stage).model_dump() if rejected else None,
+        "source": source,
+        "provenance": {
+            "manitwin_version": installed_version(),
+            "config_sha256": config_sha256,
+            "seed": draft.seed,
+            "stages": {s.name: _provenance(s, draft) for s in stages},
+        },
+        "quality": {"checks": _checks_so_far(draft)},
+    }
+    if rejected is None:
+        _write_accepted(draft, fresh)
+        record |= _accepted_sections(draft)
+    run = {
+        "stages": {name: vars(cost) for name, cost in costs.items()},
+        "host": {"machine": platform.machine(), "system": platform.system(), "python": platform.python_version()},
+    }
+    write_bytes_atomically(fresh / RUN, canonical_json(run).encode())
+    return seal(fresh, record)
+
+
+def _provenance(stage: Stage, draft: Draft) -> dict[str, Any]:
+    return {
+        "version": stage.version,
+        "backend": stage.backend,
+        "model": _model(stage, draft),
+        "rehearsal": stage.name in draft.rehearsed,
+    }
+
+
+def _checks_so_far(draft: Draft) -> list[dict[str, Any]]:
+    """Return the checks of a twin that was rejected; those of an accepted one take their place."""
+    return [*(check.model_dump() for check in rehearsal_checks(draft)), *draft.fields.get("gate", {}).get("checks", [])]
+
+
+def _model(stage: Stage, draft: Draft) -> str | None:
+    """Return which model did a stage; a generator may know it only afterwards (lift: the primitive that fits)."""
+    if stage.name == "generate" and "generation" in draft.fields:
+        return stage.model or draft.field("generation")["model"]
+    return stage.model
+
+
+def _write_source(draft: Draft, kind: str, folder: Path) -> dict[str, Any]:
+    item = draft.item
+    if item.file is None:
+        name, content = "prompt.txt", (item.text or "").encode()
+    else:
+        beside = [] if item.given is None else [Path(item.given)]
+        name, content = pack_source(Path(item.file), beside)
+    (folder / name).write_bytes(content)
+    return {
+        "kind": kind,
+        "file": name,
+        "sha256": hashlib.sha256(content).hexdigest(),
+        "prompt": item.text,
+        "license": item.license or "unknown",
+        "attribution": item.attribution,
+    }
+
+
+def _rejection(rejected: Rejected, stage: str | None) -> Rejection:
+    named = rejected.stage or stage or ""
+    if rejected.reason not in REJECTION_REASONS.get(named, frozenset()):
+        named = next((s for s, reasons in REJECTION_REASONS.items() if rejected.reason in reasons), named)
+    return Rejection(stage=named, reason=rejected.reason, detail=rejected.detail)
+
+
+def _write_accepted(draft: Draft, folder: Path) -> None:
+    for name in ("visual.glb", "grasps.parquet", "card.png"):
+        shutil.copyfile(draft.path(name), folder / name)
+    (folder / "views").mkdir()
+    for artifact in ("views/", "marked/"):
+        for picture in sorted(draft.path(artifact).iterdir()):
+            shutil.copyfile(picture, folder / "views" / picture.name)
+    (folder / "collision").mkdir()
+    with np.load(draft.path("hulls.npz")) as hulls:
+        for index, name in enumerate(sorted(hulls.files)):
+            (folder / "collision" / f"hull_{index:02d}.obj").write_bytes(hull_to_obj(hulls[name]))
+
+
+def _accepted_sections(draft: Draft) -> dict[str, Any]:
+    geometry, collision, points = draft.field("geometry"), draft.field("collision"), draft.field("points")
+    mesh = {key: geometry[key] for key in ("vertices", "faces", "watertight", "components", "euler_number", "repairs")}
+    with np.load(draft.path("solid.npz")) as solid:
+        triangles = solid["vertices"][solid["faces"]]
+    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    mesh["volume_m3"] = float(np.einsum("ij,ij->", triangles[:, 0], cross) / 6)
+    mesh["area_m2"] = float(np.linalg.norm(cross, axis=1).sum() / 2)
+    mesh["hulls"] = {key: value for key, value in collision.items() if key not in ("method", "notes")}
+    return {
+        "mesh": mesh,
+        "physical": draft.field("physical"),
+        "language": draft.field("language"),
+        "points": {"candidates": draft.field("candidates"), **points},
+        "grasps": draft.field("grasps"),
+        "placements": draft.field("placements"),
+        "quality": draft.field("quality"),
+    }

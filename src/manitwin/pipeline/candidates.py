@@ -1,0 +1,110 @@
+"""The points among which functional and grasp points are chosen, and pictures that show them by number."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import trimesh
+from PIL import Image
+
+from manitwin.config import CandidatesConfig, Resource
+from manitwin.engine.stage import Draft
+from manitwin.errors import Rejected
+from manitwin.formats.glb import read_glb
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
+from manitwin.pipeline.views import write_webp
+from manitwin.render.cameras import Camera, project
+from manitwin.render.markers import draw_markers, font_px
+from manitwin.render.raycast import merged, silhouette, visible_points
+
+ON_SURFACE_M = 0.001  # a candidate is on the surface that is seen, to a millimetre (half of what a twin may be off)
+ON_SURFACE_SHARE = 0.01  # and of small objects to this share of the longest side
+
+
+class CandidatesStage:
+    """Sample the surface, keep 42 far-apart points and mark them on the views (paper, "Point Sampling and Selection").
+
+    Only what some view shows is sampled: nobody can choose a point that no picture shows. Fields: ``candidates``
+    ``{positions_m, normals}`` in the object frame; ``visible_candidates``, for each view the ids (rows of
+    ``candidates``) that are drawn on it. The number on a picture is the id.
+    """
+
+    name: ClassVar[str] = "candidates"
+    version: ClassVar[str] = "2"
+    reads: ClassVar[tuple[str, ...]] = ("solid.npz", "visual.glb", "views/", "cameras", "physical")
+    writes: ClassVar[tuple[str, ...]] = ("marked/", "candidates", "visible_candidates")
+    needs: ClassVar[Resource] = "cpu"
+    backend = "builtin"
+    model: str | None = None
+
+    def __init__(self, settings: CandidatesConfig):
+        self.settings = settings
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Choose and mark the candidates; raises Rejected where the solid does not follow the surface that is seen."""
+        with np.load(draft.path("solid.npz")) as arrays:
+            solid = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+        caster = RayCaster(merged(read_glb(draft.path("visual.glb"))))
+        scale = draft.field("physical")["scale_applied"]
+        cameras = [Camera.from_json(value).scaled(scale) for value in draft.field("cameras")]
+        positions, normals, visible = choose_candidates(
+            solid,
+            caster,
+            cameras,
+            samples=self.settings.samples,
+            count=self.settings.count,
+            rng=np.random.default_rng(draft.seed),
+        )
+        (folder / "marked").mkdir(parents=True, exist_ok=True)
+        for index, (camera, seen) in enumerate(zip(cameras, visible, strict=True)):
+            view = np.asarray(Image.open(draft.path("views/") / f"rgb_{index:02d}.webp").convert("RGB"))
+            marked = draw_markers(
+                view,
+                project(positions[seen], camera)[0],
+                [str(i) for i in seen],
+                occupied=silhouette(caster, camera),
+                font_px=font_px(camera.height_px),
+            )
+            write_webp(marked, folder / "marked" / f"marked_{index:02d}.webp", self.settings.webp_quality)
+        return {
+            "candidates": {"positions_m": positions.tolist(), "normals": normals.tolist()},
+            "visible_candidates": [[int(i) for i in seen] for seen in visible],
+        }
+
+
+def choose_candidates(
+    solid: trimesh.Trimesh,
+    caster: RayCaster,
+    cameras: list[Camera],
+    *,
+    samples: int,
+    count: int,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
+    """Return positions ``(count, 3)`` m, outward normals ``(count, 3)``, and for each camera the ids that it sees.
+
+    The first point is the one farthest from the middle of all that is seen; each next one the farthest from those
+    before (paper, eq. 1). Raises Rejected where fewer than ``count`` samples are seen.
+    """
+    points, normals, _ = sample_surface(solid, samples, rng)
+    tolerance_m = seen_tolerance_m(solid.extents)
+    seen = np.stack([visible_points(points, normals, camera, caster, tolerance_m) for camera in cameras])
+    shown = np.flatnonzero(seen.any(0))
+    if len(shown) < count:
+        raise Rejected(
+            "degenerate",
+            f"only {len(shown)} of {samples} points of the repaired solid lie on the surface that the views show;"
+            " close the holes of the mesh",
+            stage="gate",
+        )
+    start = int(((points[shown] - points[shown].mean(0)) ** 2).sum(1).argmax())
+    chosen = shown[farthest_point_sampling(points[shown], count, start)]
+    return points[chosen], normals[chosen], [np.flatnonzero(row[chosen]) for row in seen]
+
+
+def seen_tolerance_m(extents_m: np.ndarray) -> float:
+    """Return how far (m) a candidate may be off the surface that is seen, for an object of extents ``(3,)``."""
+    return min(ON_SURFACE_M, ON_SURFACE_SHARE * float(extents_m.max()))

@@ -1,0 +1,39 @@
+"""The caption stage: category, color, material, size, shape and function in words (paper, "Semantic Captioning")."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from manitwin.config import CaptionConfig, Resource
+from manitwin.engine.stage import Draft
+from manitwin.models.annotators.protocol import Annotator
+from manitwin.pipeline.subject import read_subject
+
+
+class CaptionStage:
+    """Ask the annotator for words."""
+
+    name: ClassVar[str] = "caption"
+    version: ClassVar[str] = "1"
+    reads: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "views/", "cameras", "geometry?")
+    writes: ClassVar[tuple[str, ...]] = ("language",)
+
+    def __init__(self, settings: CaptionConfig, annotator: Annotator):
+        self.settings = settings
+        self._annotator = annotator
+        self.backend = annotator.name
+        self.model = annotator.model_for("captions")
+        self.needs: Resource = annotator.needs
+        self.expected_usd = annotator.expected_usd("captions")
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Return ``language``."""
+        physical = draft.field("physical")
+        subject = read_subject(
+            draft, solid="solid.npz", visual="visual.glb", metric=True, scale=physical["scale_applied"]
+        )
+        language = self._annotator.describe(subject, physical["material"], np.array(physical["extents_m"]))
+        return {"language": language.model_dump()}

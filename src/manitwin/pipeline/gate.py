@@ -1,0 +1,133 @@
+"""The gate: one object, a real solid, of a size that hands can hold (paper, "Quality Gate")."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import trimesh
+
+from manitwin.config import GateConfig, Resource
+from manitwin.engine.stage import Draft
+from manitwin.errors import Rejected
+from manitwin.geometry.repair.components import separate_objects
+from manitwin.models.annotators.protocol import Annotator, QualityVerdict
+from manitwin.pipeline.subject import read_subject
+from manitwin.twin.record import Check
+
+
+class GateStage:
+    """Reject what geometry can tell is no single solid object, then ask the annotator what only an eye can tell.
+
+    Field ``gate``: ``checks`` in the order they were made. What nobody judged has ``passed`` None, never True.
+    """
+
+    name: ClassVar[str] = "gate"
+    version: ClassVar[str] = "1"
+    reads: ClassVar[tuple[str, ...]] = ("canonical.npz", "canonical.glb", "geometry", "views/", "cameras")
+    writes: ClassVar[tuple[str, ...]] = ("gate",)
+
+    def __init__(self, settings: GateConfig, annotator: Annotator | None = None):
+        """Take the settings and who looks at the views; without an annotator nothing is judged by eye."""
+        self.settings, self.annotator = settings, annotator
+        self.backend = "geometry" if annotator is None else annotator.name
+        self.model: str | None = None if annotator is None else annotator.model_for("quality")
+        self.needs: Resource = "cpu" if annotator is None else annotator.needs
+        self.expected_usd = 0.0 if annotator is None else annotator.expected_usd("quality")
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Return the field ``gate``; raises Rejected with the first check that fails, BackendError of the annotator."""
+        with np.load(draft.path("canonical.npz")) as arrays:
+            solid = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+        geometry = draft.field("geometry")
+        checks = [
+            check_watertight(geometry["watertight"], geometry["repairs"]),
+            check_positive_volume(solid, self.settings.min_thickness_share),
+            check_plausible_size(
+                solid, geometry["metric"], self.settings.min_longest_side_m, self.settings.max_longest_side_m
+            ),
+            check_single_object(
+                solid, self.settings.max_gap_share, self.settings.object_share, np.random.default_rng(draft.seed)
+            ),
+        ]
+        checks += seen_checks(self._verdict(draft, geometry["metric"]))
+        return {"gate": {"checks": [check.model_dump() for check in checks]}}
+
+    def _verdict(self, draft: Draft, metric: bool) -> QualityVerdict:
+        if self.annotator is None:
+            return QualityVerdict(None, None, "no annotator that sees")
+        return self.annotator.judge_quality(
+            read_subject(draft, solid="canonical.npz", visual="canonical.glb", metric=metric)
+        )
+
+
+def check_watertight(watertight: bool, repairs: list[str]) -> Check:
+    """Check that repair made a closed surface; raises Rejected not_watertight."""
+    if not watertight:
+        done = "; ".join(repairs) or "nothing could be done"
+        raise Rejected(
+            "not_watertight", f"no closed surface after repair ({done}); close the mesh in a modeller", "gate"
+        )
+    return Check(name="watertight", passed=True)
+
+
+def check_positive_volume(solid: trimesh.Trimesh, min_thickness_share: float) -> Check:
+    """Check that the solid is not inside out and thicker than a film; raises Rejected degenerate.
+
+    Thickness is twice the volume over the area: that of a plate with the same volume and area.
+    """
+    thickness_m = 2 * float(solid.volume) / float(solid.area) if solid.area > 0 else 0.0
+    limit_m = min_thickness_share * float(np.linalg.norm(np.ptp(solid.vertices, axis=0)))
+    if thickness_m <= limit_m:
+        what = "inside out" if thickness_m < 0 else "as thin as a film"
+        detail = (
+            f"the solid is {what}: mean thickness {thickness_m:.3g} m, at least {limit_m:.3g} m;"
+            " give a mesh that encloses a volume"
+        )
+        raise Rejected("degenerate", detail, "gate")
+    return Check(name="positive_volume", passed=True, value=thickness_m, limit=limit_m, message="mean thickness, m")
+
+
+def check_plausible_size(solid: trimesh.Trimesh, metric: bool, smallest_m: float, largest_m: float) -> Check:
+    """Check the longest side where the scale is known; raises Rejected absurd_size."""
+    side_m = float(np.ptp(solid.vertices, axis=0).max())
+    if not metric:
+        return Check(
+            name="plausible_size", passed=None, value=side_m, message="not judged: the mesh has no known scale yet"
+        )
+    if not smallest_m <= side_m <= largest_m:
+        detail = (
+            f"the longest side is {side_m:.4g} m, valid is {smallest_m:g} to {largest_m:g} m;"
+            " give the right units (m, cm, mm)"
+        )
+        raise Rejected("absurd_size", detail, "gate")
+    limit_m = smallest_m if side_m < np.sqrt(smallest_m * largest_m) else largest_m
+    return Check(
+        name="plausible_size", passed=True, value=side_m, limit=limit_m, message="longest side, m; the nearer limit"
+    )
+
+
+def check_single_object(
+    solid: trimesh.Trimesh, gap_share: float, object_share: float, rng: np.random.Generator
+) -> Check:
+    """Check that all large parts touch, nearly touch or enclose each other; raises Rejected several_objects."""
+    gap_m = gap_share * float(np.linalg.norm(np.ptp(solid.vertices, axis=0)))
+    found = separate_objects(solid, gap_m=gap_m, object_share=object_share, rng=rng)
+    if found.count > 1:
+        detail = f"{found.count} separate objects, more than {gap_m:.3g} m apart; give each object in a file of its own"
+        raise Rejected("several_objects", detail, "gate")
+    message = f"{found.specks} small parts float apart" if found.specks else ""
+    return Check(name="single_object", passed=True, value=float(found.count), limit=1.0, message=message)
+
+
+def seen_checks(verdict: QualityVerdict) -> list[Check]:
+    """Turn what was seen into checks; raises Rejected where the annotator said no."""
+    if verdict.single_object is False:
+        raise Rejected("several_objects", f"not one coherent object by its pictures: {verdict.detail}", "gate")
+    if verdict.visual_quality is False:
+        raise Rejected("poor_quality", f"severe artifacts in its pictures: {verdict.detail}", "gate")
+    return [
+        Check(name=name, passed=passed, message=verdict.detail if passed else f"not judged: {verdict.detail}")
+        for name, passed in (("one_coherent_object", verdict.single_object), ("visual_quality", verdict.visual_quality))
+    ]

@@ -1,0 +1,54 @@
+"""Paper, Asset Generation: a 3D generator turns the matted photo, or a text, into a mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from PIL import Image
+
+from manitwin.config import GenerateConfig, Resource
+from manitwin.engine.stage import Draft
+from manitwin.models.generators.mesh_file import as_glb
+from manitwin.models.generators.protocol import GenerationRequest, Generator
+from manitwin.models.generators.run import run_generator
+
+
+class GenerateStage:
+    """Write ``generated.glb`` and the field ``generation``."""
+
+    name: ClassVar[str] = "generate"
+    version: ClassVar[str] = "4"
+    reads: ClassVar[tuple[str, ...]] = ("photo.png?",)
+    writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
+
+    def __init__(self, settings: GenerateConfig, generator: Generator, submit_again: bool = False):
+        """Take the settings, who generates, and whether a submit of unknown outcome may be made again (it may pay twice)."""
+        self.settings, self._submit_again = settings, submit_again
+        self.generator = generator
+        self.backend: str = generator.name
+        self.model: str | None = generator.model
+        self.needs: Resource = generator.needs
+        self.expected_usd = generator.usd_per_job
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Generate; raises Rejected ``generator_failed``, or BackendError where the generator cannot work now."""
+        rgba = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
+        request = GenerationRequest(rgba=rgba, text=draft.item.text, name=draft.item.name, seed=draft.seed)
+        made = run_generator(
+            self.generator, request, folder, settings=self.settings, jobs=draft.jobs, submit_again=self._submit_again
+        )
+        content = as_glb(made.path)
+        made.path.unlink()
+        (folder / "generated.glb").write_bytes(content)
+        return {
+            "generation": {
+                "generator": self.generator.name,
+                "model": made.model,
+                "metric": made.metric,
+                "rests": made.rests,
+                "unseen_share": made.unseen_share,
+                "notes": made.notes,
+            }
+        }

@@ -1,0 +1,63 @@
+"""What the chosen generator can never make a mesh of: told before anything is begun."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from manitwin.config import BuildConfig
+from manitwin.engine.stage import Item
+from manitwin.errors import Rejected, Unavailable
+from manitwin.formats.sniff import sniff
+from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked
+from manitwin.models.registry import backends, create, factory
+
+
+def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
+    """Return what says why the chosen generator can never make a mesh of an item; None of one that it can be asked for.
+
+    The generator is created for the first item: what is wrong with it is raised then.
+    """
+
+    @cache
+    def asked_with() -> frozenset[Asked]:
+        return _asked_with(create("generator", config.generator, config))
+
+    def why(item: Item) -> str | None:
+        asked, called, other = "text", f"text ({item.text!r})", "a photo"
+        if item.file is not None:
+            if "image" in asked_with() or not _is_image(Path(item.file)):
+                return None
+            asked, called, other = "image", f"a photo ({Path(item.file).name})", "a text"
+        if asked in asked_with():
+            return None
+        able = ", ".join(_generators_asked_with(asked))
+        return (
+            f"the generator {config.generator!r} makes no meshes of {called}; choose one that does with --generator"
+            f" ({able}), or give {other} or a mesh"
+        )
+
+    return why
+
+
+def _asked_with(generator: Any) -> frozenset[Asked]:
+    return getattr(generator, "asked_with", IMAGE_OR_TEXT)
+
+
+def _generators_asked_with(asked: str) -> list[str]:
+    """Return the names of the generators that may be asked with a text, or an image."""
+    found = []
+    for name in sorted(backends()["generator"]):
+        with suppress(Unavailable):  # of a package that is not whole: nobody can choose it now
+            found += [name] if asked in _asked_with(factory("generator", name)) else []
+    return found
+
+
+def _is_image(file: Path) -> bool:
+    try:
+        return sniff(file).kind == "image"
+    except Rejected:
+        return False

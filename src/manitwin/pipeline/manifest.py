@@ -1,0 +1,206 @@
+"""What to build: files, folders and CSV or JSONL manifests, as a list of items."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Literal, TextIO, cast, get_args
+
+from manitwin.engine.stage import Item
+from manitwin.errors import UsageError, choose_from
+from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
+from manitwin.pipeline.folder_listing import FolderListing, list_folder
+from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported, read_import_record
+
+MANIFEST_SUFFIXES = frozenset({".csv", ".jsonl"})
+COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution")
+
+Units = Literal["m", "cm", "mm", "auto"]
+Up = Literal["y", "z", "auto"]
+Refusal = Callable[[Item], str | None]
+
+
+@dataclass
+class Notes:
+    """Collect what a user should be told of the inputs: ``remarks`` are lines, ``folders`` say what became of each file."""
+
+    remarks: list[str] = field(default_factory=list)
+    folders: list[FolderListing] = field(default_factory=list)
+
+
+def collect_items(
+    inputs: Iterable[str | Path],
+    texts: Iterable[str] = (),
+    *,
+    name: str | None = None,
+    units: str = "auto",
+    up: str = "auto",
+    license: str | None = None,
+    attribution: str | None = None,
+    strict: bool = False,
+    refusal: Refusal = lambda item: None,
+) -> tuple[list[Item], Notes]:
+    """Turn what a user typed into items, in order, without repeats; returns them and what is to be said of the inputs.
+
+    The keyword arguments hold for every item whose manifest row does not say otherwise. Raises as ``iterate_items``.
+    """
+    defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
+    notes = Notes()
+    return list(dict.fromkeys(iterate_items(inputs, defaults, notes, texts, strict=strict, refusal=refusal))), notes
+
+
+def iterate_items(
+    inputs: Iterable[str | Path],
+    defaults: dict[str, str | None],
+    notes: Notes,
+    texts: Iterable[str] = (),
+    *,
+    strict: bool = False,
+    refusal: Refusal = lambda item: None,
+) -> Iterator[Item]:
+    """Yield the items one by one, so that a manifest may be of any length; notes are added at the end of each.
+
+    ``texts`` are things to make from words alone, after the ``inputs``. ``strict``: a column that nobody knows is an error.
+    ``refusal`` says of an item why nothing can ever be made of it.
+
+    Raises UsageError for a path that is not there, a folder without inputs, a manifest that cannot be read, an unknown
+    value, or an item that is refused.
+    """
+    defaults = {"units": "auto", "up": "auto", "name": None, "license": None, "attribution": None, **defaults}
+    for given in inputs:
+        path = Path(given)
+        if not path.exists():
+            raise UsageError(f"{given}: not there; give an image, a mesh, a folder, or a .csv or .jsonl manifest")
+        if path.is_dir():
+            yield from _allowed(_folder_items(path, str(given), defaults, notes), str(given), refusal)
+        elif path.suffix.lower() in MANIFEST_SUFFIXES:
+            yield from _manifest_items(path, defaults, notes, strict, refusal)
+        else:
+            yield from _allowed([_item({"file": str(path)}, Path.cwd(), defaults, str(path))], str(given), refusal)
+    for text in texts:
+        if not text.strip():
+            raise UsageError("an empty text; say what to make, such as 'a red mug'")
+        yield from _allowed([_item({"text": text}, Path.cwd(), defaults, text)], "--text", refusal)
+
+
+def _allowed(items: Iterable[Item], where: str, refusal: Refusal) -> Iterator[Item]:
+    for item in items:
+        why = refusal(item)
+        if why is not None:
+            raise UsageError(f"{where}: {why}")
+        yield item
+
+
+def _folder_items(folder: Path, given: str, defaults: dict[str, Any], notes: Notes) -> Iterator[Item]:
+    listing = list_folder(folder)
+    if not listing.inputs:
+        left = "".join(f"; {line.removeprefix(f'{folder}: ')}" for line in listing.remarks()[1:])
+        known = ", ".join(sorted(MESH_SUFFIXES | IMAGE_SUFFIXES))
+        raise UsageError(f"{given}: no image or mesh in this folder{left}; known: {known}")
+    yield from (_item({"file": str(p)}, Path.cwd(), defaults, str(folder)) for p in listing.inputs)
+    notes.folders.append(listing)
+    notes.remarks.extend(listing.remarks())
+
+
+def _manifest_items(
+    path: Path, defaults: dict[str, Any], notes: Notes, strict: bool, refusal: Refusal
+) -> Iterator[Item]:
+    unknown: dict[str, str] = {}
+    line = None
+    for line, row in _rows(path):
+        for column in sorted(map(str, row.keys() - set(COLUMNS) - unknown.keys())):
+            near = get_close_matches(column.lower().strip(), COLUMNS, n=1, cutoff=0.6)
+            unknown[column] = f"{column!r} (did you mean {near[0]!r}?)" if near else repr(column)
+            if strict:
+                raise UsageError(f"{path}: unknown column {unknown[column]}; valid: {', '.join(COLUMNS)}")
+        where = f"{path}:{line}"
+        yield from _allowed([_item(row, path.parent, defaults, where, unknown)], where, refusal)
+    if line is None:
+        raise UsageError(
+            f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"
+        )
+    if unknown:
+        notes.remarks.append(f"{path}: columns not used: {', '.join(unknown[c] for c in sorted(unknown))}")
+
+
+def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            yield from _csv_rows(path, stream) if path.suffix.lower() == ".csv" else _jsonl_rows(path, stream)
+    except UnicodeDecodeError as error:
+        raise UsageError(
+            f"{path}: not UTF-8 text ({error.reason} at byte {error.start}); save the manifest as UTF-8"
+        ) from error
+
+
+def _csv_rows(path: Path, stream: TextIO) -> Iterator[tuple[int, dict[str, Any]]]:
+    reader = csv.DictReader(stream)
+    for row in reader:
+        if None in row:
+            raise UsageError(f"{path}:{reader.line_num}: more values than columns; quote values that hold a comma")
+        yield reader.line_num, row
+
+
+def _jsonl_rows(path: Path, stream: TextIO) -> Iterator[tuple[int, dict[str, Any]]]:
+    for number, line in enumerate(stream, 1):
+        if not line.strip():
+            continue
+        try:
+            row = json.loads(line)
+        except json.JSONDecodeError as error:
+            raise UsageError(f"{path}:{number}: not JSON ({error.msg}); each line is one object") from error
+        if not isinstance(row, dict):
+            raise UsageError(
+                f"{path}:{number}: a line is one JSON object with 'file' or 'text', not {type(row).__name__}"
+            )
+        yield number, row
+
+
+def _item(
+    row: dict[str, Any], folder: Path, defaults: dict[str, Any], where: str, unknown: dict[str, str] | None = None
+) -> Item:
+    values = {
+        **defaults,
+        **{key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")},
+    }
+    file, text = values.get("file"), values.get("text")
+    if (file is None) == (text is None):
+        columns = f"; its unknown columns: {', '.join(unknown[c] for c in sorted(unknown))}" if unknown else ""
+        raise UsageError(f"{where}: a row has either 'file' or 'text'{columns}")
+    if file is not None:
+        path = Path(file) if Path(file).is_absolute() else folder / file
+        if path.is_dir() and is_imported(path):
+            return _imported_item(path.resolve(), values)
+        if not path.is_file():
+            raise UsageError(f"{where}: {path} is not there; paths are absolute or relative to the manifest")
+        file = str(path.resolve())
+    for key, kind in (("units", Units), ("up", Up)):
+        if values[key] not in get_args(kind):
+            raise UsageError(f"{where}: {choose_from(key, str(values[key]), get_args(kind))}")
+    return Item(
+        file=file,
+        text=text,
+        name=values["name"] or None,
+        units=cast(Units, values["units"]),
+        up=cast(Up, values["up"]),
+        license=values["license"],
+        attribution=values["attribution"],
+    )
+
+
+def _imported_item(folder: Path, values: dict[str, Any]) -> Item:
+    """Return the item of an imported asset; unit and axes are those that the import wrote, whatever the user says."""
+    given = read_import_record(folder / IMPORT_RECORD)
+    return Item(
+        file=str(folder / IMPORTED_MESH),
+        name=values["name"] or given.called,
+        units="m",
+        up="y",
+        license=values["license"] or given.license,
+        attribution=values["attribution"] or given.attribution,
+        given=str(folder / IMPORT_RECORD),
+    )

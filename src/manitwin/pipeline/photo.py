@@ -1,0 +1,54 @@
+"""Paper, Asset Generation: the photo is read and its object cut out of the background."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from PIL import Image
+
+from manitwin.config import MattingConfig, Resource
+from manitwin.engine.stage import Draft
+from manitwin.errors import InputError
+from manitwin.formats.image_file import read_image
+from manitwin.models.matting import matte_photo
+
+
+class PhotoStage:
+    """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
+
+    name: ClassVar[str] = "photo"
+    version: ClassVar[str] = "2"
+    reads: ClassVar[tuple[str, ...]] = ()
+    writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
+    needs: ClassVar[Resource] = "cpu"
+    backend: str = "classical"
+    model: str | None = None
+
+    def __init__(self, settings: MattingConfig):
+        self.settings = settings
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
+        if draft.item.file is None:
+            raise InputError("empty", "no image file; give one")
+        path, settings = Path(draft.item.file), self.settings
+        photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px)
+        matte = matte_photo(
+            photo.pixels,
+            path.name,
+            working_side_px=settings.working_side_px,
+            min_confidence=settings.min_confidence,
+            min_area_share=settings.min_area_share,
+            second_object_share=settings.second_object_share,
+        )
+        Image.fromarray(np.ascontiguousarray(matte.rgba)).save(folder / "photo.png", compress_level=3)
+        return {
+            "matte": {
+                "method": matte.method,
+                "confidence": matte.confidence,
+                "findings": [*photo.findings, *matte.findings],
+                "scores": matte.scores,
+            }
+        }

@@ -1,0 +1,164 @@
+"""The physical stage: true size, mass, friction, and how the mass is spread (paper, "Physical Property Estimation")."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import trimesh
+
+from manitwin.config import PhysicalConfig, Resource
+from manitwin.engine.stage import Draft
+from manitwin.errors import BadReply, Rejected
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.textures import bake_transform
+from manitwin.geometry.boxes import oriented_bounding_box
+from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
+from manitwin.models.annotators.priors import Interval, lookup
+from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
+from manitwin.pipeline.subject import findings_of, read_subject
+from manitwin.twin.record import Estimate, OrientedBox, Physical
+
+CONFIRMED = ("measured", "user")
+"""Sources that a plausibility check does not overrule (design: rejected where implausible and not confirmed)."""
+
+NOMINAL_WALL_M = 0.002
+"""The wall of an ordinary bottle or housing: what the centre of mass is compared with where no wall is known."""
+
+
+class PhysicalStage:
+    """Ask for size, mass and friction, scale the object, and compute the mass properties of its real shape."""
+
+    name: ClassVar[str] = "physical"
+    version: ClassVar[str] = "3"
+    reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras")
+    writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings")
+
+    def __init__(self, settings: PhysicalConfig, annotator: Annotator):
+        self.settings = settings
+        self._annotator = annotator
+        self.backend = annotator.name
+        self.model = annotator.model_for("physical")
+        self.needs: Resource = annotator.needs
+        self.expected_usd = annotator.expected_usd("physical")
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Write ``visual.glb`` and ``solid.npz`` in true metres; return ``physical`` and what speaks against it.
+
+        Raises Rejected where size, mass or density are beyond what a thing of this name has, BadReply where the
+        annotator gives neither mass nor density.
+        """
+        metric = bool(draft.field("geometry")["metric"])
+        subject = read_subject(draft, solid="canonical.npz", visual="canonical.glb", metric=metric)
+        estimates = self._annotator.estimate_physical(subject)
+        obb_extents, obb_to_object = oriented_bounding_box(subject.solid.vertices)
+        scale = size_scale(subject, estimates, float(obb_extents.max()))
+        obb_extents, obb_to_object[:3, 3] = obb_extents * scale, obb_to_object[:3, 3] * scale
+        solid = trimesh.Trimesh(subject.solid.vertices * scale, subject.solid.faces, process=False)
+        mass = mass_estimate(estimates, float(solid.volume))
+        self._check_size(draft.item.name, float(obb_extents.max()), estimates.longest_axis_m)
+        self._check_mass(draft.item.name, mass, float(solid.volume))
+        parts = [bake_transform(part, np.diag([scale, scale, scale, 1.0])) for part in subject.parts]
+        _write_meshes(draft, folder, solid, parts, scale, self.settings.max_texture_size)
+        properties, uncertainty = spread_mass(solid, mass.value, estimates.wall_thickness_m)
+        corners = np.array([part.bounds for part in parts])
+        physical = Physical(
+            extents_m=(corners[:, 1].max(0) - corners[:, 0].min(0)).tolist(),
+            obb=OrientedBox(extents_m=obb_extents.tolist(), obb_to_object=obb_to_object.tolist()),
+            scale_applied=scale,
+            material=estimates.material,
+            mass_kg=mass,
+            friction_static=estimates.friction_static,
+            friction_dynamic=estimates.friction_dynamic,
+            restitution=estimates.restitution,
+            density_kg_m3=mass.value / float(solid.volume),
+            center_of_mass_m=properties.center_of_mass_m.tolist(),
+            center_of_mass_uncertainty_m=uncertainty,
+            inertia_kg_m2=properties.inertia_kg_m2.tolist(),
+            mass_distribution="solid" if estimates.wall_thickness_m is None else "shell",
+        )
+        return {"physical": physical.model_dump(), "physical_findings": findings_of(estimates)}
+
+    def _check_size(self, name: str | None, longest_m: float, said: Estimate | None) -> None:
+        prior = lookup(name)
+        if prior is None or (said is not None and said.source in CONFIRMED):
+            return
+        if not _within(longest_m, prior.longest_axis_m, self.settings.size_margin):
+            raise Rejected(
+                "implausible_size",
+                f"{longest_m:.4g} m long, but a {prior.category} has {_span(prior.longest_axis_m)} m; "
+                "check units and name",
+            )
+
+    def _check_mass(self, name: str | None, mass: Estimate, volume_m3: float) -> None:
+        if mass.source in CONFIRMED:
+            return
+        prior = lookup(name)
+        if prior is not None and not _within(mass.value, prior.mass_kg, self.settings.mass_margin):
+            raise Rejected(
+                "implausible_mass",
+                f"{mass.value:.4g} kg, but a {prior.category} weighs {_span(prior.mass_kg)} kg; check the name",
+            )
+        density = mass.value / volume_m3
+        if not self.settings.min_density_kg_m3 <= density <= self.settings.max_density_kg_m3:
+            raise Rejected(
+                "implausible_mass",
+                f"{mass.value:.4g} kg in {volume_m3 * 1e6:.4g} ml is {density:.4g} kg/m3, as no object has; "
+                "check units and name",
+            )
+
+
+def size_scale(subject: Subject, estimates: PhysicalEstimates, longest: float) -> float:
+    """Return the factor to true size by the ``longest`` axis of the oriented box (paper); 1 for a metric mesh."""
+    if subject.metric or estimates.longest_axis_m is None:
+        return 1.0
+    return estimates.longest_axis_m.value / longest
+
+
+def mass_estimate(estimates: PhysicalEstimates, volume_m3: float) -> Estimate:
+    """Return the mass as said, or bulk density times volume; raises BadReply where neither is said."""
+    if estimates.mass_kg is not None:
+        return estimates.mass_kg
+    density = estimates.bulk_density_kg_m3
+    if density is None:
+        raise BadReply("the annotator gave neither a mass nor a bulk density; ask again or use rules")
+    return Estimate(
+        value=density.value * volume_m3,
+        low=density.low * volume_m3,
+        high=density.high * volume_m3,
+        source="density*volume",
+    )
+
+
+def spread_mass(solid: trimesh.Trimesh, mass_kg: float, wall_thickness_m: float | None) -> tuple[MassProperties, float]:
+    """Return mass properties, and how far (m) the centre of mass would be off if the mass were spread the other way.
+
+    With a wall thickness the closed skin is hollow: a shell. Without, the mesh is the matter itself or full: a solid.
+    """
+    as_solid = solid_mass_properties(solid, mass_kg)
+    as_shell = shell_mass_properties(solid, mass_kg, wall_thickness_m or NOMINAL_WALL_M)
+    uncertainty = float(np.linalg.norm(as_solid.center_of_mass_m - as_shell.center_of_mass_m))
+    return (as_solid if wall_thickness_m is None else as_shell), uncertainty
+
+
+def _write_meshes(
+    draft: Draft,
+    folder: Path,
+    solid: trimesh.Trimesh,
+    parts: list[trimesh.Trimesh],
+    scale: float,
+    max_texture_size: int,
+) -> None:
+    # An unscaled mesh keeps its file: encoding its textures again would only lose detail.
+    unscaled = draft.path("canonical.glb").read_bytes() if scale == 1.0 else None
+    (folder / "visual.glb").write_bytes(unscaled or write_glb(parts, max_texture_size=max_texture_size))
+    np.savez(folder / "solid.npz", vertices=np.asarray(solid.vertices), faces=np.asarray(solid.faces, dtype=np.int64))
+
+
+def _within(value: float, interval: Interval, margin: float) -> bool:
+    return interval.low / margin <= value <= interval.high * margin
+
+
+def _span(interval: Interval) -> str:
+    return f"{interval.low:.3g} to {interval.high:.3g}"

@@ -1,0 +1,86 @@
+"""The points stage: functional and grasp points among the candidates (paper, "VLM-Based Point Selection")."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from manitwin.config import PointsConfig, Resource
+from manitwin.engine.stage import Draft
+from manitwin.errors import BadReply
+from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints
+from manitwin.pipeline.subject import findings_of, pictures, read_subject
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.twin.record import FunctionalPoint, GraspPoint
+
+FUNCTIONAL, GRASP = (2, 4), (2, 3)
+"""How many points an object has (paper: 2-4 functional and 2-3 grasp points)."""
+
+
+class PointsStage:
+    """Ask the annotator for points, and see that each is one of the candidates."""
+
+    name: ClassVar[str] = "points"
+    version: ClassVar[str] = "3"
+    reads: ClassVar[tuple[str, ...]] = (
+        "solid.npz", "visual.glb", "views/", "marked/", "physical", "language", "candidates", "visible_candidates",
+        "cameras", "geometry?",
+    )  # fmt: skip
+    writes: ClassVar[tuple[str, ...]] = ("points", "points_findings")
+
+    def __init__(self, settings: PointsConfig, annotator: Annotator, gripper: Gripper):
+        self.settings = settings
+        self._annotator = annotator
+        self._gripper = gripper
+        self.backend = annotator.name
+        self.model = annotator.model_for("points")
+        self.needs: Resource = annotator.needs
+        self.expected_usd = annotator.expected_usd("points")
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Return ``points`` ``{functional, grasp}``; raises BadReply for too few, too many, or no candidates."""
+        candidates, physical = draft.field("candidates"), draft.field("physical")
+        request = PointsRequest(
+            subject=read_subject(
+                draft, solid="solid.npz", visual="visual.glb", metric=True, scale=physical["scale_applied"]
+            ),
+            positions_m=np.array(candidates["positions_m"]),
+            normals=np.array(candidates["normals"]),
+            marked_views=pictures(draft.path("marked/"), "marked"),
+            visible=tuple(tuple(ids) for ids in draft.field("visible_candidates")),
+            center_of_mass_m=np.array(physical["center_of_mass_m"]),
+            max_opening_m=self._gripper.opening_m,
+        )
+        selected = self._annotator.select_points(request)
+        check_selection(selected, request.positions_m)
+        return {
+            "points": {
+                "functional": [point.model_dump() for point in selected.functional],
+                "grasp": [point.model_dump() for point in selected.grasp],
+            },
+            "points_findings": findings_of(selected),
+        }
+
+
+def check_selection(selected: SelectedPoints, positions_m: np.ndarray) -> None:
+    """Raise BadReply where the points are not 2-4 and 2-3 different candidates at their places."""
+    _check_kind("functional", selected.functional, FUNCTIONAL, positions_m)
+    _check_kind("grasp", selected.grasp, GRASP, positions_m)
+
+
+def _check_kind(
+    kind: str,
+    points: tuple[FunctionalPoint, ...] | tuple[GraspPoint, ...],
+    limits: tuple[int, int],
+    positions_m: np.ndarray,
+) -> None:
+    if not limits[0] <= len(points) <= limits[1]:
+        raise BadReply(f"{len(points)} {kind} points, not {limits[0]} to {limits[1]}; ask the annotator again")
+    numbers = [point.candidate for point in points]
+    if len(set(numbers)) != len(numbers) or not all(0 <= i < len(positions_m) for i in numbers):
+        raise BadReply(f"{kind} points at candidates {numbers}, not different ones below {len(positions_m)}; ask again")
+    for point in points:
+        if not np.allclose(point.position_m, positions_m[point.candidate], atol=1e-6):
+            raise BadReply(f"{kind} point {point.id} is not at its candidate {point.candidate}; ask again")

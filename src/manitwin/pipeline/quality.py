@@ -1,0 +1,169 @@
+"""What was found about a twin that does not reject it: shown, counted, filterable."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from manitwin.engine.stage import Draft
+from manitwin.twin.record import Check
+
+UNCOVERED_LIMIT_M = 0.002
+"""Of the surface that no collision hull covers: more would let fingers sink in (reference study of hulls)."""
+
+CAVITY_LIMIT = 0.8
+"""Of the open cavity that the hulls keep: less, and a container holds visibly less than it shows."""
+
+CENTER_OF_MASS_LIMIT = 0.1
+"""Of the longest side: an uncertainty beyond it decides whether a grasp holds."""
+
+REHEARSAL = "rehearsal"
+"""The check that only fails, and is only there, where a rehearsal server stood in for a model."""
+
+ESTIMATES = ("mass_kg", "friction_static", "friction_dynamic", "restitution")
+
+
+def quality_checks(draft: Draft) -> list[dict[str, Any]]:
+    """Collect the gate's checks and the findings of the later stages, in the order of the stages."""
+    checks = [*rehearsal_checks(draft), *(Check(**check) for check in draft.field("gate")["checks"])]
+    if "matte" in draft.fields:
+        matte = draft.field("matte")
+        checks.append(
+            Check(
+                name="matte",
+                passed=not matte["findings"],
+                value=matte["confidence"],
+                message="; ".join(matte["findings"]),
+            )
+        )
+    checks += _unseen(draft)
+    findings = draft.field("geometry")["findings"]
+    checks.append(
+        Check(
+            name="input_as_declared",
+            passed=not findings,
+            value=float(len(findings)),
+            limit=0.0,
+            message="; ".join(findings),
+        )
+    )
+    for checks_of in (_physical_checks, _examined, _collision_checks, _grasp_checks, _placement_checks):
+        checks += checks_of(draft)
+    return [check.model_dump() for check in checks]
+
+
+def _unseen(draft: Draft) -> list[Check]:
+    """Return what the photo did not show, where the generator says how much of the surface that is."""
+    share = draft.field("generation").get("unseen_share") if "generation" in draft.fields else None
+    if share is None:
+        return []
+    message = "share of the surface that the photo does not show: its shape and colours are a guess" if share else ""
+    return [Check(name="every_side_seen", passed=not share, value=share, limit=0.0, message=message)]
+
+
+def rehearsal_checks(draft: Draft) -> list[Check]:
+    """Return the failed check of a twin that a rehearsal server had a part in; none for all others."""
+    if not draft.rehearsed:
+        return []
+    message = f"{rehearsed_words(draft.rehearsed)}; nothing of this twin is to be believed"
+    return [Check(name=REHEARSAL, passed=False, value=float(len(draft.rehearsed)), limit=0.0, message=message)]
+
+
+def rehearsed_words(stages: Iterable[str]) -> str:
+    """Say which stages a rehearsal server answered for."""
+    return f"a rehearsal server (manitwin fake), not a model, answered for {', '.join(sorted(stages))}"
+
+
+def _physical_checks(draft: Draft) -> list[Check]:
+    physical = draft.field("physical")
+    invented = [name for name in ESTIMATES if physical[name]["source"] == "default"]
+    unknown = physical["mass_kg"]["source"] == "prior:unknown"
+    uncertainty, longest = physical["center_of_mass_uncertainty_m"], max(physical["extents_m"])
+    return [
+        Check(
+            name="no_invented_number",
+            passed=not invented,
+            value=float(len(invented)),
+            limit=0.0,
+            message=f"no source for {', '.join(invented)}" if invented else "",
+        ),
+        Check(
+            name="category_known",
+            passed=not unknown,
+            value=draft.field("language")["category"],
+            message="no name given that the priors know: intervals are wide; give --name or a name in the manifest"
+            if unknown
+            else "",
+        ),
+        Check(
+            name="center_of_mass_known",
+            passed=uncertainty <= CENTER_OF_MASS_LIMIT * longest,
+            value=uncertainty,
+            limit=CENTER_OF_MASS_LIMIT * longest,
+            message="the centre of mass depends on how the mass is spread inside, which no surface shows",
+        ),
+    ]
+
+
+def _examined(draft: Draft) -> list[Check]:
+    """Return what spoke against the answers of an annotator that were examined."""
+    checks = []
+    for name, field in (("estimates_agree", "physical_findings"), ("points_agree", "points_findings")):
+        findings = draft.field(field)
+        if findings is not None:
+            checks.append(
+                Check(name=name, passed=not findings, value=float(len(findings)), message="; ".join(findings))
+            )
+    return checks
+
+
+def _collision_checks(draft: Draft) -> list[Check]:
+    collision = draft.field("collision")
+    uncovered, kept = collision["surface_uncovered_max_m"], collision["cavity_kept"]
+    checks = [
+        Check(
+            name="hulls_cover_surface",
+            passed=uncovered <= UNCOVERED_LIMIT_M,
+            value=uncovered,
+            limit=UNCOVERED_LIMIT_M,
+            message="largest distance of the surface from the collision hulls, m",
+        )
+    ]
+    if kept is not None:
+        checks.append(
+            Check(
+                name="container_stays_open",
+                passed=kept >= CAVITY_LIMIT,
+                value=kept,
+                limit=CAVITY_LIMIT,
+                message="share of the open cavity that the collision hulls keep",
+            )
+        )
+    return checks
+
+
+def _grasp_checks(draft: Draft) -> list[Check]:
+    grasps = draft.field("grasps")
+    return [
+        Check(
+            name="grasps_near_points",
+            passed=not grasps["association_radius_widened"],
+            value=grasps["association_radius_m"],
+            limit=0.03,
+            message="grasps were taken from farther than 3 cm around the points"
+            if grasps["association_radius_widened"]
+            else "",
+        ),
+        Check(
+            name="approach_directions",
+            passed=grasps["approach_octants"] >= 4,
+            message="octants of the approach direction among the verified grasps",
+            value=float(grasps["approach_octants"]),
+            limit=4.0,
+        ),
+    ]
+
+
+def _placement_checks(draft: Draft) -> list[Check]:
+    first = draft.field("placements")[0]
+    return [Check(name="rests_in_simulation", passed=first["settled"], value=first["probability"])]

@@ -1,0 +1,266 @@
+"""The paper's figure 2 as a list of stages, and the recipe that the engine follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Literal, cast
+
+from manitwin.config import BuildConfig
+from manitwin.engine.recipe import Ending, Identity, Tables
+from manitwin.engine.stage import Draft, Item, PaidStage, Stage
+from manitwin.engine.stage_order import INPUT
+from manitwin.engine.stage_runner import StageCost
+from manitwin.errors import Rejected, TwinError, UsageError
+from manitwin.formats.sniff import sniff
+from manitwin.formats.source_files import MESH_SUFFIXES
+from manitwin.models.annotators.given import KeepsGiven
+from manitwin.models.registry import create, target, without_url
+from manitwin.pipeline.assembly import assemble
+from manitwin.pipeline.candidates import CandidatesStage
+from manitwin.pipeline.caption import CaptionStage
+from manitwin.pipeline.collision import CollisionStage
+from manitwin.pipeline.finish import FinishStage
+from manitwin.pipeline.gate import GateStage
+from manitwin.pipeline.generate import GenerateStage
+from manitwin.pipeline.grasps import GraspsStage
+from manitwin.pipeline.gripper_kinds import KINDS
+from manitwin.pipeline.identity import twin_id
+from manitwin.pipeline.mesh import MeshStage
+from manitwin.pipeline.name_hint import NAME_HINT, name_would_help
+from manitwin.pipeline.photo import PhotoStage
+from manitwin.pipeline.physical import PhysicalStage
+from manitwin.pipeline.placement import PlacementStage
+from manitwin.pipeline.points import PointsStage
+from manitwin.pipeline.record_grasps import RecordGraspsStage
+from manitwin.pipeline.robustness import RobustnessStage
+from manitwin.pipeline.second_opinion import SecondOpinionStage
+from manitwin.pipeline.verify import VerifyStage
+from manitwin.pipeline.views import ViewsStage
+from manitwin.robots.grippers.gripper import Gripper, load_gripper
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.loggers import RUN
+from manitwin.twin.record import StageProvenance, TwinRecord
+from manitwin.twin.store import RECORD, parse_record, sha256_of_json
+
+Kind = Literal["image", "text", "mesh"]
+KINDS_OF_INPUT: tuple[Kind, ...] = ("image", "text", "mesh")
+
+
+def check_names(config: BuildConfig) -> None:
+    """Raise UsageError for a backend or gripper that cannot be had, before any work is begun."""
+    for kind in ("generator", "annotator", "grasper", "simulator"):
+        create(kind, getattr(config, kind), config)
+    target("simulator", config.second_simulator)
+    grippers = [gripper for gripper, _ in _grippers(config)]
+    if config.second_opinion.require_agreement:
+        _check_agreement(grippers, config)
+
+
+def log_choices(config: BuildConfig) -> None:
+    """Tell the log what twins are made with, and what of it is only the default."""
+    default = BuildConfig()
+    RUN.info("configuration %s, seed %d", config_sha256(config), config.seed)
+    for name in ("generator", "annotator", "grasper", "simulator", "second_simulator", "grippers"):
+        chosen = getattr(config, name)
+        why = "the default" if chosen == getattr(default, name) else "asked for"
+        RUN.info("%s: %s (%s)", name, chosen if isinstance(chosen, str) else ", ".join(chosen), why)
+
+
+def _check_agreement(grippers: list[Gripper], config: BuildConfig) -> None:
+    """Raise UsageError where agreement is asked for and nobody could give it: what is not judged is not accepted."""
+    if not config.second_opinion.enabled:
+        raise UsageError("second_opinion requires agreement and is not enabled; enable it, or require none")
+    alone = [gripper.name for gripper in grippers if KINDS[gripper.kind].second_simulator(config) is None]
+    if alone:
+        raise UsageError(
+            f"agreement is required, and no second engine can try the gripper {', '.join(alone)}; leave it out, or "
+            f"require none"
+        )
+
+
+def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
+    """Return the stages of the paper's pipeline for a kind of input, in order."""
+    annotator = KeepsGiven(create("annotator", config.annotator, config))
+    grippers = _grippers(config)
+    first = grippers[0][0]
+    return [
+        *_generation(kind, config),
+        MeshStage(config.mesh),
+        ViewsStage(config.views, annotator.picture_px),
+        GateStage(config.gate, annotator),
+        PhysicalStage(config.physical, annotator),
+        CollisionStage(config.collision),
+        PlacementStage(config.placement),
+        CaptionStage(config.caption, annotator),
+        CandidatesStage(config.candidates),
+        PointsStage(config.points, annotator, first),
+        *(stage for gripper, suffix in grippers for stage in _trials(gripper, suffix, config)),
+        RecordGraspsStage(config.second_opinion, grippers),
+        FinishStage(config.finish, first),
+    ]
+
+
+def _grippers(config: BuildConfig) -> list[tuple[Gripper, str]]:
+    """Return the grippers with the suffixes of their artifacts' names; raises UsageError where two have one name."""
+    grippers = [load_gripper(name) for name in config.grippers]
+    names = [gripper.name for gripper in grippers]
+    if len(set(names)) < len(names):
+        raise UsageError(f"grippers {', '.join(names)}: each may be named once")
+    return [(gripper, f"-{gripper.name}" if number else "") for number, gripper in enumerate(grippers)]
+
+
+def _trials(gripper: Gripper, suffix: str, config: BuildConfig) -> list[Stage]:
+    """Return the stages that propose and try the grasps of one gripper."""
+    kind = KINDS[gripper.kind]
+    simulator = create("simulator", kind.simulator(config), config)
+    stages: list[Stage] = [
+        GraspsStage(config.grasps, create("grasper", kind.grasper(config), config), gripper, suffix),
+        VerifyStage(config.verify, simulator, gripper, suffix),
+    ]
+    second = kind.second_simulator(config)
+    if config.second_opinion.enabled and second is not None:
+        other = create("simulator", second, config)
+        stages.append(SecondOpinionStage(config.second_opinion, config.verify, simulator, other, gripper, suffix))
+    if config.robustness.enabled:
+        stages.append(RobustnessStage(config.robustness, config.verify, simulator, gripper, suffix))
+    return stages
+
+
+def _generation(kind: Kind, config: BuildConfig) -> list[Stage]:
+    if kind == "mesh":
+        return []
+    photo: list[Stage] = [PhotoStage(config.matting)] if kind == "image" else []
+    generator = create("generator", config.generator, config)
+    return [*photo, GenerateStage(config.generate, generator, config.services.submit_again)]
+
+
+def config_sha256(config: BuildConfig) -> str:
+    """Return the digest of all in the configuration that decides a twin, but the seed, which a twin states by itself.
+
+    Grippers count by their content: a changed file is another configuration.
+    """
+    decides = config.model_dump(mode="json", exclude={"seed", "item_timeout_s", "services", "run"})
+    decides["grippers"] = [gripper.sha256 for gripper, _ in _grippers(config)]
+    decides |= {kind: without_url(decides[kind]) for kind in ("generator", "annotator", "grasper")}
+    del decides["vlm"]["prompts"]  # their content counts, as part of what each stage is asked with
+    return sha256_of_json(decides)
+
+
+def is_current(record: TwinRecord, config: BuildConfig) -> bool:
+    """Tell whether a record is what this configuration and seed, and the stages as they are now, would make."""
+    if (record.provenance.config_sha256, record.provenance.seed) != (config_sha256(config), config.seed):
+        return False
+    now = {stage.name: _decided_by(stage) for stage in stages_for(record.source.kind, config)}
+    ran = {name: _decided_by(stage) for name, stage in record.provenance.stages.items()}
+    if "generate" in ran and "generate" in now and now["generate"][2] is None:
+        ran["generate"] = (*ran["generate"][:2], None)  # which model it was, this generator knows only afterwards
+    if record.status == "accepted":
+        return ran == now
+    return all(now.get(name) == identity for name, identity in ran.items())
+
+
+def _decided_by(stage: Stage | StageProvenance) -> tuple[str, str, str | None]:
+    return stage.version, stage.backend, stage.model
+
+
+@dataclass(frozen=True)
+class TwinRecipe:
+    """What the engine makes of an item: a twin. ``tables`` are kept of the twins while a run goes on."""
+
+    config: BuildConfig
+    tables: Tables | None = None
+
+    @cached_property
+    def sha256(self) -> str:
+        """The digest of the configuration and of every stage that there is."""
+        stages = [
+            [kind, stage.name, stage.version, stage.backend, stage.model]
+            for kind in KINDS_OF_INPUT
+            for stage in stages_for(kind, self.config)
+        ]
+        return sha256_of_json([config_sha256(self.config), self.config.seed, stages])
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything random."""
+        return self.config.seed
+
+    @property
+    def record(self) -> str:
+        """The record of a twin."""
+        return RECORD
+
+    def folder_of(self, twin_id: str) -> str:
+        """Return the twin's folder."""
+        return twin_name(twin_id)
+
+    def identify(self, item: Item) -> Identity:
+        """Return the id by the input's bytes, and its kind by what they are, not by what they claim to be."""
+        identity = twin_id(item)
+        if item.file is None:
+            return Identity(identity, "text")
+        try:
+            return Identity(identity, sniff(Path(item.file)).kind)
+        except Rejected as answer:
+            return Identity(identity, _claimed_kind(item), answer)
+
+    def stages(self, kind: str) -> list[Stage]:
+        """Return the stages of the paper's pipeline for a kind of input, in order."""
+        return stages_for(cast(Kind, kind), self.config)
+
+    def finish(
+        self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
+    ) -> Ending:
+        """Write the twin's folder."""
+        names = [*costs, *([stage] if rejected is not None and stage != INPUT else [])]
+        ran = [s for s in self.stages(kind) if s.name in names]
+        record = assemble(
+            draft,
+            kind=kind,
+            stages=ran,
+            costs=costs,
+            config_sha256=config_sha256(self.config),
+            rejected=rejected,
+            rejecting_stage=stage,
+            fresh=fresh,
+        )
+        return ending_of(record)
+
+    def ending_of(self, record: bytes) -> Ending | None:
+        """Return how a finished twin ended; None where this recipe would make another one."""
+        try:
+            twin = parse_record(record)
+        except TwinError:
+            return None  # unreadable or of another version: built again
+        return ending_of(twin) if is_current(twin, self.config) else None
+
+
+def ending_of(record: TwinRecord) -> Ending:
+    """Return how a twin's record says that its item ended."""
+    reason = record.rejection.reason if record.rejection is not None else None
+    if record.rejection is not None:
+        detail = record.rejection.detail
+    else:
+        detail = f"{record.grasps.verified} of {record.grasps.simulated} grasps verified" if record.grasps else ""
+    if record.provenance.rehearsed:
+        detail += "; a rehearsal"
+    return Ending(record.status, record.revision, reason, detail, NAME_HINT if name_would_help(record) else None)
+
+
+def _claimed_kind(item: Item) -> Kind:
+    """Return what an input claims to be: for a file, by its suffix."""
+    if item.file is None:
+        return "text"
+    return "mesh" if Path(item.file).suffix.lower() in MESH_SUFFIXES else "image"
+
+
+def estimate_usd(config: BuildConfig) -> dict[str, float]:
+    """Return about what services charge for a twin, by the kind of its input."""
+    return {kind: expected_usd(stages_for(kind, config)) for kind in KINDS_OF_INPUT}
+
+
+def expected_usd(stages: list[Stage]) -> float:
+    """Return about what services charge for a twin that goes through these stages."""
+    return sum(stage.expected_usd for stage in stages if isinstance(stage, PaidStage))

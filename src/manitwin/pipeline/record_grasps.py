@@ -1,0 +1,209 @@
+"""Put together what all trials found: the table of grasps, best first, and the summary of every gripper."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manitwin.config import Resource, SecondOpinionConfig
+from manitwin.engine.stage import Draft
+from manitwin.errors import Rejected
+from manitwin.geometry.grasp_diversity import approach_octants
+from manitwin.pipeline.grasps import PROPOSALS, PROPOSED, UNFILTERED
+from manitwin.pipeline.robustness import ROBUSTNESS, ROBUSTNESS_FILE, rank_values
+from manitwin.pipeline.second_opinion import AGREEMENT, FAILS, NOT_TRIED, SECOND_OPINION
+from manitwin.pipeline.verify import TRIAL, VERDICTS
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.twin.grasp_table import JITTERED, GripperRows, write_grasp_table
+from manitwin.twin.record import FailureTable, GraspSummary, OtherGripper
+
+TABLE = "grasps.parquet"
+
+
+class RecordGraspsStage:
+    """Write ``grasps.parquet`` and the field ``grasps`` for the twin's first gripper and all others."""
+
+    name = "record_grasps"
+    version = "1"
+    writes: tuple[str, ...] = (TABLE, "grasps")
+    needs: Resource = "cpu"
+    backend = "builtin"
+    model: str | None = None
+
+    def __init__(self, settings: SecondOpinionConfig, grippers: list[tuple[Gripper, str]]):
+        """Take whether both engines must agree, and the grippers with the suffixes of their artifacts, the first one first."""
+        self.settings, self.grippers = settings, grippers
+        self.model = ", ".join(f"{gripper.name} {gripper.sha256[:12]}" for gripper, _ in grippers)
+        kinds = [PROPOSALS, PROPOSED, VERDICTS, TRIAL]
+        optional = [SECOND_OPINION, AGREEMENT, ROBUSTNESS_FILE, ROBUSTNESS]
+        self.reads: tuple[str, ...] = (
+            "points",
+            *(name.format(suffix) for _, suffix in grippers for name in kinds),
+            *(f"{name.format(suffix)}?" for _, suffix in grippers for name in optional),
+        )
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Write the table and return the summary; raises Rejected where engines must agree and do so on no grasp."""
+        types = {point["id"]: point["type"] for point in draft.field("points")["grasp"]}
+        labels = {point["id"]: point["label"] for point in draft.field("points")["functional"]}
+        parts: list[dict[str, list[Any]]] = []
+        summaries: list[GraspSummary | None] = []
+        held_points: list[set[str]] = []
+        for gripper, suffix in self.grippers:
+            rows, controls = self._rows(draft, gripper, suffix)
+            parts += [rows.columns(_best_first(rows)), *controls]
+            summaries.append(_summary(draft, gripper, suffix, rows, types, labels))
+            chosen = (rows.outcome == "held") & ~_unfiltered(rows)
+            if self.settings.require_agreement and not suffix and not chosen.any():
+                raise _none_agreed(draft, rows)
+            held_points.append(set(rows.proposals["grasp_point_id"][chosen].tolist()))
+        write_grasp_table(folder / TABLE, parts)
+        others = {
+            gripper.name: _other(draft, suffix, summary, held_points[0], points)
+            for (gripper, suffix), summary, points in zip(
+                self.grippers[1:], summaries[1:], held_points[1:], strict=True
+            )
+        }
+        first = summaries[0]
+        if first is None:
+            raise AssertionError("the first gripper has proposals, or the object was rejected")
+        return {"grasps": first.model_copy(update={"other_grippers": others}).model_dump(mode="json")}
+
+    def _rows(self, draft: Draft, gripper: Gripper, suffix: str) -> tuple[GripperRows, list[dict[str, list[Any]]]]:
+        """Return the rows of the proposals, and the columns of the jittered controls where there are any."""
+        proposals, verdicts = _arrays(draft, PROPOSALS.format(suffix)), _arrays(draft, VERDICTS.format(suffix))
+        count = len(proposals["score"])
+        ids = [f"{gripper.name}-{number:04d}" for number in range(count)]
+        holds: list[bool | None] = [None] * count
+        outcome = verdicts["outcome"]
+        controls = []
+        if SECOND_OPINION.format(suffix) in draft.paths:
+            second = _arrays(draft, SECOND_OPINION.format(suffix))
+            holds = [None if value == NOT_TRIED else bool(value) for value in second["holds"]]
+            if self.settings.require_agreement:
+                refused = (outcome == "held") & (second["holds"] == FAILS)
+                outcome = np.where(refused, second["outcome"], outcome)
+            controls.append(_controls(gripper, proposals, second, ids))
+        shares: list[float | None] = [None] * count
+        trials: list[int | None] = [None] * count
+        if ROBUSTNESS_FILE.format(suffix) in draft.paths:
+            again = _arrays(draft, ROBUSTNESS_FILE.format(suffix))
+            shares = [float(h / n) if n else None for h, n in zip(again["held"], again["trials"], strict=True)]
+            trials = [int(n) if n else None for n in again["trials"]]
+        rows = GripperRows(
+            gripper.name,
+            proposals,
+            outcome,
+            verdicts["displacement_m"],
+            verdicts["rotation_rad"],
+            holds,
+            shares,
+            trials,
+            ids,
+        )
+        return rows, controls
+
+
+def _none_agreed(draft: Draft, rows: GripperRows) -> Rejected:
+    """Say what became in the second engine of all that held in the first."""
+    held = (_arrays(draft, VERDICTS.format(""))["outcome"] == "held") & ~_unfiltered(rows)
+    counted = ", ".join(f"{n} {outcome}" for outcome, n in sorted(Counter(rows.outcome[held].tolist()).items()))
+    engine, second = (draft.field(name.format(""))["engine"] for name in (TRIAL, AGREEMENT))
+    return Rejected("none_held", f"of {held.sum()} grasps that held in {engine} none holds in {second}: {counted}")
+
+
+def _arrays(draft: Draft, name: str) -> dict[str, np.ndarray]:
+    with np.load(draft.path(name)) as arrays:
+        return dict(arrays)
+
+
+def _unfiltered(rows: GripperRows) -> np.ndarray:
+    return np.char.endswith(rows.proposals["proposer"], UNFILTERED)
+
+
+def _best_first(rows: GripperRows) -> np.ndarray:
+    """Order: held before failed, robust before fragile, unfiltered last; else as proposed."""
+    trials = np.array([n or 0 for n in rows.robustness_trials])
+    held = np.array([round((share or 0.0) * n) for share, n in zip(rows.robustness, trials, strict=True)], int)
+    rank = rank_values(held, trials)
+    return np.lexsort((np.arange(len(rank)), -rank, rows.outcome != "held", _unfiltered(rows)))
+
+
+def _controls(
+    gripper: Gripper, proposals: dict[str, np.ndarray], second: dict[str, np.ndarray], ids: list[str]
+) -> dict[str, list[Any]]:
+    of = second["jittered_of"]
+    moved = {name: values[of] for name, values in proposals.items()}
+    moved["gripper_to_object"] = second["jittered_gripper_to_object"]
+    moved["proposer"] = np.char.add(moved["proposer"], JITTERED)
+    rows = GripperRows(
+        gripper.name,
+        moved,
+        second["jittered_outcome"],
+        second["jittered_displacement_m"],
+        second["jittered_rotation_rad"],
+        [bool(value) for value in second["jittered_holds"]],
+        [None] * len(of),
+        [None] * len(of),
+        [f"{ids[i]}{JITTERED}" for i in of],
+    )
+    return rows.columns(np.arange(len(of)))
+
+
+def _summary(
+    draft: Draft, gripper: Gripper, suffix: str, rows: GripperRows, types: dict[str, str], labels: dict[str, str]
+) -> GraspSummary | None:
+    proposed = draft.field(PROPOSED.format(suffix))
+    if "none_because" in proposed:
+        return None
+    unfiltered = _unfiltered(rows)
+    held = rows.outcome == "held"
+    verified = held & ~unfiltered
+    return GraspSummary(
+        gripper=gripper.name,
+        gripper_sha256=gripper.sha256,
+        proposed=proposed["proposed"],
+        proposed_by_filter=proposed["proposed_by_filter"],
+        simulated=int((~unfiltered).sum()),
+        verified=int(verified.sum()),
+        success_rate=float(held[~unfiltered].mean()),
+        unfiltered_simulated=int(unfiltered.sum()),
+        unfiltered_success_rate=float(held[unfiltered].mean()) if unfiltered.any() else None,
+        failures=dict(sorted(Counter(rows.outcome[~held & ~unfiltered].tolist()).items())),
+        approach_octants=len(np.unique(approach_octants(rows.proposals["gripper_to_object"][verified]))),
+        file=TABLE,
+        association_radius_m=proposed["association_radius_m"],
+        association_radius_widened=proposed["association_radius_widened"],
+        share_beyond_3cm=proposed["share_beyond_3cm"],
+        trial=draft.field(TRIAL.format(suffix)),
+        failure_table=FailureTable(
+            by_grasp_type=_outcomes_by(rows, "grasp_point_id", types, ~unfiltered),
+            by_region=_outcomes_by(rows, "functional_point_id", labels, ~unfiltered),
+        ),
+        second_opinion=draft.fields.get(AGREEMENT.format(suffix)),
+        robustness=draft.fields.get(ROBUSTNESS.format(suffix)),
+    )
+
+
+def _outcomes_by(rows: GripperRows, column: str, names: dict[str, str], which: np.ndarray) -> dict[str, dict[str, int]]:
+    """Count outcomes of the rows ``which`` by the name of their nearest point."""
+    counts: dict[str, Counter[str]] = defaultdict(Counter)
+    for point, outcome in zip(rows.proposals[column][which].tolist(), rows.outcome[which].tolist(), strict=True):
+        counts[names[point]][outcome] += 1
+    return {name: dict(sorted(counter.items())) for name, counter in sorted(counts.items())}
+
+
+def _other(
+    draft: Draft, suffix: str, summary: GraspSummary | None, first_holds: set[str], holds: set[str]
+) -> OtherGripper:
+    because = draft.field(PROPOSED.format(suffix)).get("none_because") or {}
+    return OtherGripper(
+        summary=summary,
+        reason=because.get("reason"),
+        detail=because.get("detail"),
+        transferable=len(first_holds),
+        transferred=len(first_holds & holds),
+    )

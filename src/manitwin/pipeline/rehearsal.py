@@ -1,0 +1,205 @@
+"""A recipe without meshes, to rehearse a run: stages that do nothing, or fail as the item's text says.
+
+The text of an item is words apart by spaces, each ``what:stage`` or ``what:stage:more``:
+
+    reject:b              the stage rejects the item
+    raise:b               it raises an error, each time
+    segfault:b            it kills its process with SIGSEGV, each time
+    segfault-once:b       the first time only
+    hang:b                it does not end
+    unavailable:b:/file   it raises Unavailable while that file is there
+    limited:b:/file       it raises RateLimited (0.2 s) while that file is there
+    denied:b:/file        it raises AccessDenied while that file is there
+    charge:b:0.02         a service charges so many USD, each time
+    sleep:b:1.5           it takes so many seconds
+    parts:b:/file         it says that one of two things is done, and waits until that file is there
+    wait:b:/file          it does not end before that file is there
+
+Every run of a stage adds a line ``<twin_id> <stage>`` to the recipe's log, so that a test can count them.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import signal
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+from pydantic import BaseModel
+
+from manitwin.config import Resource
+from manitwin.engine.charges import charge
+from manitwin.engine.recipe import Ending, Identity, Tables
+from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage_parts import tell_part
+from manitwin.engine.stage_runner import StageCost
+from manitwin.errors import AccessDenied, RateLimited, Rejected, Unavailable
+from manitwin.pipeline.rehearsal_cube import CUBE, cube_files
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.record import SCHEMA_VERSION
+from manitwin.twin.store import RECORD, RUN, canonical_json, seal, sha256_of_json, write_bytes_atomically
+
+
+class RehearsalSettings(BaseModel):
+    """What is part of a rehearsed stage's key."""
+
+    bytes: int = 0
+
+
+class RehearsedStage:
+    """Write a field, and a file of so many bytes, after doing what the item's text says."""
+
+    backend = "rehearsal"
+    model: str | None = None
+
+    def __init__(
+        self, name: str, reads: tuple[str, ...], needs: Resource, version: str, size: int, log: Path | None, usd: float
+    ):
+        self.name, self.reads, self.needs, self.version = name, reads, needs, version
+        self.expected_usd = usd
+        self.writes: tuple[str, ...] = (name, f"{name}.bin") if size else (name,)
+        self.settings = RehearsalSettings(bytes=size)
+        self._log = log
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Do as the item says; raises what it says."""
+        if self._log is not None:
+            with self._log.open("a") as stream:
+                stream.write(f"{draft.twin_id} {self.name}\n")
+        for word in (draft.item.text or "").split():
+            what, _, where = word.partition(":")
+            stage, _, more = where.partition(":")
+            if stage == self.name:
+                self._act(what, more, draft.twin_id)
+        if self.settings.bytes:
+            (folder / f"{self.name}.bin").write_bytes(b"\0" * self.settings.bytes)
+        return {self.name: {"version": self.version, "after": [draft.field(name) for name in self.reads][-1:]}}
+
+    def _act(self, what: str, more: str, twin_id: str) -> None:
+        if what == "reject":
+            raise Rejected("poor_quality", "the text says so", stage="gate")
+        if what == "raise":
+            raise RuntimeError("the text says so")
+        if what == "segfault" or (what == "segfault-once" and self._first_time(twin_id)):
+            signal.raise_signal(signal.SIGSEGV)
+        if what == "unavailable" and Path(more).exists():
+            raise Unavailable(f"{self.name}: down while {more} is there")
+        if what == "limited" and Path(more).exists():
+            raise RateLimited(f"{self.name}: asks to wait while {more} is there", 0.2)
+        if what == "denied" and Path(more).exists():
+            raise AccessDenied(f"{self.name}: refused while {more} is there")
+        if what == "charge":
+            charge(float(more))
+        if what == "sleep":
+            time.sleep(float(more))
+        if what == "parts":
+            tell_part(1, 2, "things")
+        while what in ("wait", "parts") and not Path(more).exists():
+            time.sleep(0.02)
+        if what == "hang":
+            _hang()
+
+    def _first_time(self, twin_id: str) -> bool:
+        assert self._log is not None, "a recipe without a log cannot count"
+        return self._log.read_text().splitlines().count(f"{twin_id} {self.name}") == 1
+
+
+def _hang() -> NoReturn:
+    while True:
+        time.sleep(1)
+
+
+@dataclass(frozen=True)
+class RehearsalRecipe:
+    """Stages by name and what they need, each reading the one before it; ``size`` bytes each leaves as a file.
+
+    ``usd`` is what those are expected to cost that do not run on cores.
+    """
+
+    plan: tuple[tuple[str, Resource], ...] = (("a", "cpu"), ("b", "cpu"), ("c", "cpu"))
+    versions: tuple[tuple[str, str], ...] = ()
+    size: int = 0
+    log: Path | None = None
+    seed: int = 0
+    usd: float = 0.0
+    tables: Tables | None = None
+
+    @property
+    def sha256(self) -> str:
+        """The digest of what decides the results."""
+        return sha256_of_json([self.plan, self.versions, self.size, self.seed])
+
+    @property
+    def record(self) -> str:
+        """The record of a twin."""
+        return RECORD
+
+    def folder_of(self, twin_id: str) -> str:
+        """Return the twin's folder."""
+        return twin_name(twin_id)
+
+    def identify(self, item: Item) -> Identity:
+        """Return the hash of the text."""
+        return Identity(sha256_of_json([item.text, item.name])[:16], "text")
+
+    def stages(self, kind: str) -> list[Stage]:
+        """Return the stages."""
+        versions = dict(self.versions)
+        return [
+            RehearsedStage(
+                name,
+                (self.plan[at - 1][0],) if at else (),
+                needs,
+                versions.get(name, "1"),
+                self.size,
+                self.log,
+                0.0 if needs == "cpu" else self.usd,
+            )
+            for at, (name, needs) in enumerate(self.plan)
+        ]
+
+    def finish(
+        self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
+    ) -> Ending:
+        """Write a folder with a valid record."""
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        content = rehearsed_record(draft, self.sha256, rejected)
+        costs_json = {"stages": {name: vars(cost) for name, cost in costs.items()}, "host": {}}
+        write_bytes_atomically(fresh / RUN, canonical_json(costs_json).encode())
+        (fresh / "prompt.txt").write_text(draft.item.text or "")
+        if rejected is None:
+            for name, file in cube_files().items():
+                (fresh / name).write_bytes(file)
+        record = seal(fresh, content)
+        if rejected is None:
+            return Ending("accepted", record.revision, None, "")
+        return Ending("rejected", record.revision, rejected.reason, rejected.detail)
+
+    def ending_of(self, record: bytes) -> Ending | None:
+        """Return how a folder of this very recipe ended."""
+        data = json.loads(record)
+        if data["provenance"]["config_sha256"] != self.sha256:
+            return None
+        rejection = data["rejection"]
+        if rejection is None:
+            return Ending("accepted", data["revision"], None, "")
+        return Ending("rejected", data["revision"], rejection["reason"], rejection["detail"])
+
+
+def rehearsed_record(draft: Draft, recipe_sha256: str, rejected: Rejected | None) -> dict[str, Any]:
+    """Return the content of a record: all a rehearsal can say of a twin is that it was rejected, or that it is a cube."""
+    common = {
+        "schema_version": SCHEMA_VERSION,
+        "twin_id": draft.twin_id,
+        "name": draft.item.name,
+        "status": "rejected" if rejected else "accepted",
+        "rejection": rejected and {"stage": "gate", "reason": rejected.reason, "detail": rejected.detail},
+        "source": {"kind": "text", "file": "prompt.txt", "sha256": sha256_of_json(draft.item.text), "license": "CC0-1.0"},
+        "provenance": {"manitwin_version": "rehearsal", "config_sha256": recipe_sha256, "seed": draft.seed, "stages": {}},
+        "quality": {"checks": []},
+    }  # fmt: skip
+    return common if rejected else common | CUBE

@@ -1,0 +1,99 @@
+"""How robust each held grasp is: tried again under seeded perturbations until a sequential test is settled."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manitwin.config import Resource, RobustnessConfig, VerifyConfig
+from manitwin.engine.stage import Draft
+from manitwin.physics.perturbation import Spread, draw_perturbations
+from manitwin.physics.robustness import Robustness, SequentialTest, try_until_clear
+from manitwin.physics.trial import GraspTrial
+from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
+from manitwin.pipeline.object_arrays import joints_of, load_body
+from manitwin.pipeline.verify import VERDICTS, trial_settings
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.twin.record import RobustnessSummary
+
+ROBUSTNESS_FILE = "robustness{}.npz"
+ROBUSTNESS = "robustness{}"
+
+
+class RobustnessStage:
+    """Try each held grasp again and again; writes ``held (N,)`` and ``trials (N,)``, zero trials where it never held."""
+
+    version = "1"
+    needs: Resource = "cpu"
+
+    def __init__(
+        self, settings: RobustnessConfig, verify: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""
+    ):
+        """Take the settings, the trial's, the engine and the gripper."""
+        self.settings, self.verify, self.trial, self.gripper = settings, verify, trial, gripper
+        self.backend = trial.name
+        self.model: str | None = f"{gripper.name} {gripper.sha256[:12]}, {verify.model_dump_json()}"
+        self.name = f"robustness{suffix}"
+        self.proposals, self.verdicts = PROPOSALS.format(suffix), VERDICTS.format(suffix)
+        self.file, self.field = ROBUSTNESS_FILE.format(suffix), ROBUSTNESS.format(suffix)
+        self.reads: tuple[str, ...] = (self.proposals, self.verdicts, "solid.npz", "hulls.npz", "physical")
+        self.writes: tuple[str, ...] = (self.file, self.field)
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Write how many trials each grasp survived and return the summary."""
+        with np.load(draft.path(self.proposals)) as proposals, np.load(draft.path(self.verdicts)) as verdicts:
+            poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
+            chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
+            good = np.flatnonzero((verdicts["outcome"] == "held") & chosen)
+            joints = joints_of(proposals, np.arange(len(poses)))
+        spread = self._spread(draft.field("physical"))
+        draws = draw_perturbations(spread, self.settings.max_trials, draft.seed)
+        body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
+        variants = [(draw, draw.body(body), draw.settings(settings)) for draw in draws]
+
+        def survives(index: int, number: int) -> bool:
+            draw, other_body, other_settings = variants[number]
+            pose = draw.grasp(poses[index], float(depth_m[index]))
+            closing = {name: values[index : index + 1] for name, values in joints.items()}
+            result = self.trial.run(other_body, self.gripper, pose[None], other_settings, **closing)[0]
+            return result.outcome == "held"
+
+        test = SequentialTest(
+            self.settings.robust_share, self.settings.fragile_share, self.settings.error, self.settings.max_trials
+        )
+        held, trials = np.zeros(len(poses), np.int32), np.zeros(len(poses), np.int32)
+        for index in good:
+            answer = try_until_clear(lambda number, index=index: survives(index, number), test)  # type: ignore[misc]
+            held[index], trials[index] = answer.held, answer.trials
+        np.savez(folder / self.file, held=held, trials=trials)
+        return {self.field: self._summary(spread, test, held[good], trials[good]).model_dump(mode="json")}
+
+    def _spread(self, physical: dict[str, Any]) -> Spread:
+        settings, mass = self.settings, physical["mass_kg"]
+        return Spread(
+            pose_m=settings.pose_m,
+            pose_deg=settings.pose_deg,
+            friction=settings.friction,
+            force=settings.force,
+            mass_kg=(mass["low"], mass["high"]),
+            center_of_mass_m=physical["center_of_mass_uncertainty_m"],
+        )
+
+    def _summary(self, spread: Spread, test: SequentialTest, held: np.ndarray, trials: np.ndarray) -> RobustnessSummary:
+        share = held / np.maximum(trials, 1)
+        return RobustnessSummary(
+            **vars(spread),
+            max_trials=self.settings.max_trials,
+            trials=int(trials.sum()),
+            median=float(np.median(share)) if len(share) else None,
+            robust=sum(test.is_robust(int(h), int(n)) for h, n in zip(held, trials, strict=True)),
+            robust_share=self.settings.robust_share,
+            fragile_share=self.settings.fragile_share,
+        )
+
+
+def rank_values(held: np.ndarray, trials: np.ndarray) -> np.ndarray:
+    """Return by what grasps are ranked: the posterior mean of the share, and less than any of these where none was tried."""
+    return np.array([Robustness(int(h), int(n)).rank_value if n else -1.0 for h, n in zip(held, trials, strict=True)])

@@ -1,0 +1,118 @@
+"""The same grasps in a second engine, and negative controls in both: a verdict that means something outside one solver."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manitwin.config import Resource, SecondOpinionConfig, VerifyConfig
+from manitwin.engine.stage import Draft
+from manitwin.physics.agreement import cohens_kappa
+from manitwin.physics.jitter import jittered
+from manitwin.physics.trial import GraspTrial, TrialResult
+from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
+from manitwin.pipeline.object_arrays import joints_of, load_body
+from manitwin.pipeline.verify import VERDICTS, trial_settings
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.twin.record import SecondOpinion as SecondOpinionRecord
+
+SECOND_OPINION = "second_opinion{}.npz"
+AGREEMENT = "second_opinion{}"
+NOT_TRIED, FAILS, HOLDS = -1, 0, 1
+JITTER_STREAM = 7  # keeps the draws apart from those of other stages with the same seed
+
+
+class SecondOpinionStage:
+    """Try the held grasps, a share of the failed ones, and jittered ones again.
+
+    Writes ``holds (N,) int8`` and ``outcome (N,)`` of the second engine, one for each proposal, and the jittered grasps
+    with both engines' verdicts.
+    """
+
+    version = "1"
+    needs: Resource = "cpu"
+
+    def __init__(
+        self,
+        settings: SecondOpinionConfig,
+        verify: VerifyConfig,
+        first: GraspTrial,
+        second: GraspTrial,
+        gripper: Gripper,
+        suffix: str = "",
+    ):
+        """Take the settings, the trial's, both engines and the gripper."""
+        self.settings, self.verify, self.first, self.second, self.gripper = settings, verify, first, second, gripper
+        self.backend = second.name
+        self.model: str | None = (
+            f"beside {first.name}, {gripper.name} {gripper.sha256[:12]}, {verify.model_dump_json()}"
+        )
+        self.name = f"second_opinion{suffix}"
+        self.proposals, self.verdicts = PROPOSALS.format(suffix), VERDICTS.format(suffix)
+        self.file, self.field = SECOND_OPINION.format(suffix), AGREEMENT.format(suffix)
+        self.reads: tuple[str, ...] = (self.proposals, self.verdicts, "solid.npz", "hulls.npz", "physical")
+        self.writes: tuple[str, ...] = (self.file, self.field)
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Write the second engine's verdicts and return how far the two agree."""
+        with np.load(draft.path(self.proposals)) as proposals, np.load(draft.path(self.verdicts)) as verdicts:
+            poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
+            chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
+            held = verdicts["outcome"] == "held"
+            joints = joints_of(proposals, np.arange(len(poses)))
+        rng = np.random.default_rng([draft.seed, JITTER_STREAM])
+        good, bad = np.flatnonzero(held & chosen), np.flatnonzero(~held & chosen)
+        some_bad = np.sort(rng.permutation(bad)[: round(self.settings.share_of_failed * len(bad))])
+        of = np.sort(rng.permutation(good)[: self.settings.jittered])
+        moved = jittered(
+            poses[of], depth_m[of], rng, sigma_deg=self.settings.jitter_deg, sigma_m=self.settings.jitter_m
+        )
+        body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
+        tried = np.concatenate([good, some_bad])
+        again = self.second.run(
+            body,
+            self.gripper,
+            np.concatenate([poses[tried], moved]),
+            settings,
+            **{name: values[np.concatenate([tried, of])] for name, values in joints.items()},
+        )
+        first = self.first.run(
+            body, self.gripper, moved, settings, **{name: values[of] for name, values in joints.items()}
+        )
+        holds, outcome = np.full(len(poses), NOT_TRIED, np.int8), np.full(len(poses), "", "U16")
+        holds[tried] = [result.outcome == "held" for result in again[: len(tried)]]
+        outcome[tried] = [result.outcome for result in again[: len(tried)]]
+        second = np.array([result.outcome == "held" for result in again[len(tried) :]], bool)
+        np.savez(
+            folder / self.file,
+            holds=holds,
+            outcome=outcome,
+            jittered_of=of,
+            jittered_gripper_to_object=moved,
+            jittered_outcome=np.array([result.outcome for result in first], "U16"),
+            jittered_displacement_m=np.array([result.displacement_m for result in first], float),
+            jittered_rotation_rad=np.array([result.rotation_rad for result in first], float),
+            jittered_holds=second.astype(np.int8),
+        )
+        record = _agreement(self.second.name, holds[good], holds[some_bad], first, second)
+        return {self.field: record.model_dump(mode="json")}
+
+
+def _agreement(
+    engine: str, held: np.ndarray, failed: np.ndarray, first: list[TrialResult], second: np.ndarray
+) -> SecondOpinionRecord:
+    controls = np.array([result.outcome == "held" for result in first], bool)
+    return SecondOpinionRecord(
+        engine=engine,
+        held_tried=len(held),
+        holds_share=float((held == HOLDS).mean()) if len(held) else None,
+        failed_tried=len(failed),
+        failed_pass_share=float((failed == HOLDS).mean()) if len(failed) else None,
+        jittered=len(controls),
+        jittered_held=int(controls.sum()),
+        jittered_hold_in_second_engine=int(second.sum()),
+        jittered_agree=int((controls == second).sum()),
+        kappa=cohens_kappa(controls, second),
+    )

@@ -1,0 +1,99 @@
+"""Verify grasps by simulation, and keep every verdict (paper, "Simulation Verification")."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from manitwin.config import Resource, VerifyConfig
+from manitwin.engine.stage import Draft
+from manitwin.errors import Rejected
+from manitwin.physics.trial import GraspTrial, TrialResult, TrialSettings
+from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
+from manitwin.pipeline.gripper_kinds import KINDS
+from manitwin.pipeline.object_arrays import joints_of, load_body
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.twin.record import Trial
+
+VERDICTS = "verdicts{}.npz"
+TRIAL = "trial{}"
+
+
+class VerifyStage:
+    """Try every chosen grasp of a gripper, and the unfiltered sample beside it.
+
+    ``suffix`` is part of the artifacts' names: empty for the twin's first gripper. Without one that held, the first
+    gripper rejects the object; another gripper does not.
+    """
+
+    version = "3"
+    needs: Resource = "cpu"
+
+    def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""):
+        """Take the settings, the engine, and the gripper."""
+        self.settings, self.trial, self.gripper = settings, trial, gripper
+        self.backend = trial.name
+        self.model: str | None = f"{gripper.name} {gripper.sha256[:12]}"
+        self.name = f"verify{suffix}"
+        self.proposals, self.verdicts, self.trial_field = (n.format(suffix) for n in (PROPOSALS, VERDICTS, TRIAL))
+        self.reads: tuple[str, ...] = (self.proposals, "solid.npz", "hulls.npz", "physical")
+        self.writes: tuple[str, ...] = (self.verdicts, self.trial_field)
+        self.may_reject = not suffix
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Write the verdicts and return the field ``trial``; raises Rejected where no grasp held."""
+        with np.load(draft.path(self.proposals)) as arrays:
+            poses, depth_m, proposer = (arrays[n] for n in ("gripper_to_object", "depth_m", "proposer"))
+            joints = joints_of(arrays, np.arange(len(poses)))
+        body, settings = load_body(draft), trial_settings(self.settings, self.gripper)
+        results = self.trial.run(body, self.gripper, poses, settings, **joints)
+        chosen = np.flatnonzero(~np.char.endswith(proposer, UNFILTERED))
+        if self.may_reject and not any(results[i].outcome == "held" for i in chosen):
+            tried = [results[i] for i in chosen]
+            why = KINDS[self.gripper.kind].why_none_held
+            raise Rejected("none_held", why(tried, poses[chosen], depth_m[chosen], body, settings))
+        save_results(folder / self.verdicts, results)
+        return {self.trial_field: describe(self.trial, settings, body.friction_static).model_dump(mode="json")}
+
+
+def trial_settings(settings: VerifyConfig, gripper: Gripper) -> TrialSettings:
+    """Return the trial's numbers: the configuration's, and the gripper's own force where that names none."""
+    return TrialSettings(
+        force_n=gripper.force_n if settings.force_n is None else settings.force_n,
+        finger_friction=gripper.finger_friction,
+        timestep_s=settings.timestep_s,
+        solver_iterations=settings.solver_iterations,
+        max_steps=settings.max_steps,
+        stable_frames=settings.stable_frames,
+        max_displacement_m=settings.max_displacement_m,
+        slide_m=settings.slide_distance_m,
+    )
+
+
+def describe(trial: GraspTrial, settings: TrialSettings, object_friction: float) -> Trial:
+    """Return what a twin says of the trial that its grasps went through."""
+    return Trial(
+        engine=trial.name,
+        finger_friction=settings.finger_friction,
+        object_friction=object_friction,
+        combine="average",
+        force_n=settings.force_n,
+        timestep_s=settings.timestep_s,
+        solver_iterations=settings.solver_iterations,
+        max_steps=settings.max_steps,
+        stable_frames=settings.stable_frames,
+        max_displacement_m=settings.max_displacement_m,
+        slide_distance_m=settings.slide_m,
+    )
+
+
+def save_results(path: Path, results: list[TrialResult]) -> None:
+    """Save outcome, displacement (m) and rotation (rad) of each trial as arrays."""
+    np.savez(
+        path,
+        outcome=np.array([result.outcome for result in results], dtype="U16"),
+        displacement_m=np.array([result.displacement_m for result in results], float),
+        rotation_rad=np.array([result.rotation_rad for result in results], float),
+    )

@@ -1,0 +1,56 @@
+"""Eight pictures of the object, for people and for annotators that see."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from PIL import Image, WebPImagePlugin
+
+from manitwin.config import Resource, ViewsConfig
+from manitwin.engine.stage import Draft
+from manitwin.formats.glb import read_glb
+from manitwin.render.cameras import orbit_cameras
+from manitwin.render.renderer import shared_renderer
+
+VIEWS = 8
+"""Paper, "Physical Property Estimation"."""
+
+
+class ViewsStage:
+    """Draw ``canonical.glb`` from eight sides (paper, "Physical Property Estimation").
+
+    Field ``cameras``: for each view ``camera_to_object`` (OpenGL axes, translation in the unit of the canonical mesh),
+    ``fov_y_rad``, ``width_px``, ``height_px``.
+    """
+
+    name: ClassVar[str] = "views"
+    version: ClassVar[str] = "2"
+    reads: ClassVar[tuple[str, ...]] = ("canonical.glb",)
+    writes: ClassVar[tuple[str, ...]] = ("views/", "cameras")
+    needs: ClassVar[Resource] = "cpu"
+    backend = "sapien"
+    model: str | None = None
+
+    def __init__(self, settings: ViewsConfig, size_px: int):
+        """Take the settings and the side of the pictures, where these do not say."""
+        self.settings = settings.model_copy(update={"size_px": settings.size_px or size_px})
+        self._size_px = settings.size_px or size_px
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Draw the views; raises RendererMissing where nothing renders."""
+        parts = read_glb(draft.path("canonical.glb"))
+        points = np.concatenate([part.vertices for part in parts])
+        cameras = orbit_cameras(points, fov_y_deg=self.settings.fov_y_deg, size_px=self._size_px)
+        frames = shared_renderer().render(parts, cameras)
+        (folder / "views").mkdir(parents=True, exist_ok=True)
+        for index, frame in enumerate(frames):
+            write_webp(frame.rgb, folder / "views" / f"rgb_{index:02d}.webp", self.settings.webp_quality)
+        return {"cameras": [camera.to_json() for camera in cameras]}
+
+
+def write_webp(picture: np.ndarray, path: Path, quality: int) -> None:
+    """Write a picture ``(H, W, 3) uint8``; equal pictures give equal bytes."""
+    # Method 2 of 6 takes half the time of 4, for files 5 % larger (measured on 32 views).
+    Image.fromarray(picture).save(path, WebPImagePlugin.WebPImageFile.format, quality=quality, method=2)

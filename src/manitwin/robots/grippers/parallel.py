@@ -1,0 +1,44 @@
+"""A parallel-jaw gripper: two fingers that close along X."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from manitwin.robots.grippers.box import Box, PlacedBox
+from manitwin.robots.grippers.fields import STRICT
+
+
+@dataclass(frozen=True)
+class ParallelGripper:
+    """A parallel-jaw gripper.
+
+    ``finger_boxes`` are those of the +X finger when closed (its inner face touches x = 0); the other finger is its half turn
+    about Z. ``opening_m`` is the full stroke; ``tip_depth_m`` is the fingertips' centre along +Z; ``pad_half_extents_m`` is
+    half of the pad's width (Y) and height (Z), centred on the tip depth.
+    """
+
+    __pydantic_config__ = STRICT
+    kind: ClassVar[str] = "parallel"
+
+    name: str
+    sha256: str
+    opening_m: float
+    tip_depth_m: float
+    force_n: float
+    finger_friction: float
+    pad_half_extents_m: tuple[float, float]
+    finger_boxes: tuple[Box, ...]
+    palm_boxes: tuple[Box, ...]
+    source: str
+
+    def boxes(self, opening_m: float) -> list[PlacedBox]:
+        """Return ``(box_to_gripper 4x4, half_extents_m (3,))`` of palm and both fingers at a given opening between the pads."""
+        placed = [box.placed() for box in self.palm_boxes]
+        for side in (1, -1):
+            placed += [box.placed(opening_m / 2, side) for box in self.finger_boxes]
+        return placed
+
+    def symbol(self, width_m: float) -> list[PlacedBox]:
+        """Return the boxes that stand for the gripper in a drawing of many grasps: its own."""
+        return self.boxes(width_m)

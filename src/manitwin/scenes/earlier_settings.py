@@ -1,0 +1,52 @@
+"""What the folder of an application was made with: nothing in it is made again because a command was typed otherwise."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from manitwin.engine.ledger.ledger import read_ledger
+from manitwin.errors import UsageError
+from manitwin.pipeline.dataset_run import CONFIG, local_ledger
+from manitwin.twin.dataset_root import DatasetRoot
+
+
+def earlier_settings(root: DatasetRoot) -> dict[str, Any]:
+    """Return the configuration of the last run at a root; empty where there was none."""
+    return dict(json.loads(root.read_bytes(CONFIG))) if root.exists(CONFIG) else {}
+
+
+def check_settings(root: DatasetRoot, now: Mapping[str, Any], *, free: frozenset[str], made: str) -> None:
+    """Raise UsageError where finished items at a root were made with other settings, which would replace them.
+
+    Also where a root holds what another command makes. ``free`` names the sections and settings that decide nothing of the
+    items. ``made`` is what they are called, in the plural.
+    Settings that the earlier version did not have are passed over.
+    """
+    earlier = earlier_settings(root)
+    if earlier and earlier.get("kind") != now["kind"]:
+        raise UsageError(f"{root.url}: holds {earlier.get('kind', 'twins')}, not {now['kind']}; give another folder")
+    before = dict(_flat(earlier))
+    differ = [
+        f"{name}: {json.dumps(before[name])} there, {json.dumps(value)} now"
+        for name, value in _flat(json.loads(json.dumps(now)))
+        if name in before and before[name] != value and name.partition(".")[0] not in free
+    ]
+    if not differ or not (ledger := local_ledger(root)).is_file():
+        return
+    with read_ledger(ledger) as connection:
+        (count,) = connection.execute("SELECT count(*) FROM items WHERE state = 'accepted'").fetchone()
+    if count:
+        raise UsageError(
+            f"{root.url}: {count} {made} in it were made with other settings ({'; '.join(differ)});"
+            " give the same ones to add to it, or another folder"
+        )
+
+
+def _flat(settings: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in settings.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value

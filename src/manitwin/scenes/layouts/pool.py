@@ -1,0 +1,158 @@
+"""What layouts are made of: a data set's accepted twins as a light table, their bodies read when they are drawn."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from manitwin.errors import UsageError
+from manitwin.geometry.cavity import Opening, find_opening
+from manitwin.geometry.hull_distance import ConvexParts
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.twin.twin_source import TwinSource
+
+KEPT_BODIES = 256
+
+
+@dataclass(frozen=True)
+class StandingPose:
+    """A placement that stayed in simulation: its number in the twin's record, and ``object_to_plane (4, 4)``.
+
+    The plane frame's origin is the centre of the circle of ``collision_radius_m`` around the projection.
+    """
+
+    placement: int
+    object_to_plane: np.ndarray
+    probability: float
+    collision_radius_m: float
+    upright: bool = False
+
+
+@dataclass(frozen=True)
+class PoolTwin:
+    """A twin as far as drawing it needs; ``vessel``: it has an opening that its hulls keep."""
+
+    twin_id: str
+    revision: str
+    category: str
+    poses: tuple[StandingPose, ...]
+    vessel: bool
+
+    @property
+    def stands(self) -> bool:
+        """Whether one of its placements is upright."""
+        return any(pose.upright for pose in self.poses)
+
+    def is_a(self, category: str) -> bool:
+        """Tell whether this is of a category: its own, or one with words before it (a frying pan is a pan)."""
+        own, wanted = self.category.casefold(), " ".join(category.casefold().split())
+        return own == wanted or own.endswith(f" {wanted}")
+
+
+@dataclass(frozen=True)
+class PoolBody:
+    """What is known of a twin once it is drawn."""
+
+    body: RigidBody
+    parts: ConvexParts
+
+    @cached_property
+    def opening(self) -> Opening | None:
+        """The largest opening of its hulls, in the object frame."""
+        hulls = [trimesh.convex.convex_hull(hull) for hull in self.body.hulls]
+        vertices, faces = trimesh.util.append_faces([h.vertices for h in hulls], [h.faces for h in hulls])
+        return find_opening(trimesh.Trimesh(vertices, faces, process=False))
+
+
+class Pool:
+    """The twins that layouts may hold. ``read_body`` gives the body of one by its id; those used last are kept.
+
+    Raises UsageError where there is none.
+    """
+
+    def __init__(
+        self,
+        twins: Iterable[PoolTwin],
+        read_body: Callable[[str], RigidBody],
+        bodies: dict[str, PoolBody] | None = None,
+    ):
+        self.twins = tuple(sorted(twins, key=lambda twin: twin.twin_id))
+        self._read_body = read_body
+        self._bodies: dict[str, PoolBody] = {} if bodies is None else bodies
+        if not self.twins:
+            raise UsageError("no accepted twin that stays where it is set down; build some first")
+
+    def body(self, twin_id: str) -> PoolBody:
+        """Return a twin's body and convex parts."""
+        found = self._bodies.pop(twin_id, None)
+        if found is None:
+            body = self._read_body(twin_id)
+            found = PoolBody(body, ConvexParts.of(body.hulls))
+        self._bodies[twin_id] = found  # now the last one to go
+        while len(self._bodies) > KEPT_BODIES:
+            del self._bodies[next(iter(self._bodies))]
+        return found
+
+    @cached_property
+    def upright(self) -> Pool:
+        """The same twins, those that have upright placements with these alone; bodies are shared."""
+        twins = (
+            replace(twin, poses=tuple(pose for pose in twin.poses if pose.upright)) if twin.stands else twin
+            for twin in self.twins
+        )
+        return Pool(twins, self._read_body, self._bodies)
+
+    def of_category(self, category: str) -> tuple[PoolTwin, ...]:
+        """Return the twins of a category. Raises UsageError naming those that there are, where it has none."""
+        found = tuple(twin for twin in self.twins if twin.is_a(category))
+        if not found:
+            known = sorted({twin.category for twin in self.twins})
+            some = ", ".join(known[:40]) + (", ..." if len(known) > 40 else "")
+            raise UsageError(f"no twin of category {category!r}; there are: {some}")
+        return found
+
+
+def read_pool(dataset: str | Path, cache: Path | None = None) -> Pool:
+    """Read the records of a data set's, or a flat folder's, accepted twins that have a placement that stayed.
+
+    ``cache`` is a local folder for the twins of a data set at a URL. Raises UsageError for a place without any.
+    """
+    source = TwinSource(dataset, cache)
+    twins = [twin for twin in (_pool_twin(source.record_bytes(name)) for name in source.twin_ids()) if twin is not None]
+    if not twins:
+        raise UsageError(f"{dataset}: no accepted twin that stays where it is set down; give the folder of a build")
+    return Pool(twins, lambda twin_id: source.twin(twin_id).rigid_body())
+
+
+@lru_cache(maxsize=4)
+def pool_of(dataset: str, cache: str | None = None) -> Pool:
+    """Return ``read_pool`` of a place, read once a process: a data set is not expected to change while layouts are made."""
+    return read_pool(dataset, None if cache is None else Path(cache))
+
+
+def _pool_twin(content: bytes) -> PoolTwin | None:
+    record = json.loads(content)  # not validated: of a hundred thousand records that would take minutes
+    if record["status"] != "accepted":
+        return None
+    poses = tuple(
+        StandingPose(
+            number,
+            transform(rotation_from_quaternion_wxyz(np.array(each["quaternion_wxyz"])), np.array(each["position_m"])),
+            each["probability"],
+            each["collision_radius_m"],
+            each["upright"],
+        )
+        for number, each in enumerate(record["placements"])
+        if each["settled"]
+    )
+    if not poses:
+        return None
+    vessel = record["mesh"]["hulls"]["keeps_opening"] is True
+    return PoolTwin(record["twin_id"], record["revision"], record["language"]["category"], poses, vessel)

@@ -1,0 +1,102 @@
+"""Pictures of a layout from its cameras: colour, depth, normals and instance ids, as files."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from manitwin.errors import UsageError
+from manitwin.formats.glb import read_glb
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.render.cameras import Camera, look_at
+from manitwin.render.false_colors import depth_picture, id_color, ids_picture
+from manitwin.render.scene_renderer import SceneFrame, SceneRenderer
+from manitwin.scenes.furniture_pictures import add_furniture, lighting_of
+from manitwin.scenes.scene import SceneCamera, SceneRecord
+
+PICTURES = "pictures.json"
+WEBP_QUALITY = 90
+DEPTH_UNIT_M = 0.001
+"""Depth is written in whole millimetres, as the cameras that it stands for write it: up to 65 m in 16 bits."""
+
+
+def scene_pictures(
+    record: SceneRecord, twin_folder: Callable[[str], Path], *, width_px: int, height_px: int
+) -> tuple[dict[str, SceneFrame], dict[str, int]]:
+    """Draw a scene from each of its cameras; returns the frames by camera and the ids by name.
+
+    Ids are those of the objects from 1 in the record's order, then those of the furniture's boxes. ``twin_folder`` finds a
+    twin's folder by its id. Raises UsageError for a scene without cameras, RendererMissing, InputError.
+    """
+    if not record.cameras:
+        raise UsageError(f"scene {record.scene_id}: no cameras in its record; sample it again")
+    with SceneRenderer(lighting_of(record.ambient, record.lights)) as renderer:
+        for thing in record.objects:
+            pose = transform(rotation_from_quaternion_wxyz(np.array(thing.quaternion_wxyz)), np.array(thing.position_m))
+            renderer.add(thing.name, read_glb(twin_folder(thing.twin_id) / "visual.glb"), pose)
+        add_furniture(renderer, record.furniture, seed=zlib.crc32(record.scene_id.encode()))
+        cameras = [_camera(each, width_px, height_px) for each in record.cameras]
+        frames = renderer.render(cameras, geometry=True)
+        ids = renderer.ids
+    return dict(zip((each.name for each in record.cameras), frames, strict=True)), ids
+
+
+def write_previews(
+    record: SceneRecord, twin_folder: Callable[[str], Path], folder: Path, *, size_px: int
+) -> list[Path]:
+    """Write square pictures of a scene and what they mean; returns the files, sorted.
+
+    For each camera: ``NAME_rgb.webp``; ``NAME_depth.png`` (16 bits, millimetres along the viewing axis, 0: nothing);
+    ``NAME_normals.png`` (world frame, 8 bits: 255 (n + 1) / 2, black: nothing); ``NAME_ids.png`` (8 bits, 16 where there are
+    more than 255 things; 0: floor and backdrop); to look at, depth and ids in colours that are explained beside them:
+    ``NAME_depth_colors.png``, ``NAME_ids_colors.png``. ``pictures.json`` has the ids by name, their colours (RGB) and the
+    cameras: ``camera_to_world`` (OpenGL axes: x right, y up, looking along -z), the focal length in pixels, the size. Raises
+    as ``scene_pictures`` does.
+    """
+    frames, ids = scene_pictures(record, twin_folder, width_px=size_px, height_px=size_px)
+    folder.mkdir(parents=True, exist_ok=True)
+    facts: dict[str, object] = {"scene_id": record.scene_id, "depth_unit_m": DEPTH_UNIT_M, "ids": ids}
+    facts["colors_rgb"] = {name: id_color(number) for name, number in ids.items()}
+    facts["cameras"] = {
+        each.name: {
+            "camera_to_world": camera.camera_to_object.tolist(),
+            "focal_px": camera.focal_px,
+            "width_px": size_px,
+            "height_px": size_px,
+        }
+        for each in record.cameras
+        for camera in [_camera(each, size_px, size_px)]
+    }
+    called = {thing.name: f"{thing.name} {thing.category}" for thing in record.objects}
+    names = {called.get(name, name): number for name, number in ids.items()}
+    files = [path for name, frame in frames.items() for path in _write_frame(frame, folder, name, names)]
+    (folder / PICTURES).write_text(json.dumps(facts, indent=1) + "\n")
+    return sorted([*files, folder / PICTURES])
+
+
+def _camera(camera: SceneCamera, width_px: int, height_px: int) -> Camera:
+    pose = look_at(np.array(camera.position_m), np.array(camera.target_m))
+    return Camera(pose, camera.fov_y_rad, width_px, height_px)
+
+
+def _write_frame(frame: SceneFrame, folder: Path, name: str, ids_by_name: Mapping[str, int]) -> list[Path]:
+    assert frame.depth_m is not None and frame.normals is not None and frame.ids is not None
+    rgb, depth, normals, ids = (
+        folder / f"{name}_{what}" for what in ("rgb.webp", "depth.png", "normals.png", "ids.png")
+    )
+    Image.fromarray(frame.rgb).save(rgb, quality=WEBP_QUALITY, method=4)
+    millimetres = np.minimum(np.rint(frame.depth_m / DEPTH_UNIT_M), np.iinfo(np.uint16).max).astype(np.uint16)
+    shown = np.where(frame.depth_m[..., None] > 0, np.rint(127.5 * (frame.normals + 1)), 0).astype(np.uint8)
+    numbers = frame.ids if len(ids_by_name) > np.iinfo(np.uint8).max else frame.ids.astype(np.uint8)
+    for path, image in ((depth, millimetres), (normals, shown[..., ::-1]), (ids, numbers)):
+        path.write_bytes(cv2.imencode(".png", image)[1].tobytes())
+    depth_colors, ids_colors = folder / f"{name}_depth_colors.png", folder / f"{name}_ids_colors.png"
+    depth_picture(frame.depth_m, frame.ids).save(depth_colors)
+    ids_picture(frame.ids, ids_by_name).save(ids_colors)
+    return [rgb, depth, normals, ids, depth_colors, ids_colors]

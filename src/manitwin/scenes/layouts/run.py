@@ -1,0 +1,125 @@
+"""Make many layouts: the engine's run, and what came of it in a few lines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from manitwin.engine.events import ItemEnded, OnStage
+from manitwin.engine.ledger.ledger import read_ledger
+from manitwin.errors import UsageError
+from manitwin.pipeline.dataset_run import ExecutorName, RunReport, drive, local_ledger
+from manitwin.scenes.app_config import LayoutsConfig
+from manitwin.scenes.earlier_settings import check_settings, earlier_settings
+from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.recipe import LayoutsRecipe
+from manitwin.scenes.scene import SCENE
+from manitwin.scenes.scene_file import parse_scene
+from manitwin.scenes.scene_folders import scene_name
+from manitwin.twin.dataset_root import DatasetRoot
+
+CONTACT_SHEET = "contact_sheet.webp"
+DECIDE_NO_SCENE = frozenset(("dataset", "run", "pictures", "picture_px"))
+
+
+@dataclass(frozen=True)
+class LayoutTotals:
+    """What came of all layouts below a root; the most of each measure is over the accepted ones."""
+
+    accepted: int
+    rejected: dict[str, int]
+    repaired: int
+    objects: int
+    max_moved_m: float
+    max_turned_rad: float
+    max_penetration_m: float
+    cpu_seconds: float
+
+    @property
+    def acceptance(self) -> float:
+        """The accepted share of those that ended."""
+        return self.accepted / max(1, self.accepted + sum(self.rejected.values()))
+
+
+def make_layouts(
+    dataset: str | Path,
+    out: str | Path,
+    count: int,
+    config: LayoutsConfig,
+    *,
+    executor: ExecutorName = "local",
+    address: str | None = None,
+    on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_stage: OnStage = lambda event: None,
+    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+) -> RunReport:
+    """Sample the layouts number 0 to ``count - 1`` of a data set's twins below ``out``; those that are there stay.
+
+    Scenes that were drawn by an earlier run stay so: ``pictures`` is kept. A contact sheet is removed before scenes are made,
+    which it would not show.
+    Raises UsageError for a data set without twins, categories that it has not, scenes of other settings at ``out``, or where
+    another run is at work there.
+    """
+    if count < 1:
+        raise UsageError(f"{count} layouts; ask for 1 or more")
+    place = DatasetRoot(dataset).absolute()
+    pool = pool_of(place)
+    for category in config.layout.include:
+        pool.of_category(category)
+    root = DatasetRoot(out)
+    config = _with_pictures_there(config, earlier_settings(root))
+    recipe = LayoutsRecipe(config, place)
+    configuration = {"kind": "layouts", "dataset": place, **config.model_dump(mode="json")}
+    check_settings(root, configuration, free=DECIDE_NO_SCENE, made="scenes")
+
+    def started(items: int, opened: int) -> None:
+        if opened and root.exists(CONTACT_SHEET):
+            root.remove(CONTACT_SHEET)
+        on_start(items, opened)
+
+    return drive(
+        recipe, recipe.items(count), root, config.run, configuration=configuration, executor=executor,
+        address=address, on_start=started, on_stage=on_stage, on_ended=on_ended,
+    )  # fmt: skip
+
+
+def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any]) -> LayoutsConfig:
+    """Return a configuration that draws scenes where an earlier run did: those that it drew are not made without pictures."""
+    if config.pictures or not before.get("pictures"):
+        return config
+    return config.model_copy(update={"pictures": True, "picture_px": before.get("picture_px", config.picture_px)})
+
+
+def without_upright(dataset: str | Path) -> tuple[str, ...]:
+    """Return the ids of a data set's twins that ``upright`` layouts hold as they rest: none of their placements is upright."""
+    return tuple(twin.twin_id for twin in pool_of(DatasetRoot(dataset).absolute()).twins if not twin.stands)
+
+
+def accepted_scenes(out: str | Path) -> list[str]:
+    """Return the ids of the accepted scenes of a run in the order of their numbers."""
+    with read_ledger(local_ledger(DatasetRoot(out))) as ledger:
+        return [row[0] for row in ledger.execute("SELECT twin_id FROM items WHERE state = 'accepted' ORDER BY number")]
+
+
+def layout_totals(out: str | Path) -> LayoutTotals:
+    """Add up what the ledger and the scenes say."""
+    root = DatasetRoot(out)
+    with read_ledger(local_ledger(root)) as ledger:
+        rows = ledger.execute(
+            "SELECT reason, count(*) FROM items WHERE state = 'rejected' GROUP BY reason ORDER BY reason"
+        )
+        rejected = {str(reason): int(count) for reason, count in rows}
+        (cpu_seconds,) = ledger.execute("SELECT coalesce(sum(cpu_seconds), 0) FROM stages").fetchone()
+    scenes = [parse_scene(root.read_bytes(f"{scene_name(each)}/{SCENE}"), each) for each in accepted_scenes(out)]
+    return LayoutTotals(
+        accepted=len(scenes),
+        rejected=rejected,
+        repaired=sum(scene.repairs > 0 for scene in scenes),
+        objects=sum(len(scene.objects) for scene in scenes),
+        max_moved_m=max((scene.measures.max_moved_m for scene in scenes), default=0.0),
+        max_turned_rad=max((scene.measures.max_turned_rad for scene in scenes), default=0.0),
+        max_penetration_m=max((scene.measures.max_penetration_m for scene in scenes), default=0.0),
+        cpu_seconds=float(cpu_seconds),
+    )

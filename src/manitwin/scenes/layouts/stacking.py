@@ -1,0 +1,181 @@
+"""Put one object on another or into it: lowered from above until it nearly touches; physics has the last word."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from manitwin.geometry.hull_distance import PlacedParts, distance
+from manitwin.geometry.poses import rotation_between, transform, transform_points
+from manitwin.scenes.layouts.placing import draw_pose, on_plane
+from manitwin.scenes.layouts.pool import PoolBody, PoolTwin, StandingPose
+from manitwin.scenes.layouts.slots import Put
+
+ABOVE_M = 0.0005  # how near lowering comes: what is let go there does not fall far
+LOWERING_STEPS = 12
+LONGEST_STEP_M = 0.05
+LEVEL_M = 0.001  # corners within this of the highest make the top, of the lowest the foot
+STANDS_M = 0.006  # how far inside of both the centre of mass is of what is stacked
+BROAD_M = 0.02  # how far the middle of a top is from its edges, for things to stand on it
+FLAT_M = 0.003  # what is stacked stands this near to the highest point below it
+UP_RIGHT = np.cos(np.radians(12))
+LEAN_RAD = np.radians(20)  # most that a long thing is tilted when it is put into a vessel
+RIM_SLACK = 0.95  # of the rim's radius: what goes in is narrower
+
+
+@dataclass(frozen=True)
+class Mouth:
+    """A vessel's opening in the world: the middle of its rim, the rim's radius, and how deep it is below."""
+
+    center_m: np.ndarray
+    radius_m: float
+    depth_m: float
+
+
+def mouth_of(body: PoolBody, object_to_world: np.ndarray) -> Mouth | None:
+    """Return a vessel's mouth where it opens upward, else None."""
+    opening = body.opening
+    if opening is None or float((object_to_world[:3, :3] @ opening.axis)[2]) < UP_RIGHT:
+        return None
+    center = transform_points(object_to_world, opening.center_m[None])[0]
+    return Mouth(center, opening.rim_radius_m, opening.depth_m)
+
+
+def open_poses(twin: PoolTwin, body: PoolBody) -> list[StandingPose]:
+    """Return the placements of a vessel in which it opens upward."""
+    return [pose for pose in twin.poses if mouth_of(body, pose.object_to_plane) is not None]
+
+
+def level_poses(twin: PoolTwin, body: PoolBody) -> list[StandingPose]:
+    """Return the placements of a twin with a top that something can stand on; a vessel has only a rim."""
+    if twin.vessel:
+        return []
+    return [pose for pose in twin.poses if _is_broad(_level_end(body.parts.at(pose.object_to_plane), top=True))]
+
+
+def _is_broad(level: _Level | None) -> bool:
+    return level is not None and level.depth_inside(level.middle_m) >= BROAD_M
+
+
+def put_into(
+    twin: PoolTwin,
+    body: PoolBody,
+    surface: str,
+    mouth: Mouth,
+    obstacles: Sequence[PlacedParts],
+    rng: np.random.Generator,
+) -> Put | None:
+    """Return a twin lowered into a vessel, in one of its placements or on end; None where it is wider than the rim."""
+    rotation = _turned(
+        draw_pose(twin.poses, rng).object_to_plane[:3, :3] if rng.random() < 0.5 else _on_end(body, rng), rng
+    )
+    points = body.parts.whole @ rotation.T
+    middle = (points[:, :2].min(0) + points[:, :2].max(0)) / 2
+    spare = RIM_SLACK * mouth.radius_m - float(np.linalg.norm(points[:, :2] - middle, axis=1).max())
+    if spare < 0:
+        return None
+    around, out = rng.uniform(-np.pi, np.pi), spare * np.sqrt(rng.random())
+    shift = mouth.center_m[:2] - middle + out * np.array([np.cos(around), np.sin(around)])
+    start = mouth.center_m[2] + 0.02 - points[:, 2].min()
+    lowered = lower(
+        body, transform(rotation, np.array([*shift, start])), obstacles, mouth.center_m[2] - 2 * mouth.depth_m
+    )
+    if lowered is None or lowered.bounds[0][2] > mouth.center_m[2] - mouth.depth_m / 4:
+        return None
+    return Put(surface, None, lowered)
+
+
+def put_onto(
+    twin: PoolTwin,
+    body: PoolBody,
+    surface: str,
+    base: PlacedParts,
+    obstacles: Sequence[PlacedParts],
+    rng: np.random.Generator,
+) -> Put | None:
+    """Return a twin in one of its placements on the level top of another, or None where it would not stand there.
+
+    Its centre of mass is over the top and over its own foot, by ``STANDS_M`` inside of both: then it is over the part that
+    they have in common.
+    """
+    pose = draw_pose(twin.poses, rng)
+    top = _level_end(base, top=True)
+    turned = body.parts.at(on_plane(pose, np.zeros(2), 0.0, rng.uniform(-np.pi, np.pi)))
+    foot = _level_end(turned, top=False)
+    center = transform_points(turned.pose, body.body.center_of_mass_m[None])[0, :2]
+    if top is None or foot is None or foot.depth_inside(center) < STANDS_M:
+        return None
+    target = top.middle_m + (top.depth_inside(top.middle_m) - STANDS_M) * rng.uniform(-0.7, 0.7, 2)
+    top_m = float(base.bounds[1][2])
+    raised = transform(translation=np.array([*(target - center), top_m + 0.02])) @ turned.pose
+    lowered = lower(body, raised, obstacles, top_m - FLAT_M)
+    if lowered is None or lowered.bounds[0][2] < top_m - FLAT_M:
+        return None
+    return Put(surface, pose.placement, lowered)
+
+
+def lower(body: PoolBody, raised: np.ndarray, obstacles: Sequence[PlacedParts], floor_m: float) -> PlacedParts | None:
+    """Lower a body until something is near below it; None where it starts in something or comes below ``floor_m`` freely.
+
+    A body may sink by its distance to the nearest obstacle without touching any: conservative advancement. What is left
+    after ``LOWERING_STEPS``, it falls.
+    """
+    parts = body.parts.at(raised)
+    low, high = parts.bounds
+    below = [o for o in obstacles if (o.bounds[0][:2] <= high[:2]).all() and (o.bounds[1][:2] >= low[:2]).all()]
+    for number in range(LOWERING_STEPS):
+        gap = LONGEST_STEP_M
+        for other in below:
+            gap = min(gap, distance(parts, other, beyond_m=gap))
+        if gap <= 2 * ABOVE_M:
+            return parts if number else None
+        if parts.bounds[0][2] < floor_m:
+            return None
+        pose = parts.pose.copy()
+        pose[2, 3] -= gap - ABOVE_M
+        parts = body.parts.at(pose)
+    return parts
+
+
+@dataclass(frozen=True)
+class _Level:
+    """The level end of a body seen from above: the middle of a convex polygon, and its sides' ``normals . x + offsets <= 0``."""
+
+    middle_m: np.ndarray
+    normals: np.ndarray
+    offsets_m: np.ndarray
+
+    def depth_inside(self, point: np.ndarray) -> float:
+        """Return how far (m) inside the polygon a point ``(2,)`` is; negative outside."""
+        return -float((self.normals @ point + self.offsets_m).max())
+
+
+def _level_end(parts: PlacedParts, *, top: bool) -> _Level | None:
+    """Return a body's upper or lower end where that is level, and ``STANDS_M`` wide about its middle."""
+    heights = parts.whole[:, 2] * (1 if top else -1)
+    points = parts.whole[heights > heights.max() - LEVEL_M][:, :2]
+    if len(points) < 3 or np.linalg.matrix_rank(points - points.mean(0), tol=STANDS_M) < 2:
+        return None
+    polygon = ConvexHull(points)
+    middle = points[polygon.vertices].mean(0)
+    level = _Level(middle, polygon.equations[:, :2], polygon.equations[:, 2])
+    return level if level.depth_inside(middle) >= 2 * STANDS_M else None
+
+
+def _on_end(body: PoolBody, rng: np.random.Generator) -> np.ndarray:
+    """Return a rotation that puts the body's longest axis upright, either end up, leaning a little."""
+    spread = np.linalg.eigh(np.cov(body.parts.whole.T))[1]
+    longest = spread[:, 2] * (1 if rng.random() < 0.5 else -1)
+    lean, around = LEAN_RAD * rng.random(), rng.uniform(-np.pi, np.pi)
+    tilt = Rotation.from_rotvec(lean * np.array([np.cos(around), np.sin(around), 0.0])).as_matrix()
+    result: np.ndarray = tilt @ rotation_between(longest, np.array([0.0, 0, 1]))
+    return result
+
+
+def _turned(rotation: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    result: np.ndarray = Rotation.from_rotvec([0, 0, rng.uniform(-np.pi, np.pi)]).as_matrix() @ rotation
+    return result

@@ -1,0 +1,1 @@
+"""A finished twin: its record, its folder, its table of grasps."""

@@ -1,0 +1,140 @@
+"""Where a data set lives: a local folder, or any URL that fsspec reads and writes (``s3://``, ``gs://``, ``memory://``).
+
+DATASET/
+  config.json                 what was asked for: the whole configuration
+  ledger.sqlite               the run's ledger (of a URL: a copy, the ledger itself is local)
+  twins/<2 hex>/<twin_id>/    finished twins, accepted and rejected
+  index/                      Parquet tables
+  .work/<twin_id>/<stage>/<key>/   results of stages
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path, PurePosixPath
+
+from fsspec.core import url_to_fs
+from fsspec.implementations.local import LocalFileSystem
+
+from manitwin.errors import UsageError
+from manitwin.twin.store import RECORD, replace_folder, write_bytes_atomically
+
+TWINS = "twins"
+
+
+def twin_name(twin_id: str) -> str:
+    """Return a twin's folder below the root: 256 prefixes, so that no folder has more than some hundred entries."""
+    return f"{TWINS}/{twin_id[:2]}/{twin_id}"
+
+
+class DatasetRoot:
+    """Read and write below one folder or URL; names are relative and use ``/``.
+
+    Raises UsageError for a URL whose protocol is unknown or not installed.
+    """
+
+    def __init__(self, url: str | Path):
+        try:
+            self.fs, self.path = url_to_fs(str(url), use_listings_cache=False)  # others write there as well
+        except (ValueError, ImportError) as error:
+            raise UsageError(f"{url}: {error}; give a folder, or a URL such as s3://bucket/name") from error
+        self.url = str(url)
+        self.local: Path | None = Path(self.path) if isinstance(self.fs, LocalFileSystem) else None
+
+    def __reduce__(self) -> tuple[type, tuple[str]]:
+        return type(self), (self.path if self.local else self.url,)
+
+    def absolute(self) -> str:
+        """Return a folder's absolute path, for workers that run elsewhere; a URL stays as it is."""
+        return self.url if self.local is None else str(self.local.resolve())
+
+    def full(self, name: str) -> str:
+        """Return the name as the file system knows it. Raises UsageError for one that leaves the root."""
+        if name.startswith("/") or ".." in PurePosixPath(name).parts:
+            raise UsageError(f"{name}: leaves the data set {self.url}")
+        return f"{self.path.rstrip('/')}/{name}"
+
+    def exists(self, name: str) -> bool:
+        """Tell whether a file or folder is there."""
+        return bool(self.fs.exists(self.full(name)))
+
+    def read_bytes(self, name: str) -> bytes:
+        """Return a file's content; raises FileNotFoundError."""
+        content: bytes = self.fs.cat_file(self.full(name))
+        return content
+
+    def write_bytes(self, name: str, content: bytes) -> None:
+        """Write a file whole or not at all."""
+        if self.local is not None:
+            place = Path(self.full(name))
+            place.parent.mkdir(parents=True, exist_ok=True)
+            write_bytes_atomically(place, content)
+        else:
+            self.fs.pipe_file(self.full(name), content)  # an object appears when it is complete
+
+    def put_file(self, source: Path, name: str) -> None:
+        """Copy a local file to a name, whole or not at all."""
+        if self.local is not None:
+            place = Path(self.full(name))
+            place.parent.mkdir(parents=True, exist_ok=True)
+            beside = place.with_name(f".{place.name}.{os.getpid()}")
+            shutil.copyfile(source, beside)
+            os.replace(beside, place)
+        else:
+            self.fs.put_file(str(source), self.full(name))
+
+    def fetch_file(self, name: str, to: Path) -> None:
+        """Copy a file to a local path; raises FileNotFoundError."""
+        to.parent.mkdir(parents=True, exist_ok=True)
+        self.fs.get_file(self.full(name), str(to))
+
+    def remove(self, name: str) -> None:
+        """Remove a file or a whole folder; one that is not there is no error."""
+        if self.fs.exists(self.full(name)):
+            self.fs.rm(self.full(name), recursive=True)
+
+    def names_below(self, name: str) -> list[str]:
+        """Return the names of all files below a folder, sorted; empty where there is none."""
+        root = self.path.rstrip("/") + "/"
+        found = self.fs.find(self.full(name)) if self.fs.exists(self.full(name)) else []
+        return sorted(str(path).removeprefix(root) for path in found)
+
+    def put_folder(self, fresh: Path, name: str, record: str = RECORD) -> None:
+        """Move a finished local folder to its name; its ``record`` goes last, and what the older one had more goes then.
+
+        On a local root ``fresh`` must be on the same file system, and is renamed.
+        """
+        if self.local is not None:
+            replace_folder(fresh, Path(self.full(name)))
+            return
+        files = sorted((p for p in fresh.rglob("*") if p.is_file()), key=lambda p: (p.name == record, p))
+        names = [f"{name}/{path.relative_to(fresh).as_posix()}" for path in files]
+        before = self.names_below(name)
+        for path, target in zip(files, names, strict=True):
+            self.fs.put_file(str(path), self.full(target))
+        for old in set(before) - set(names):
+            self.fs.rm_file(self.full(old))
+        shutil.rmtree(fresh)
+
+    def fetch_folder(self, name: str, to: Path) -> Path:
+        """Return a local folder with a folder's files: itself where the root is local, else a copy at ``to``."""
+        if self.local is not None:
+            return Path(self.full(name))
+        for each in self.names_below(name):
+            self.fetch_file(each, to / each.removeprefix(f"{name}/"))
+        return to
+
+    def twin_ids(self) -> Iterator[str]:
+        """Yield the ids of all finished twins, sorted."""
+        prefixes = sorted(self._children(TWINS))
+        for prefix in prefixes:
+            for twin_id in sorted(self._children(f"{TWINS}/{prefix}")):
+                if self.exists(f"{TWINS}/{prefix}/{twin_id}/{RECORD}"):
+                    yield twin_id
+
+    def _children(self, name: str) -> list[str]:
+        if not self.exists(name):
+            return []
+        return [PurePosixPath(path).name for path in self.fs.ls(self.full(name), detail=False)]

@@ -1,0 +1,94 @@
+"""``grasps.parquet``: one row a grasp that reached verification, held or failed (design of the twin folder)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from manitwin.geometry.poses import quaternion_wxyz
+
+JITTERED = ":jittered"
+JOINTS = ("pregrasp_joints_rad", "grasp_joints_rad")
+"""The arrays of ``proposals.npz`` that hands with more joints have: ``(N, J)`` each."""
+SCHEMA = pa.schema(
+    [
+        ("grasp_id", pa.string()),
+        ("gripper", pa.string()),
+        ("position_m", pa.list_(pa.float64(), 3)),
+        ("quaternion_wxyz", pa.list_(pa.float64(), 4)),
+        ("width_m", pa.float64()),
+        ("depth_m", pa.float64()),
+        ("score", pa.float64()),
+        ("proposer", pa.string()),
+        ("grasp_point_id", pa.string()),
+        ("functional_point_id", pa.string()),
+        ("distance_to_point_m", pa.float64()),
+        ("outcome", pa.string()),
+        ("verified", pa.bool_()),
+        ("displacement_m", pa.float64()),
+        ("rotation_rad", pa.float64()),
+        ("holds_in_second_engine", pa.bool_()),
+        ("robustness", pa.float64()),
+        ("robustness_trials", pa.int32()),
+        ("retired", pa.bool_()),
+        *((name, pa.list_(pa.float64())) for name in JOINTS),
+    ]
+)
+FROM_PROPOSALS = (
+    *("width_m", "depth_m", "score", "proposer"),
+    *("grasp_point_id", "functional_point_id", "distance_to_point_m"),
+)
+
+
+@dataclass(frozen=True)
+class GripperRows:
+    """All that was found of one gripper's proposals, row by row.
+
+    ``proposals`` holds the arrays of ``proposals.npz``; ``outcome``, ``displacement_m`` and ``rotation_rad`` the trial's;
+    ``holds_in_second_engine`` and ``robustness`` are None where that was not tried.
+    """
+
+    gripper: str
+    proposals: dict[str, np.ndarray]
+    outcome: np.ndarray
+    displacement_m: np.ndarray
+    rotation_rad: np.ndarray
+    holds_in_second_engine: list[bool | None]
+    robustness: list[float | None]
+    robustness_trials: list[int | None]
+    ids: list[str]
+
+    def columns(self, order: np.ndarray) -> dict[str, list[Any]]:
+        """Return the table's columns, rows in the given order."""
+        poses = self.proposals["gripper_to_object"][order]
+        return {
+            "grasp_id": [self.ids[i] for i in order],
+            "gripper": [self.gripper] * len(order),
+            "position_m": poses[:, :3, 3].tolist(),
+            "quaternion_wxyz": quaternion_wxyz(poses[:, :3, :3]).tolist(),
+            **{name: self.proposals[name][order].tolist() for name in FROM_PROPOSALS},
+            "outcome": self.outcome[order].tolist(),
+            "verified": (self.outcome[order] == "held").tolist(),
+            "displacement_m": self.displacement_m[order].tolist(),
+            "rotation_rad": self.rotation_rad[order].tolist(),
+            "holds_in_second_engine": [self.holds_in_second_engine[i] for i in order],
+            "robustness": [self.robustness[i] for i in order],
+            "robustness_trials": [self.robustness_trials[i] for i in order],
+            "retired": [False] * len(order),
+            **{name: self._joints(name, order) for name in JOINTS},
+        }
+
+    def _joints(self, name: str, order: np.ndarray) -> list[Any]:
+        """Return the joints of hands with more than one, null for the others."""
+        return self.proposals[name][order].tolist() if name in self.proposals else [None] * len(order)
+
+
+def write_grasp_table(path: Path, parts: list[dict[str, list[Any]]]) -> None:
+    """Write the columns of all parts, one after the other; equal arguments give equal bytes."""
+    columns = {name: [value for part in parts for value in part[name]] for name in SCHEMA.names}
+    pq.write_table(pa.table(columns, schema=SCHEMA), path, compression="zstd", version="2.6")

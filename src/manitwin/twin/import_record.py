@@ -1,0 +1,131 @@
+"""import.json: what an asset of another tool gives, brought to the object frame of twins, and what it does not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, ValidationError
+
+from manitwin.errors import UsageError
+from manitwin.twin.record import Finite, Matrix3, Matrix4, Record, Vector3
+
+IMPORT_RECORD, IMPORTED_MESH = "import.json", "asset.glb"
+MAX_BYTES = 64 << 20
+Positive = Annotated[Finite, Field(gt=0)]
+
+
+class GivenPoint(Record):
+    """An annotated point: where, which way is out of the object (None: unsaid), what it is for.
+
+    For a place to hold, ``position_m`` is between the fingertips, and ``approach`` and ``closing`` are unit vectors.
+    """
+
+    position_m: Vector3
+    normal: Vector3 | None = None
+    label: str = ""
+    approach: Vector3 | None = None
+    closing: Vector3 | None = None
+
+
+class GivenGrasps(Record):
+    """Grasps of one gripper in the grasp frame of twins; ``held`` is what whoever made them says of each."""
+
+    gripper: str
+    gripper_to_object: list[Matrix4]
+    depth_m: list[Finite]
+    width_m: list[Finite]
+    held: list[bool]
+
+
+class ImportRecord(Record):
+    """An imported asset in the object frame: Z up, origin at the bottom centre of its visual meshes, metres.
+
+    ``asset_to_object`` is what brought the asset's own axes there. ``missing`` says in words what it does not give.
+    """
+
+    import_version: Literal[1] = 1
+    format: str = Field(pattern=r"^[a-z0-9]+$")
+    file: str
+    name: str = Field(min_length=1)
+    category: str | None
+    license: str | None
+    attribution: str | None
+    asset_to_object: Matrix4
+    mass_kg: Positive | None
+    center_of_mass_m: Vector3 | None
+    inertia_kg_m2: Matrix3 | None
+    friction_static: Positive | None
+    friction_dynamic: Positive | None
+    restitution: Annotated[Finite, Field(ge=0, le=1)] | None
+    material: str | None
+    captions: list[str]
+    functional_points: list[GivenPoint]
+    grasp_points: list[GivenPoint]
+    grasps: list[GivenGrasps]
+    rests: list[Matrix4]
+    missing: list[str]
+    remarks: list[str]
+
+    @property
+    def source(self) -> str:
+        """Who says so, as an Estimate's source."""
+        return f"imported:{self.format}"
+
+    @property
+    def called(self) -> str:
+        """What the thing is called: the key to the priors."""
+        return self.category or self.name
+
+    def moved(self, transform: np.ndarray) -> ImportRecord:
+        """Return the record under a rigid transform ``(4, 4)`` of the object frame."""
+        rotation = transform[:3, :3]
+        center = None if self.center_of_mass_m is None else rotation @ self.center_of_mass_m + transform[:3, 3]
+        inertia = None if self.inertia_kg_m2 is None else rotation @ np.array(self.inertia_kg_m2) @ rotation.T
+        return self.model_copy(
+            update={
+                "asset_to_object": (transform @ np.array(self.asset_to_object)).tolist(),
+                "center_of_mass_m": None if center is None else center.tolist(),
+                "inertia_kg_m2": None if inertia is None else inertia.tolist(),
+                "functional_points": [_moved(point, transform) for point in self.functional_points],
+                "grasp_points": [_moved(point, transform) for point in self.grasp_points],
+                "grasps": [
+                    grasps.model_copy(
+                        update={
+                            "gripper_to_object": [(transform @ np.array(g)).tolist() for g in grasps.gripper_to_object]
+                        }
+                    )
+                    for grasps in self.grasps
+                ],
+                "rests": [(np.array(rest) @ np.linalg.inv(transform)).tolist() for rest in self.rests],
+            }
+        )
+
+
+def _moved(point: GivenPoint, transform: np.ndarray) -> GivenPoint:
+    directions = {
+        name: None if (value := getattr(point, name)) is None else (transform[:3, :3] @ value).tolist()
+        for name in ("normal", "approach", "closing")
+    }
+    position = transform[:3, :3] @ point.position_m + transform[:3, 3]
+    return point.model_copy(update={"position_m": position.tolist(), **directions})
+
+
+def is_imported(folder: Path) -> bool:
+    """Tell whether a folder is what ``manitwin import`` writes."""
+    return (folder / IMPORT_RECORD).is_file() and (folder / IMPORTED_MESH).is_file()
+
+
+def read_import_record(path: Path) -> ImportRecord:
+    """Read an import.json; raises UsageError naming the first thing that is wrong with it."""
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise UsageError(f"{path}: more than {MAX_BYTES >> 20} MiB; import the asset again")
+        return ImportRecord.model_validate_json(path.read_bytes())
+    except OSError as error:
+        raise UsageError(f"{path}: {error.strerror or error}; import the asset again") from error
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_input=False)[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise UsageError(f"{path}: {place}: {first['msg']}; import the asset again") from error

@@ -1,0 +1,60 @@
+"""How an object rests on a plane: upright, upside down, or lying on one of its sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.twin.record import Placement
+
+UPRIGHT_DEG = 10.0
+"""A pose whose +Z axis is within this of the vertical is upright, or upside down where +Z points down."""
+
+Rest = Literal["upright", "upside_down", "lying"]
+
+
+@dataclass(frozen=True)
+class RestingPose:
+    """A placement with its number in the record, and how an object rests in it; ``side_down`` is None unless it lies."""
+
+    number: int
+    placement: Placement
+    rest: Rest
+    side_down: str | None
+    tilt_deg: float
+
+
+def resting_poses(placements: Sequence[Placement]) -> list[RestingPose]:
+    """Say how an object rests in each placement: first those that stayed in simulation, likely ones before unlikely ones."""
+    order = sorted(enumerate(placements), key=lambda each: (not each[1].settled, -each[1].probability))
+    return [_resting_pose(number, placement) for number, placement in order]
+
+
+def _resting_pose(number: int, placement: Placement) -> RestingPose:
+    rotation = rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz))
+    rest = rest_of(rotation)
+    return RestingPose(number, placement, rest, side_down(rotation) if rest == "lying" else None, tilt_deg(rotation))
+
+
+def rest_of(object_to_plane: np.ndarray) -> Rest:
+    """Return how an object rests, by where the rotation ``object_to_plane (3, 3)`` takes its +Z axis."""
+    cosine, limit = float(object_to_plane[2, 2]), np.cos(np.radians(UPRIGHT_DEG))
+    if cosine > limit:
+        return "upright"
+    return "upside_down" if cosine < -limit else "lying"
+
+
+def side_down(object_to_plane: np.ndarray) -> str:
+    """Return the side that a lying object lies on: the one of ``+x``, ``-x``, ``+y``, ``-y`` that points down most."""
+    down = -object_to_plane[2, :2]
+    axis = int(np.abs(down).argmax())
+    return f"{'+' if down[axis] > 0 else '-'}{'xy'[axis]}"
+
+
+def tilt_deg(object_to_plane: np.ndarray) -> float:
+    """Return the angle (degrees) between the object's +Z axis and the vertical: 0 upright, 180 upside down."""
+    return float(np.degrees(np.arccos(np.clip(object_to_plane[2, 2], -1.0, 1.0))))

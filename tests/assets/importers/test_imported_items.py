@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import pytest
+from typer import Typer
+from typer.testing import CliRunner
+
+from foreign_assets import mug_urdf
+from manitwin.assets.importers.importer import import_assets
+from manitwin.cli.commands.import_ import import_
+from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.stage import Item
+from manitwin.errors import UsageError
+from manitwin.formats.source_files import pack_source
+from manitwin.pipeline.identity import twin_id
+from manitwin.pipeline.manifest import collect_items
+
+
+def imported(folder: Path, **mug: float) -> Path:
+    (one,) = import_assets([mug_urdf(folder / "in", **mug)], folder / "out")  # type: ignore[arg-type]
+    assert one.folder is not None
+    return one.folder
+
+
+def test_imported_folder_is_one_item_in_metres_and_y_up(tmp_path: Path) -> None:
+    folder = imported(tmp_path)
+    ((item,), _) = collect_items([folder], units="mm", up="z")
+    assert item == Item(
+        file=str(folder / "asset.glb"),
+        name="mug",
+        units="m",
+        up="y",
+        license="CC0-1.0",
+        given=str(folder / "import.json"),
+    )
+    ((named,), _) = collect_items([folder], name="cup", license="MIT")
+    assert (named.name, named.license) == ("cup", "MIT")
+
+
+def test_folder_of_imported_assets_and_meshes_gives_each_once(tmp_path: Path) -> None:
+    folder = imported(tmp_path)
+    (folder.parent / "other.stl").write_bytes(b"solid x\nendsolid x\n")
+    items, _ = collect_items([folder.parent])
+    assert [Path(item.file or "").name for item in items] == ["asset.glb", "other.stl"]
+    assert [item.given is not None for item in items] == [True, False]
+
+
+def test_manifest_may_name_an_imported_folder(tmp_path: Path) -> None:
+    folder = imported(tmp_path)
+    (tmp_path / "list.jsonl").write_text(json.dumps({"file": "out/mug", "name": "beer mug"}) + "\n")
+    ((item,), _) = collect_items([tmp_path / "list.jsonl"])
+    assert item.given == str(folder / "import.json") and item.name == "beer mug"
+
+
+def test_what_is_given_is_part_of_the_identity_and_only_there(tmp_path: Path) -> None:
+    folder = imported(tmp_path)
+    ((item,), _) = collect_items([folder])
+    before = twin_id(item)
+    plain = dataclasses.replace(item, given=None)
+    mesh_alone = twin_id(plain)
+    record = json.loads((folder / "import.json").read_text())
+    (folder / "import.json").write_text(json.dumps(record | {"mass_kg": 0.5}))
+    assert len({before, twin_id(item), mesh_alone}) == 3
+    assert twin_id(plain) == mesh_alone
+
+
+def test_ledger_of_before_knows_its_items_again(tmp_path: Path) -> None:
+    item = Item(file="/data/mug.glb", name="mug")
+    ledger = Ledger(tmp_path / "ledger.sqlite")
+    fields = {name: value for name, value in dataclasses.asdict(item).items() if name != "given"}
+    ledger.connection.execute("INSERT INTO items (item) VALUES (?)", (json.dumps(fields, sort_keys=True),))
+    ledger.add_items([item, dataclasses.replace(item, given="/data/import.json")])
+    assert [open_item.item for open_item in ledger.next_open(0, 10)] == [
+        item,
+        dataclasses.replace(item, given="/data/import.json"),
+    ]
+    ledger.close()
+
+
+def test_source_of_an_imported_twin_has_what_was_given(tmp_path: Path) -> None:
+    folder = imported(tmp_path)
+    name, content = pack_source(folder / "asset.glb", [folder / "import.json"])
+    assert name == "source.zip" and b"import.json" in content
+    assert pack_source(folder / "asset.glb") == ("source.glb", (folder / "asset.glb").read_bytes())
+
+
+def test_broken_import_record_is_a_usage_error(tmp_path: Path) -> None:
+    folder = imported(tmp_path)
+    (folder / "import.json").write_text("{")
+    with pytest.raises(UsageError, match=r"import\.json"):
+        collect_items([folder])
+
+
+def test_command_prints_one_line_an_asset(tmp_path: Path) -> None:
+    app = Typer()
+    app.command()(import_)
+    path = mug_urdf(tmp_path / "in", mass_kg=0.32)
+    done = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out"), "--from", "urdf"])
+    assert done.exit_code == 0, done.output
+    said = " ".join(done.output.split())
+    assert "mug: urdf; kept mass 0.32 kg, friction 0.55, inertia; missing restitution" in said
+    assert "1 imported, 0 not" in said
+    again = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out")])
+    assert again.exit_code == 0 and "mug: imported before, left as it is" in again.output
+    assert "0 imported, 1 imported before, 0 not" in " ".join(again.output.split())
+    broken = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out"), "--from", "urd"])
+    assert isinstance(broken.exception, UsageError) and "did you mean 'urdf'" in str(broken.exception)

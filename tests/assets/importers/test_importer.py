@@ -1,0 +1,219 @@
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from foreign_assets import embodiedgen, gso, manitwin100k, mug_urdf
+from handmade import mug
+from manitwin.assets.importers.importer import import_assets
+from manitwin.assets.read import read_asset
+from manitwin.errors import AssetError, UsageError
+from manitwin.formats.glb import read_glb
+from manitwin.formats.meshes.textures import material_of
+from manitwin.twin.import_record import ImportRecord, read_import_record
+from twin_folders import write_accepted
+
+
+def imported(path: Path, out: Path, format: str = "auto") -> tuple[ImportRecord, Path]:
+    """Import one asset; returns the record as written and its folder."""
+    (one,) = import_assets([path], out, format=format)  # type: ignore[arg-type]
+    assert one.error is None and one.folder is not None
+    return read_import_record(one.folder / "import.json"), one.folder
+
+
+def test_urdf_is_brought_to_the_object_frame(tmp_path: Path) -> None:
+    record, folder = imported(mug_urdf(tmp_path / "in"), tmp_path / "out")
+    parts = read_glb(folder / "asset.glb")
+    assert np.allclose(parts[0].bounds, _centred(mug().bounds), atol=1e-6)
+    shift = -mug().bounds.mean(0)[0]  # the handle moves the box's centre off the axis
+    assert record.mass_kg == 0.32 and record.friction_static == record.friction_dynamic == 0.55
+    assert np.allclose(record.center_of_mass_m, [0.005 + shift, 0, 0.045], atol=1e-9)
+    assert np.allclose(record.inertia_kg_m2, np.diag([5e-4, 5e-4, 4e-4]))
+    assert np.allclose(np.array(record.asset_to_object)[:3, 3], [shift - 0.5, 0, -0.2])
+    assert record.license == "CC0-1.0" and record.name == "mug"
+    assert {"captions", "functional points", "grasp points", "grasps", "category"} <= set(record.missing)
+    assert "mass" not in record.missing and "friction" not in record.missing
+
+
+def _centred(bounds: np.ndarray) -> np.ndarray:
+    middle = bounds.mean(0)
+    return bounds - [middle[0], middle[1], bounds[0, 2]]
+
+
+def test_same_asset_gives_the_same_bytes(tmp_path: Path) -> None:
+    path = mug_urdf(tmp_path / "in")
+    _, first = imported(path, tmp_path / "a")
+    _, second = imported(path, tmp_path / "b")
+    for name in ("asset.glb", "import.json"):
+        assert (first / name).read_bytes() == (second / name).read_bytes()
+
+
+@pytest.mark.parametrize("mass_kg", [0.0, -1.0])
+def test_mass_that_cannot_be_is_missing_with_what_was_declared(tmp_path: Path, mass_kg: float) -> None:
+    record, _ = imported(mug_urdf(tmp_path / "in", mass_kg=mass_kg), tmp_path / "out")
+    assert record.mass_kg is None and f"mass (declared as {mass_kg:g})" in record.missing
+
+
+def test_twin_comes_back_with_everything(tmp_path: Path) -> None:
+    write_accepted(tmp_path / "twins", 1, mass_kg=0.42)
+    record, _ = imported(tmp_path / "twins", tmp_path / "out")
+    assert record.format == "twin" and record.mass_kg == 0.42 and record.category == "mug"
+    assert record.functional_points and record.grasp_points and record.grasps and record.rests and record.captions
+    assert np.allclose(record.asset_to_object, np.eye(4), atol=1e-6)
+    assert [what for what in record.missing if what not in ("collision shapes", "licence")] == []
+
+
+def test_manitwin100k_is_taken_over(tmp_path: Path) -> None:
+    record, folder = imported(manitwin100k(tmp_path / "mug" / "002"), tmp_path / "out")
+    assert (record.format, record.category, record.name) == ("manitwin100k", "mug", "mug")
+    assert record.captions == ["a red mug with one round handle"]
+    assert np.allclose(read_glb(folder / "asset.glb")[0].bounds, _centred(mug().bounds), atol=1e-6)
+    assert np.allclose(np.array(record.rests[0])[:3, :3], np.eye(3), atol=1e-9)
+    assert record.remarks == [] and "mass" in record.missing
+
+
+def test_place_off_the_lowest_point_is_repaired_and_said(tmp_path: Path) -> None:
+    record, folder = imported(manitwin100k(tmp_path / "mug" / "002", place_off_m=0.012), tmp_path / "out")
+    points = np.concatenate([part.vertices for part in read_glb(folder / "asset.glb")])
+    rest = np.array(record.rests[0])
+    assert (points @ rest[:3, :3].T + rest[:3, 3])[:, 2].min() == pytest.approx(0, abs=1e-6)
+    assert any("12.0 mm below" in remark for remark in record.remarks)
+
+
+def test_manitwin100k_box_that_is_not_the_meshs_is_said(tmp_path: Path) -> None:
+    box = {"bounding_box": {"min_bounds": [-1, 0, -1], "max_bounds": [1, 1, 1]}}
+    record, _ = imported(manitwin100k(tmp_path / "mug" / "002", annotations=box), tmp_path / "out")
+    assert any("bounding box is" in remark for remark in record.remarks)
+
+
+def test_annotations_in_z_up_axes_are_recognised_by_the_box(tmp_path: Path) -> None:
+    low, high = mug().bounds
+    z_up = {
+        "bounding_box": {"min_bounds": low.tolist(), "max_bounds": high.tolist()},
+        "active": {"place": {"id_0": {"position": [0, 0, 0], "rotation": [0, 0, 1], "face": "-z"}}},
+    }
+    record, _ = imported(manitwin100k(tmp_path / "mug" / "002", annotations=z_up), tmp_path / "out")
+    assert record.remarks == [] and np.allclose(np.array(record.rests[0])[:3, :3], np.eye(3), atol=1e-9)
+
+
+def test_successor_fields_are_read_and_unknown_ones_named(tmp_path: Path) -> None:
+    more = {
+        "active": {
+            "place": {"up": {"projection_circle": {"center": [0, 0, 0, 0.5**0.5, -(0.5**0.5), 0, 0], "radius": 0.06}}}
+        },
+        "physics": {"mass": 0.3, "static_friction": 0.6, "dynamic_friction": 1.5, "restitution": 0.1},
+        "grasps": {"left": []},
+    }
+    record, _ = imported(manitwin100k(tmp_path / "mug" / "002", annotations=more), tmp_path / "out")
+    assert record.mass_kg == 0.3 and record.friction_static == 0.6 and record.restitution == 0.1
+    assert record.friction_dynamic is None  # nothing slides harder than it sticks
+    assert any("above the static 0.6" in what for what in record.missing)
+    assert any("'grasps' was not read" in remark for remark in record.remarks)
+    assert np.allclose(np.array(record.rests[0])[:3, 2], [0, 0, 1], atol=1e-9)  # Rx(-90) brings Y-up's +Y to its Z
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"bounding_box": {"min_bounds": [float("nan"), 0, 0], "max_bounds": [1, 1, 1]}},
+        {"physics": {"mass": 1e300}},
+        {"physics": ["mass"]},
+        {"active": {"place": {"id_0": {"position": [0, 0], "rotation": [0, 1, 0]}}}},
+        {"active": {"place": {"id_0": {"position": [0, 0, 0], "rotation": [0, 0, 0]}}}},
+        {"active": {"place": {str(i): {} for i in range(2000)}}},
+    ],
+)
+def test_broken_annotations_are_an_error_in_one_line(tmp_path: Path, more: dict[str, object]) -> None:
+    folder = manitwin100k(tmp_path / "mug" / "002", annotations=more)
+    with pytest.raises(AssetError) as caught:
+        read_asset(folder)
+    assert "\n" not in str(caught.value)
+
+
+def test_scan_finds_its_texture_and_its_collections_licence(tmp_path: Path) -> None:
+    record, folder = imported(gso(tmp_path / "Tall_Box"), tmp_path / "out")
+    part = read_glb(folder / "asset.glb")[0]
+    texture = material_of(part).baseColorTexture
+    assert isinstance(texture, Image.Image) and np.allclose(texture.getpixel((4, 4)), (1, 150, 30), atol=4)
+    assert np.allclose(part.bounds, [[-0.05, -0.1, 0], [0.05, 0.1, 0.3]], atol=1e-6)
+    assert record.license == "CC-BY-4.0" and record.category == "Bottles and Cans"
+    assert "mass" in record.missing and not any(what.startswith("file ") for what in record.missing)
+
+
+def test_embodiedgen_says_what_its_annotator_said(tmp_path: Path) -> None:
+    record, folder = imported(embodiedgen(tmp_path / "mug"), tmp_path / "out")
+    assert record.format == "embodiedgen" and record.category == "mug"
+    assert record.mass_kg == 0.3 and (record.friction_static, record.friction_dynamic) == (0.7, 0.5)
+    assert record.captions == ["a mug with one handle"]
+    assert any("mass 0.25 to 0.35 kg" in remark for remark in record.remarks)
+    assert any("MeshGeoChecker said YES" in remark for remark in record.remarks)
+    assert np.allclose(read_glb(folder / "asset.glb")[0].bounds, _centred(mug().bounds), atol=1e-5)
+
+
+def test_embodiedgen_without_an_answer_or_a_turn_is_seen(tmp_path: Path) -> None:
+    record, folder = imported(embodiedgen(tmp_path / "mug", turned=False, failed=True), tmp_path / "out")
+    assert any("did not answer" in remark for remark in record.remarks)
+    assert any("real_height says 1 m" in remark for remark in record.remarks)
+    assert np.allclose(read_glb(folder / "asset.glb")[0].bounds, _centred(mug().bounds), atol=1e-5)
+
+
+def test_one_bad_asset_does_not_stop_the_others(tmp_path: Path) -> None:
+    mug_urdf(tmp_path / "in" / "a")
+    (tmp_path / "in" / "bad.urdf").write_text("<robot name='x'/>")
+    (tmp_path / "in" / "empty.urdf").write_text(
+        "<robot name='x'><link name='l'><visual><geometry><mesh filename='../x.stl'/></geometry></visual></link></robot>"
+    )
+    results = list(import_assets([tmp_path / "in"], tmp_path / "out"))
+    assert [r.folder.name for r in results if r.folder] == ["mug"]
+    assert [r.path.name for r in results if r.error] == ["bad.urdf", "empty.urdf"]
+    assert "../x.stl is missing" in str(results[1].error)
+
+
+def test_another_asset_of_the_same_name_is_written_beside_the_first(tmp_path: Path) -> None:
+    (light,) = import_assets([mug_urdf(tmp_path / "a", mass_kg=0.2)], tmp_path / "out")
+    (heavy,) = import_assets([mug_urdf(tmp_path / "b", mass_kg=0.4)], tmp_path / "out")
+    assert light.folder is not None and heavy.folder is not None and heavy.folder != light.folder
+    assert [read_import_record(f / "import.json").mass_kg for f in (light.folder, heavy.folder)] == [0.2, 0.4]
+    assert re.fullmatch("mug_[0-9a-f]{8}", heavy.folder.name)
+    both = list(import_assets([tmp_path / "a", tmp_path / "b"], tmp_path / "other"))
+    assert [one.folder and one.folder.name for one in both] == ["mug", heavy.folder.name]  # whatever was there before
+
+
+def test_the_same_asset_imported_again_is_recognised_and_left_as_it_is(tmp_path: Path) -> None:
+    paths = [mug_urdf(tmp_path / "a", mass_kg=0.2), mug_urdf(tmp_path / "b", mass_kg=0.4)]
+    first = list(import_assets(paths, tmp_path / "out"))
+    before = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*")}
+    again = list(import_assets(reversed(paths), tmp_path / "out"))
+    assert [one.there_already for one in (*first, *again)] == [False, False, True, True]
+    assert [one.folder for one in again] == [one.folder for one in reversed(first)]
+    assert {path: path.stat().st_mtime_ns for path in (tmp_path / "out").rglob("*")} == before
+
+
+def test_an_import_that_was_changed_by_hand_is_not_written_over(tmp_path: Path) -> None:
+    _, folder = imported(mug_urdf(tmp_path / "in"), tmp_path / "out")
+    changed = (folder / "import.json").read_text().replace('"mug"', '"my mug"')
+    (folder / "import.json").write_text(changed)
+    _, other = imported(mug_urdf(tmp_path / "in"), tmp_path / "out")
+    assert other != folder and (folder / "import.json").read_text() == changed
+    (other / "import.json").write_text(changed)
+    with pytest.raises(UsageError, match="changed since"):
+        list(import_assets([mug_urdf(tmp_path / "in")], tmp_path / "out"))
+
+
+def test_folder_of_something_else_is_not_written_over(tmp_path: Path) -> None:
+    (tmp_path / "out" / "mug").mkdir(parents=True)
+    with pytest.raises(UsageError, match="no imported asset"):
+        list(import_assets([mug_urdf(tmp_path / "in")], tmp_path / "out"))
+
+
+def test_import_record_that_was_broken_is_one_line(tmp_path: Path) -> None:
+    _, folder = imported(mug_urdf(tmp_path / "in"), tmp_path / "out")
+    record = json.loads((folder / "import.json").read_text())
+    (folder / "import.json").write_text(json.dumps(record | {"mass_kg": -1}))
+    with pytest.raises(UsageError, match=r"import\.json: mass_kg"):
+        read_import_record(folder / "import.json")

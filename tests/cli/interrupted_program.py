@@ -1,0 +1,65 @@
+"""A command that a test interrupts: ``python interrupted_program.py NAME FOLDER MODE``, registered in the command line.
+
+It notes in FOLDER that it is at work (``started``) and that it is ending (``ending``). MODE ``busy`` computes until it is
+interrupted; ``slow`` then takes for ever over its end; ``late`` gets a second one as Python takes the process down;
+``run`` has two workers asleep in a stage.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import manitwin.cli.main as cli
+from manitwin.cli.reporting import reported
+from manitwin.cli.watched_run import WatchedRun
+
+NAME, FOLDER, MODE = sys.argv[1], Path(sys.argv[2]), sys.argv[3]
+
+
+def work() -> None:
+    try:
+        if MODE == "run":
+            rehearse()
+        (FOLDER / "started").touch()
+        while True:
+            sum(range(1000))
+    finally:
+        (FOLDER / "ending").touch()
+        while MODE == "slow":
+            time.sleep(0.01)
+
+
+class InterruptsWhenTakenDown:
+    """Interrupts this process as the modules' names are removed, which is the last that Python does."""
+
+    def __del__(
+        self, kill: Callable[[int, int], None] = os.kill, number: int = signal.SIGINT, me: int = os.getpid()
+    ) -> None:
+        kill(me, number)
+
+
+def rehearse() -> None:
+    from manitwin.config import RunConfig
+    from manitwin.engine.stage import Item
+    from manitwin.pipeline.dataset_run import drive, local_log
+    from manitwin.pipeline.rehearsal import RehearsalRecipe
+    from manitwin.twin.dataset_root import DatasetRoot
+
+    root = DatasetRoot(FOLDER / "data")
+    recipe = RehearsalRecipe(log=FOLDER / "started")  # which a worker writes as it begins a stage
+    items = [Item(file=None, text=f"{n} sleep:a:600") for n in range(4)]
+    with WatchedRun("items", lambda: local_log(root)) as watched:
+        drive(recipe, items, root, RunConfig(cpu=2), configuration={}, on_start=watched.start)
+
+
+if __name__ == "__main__":
+    last = InterruptsWhenTakenDown() if MODE == "late" else None
+    cli.app.registered_commands = [each for each in cli.app.registered_commands if each.callback.__name__ != NAME]
+    cli.app.command(NAME)(reported(work, own_log=NAME in ("run", "trajectories")))
+    sys.argv = ["manitwin", NAME]
+    cli.main()

@@ -1,0 +1,139 @@
+"""Causes: equal ones counted together, the most frequent told with a remedy."""
+
+from __future__ import annotations
+
+import ast
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+import manitwin
+from manitwin.api import BuildReport
+from manitwin.cli.causes import REMEDIES, cause_lines, group_causes
+from manitwin.cli.why import causes_of_build
+from manitwin.engine.ledger.unaccepted import Unaccepted
+from manitwin.engine.stage import Item
+from manitwin.pipeline.build_item import ItemResult
+from manitwin.twin.record import REJECTION_REASONS
+
+
+def failed(which: int, message: str) -> Unaccepted:
+    return Unaccepted(str(which), "failed", "error", f"episodes failed 3 times: {message}")
+
+
+def missing(which: int, twin: str, root: str = "/data/set one") -> Unaccepted:
+    return failed(which, f"UsageError: {root}: no twin {twin} there; put it back (twin_source.py:55)")
+
+
+def test_causes_are_equal_but_for_ids_paths_names_and_numbers() -> None:
+    causes = group_causes(
+        [
+            failed(1, "BadReply: model answered nothing; ask again"),
+            missing(2, "5feceb66ffc86f38"),
+            missing(3, "6b86b273ff34fce1"),
+            failed(4, "KeyError: 'mass' (physical.py:12)"),
+            missing(5, "d4735e3a265e16ee"),
+            failed(6, "KeyError: 'mass' (physical.py:14)"),
+        ]
+    )
+    assert [(cause.count, cause.example) for cause in causes] == [(3, "2"), (2, "4"), (1, "1")]
+    assert causes[0].message == "/data/set one: no twin 5feceb66ffc86f38 there" and causes[0].remedy == "put it back"
+    assert causes[1].message == "KeyError: 'mass'" and causes[1].remedy is None
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("/data/a/mug.obj: broken", "/other/cup.ply: broken"),
+        ("s3://bucket/a: gone", "s3://bucket/b: gone"),
+        ("lift cannot make a mesh from text ('a mug')", "lift cannot make a mesh from text ('a cup')"),
+        ("took longer than 30 s", "took longer than 2.5 s"),
+    ],
+)
+def test_what_varies_from_item_to_item_is_no_other_cause(one: str, other: str) -> None:
+    assert len(group_causes([failed(1, one), failed(2, other)])) == 1
+    assert len(group_causes([failed(1, one), failed(2, f"{other}, and more")])) == 2
+
+
+@pytest.mark.parametrize(
+    ("said", "message", "remedy"),
+    [
+        ("ValueError: bad header 'a; b' in row", "ValueError: bad header 'a; b' in row", None),
+        ("ValueError: bad header a; b in row", "ValueError: bad header a; b in row", None),
+        ("UsageError: no column 'a; b' there", "no column 'a; b' there", None),
+        ("UsageError: the set's 'a; b' is gone; don't move it", "the set's 'a; b' is gone", "don't move it"),
+        ("BadReply: x says: later; nothing; ask again", "x says: later; nothing", "ask again"),
+        (f"UsageError: {'x' * 600}; leave it out", f"{'x' * 500} ...", "leave it out"),
+        ("the worker process died (signal 11); stack: a; b", "the worker process died (signal 11); stack: a; b", None),
+    ],
+)
+def test_only_a_message_of_our_own_errors_ends_with_its_remedy(said: str, message: str, remedy: str | None) -> None:
+    (cause,) = group_causes([failed(1, said)])
+    assert (cause.message, cause.remedy) == (message, remedy)
+
+
+def test_a_rejection_without_a_known_remedy_has_none() -> None:
+    assert "quiet" not in REMEDIES
+    (cause,) = group_causes([Unaccepted("1", "rejected", "quiet", "quiet: nothing said; a rehearsal")])
+    assert (cause.message, cause.remedy) == ("nothing said; a rehearsal", None)
+
+
+def test_a_remedy_is_said_once() -> None:
+    said = f"empty: a.png: the file has zero bytes; {REMEDIES['empty']}"
+    (cause,) = group_causes([Unaccepted("1", "rejected", "empty", said)])
+    assert (cause.message, cause.remedy) == ("a.png: the file has zero bytes", REMEDIES["empty"])
+
+
+def test_a_build_tells_a_remedy_of_our_own_errors_and_none_of_a_defect() -> None:
+    mug = Item(file="/photos/mug.png")
+    results = [
+        ItemResult(mug, "1", "unfinished", "x does not answer; start it", None, error="Unavailable"),
+        ItemResult(mug, "2", "unfinished", "a defect in manitwin: KeyError: 'a'; the traceback is in e.txt", None),
+    ]
+    causes = causes_of_build(BuildReport(results))
+    assert [(cause.message, cause.remedy) for cause in causes] == [
+        ("x does not answer", "start it"),
+        ("a defect in manitwin: KeyError: 'a'; the traceback is in e.txt", None),
+    ]
+
+
+def test_rejections_are_grouped_by_their_reason_and_apart_from_failures() -> None:
+    items = [
+        Unaccepted("a.png", "rejected", "too_small", "too_small: a.png: 1 x 1 pixels"),
+        Unaccepted("1", "failed", "timeout", "verify failed 3 times: no answer in 600 s"),
+        Unaccepted("b.png", "rejected", "empty", "empty: b.png: the file has zero bytes"),
+        Unaccepted("c.png", "rejected", "empty", "empty: c.png: the file has zero bytes"),
+    ]
+    lines = cause_lines(group_causes(items), again="manitwin retry DATA", others="manitwin status DATA")
+    assert lines == [
+        "why rejected: 2 of 3 empty, such as b.png: b.png: the file has zero bytes",
+        f"  remedy: {REMEDIES['empty']}",
+        "  1 other cause: manitwin status DATA",
+        "why failed: 1 of 1, 1: no answer in 600 s",
+        f"  remedy: {REMEDIES['timeout']}; then manitwin retry DATA",
+    ]
+
+
+def test_nothing_is_said_where_all_were_accepted() -> None:
+    assert cause_lines(group_causes([]), again="", others="") == []
+
+
+def test_every_reason_for_a_rejection_has_a_remedy() -> None:
+    assert set(chain(*REJECTION_REASONS.values())) <= set(REMEDIES)
+    assert reasons_of_layouts() and reasons_of_layouts() <= set(REMEDIES)
+
+
+def reasons_of_layouts() -> set[str]:
+    """The words in the code of layouts that are given as a reason."""
+    tree = ast.parse((Path(manitwin.__path__[0]) / "apps/layouts/sample.py").read_text())
+    given: list[ast.expr] = [
+        node.args[0] for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) == "Rejected"
+    ]
+    given += [
+        node.value
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "reason"
+    ]
+    branches = chain(*([n.body, n.orelse] if isinstance(n, ast.IfExp) else [n] for n in given))
+    return {n.value for n in branches if isinstance(n, ast.Constant)}

@@ -1,0 +1,147 @@
+"""Ctrl-C once and twice, and SIGTERM: one line, no traceback, nobody left behind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import manitwin.cli.commands.status as status_module
+from manitwin.cli.main import app
+from manitwin.engine.ledger.ledger import Ledger
+
+PROGRAM = Path(__file__).with_name("interrupted_program.py")
+PATIENCE_S = 120.0
+
+
+class Interrupted:
+    """A command in a process group of its own, as a terminal has it."""
+
+    def __init__(self, folder: Path, name: str, mode: str):
+        self.folder = folder
+        command = [sys.executable, PROGRAM, name, folder, mode]
+        self.process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
+
+    def wait_for(self, note: str) -> None:
+        until = time.monotonic() + PATIENCE_S
+        while not (self.folder / note).exists():
+            assert self.process.poll() is None and time.monotonic() < until, self.process.communicate()
+            time.sleep(0.01)
+
+    def send(self, *numbers: signal.Signals) -> None:
+        for number in numbers:
+            os.killpg(self.process.pid, number)
+
+    def end(self) -> tuple[int, list[str]]:
+        """Return the exit status and the lines on stderr; no process of the group is left."""
+        _, errors = self.process.communicate(timeout=PATIENCE_S)
+        until = time.monotonic() + PATIENCE_S
+        while _group_lives(self.process.pid):
+            assert time.monotonic() < until, "a process is left behind"
+            time.sleep(0.01)
+        return self.process.returncode, errors.splitlines()
+
+
+def _group_lives(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+AGAIN = "; run the same command again to go on where it stopped"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    ("name", "status", "line"),
+    [
+        ("trajectories", 4, f"manitwin trajectories: interrupted{AGAIN}"),
+        ("stats", 130, "manitwin stats: interrupted"),
+    ],
+)
+def test_first_interrupt_ends_in_order_with_one_line(
+    tmp_path: Path, name: str, status: int, line: str, number: signal.Signals
+) -> None:
+    program = Interrupted(tmp_path, name, "busy")
+    program.wait_for("started")
+    program.send(number)
+    assert program.end() == (status, [line])
+    assert (tmp_path / "ending").exists()
+
+
+@pytest.mark.parametrize("numbers", [(signal.SIGINT, signal.SIGINT), (signal.SIGTERM, signal.SIGINT)])
+@pytest.mark.parametrize(("name", "status"), [("render", 4), ("export", 130)])
+def test_second_interrupt_ends_a_slow_end_at_once(
+    tmp_path: Path, name: str, status: int, numbers: tuple[signal.Signals, signal.Signals]
+) -> None:
+    program = Interrupted(tmp_path, name, "slow")
+    program.wait_for("started")
+    program.send(numbers[0])
+    program.wait_for("ending")
+    program.send(numbers[1])
+    found, lines = program.end()
+    assert found == status and len(lines) == 1 and "interrupted" in lines[0]
+
+
+@pytest.mark.parametrize("times", [1, 2, 3])
+def test_interrupts_of_a_run_leave_no_worker_and_no_traceback(tmp_path: Path, times: int) -> None:
+    program = Interrupted(tmp_path, "run", "run")
+    program.wait_for("started")
+    program.send(*[signal.SIGINT] * times)
+    status, lines = program.end()
+    assert status == 4
+    assert [line for line in lines if "interrupted" in line] == [f"manitwin run: interrupted{AGAIN}"]
+    assert len(lines) == 1, lines
+    assert not list((tmp_path / "data" / "twins").glob("*/*")), "nothing is half-made"
+
+
+def test_an_interrupt_is_how_a_watch_ends(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    Ledger(tmp_path / "ledger.sqlite").close()
+    monkeypatch.setattr(status_module.time, "sleep", lambda seconds: signal.raise_signal(signal.SIGINT))
+    done = CliRunner().invoke(app, ["status", str(tmp_path), "--watch"])
+    assert done.exit_code == 0 and "0 of 0 items ended" in done.stdout
+    assert "interrupted" not in done.output.lower() and "aborted" not in done.output.lower()
+
+
+@pytest.mark.parametrize(("name", "status"), [("layout", 4), ("export", 130)])
+def test_interrupt_while_python_takes_itself_down_keeps_the_exit_status(tmp_path: Path, name: str, status: int) -> None:
+    program = Interrupted(tmp_path, name, "late")
+    program.wait_for("started")
+    program.send(signal.SIGINT)
+    found, lines = program.end()
+    assert found == status and len(lines) == 1 and "interrupted" in lines[0]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_while_the_command_line_is_imported_is_one_line(number: signal.Signals) -> None:
+    program = """
+import os, sys
+class Interrupts:
+    def find_spec(self, name, *rest):
+        if name == "manitwin.cli.main":
+            os.kill(os.getpid(), int(sys.argv[1]))
+sys.meta_path.insert(0, Interrupts())
+from manitwin.cli.entry import main
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", program, str(int(number))], capture_output=True, text=True)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "manitwin: interrupted\n")
+
+
+def test_entry_imports_nothing_that_takes_time() -> None:
+    program = "import sys; old = set(sys.modules); import manitwin.cli.entry; print(*sorted(set(sys.modules) - old))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert not {"multiprocessing", "typer", "rich", "asyncio", "importlib.metadata"} & set(done.stdout.split())
+
+
+def test_package_runs_as_a_module() -> None:
+    done = subprocess.run([sys.executable, "-m", "manitwin", "--version"], capture_output=True, text=True)
+    assert done.returncode == 0 and done.stdout.startswith("manitwin ")

@@ -1,0 +1,102 @@
+"""``manitwin prompts``: what is written is what was asked."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from manitwin.api import build
+from manitwin.cli.annotator_questions import AskedQuestions, questions_about, write_questions
+from manitwin.config import BuildConfig, ServicesConfig
+from manitwin.errors import TwinError, UsageError
+from manitwin.models.fakes.openai_chat import FakeOpenAi
+from manitwin.models.fakes.server import FakeServer
+from manitwin.models.vlm.protocol import Picture
+
+SAMPLES = Path(__file__).resolve().parents[2] / "samples"
+
+pytestmark = pytest.mark.slow  # a whole build
+
+
+@pytest.fixture(scope="module")
+def asked_and_built(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict[str, Any]], AskedQuestions, Path]:
+    """The requests that came to the server while a mug was built, and the questions made from the finished twin."""
+    out = tmp_path_factory.mktemp("built")
+    with FakeServer(FakeOpenAi(key="rehearsal-key")) as server:
+        config = BuildConfig(annotator=f"openai:eyes@{server.url}/v1", services=ServicesConfig(cache=False))
+        with pytest.MonkeyPatch.context() as environment:
+            environment.setenv("MANITWIN_VLM_KEY", "rehearsal-key")
+            report = build(SAMPLES / "mug.glb", out, name="mug", jobs=1, quick=True, config=config)
+    folder = report.results[0].folder
+    assert folder is not None and report.results[0].status == "accepted"
+    bodies = [request.json() for request in server.requests]
+    return bodies, questions_about(folder, config, config.annotator), folder
+
+
+def asked_at_first(bodies: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The requests without those that ask for something again."""
+    return [body for body in bodies if len(body["messages"]) == 2]
+
+
+def test_text_and_schema_are_exactly_what_was_asked(
+    asked_and_built: tuple[list[dict[str, Any]], AskedQuestions, Path],
+) -> None:
+    bodies, questions, _ = asked_and_built
+    sent = asked_at_first(bodies)
+    assert len(sent) == len(questions.questions) == 7
+    for body, one in zip(sent, questions.questions, strict=True):
+        system, user = body["messages"]
+        assert system["content"] == one.system
+        texts = [part["text"] for part in user["content"] if part["type"] == "text"]
+        assert texts == [part for part in one.question.parts if isinstance(part, str)]
+        assert body["response_format"]["json_schema"]["schema"] == one.question.schema
+
+
+def test_pictures_agree_with_those_that_were_asked_with(
+    asked_and_built: tuple[list[dict[str, Any]], AskedQuestions, Path],
+) -> None:
+    bodies, questions, _ = asked_and_built
+    for body, one in zip(asked_at_first(bodies), questions.questions, strict=True):
+        urls = [part["image_url"]["url"] for part in body["messages"][1]["content"] if part["type"] == "image_url"]
+        sent = [base64.b64decode(url.partition(",")[2]) for url in urls]
+        made = [part.png for part in one.question.parts if isinstance(part, Picture)]
+        assert len(sent) == len(made)
+        for a, b in zip(sent, made, strict=True):
+            first, second = (np.asarray(Image.open(io.BytesIO(png)), dtype=int) for png in (a, b))
+            assert first.shape == second.shape == (768, 768, 3)
+            assert np.abs(first - second).mean() < 0.2, "of 255: the same picture but for the coding of its texture"
+
+
+def test_folders_hold_text_with_picture_names_and_a_bill(
+    asked_and_built: tuple[list[dict[str, Any]], AskedQuestions, Path], tmp_path: Path
+) -> None:
+    _, questions, folder = asked_and_built
+    write_questions(questions, tmp_path / "asked")
+    names = sorted(path.name for path in (tmp_path / "asked").iterdir())
+    assert names == ["1_quality", "2_physical", "3_captions", "4_functional_points", "5_grasp_points_1", "6_grasp_points_2",
+                     "7_grasp_points_3", "README.md"]  # fmt: skip
+    for one in questions.questions:
+        made = tmp_path / "asked" / one.folder
+        lines = (made / "question.txt").read_text().splitlines()
+        pictures = [line.strip("[]") for line in lines if line.startswith("[picture_")]
+        assert pictures == sorted(path.name for path in made.glob("*.png"))
+        assert json.loads((made / "schema.json").read_text()) == one.question.schema
+    readme = (tmp_path / "asked" / "README.md").read_text()
+    assert "7_grasp_points_3" in readme and "usd_per_million_tokens" in readme
+    priced = BuildConfig(services=ServicesConfig(usd_per_million_tokens=(1.0, 10.0)))
+    write_questions(questions_about(folder, priced, "openai:MODEL"), tmp_path / "priced")
+    assert "usd_per_million" not in (tmp_path / "priced" / "README.md").read_text()
+    with pytest.raises(UsageError, match="not empty"):
+        write_questions(questions, tmp_path / "asked")
+
+
+def test_folder_that_is_no_twin_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(TwinError):
+        questions_about(tmp_path, BuildConfig(), "openai:MODEL")

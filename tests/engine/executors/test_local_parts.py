@@ -1,0 +1,84 @@
+"""What a long stage says of itself reaches whoever watches the run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from manitwin.config import RunConfig
+from manitwin.engine.announcer import Announcer
+from manitwin.engine.events import StageAdvanced, StageEnded, StageEvent, StageStarted
+from manitwin.engine.executors.local import LocalExecutor
+from manitwin.engine.executors.part_notes import parts_noted, read_notes
+from manitwin.engine.flight import Flight
+from manitwin.engine.jobs import Failure, RunStage, WorkerSetup
+from manitwin.engine.ledger.ledger import OpenItem
+from manitwin.engine.stage import Item
+from manitwin.engine.stage_parts import StagePart, heard_by, tell_part
+from manitwin.pipeline.dataset_run import drive
+from manitwin.pipeline.rehearsal import RehearsalRecipe
+from manitwin.twin.dataset_root import DatasetRoot
+
+
+def test_a_run_tells_what_part_of_a_stage_is_done_while_it_runs(tmp_path: Path) -> None:
+    go_on = tmp_path / "go_on"
+    events: list[StageEvent] = []
+
+    def heard(event: StageEvent) -> None:
+        events.append(event)
+        if isinstance(event, StageAdvanced):
+            go_on.touch()  # nothing else lets the stage end
+
+    item = Item(file=None, text=f"parts:b:{go_on}")
+    report = drive(
+        RehearsalRecipe(), [item], DatasetRoot(tmp_path / "data"), RunConfig(cpu=1), configuration={}, on_stage=heard
+    )
+    assert report.counts["accepted"] == 1
+    of_b = [event for event in events if event.stage == "b"]
+    assert isinstance(of_b[0], StageStarted) and isinstance(of_b[-1], StageEnded)
+    assert of_b[1:-1] and set(of_b[1:-1]) == {StageAdvanced(item, "b", StagePart(1, 2, "things"))}
+
+
+def test_parts_of_a_worker_that_took_too_long_are_forgotten(tmp_path: Path) -> None:
+    job = RunStage(1, Item(file=None, text="hang:a"), "0" * 32, "text", 0, "a", "cpu", ())
+    setup = WorkerSetup(str(tmp_path), RehearsalRecipe(), tmp_path, False)
+    with LocalExecutor(setup, RunConfig(cpu=1, stage_timeout_s=1)) as executor:
+        notes = Path(executor._stacks.name)
+        (notes / "7.part").write_text('[1, 2, "things"]')  # what its worker cannot remove as it is killed
+        assert read_notes(notes) == {7: StagePart(1, 2, "things")}
+        executor.submit(7, job)
+        while not (ended := executor.ended(1.0)):
+            pass
+        ((_, reply),) = ended
+        assert isinstance(reply, Failure) and reply.kind == "timeout"
+        assert read_notes(notes) == {}
+
+
+def test_parts_count_for_the_attempt_that_says_them(tmp_path: Path) -> None:
+    heard: list[StageEvent] = []
+    announcer = Announcer(heard.append, lambda event: None)
+    item = Item(file=None, text="thing")
+    again = Flight(OpenItem(1, item, {"input": 1}))
+    announcer.stages_advanced({4: StagePart(1, 2, "things"), 5: StagePart(0, 2, "things")}, {5: again, 6: None})
+    assert heard == [StageAdvanced(item, "input", StagePart(0, 2, "things"))]
+
+
+def test_a_note_that_cannot_be_written_does_not_end_the_stage(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    gone = tmp_path / "gone"
+    done = []
+    for ticket in (1, 2):
+        with parts_noted(gone, ticket):
+            tell_part(1, 2, "things")
+            done.append(ticket)
+    assert done == [1, 2]
+    assert len([record for record in caplog.records if "not shown" in record.message]) == 1, "it is said once"
+
+
+def test_parts_are_heard_only_where_somebody_listens() -> None:
+    heard: list[StagePart] = []
+    tell_part(1, 3, "frames")
+    with heard_by(heard.append):
+        tell_part(2, 3, "frames")
+    tell_part(3, 3, "frames")
+    assert heard == [StagePart(2, 3, "frames")]

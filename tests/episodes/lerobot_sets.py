@@ -1,0 +1,55 @@
+"""LeRobot data sets written of made-up episodes, with and without pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+from synthetic_episodes import episode
+
+from manitwin.episodes.lerobot.videos import CameraVideos, Clip
+from manitwin.episodes.lerobot.write import Written, write_lerobot
+from manitwin.episodes.recording import RATE_HZ
+from manitwin.episodes.stored_episode import StoredEpisode
+
+HEIGHT_PX, WIDTH_PX = 48, 64
+
+
+def episodes(count: int = 5) -> list[StoredEpisode]:
+    return [episode(i) for i in range(count)]
+
+
+def written(place: Path, count: int = 5, *, size_mb: int = 100, videos: Sequence[CameraVideos] = ()) -> Written:
+    return write_lerobot(episodes(count), place, data_files_size_in_mb=size_mb, videos=videos)
+
+
+def color_rgb(number: int) -> np.ndarray:
+    """The colour that all pictures of an episode have, but for a bar."""
+    return np.array([40 * number, 200 - 30 * number, 90])
+
+
+def picture(number: int, frame: int, steps: int) -> np.ndarray:
+    """RGB uint8: the episode's colour; as many columns are white as frames are past."""
+    image = np.empty((HEIGHT_PX, WIDTH_PX, 3), np.uint8)
+    image[:] = color_rgb(number)
+    image[:, : round(WIDTH_PX * frame / steps)] = 255
+    return image
+
+
+def camera(folder: Path, given: Sequence[StoredEpisode], name: str = "front", codec: str = "vp09") -> CameraVideos:
+    """Pictures of all episodes, two an mp4, with an extra picture of the last state behind each."""
+    folder.mkdir(parents=True, exist_ok=True)
+    clips: dict[str, Clip] = {}
+    for number in range(0, len(given), 2):
+        path, frame = folder / f"{name}_{number}.mp4", 0
+        video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*codec), RATE_HZ, (WIDTH_PX, HEIGHT_PX))
+        for offset, one in enumerate(given[number : number + 2]):
+            steps = one.recording.steps
+            clips[one.attempt.episode_id] = Clip(path, frame)
+            for t in range(steps + 1):
+                video.write(picture(number + offset, t, steps)[..., ::-1])
+            frame += steps + 1
+        video.release()
+    return CameraVideos(name, clips)

@@ -1,0 +1,64 @@
+"""attempts.parquet: rows come back, batches are put together, kept ones are numbered."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from synthetic_episodes import attempt
+
+from manitwin.episodes import attempts_table as table
+from manitwin.episodes.attempt import OUTCOMES, Attempt
+from manitwin.errors import EpisodesError
+
+
+def some(count: int) -> list[Attempt]:
+    return [attempt(i, outcome=OUTCOMES[i % len(OUTCOMES)]) for i in range(count)]
+
+
+def test_attempts_come_back_as_they_were_with_equal_bytes(tmp_path: Path) -> None:
+    given = [*some(25), attempt(25, scene_id=None, transferred=True, category="茶杯", instructions=("a", "b"))]
+    table.write_attempts(tmp_path / "a.parquet", given)
+    table.write_attempts(tmp_path / "b.parquet", given)
+    assert list(table.read_attempts(tmp_path / "a.parquet")) == given
+    assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "b.parquet").read_bytes()
+
+
+def test_columns_are_the_fields_of_an_attempt() -> None:
+    assert table.SCHEMA.names == list(Attempt.__dataclass_fields__)
+
+
+def test_merging_keeps_order_and_numbers_the_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(table, "_ROW_GROUP", 16)
+    given = some(50)
+    files = [tmp_path / f"{i}.parquet" for i in range(6)]
+    for number, path in enumerate(files):
+        table.write_attempts(path, given[number * 10 : number * 10 + 10] if number < 5 else [])
+    kept = sum(a.outcome == "kept" for a in given)
+    assert table.merge_attempts(files, tmp_path / "all.parquet") == (50, kept)
+    assert list(table.read_attempts(tmp_path / "all.parquet")) == given
+    rows = pq.read_table(tmp_path / "all.parquet")
+    assert rows.schema.names == table.MERGED_SCHEMA.names
+    numbers = rows["episode_index"].to_pylist()
+    assert [n for n in numbers if n is not None] == list(range(kept))
+    assert all((n is None) == (a.outcome != "kept") for n, a in zip(numbers, given, strict=True))
+    groups = pq.ParquetFile(tmp_path / "all.parquet").metadata
+    assert [groups.row_group(i).num_rows for i in range(groups.num_row_groups)] == [16, 16, 16, 2]
+
+
+def test_merging_nothing_gives_an_empty_table(tmp_path: Path) -> None:
+    assert table.merge_attempts([], tmp_path / "all.parquet") == (0, 0)
+    assert list(table.read_attempts(tmp_path / "all.parquet")) == []
+
+
+def test_unknown_outcomes_and_other_tables_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(EpisodesError, match="unknown outcome 'won'"):
+        table.attempts_table([replace(attempt(0), outcome="won")])
+    pq.write_table(pa.table({"episode_id": ["a"]}), tmp_path / "a.parquet")
+    with pytest.raises(EpisodesError, match="has no column robot"):
+        list(table.read_attempts(tmp_path / "a.parquet"))
+    with pytest.raises(EpisodesError, match="no Parquet file"):
+        list(table.read_attempts(tmp_path / "missing.parquet"))

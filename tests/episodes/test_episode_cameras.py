@@ -1,0 +1,67 @@
+"""Named cameras: what they must see, for every robot that comes with the package."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manitwin.episodes.cameras import named_cameras
+from manitwin.episodes.robot_visuals import tip_pose
+from manitwin.errors import UsageError
+from manitwin.geometry.poses import transform, transform_points
+from manitwin.render.cameras import project
+from manitwin.robots.load import load_robot, shipped_robots
+
+SIZE = 256
+
+
+def inside(pixels: np.ndarray, depth: np.ndarray) -> np.ndarray:
+    return (depth > 0) & (pixels > 0).all(1) & (pixels < SIZE).all(1)
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_standing_cameras_see_the_whole_workspace(name: str) -> None:
+    robot = load_robot(name)
+    space = robot.workspace
+    angles = np.linspace(-space.half_angle_rad, space.half_angle_rad, 9)
+    radii = np.array([space.min_radius_m, space.max_radius_m])[:, None]
+    sector = np.stack([radii * np.cos(angles), radii * np.sin(angles), 0 * radii * angles], -1).reshape(-1, 3)
+    for camera in named_cameras(["front", "side", "top"], robot):
+        assert inside(*project(sector, camera.placed(np.eye(4), SIZE, SIZE))).all(), camera.name
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_front_camera_sees_the_hand_at_home(name: str) -> None:
+    robot = load_robot(name)
+    tip = tip_pose(robot, robot.home_rad)
+    point = transform_points(tip, np.array([[0, 0, robot.gripper.tip_depth_m]]))
+    assert inside(*project(point, named_cameras(["front"], robot)[0].placed(tip, SIZE, SIZE))).all()
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_wrist_camera_sees_the_fingertips_and_what_lies_between_them(name: str) -> None:
+    robot = load_robot(name)
+    wrist = named_cameras(["wrist"], robot)[0]
+    depth = robot.gripper.tip_depth_m
+    half = robot.gripper.opening_m / 2
+    points = np.array([[half, 0, depth], [-half, 0, depth], [0, 0, depth], [0, 0, depth + 0.05]])
+    pixels, distance = project(points, wrist.placed(np.eye(4), SIZE, SIZE))
+    assert inside(pixels, distance).all()
+    assert pixels[0, 0] > pixels[1, 0]  # the +X finger at the right
+    eye = wrist.camera_to_mount[:3, 3]
+    for box_to_gripper, half_extents in robot.gripper.boxes(robot.gripper.opening_m):
+        outside = np.abs(transform_points(np.linalg.inv(box_to_gripper), eye[None])[0]) - half_extents
+        assert outside.max() > 0.01  # it is not inside the hand
+
+
+def test_wrist_camera_rides_on_the_hand_and_the_others_stand() -> None:
+    robot = load_robot("panda")
+    moved = transform(translation=np.array([0.3, 0.1, 0.2]))
+    for camera in named_cameras(["front", "wrist"], robot):
+        here, there = (camera.placed(pose, SIZE, SIZE).position for pose in (np.eye(4), moved))
+        np.testing.assert_allclose(there - here, moved[:3, 3] if camera.on_hand else np.zeros(3), atol=1e-12)
+
+
+def test_unknown_camera_names_those_there_are() -> None:
+    with pytest.raises(UsageError, match=r"did you mean 'wrist'\? Valid: front, side, top, wrist"):
+        named_cameras(["wirst"], load_robot("panda"))

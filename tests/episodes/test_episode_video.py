@@ -1,0 +1,159 @@
+"""Videos of episodes, decoded frame by frame."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from PIL import Image
+
+from manitwin.episodes.lerobot.videos import video_facts
+from manitwin.episodes.video import EpisodesVideo, require_encoder, write_animation
+from manitwin.errors import UsageError
+from manitwin.scenes.app_config import PicturesConfig
+
+WIDTH, HEIGHT = 96, 64
+
+
+def pictures(first: int, count: int) -> list[np.ndarray]:
+    """Pictures that carry their number as 8 black or white fields, on a smooth ground of colour."""
+    made = []
+    for number in range(first, first + count):
+        picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
+        picture[..., 0] = np.linspace(40, 200, WIDTH)[None]
+        picture[..., 1] = np.linspace(60, 160, HEIGHT)[:, None]
+        picture[..., 2] = 120
+        for bit in range(8):
+            picture[8:24, 8 + 10 * bit : 16 + 10 * bit] = 255 if number >> bit & 1 else 0
+        made.append(picture)
+    return made
+
+
+def number_of(picture: np.ndarray) -> int:
+    return sum(int(picture[16, 12 + 10 * bit].mean() > 127) << bit for bit in range(8))
+
+
+def decoded(path: Path) -> list[np.ndarray]:
+    capture, frames = cv2.VideoCapture(str(path)), []
+    while True:
+        read, frame = capture.read()
+        if not read:
+            return frames
+        frames.append(cv2.cvtColor(frame, cv2.COLOR_BGR2RGB))
+
+
+def written(path: Path, codec: str) -> list[tuple[int, int, float, float]]:
+    with EpisodesVideo(path, width_px=WIDTH, height_px=HEIGHT, codec=codec) as video:  # type: ignore[arg-type]
+        spans = [video.add(pictures(0, 45)), video.add(iter(pictures(100, 30)))]
+    return [(s.first_frame, s.frames, s.from_timestamp_s, s.to_timestamp_s) for s in spans]
+
+
+@pytest.mark.parametrize("codec", ["vp9", "mpeg4"])
+def test_frames_come_back_in_their_places(tmp_path: Path, codec: str) -> None:
+    path = tmp_path / "a.mp4"
+    assert written(path, codec) == [(0, 45, 0.0, 2.25), (45, 30, 2.25, 3.75)]
+    assert [p.name for p in tmp_path.iterdir()] == ["a.mp4"]
+    frames = decoded(path)
+    assert [number_of(frame) for frame in frames] == [*range(45), *range(100, 130)]
+    for frame, original in zip(frames, [*pictures(0, 45), *pictures(100, 30)], strict=True):
+        assert np.abs(frame[32:].astype(int) - original[32:]).mean() < 8
+
+
+@pytest.mark.parametrize("codec", ["vp9", "mpeg4"])
+def test_seeking_by_frame_or_by_time_is_exact(tmp_path: Path, codec: str) -> None:
+    path = tmp_path / "a.mp4"
+    written(path, codec)
+    capture = cv2.VideoCapture(str(path))
+    assert capture.get(cv2.CAP_PROP_FPS) == 20
+    numbers = [*range(45), *range(100, 130)]
+    for index in (74, 3, 45, 44, 0, 60):
+        capture.set(cv2.CAP_PROP_POS_FRAMES, index)
+        assert number_of(capture.read()[1]) == numbers[index]
+        capture.set(cv2.CAP_PROP_POS_MSEC, 1000 * index / 20)
+        assert number_of(capture.read()[1]) == numbers[index]
+
+
+@pytest.mark.parametrize("codec", ["vp9", "mpeg4"])
+def test_same_pictures_give_the_same_bytes(tmp_path: Path, codec: str) -> None:
+    for name in ("a.mp4", "b.mp4"):
+        written(tmp_path / name, codec)
+    assert (tmp_path / "a.mp4").read_bytes() == (tmp_path / "b.mp4").read_bytes()
+
+
+def test_video_that_breaks_off_leaves_nothing(tmp_path: Path) -> None:
+    with (
+        pytest.raises(UsageError, match=r"a picture is \(10, 10, 3\) uint8"),
+        EpisodesVideo(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT) as video,
+    ):
+        video.add([*pictures(0, 2), np.zeros((10, 10, 3), np.uint8)])
+    assert not list(tmp_path.iterdir())
+
+
+def test_odd_sizes_and_unknown_codecs_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="even, not 95 x 64"):
+        EpisodesVideo(tmp_path / "a.mp4", width_px=95, height_px=64)
+    with pytest.raises(UsageError, match="video codec 'h264'"):
+        EpisodesVideo(tmp_path / "a.mp4", width_px=96, height_px=64, codec="h264")  # type: ignore[arg-type]
+
+
+def test_default_is_a_codec_that_browsers_play_with_a_licence_that_lets_everybody_carry_it(tmp_path: Path) -> None:
+    """VP9 of profile 0 (8 bits, 4:2:0), which Chromium and Firefox play; libvpx is BSD, and FFmpeg is there under the LGPL."""
+    path = tmp_path / "a.mp4"
+    with EpisodesVideo(path, width_px=WIDTH, height_px=HEIGHT, codec=PicturesConfig().codec) as video:
+        video.add(pictures(0, 3))
+    assert video_facts(path).codec == "vp9"
+    box = path.read_bytes().partition(b"vpcC")[
+        2
+    ]  # VPCodecConfigurationRecord: version, flags, profile, level, depth ...
+    profile, depth_bits, subsampling = box[4], box[6] >> 4, box[6] >> 1 & 7
+    assert (profile, depth_bits) == (0, 8) and subsampling in (0, 1)
+
+
+def test_build_without_the_encoder_says_which_has_it_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = cv2.VideoWriter
+
+    class Lacking:
+        """An OpenCV whose FFmpeg has no libvpx."""
+
+        fourcc = staticmethod(real.fourcc)
+
+        def __new__(cls, file: str, backend: int, fourcc: int, rate_hz: float, size: tuple[int, int]) -> object:
+            return real() if fourcc == real.fourcc(*"vp09") else real(file, backend, fourcc, rate_hz, size)
+
+    monkeypatch.setattr(cv2, "VideoWriter", Lacking)
+    with pytest.raises(UsageError, match=r"no encoder for vp9 \(FFmpeg with libvpx\).*opencv-python.*--codec mpeg4"):
+        require_encoder("vp9")
+    with pytest.raises(UsageError, match="no encoder for vp9"):
+        EpisodesVideo(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT)
+    assert not list(tmp_path.iterdir())
+    require_encoder("mpeg4")
+
+
+def test_folder_that_cannot_be_written_is_not_taken_for_a_missing_encoder(tmp_path: Path) -> None:
+    (tmp_path / ".a.1.mp4").mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("os.getpid", lambda: 1)
+        with pytest.raises(UsageError, match=r"a\.mp4: no video can be written there"):
+            EpisodesVideo(tmp_path / "a.mp4", width_px=WIDTH, height_px=HEIGHT)
+
+
+@pytest.mark.parametrize("suffix", [".webp", ".gif"])
+def test_animation_shows_every_picture_for_its_time(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    write_animation(pictures(0, 7), path, rate_hz=10)
+    with Image.open(path) as image:
+        assert image.n_frames == 7 and image.info["loop"] == 0
+        for index in range(7):
+            image.seek(index)
+            assert number_of(np.asarray(image.convert("RGB"))) == index
+            assert image.info["duration"] == 100  # known when the picture is decoded
+
+
+def test_animation_of_nothing_or_of_another_kind_is_refused(tmp_path: Path) -> None:
+    for shown, name in (([], "a.gif"), (pictures(0, 1), "a.mp4")):
+        with pytest.raises(UsageError, match=r"\.webp or \.gif of at least one picture"):
+            write_animation(shown, tmp_path / name)

@@ -1,0 +1,136 @@
+"""The world of an episode: what stands in it, and what its contacts are taken for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from brick_episodes import POOL, START, panda, problem, standing
+
+from manitwin.episodes.execution import Execution
+from manitwin.episodes.planning.problem import Phase, PickPlaceProblem
+from manitwin.episodes.world import EpisodeWorld
+from manitwin.geometry.placed_object import PlacedObject, StaticBox
+from manitwin.geometry.poses import transform
+from manitwin.physics.trial import TrialSettings
+from manitwin.scenes.app_config import EpisodeSettings
+from rigid_boxes import box
+
+PALM_M, FINGER_END_M = 0.066, 0.1125  # where palm and fingers end, along the approach
+
+
+def made(asked: PickPlaceProblem) -> EpisodeWorld:
+    return EpisodeWorld(panda()[0], asked, EpisodeSettings(), POOL, 50.0)
+
+
+def before_the_hand(depth_m: float) -> np.ndarray:
+    """A pose on the hand's axis at home, so far along the approach; X is the closing direction."""
+    return panda()[1].tip_pose(panda()[0].home_rad) @ transform(None, np.array([0, 0, depth_m]))
+
+
+@pytest.fixture
+def world() -> Iterator[EpisodeWorld]:
+    others = (standing("object_02", [0.05, 0.05, 0.1], 0.6, 0.2), standing("object_00", [0.04, 0.04, 0.04], 0.6, -0.3))
+    with made(problem(obstacles=others)) as world:
+        yield world
+
+
+def test_objects_are_in_the_order_of_their_names_where_they_were_put(world: EpisodeWorld) -> None:
+    assert [placed.name for placed in world.placed] == ["object_00", "object_01", "object_02"]
+    assert world.target == 1
+    for number, placed in enumerate(world.placed):
+        assert world.object_to_world(number) == pytest.approx(placed.object_to_world, abs=1e-6)
+
+
+def test_what_stands_comes_to_rest_borne_by_the_table_and_touched_by_nobody(world: EpisodeWorld) -> None:
+    world.step(60)
+    touches = world.contacts.touches(world.contacts.read())
+    assert world.is_still()
+    assert touches.on_support
+    assert touches.finger_forces_n == (0.0, 0.0)
+    assert world.contacts.unplanned(world.contacts.read(), Phase.REACH) == set()
+
+
+def test_what_stands_on_a_tray_on_the_table_is_borne_by_it() -> None:
+    tray = StaticBox("tray", np.array([0.15, 0.15, 0.01]), transform(None, np.array([START[0, 3], START[1, 3], 0.01])))
+    on_tray = problem(start=transform(None, START[:3, 3] + [0, 0, 0.02]))
+    with made(replace(on_tray, static_boxes=(*on_tray.static_boxes, tray))) as world:
+        world.step(60)
+        assert world.is_still()
+        assert world.contacts.touches(world.contacts.read()).on_support
+        assert world.object_to_world(0)[2, 3] == pytest.approx(START[2, 3] + 0.02, abs=3e-4)
+
+
+def test_what_falls_is_not_still_and_falls_as_it_should() -> None:
+    steps = 24
+    with made(problem(start=transform(None, START[:3, 3] + [0, 0, 0.4]))) as world:
+        world.step(steps)
+        assert not world.is_still()
+        assert not world.contacts.touches(world.contacts.read()).on_support
+        fallen_m = START[2, 3] + 0.4 - world.object_to_world(0)[2, 3]
+    assert fallen_m == pytest.approx(9.81 / 120**2 * steps * (steps + 1) / 2, rel=1e-3)  # semi-implicit Euler
+
+
+def test_world_with_used_shapes_is_that_with_fresh_ones() -> None:
+    asked = problem(start=transform(None, START[:3, 3] + [0, 0, 0.02]))
+    ends = []
+    for _ in range(3):
+        with made(asked) as world:
+            world.step(100)
+            ends.append(world.object_to_world(0))
+    assert np.array_equal(ends[0], ends[1])
+    assert np.array_equal(ends[0], ends[2])
+
+
+def hits(asked: PickPlaceProblem, number: int, phase: Phase) -> set[tuple[str, str]]:
+    """The unplanned contacts of an object that flies up into the hand at home at 1 m/s."""
+    found: set[tuple[str, str]] = set()
+    with made(asked) as world:
+        world.bodies[number].set_linear_velocity(np.array([0, 0, 1.0], np.float32))
+        for _ in range(8):
+            world.step()
+            found.update(world.contacts.unplanned(world.contacts.read(), phase))
+    return found
+
+
+@pytest.mark.parametrize(("phase", "unplanned"), [(Phase.REACH, True), (Phase.LIFT, False), (Phase.RETREAT, True)])
+def test_palm_may_touch_the_target_only_while_it_has_it_in_hand(phase: Phase, unplanned: bool) -> None:
+    between_the_fingers = before_the_hand(PALM_M + 0.075 + 0.005)
+    found = hits(problem(start=between_the_fingers, target=box([0.04, 0.04, 0.15], 0.3)), 0, phase)
+    assert found == ({("panda_hand", "object_01")} if unplanned else set())
+
+
+@pytest.mark.parametrize("phase", list(Phase))
+def test_robot_may_never_touch_another_object(phase: Phase) -> None:
+    below_the_fingers = before_the_hand(FINGER_END_M + 0.01 + 0.003)
+    bar = PlacedObject("object_00", "bar", box([0.2, 0.02, 0.02], 0.3), below_the_fingers)
+    assert hits(problem(obstacles=(bar,)), 0, phase) == {
+        ("panda_leftfinger", "object_00"), ("panda_rightfinger", "object_00"),
+    }  # fmt: skip
+
+
+def test_fingers_press_on_the_target_with_equal_forces_that_are_their_drives(world: EpisodeWorld) -> None:
+    in_the_fingers = before_the_hand(panda()[0].gripper.tip_depth_m)
+    with made(problem(start=in_the_fingers, target=box([0.04, 0.06, 0.06], 0.1))) as world:
+        opening_m = 0.04
+        world.expect_load(True)
+        world.robot.set_opening_target(opening_m - 2 * 20.0 / 1e4)  # 20 N at the drives' stiffness of 1e4 N/m
+        world.step(120)
+        touches = world.contacts.touches(world.contacts.read())
+    assert touches.finger_forces_n == pytest.approx((20, 20), rel=0.08)
+    assert not touches.on_support
+
+
+@pytest.mark.parametrize("phase", [Phase.REACH, Phase.CARRY, Phase.LOWER])
+def test_touch_of_one_step_between_two_rows_is_not_missed(
+    world: EpisodeWorld, monkeypatch: pytest.MonkeyPatch, phase: Phase
+) -> None:
+    robot, planner = panda()
+    execution = Execution(world, robot, TrialSettings(50.0, 1.0, timestep_s=1 / 120), planner.tip_pose)
+    pair = ("panda_link7", "board")
+    monkeypatch.setattr(world.contacts, "unplanned", lambda contacts, asked: {pair} if execution.steps == 10 else set())
+    execution.wait(phase, 18)
+    assert execution.unplanned == {pair}
+    assert execution.recording().unplanned_contact.tolist() == [False, False, True, False]

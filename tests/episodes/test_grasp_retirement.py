@@ -1,0 +1,55 @@
+"""Grasps that fail end to end are found, and retired in their twins' records."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pyarrow.parquet as pq
+from synthetic_episodes import attempt
+
+from grasped_twins import write_brick
+from manitwin.episodes.retirement import find_retirements, retire
+from manitwin.episodes.target_grasps import usable_grasps
+from manitwin.robots.grippers.gripper import load_gripper, of_kind
+from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.store import read_record
+from manitwin.twin.twin_source import TwinSource
+
+KEPT = replace(attempt(0), outcome="kept", twin_id="t", grasp_id="g", transferred=False)
+
+
+def test_a_grasp_is_retired_by_its_share_of_failures() -> None:
+    dropped = replace(KEPT, outcome="dropped")
+    assert [r.grasp_id for r in find_retirements([dropped], failed_share=1 / 3)] == ["g"]
+    assert find_retirements([dropped, KEPT, KEPT], failed_share=1 / 3) == []
+    (found,) = find_retirements([dropped, KEPT, replace(KEPT, outcome="toppled")], failed_share=1 / 3)
+    assert (found.executed, found.failed, found.outcomes) == (3, 2, {"dropped": 1, "toppled": 1})
+
+
+def test_what_is_not_the_grasps_fault_does_not_count() -> None:
+    innocent = [replace(KEPT, outcome=outcome) for outcome in ("no_plan", "no_room", "unsettled", "disturbed")]
+    borrowed = replace(KEPT, outcome="dropped", transferred=True)
+    assert find_retirements([*innocent, borrowed], failed_share=0.0) == []
+
+
+def test_a_retired_grasp_is_marked_and_used_no_more(tmp_path: Path) -> None:
+    identity = write_brick(tmp_path, 0)
+    folder, twins = tmp_path / twin_name(identity), TwinSource(tmp_path)
+    before = read_record(folder, verify=True)
+    found = find_retirements(
+        [replace(KEPT, outcome="dropped", twin_id=identity, grasp_id="panda-0002")], failed_share=0.5
+    )
+    assert retire(twins, found) == 1
+    after = read_record(folder, verify=True)
+    assert after.revision != before.revision
+    assert after.model_copy(update={"revision": "", "files": {}}) == before.model_copy(
+        update={"revision": "", "files": {}}
+    )
+    table = pq.read_table(folder / "grasps.parquet").to_pylist()
+    assert [row["grasp_id"] for row in table if row["retired"]] == ["panda-0002"]
+    gripper = of_kind(load_gripper("panda"), ParallelGripper)
+    assert "panda-0002" not in {each.grasp.grasp_id for each in usable_grasps(twins.twin(identity), gripper)}
+    assert retire(twins, found) == 0
+    assert read_record(folder).revision == after.revision

@@ -1,0 +1,102 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+
+from manitwin.errors import InputError
+from manitwin.formats.meshes.read import read_mesh
+
+DOCUMENT = """<?xml version="1.0" encoding="utf-8"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="inch" meter="0.0254"/><up_axis>Z_UP</up_axis></asset>
+<library_images><image id="i"><init_from>{texture}</init_from></image></library_images>
+<library_effects><effect id="e"><profile_COMMON>
+<newparam sid="surface"><surface type="2D"><init_from>i</init_from></surface></newparam>
+<newparam sid="sampler"><sampler2D><source>surface</source></sampler2D></newparam>
+<technique sid="common"><lambert><diffuse><texture texture="sampler" texcoord="UV"/></diffuse></lambert></technique>
+</profile_COMMON></effect></library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 1 0 0 1 1 0 0 1 0</float_array><technique_common>
+<accessor source="#pa" count="4" stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+</accessor></technique_common></source>
+<source id="t"><float_array id="ta" count="8">0 0 1 0 1 1 0 1</float_array><technique_common>
+<accessor source="#ta" count="4" stride="2"><param name="S" type="float"/><param name="T" type="float"/></accessor>
+</technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<polylist count="1" material="s"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="TEXCOORD" source="#t" offset="1" set="0"/><vcount>4</vcount><p>0 0 1 1 2 2 3 3</p></polylist>
+</mesh></geometry></library_geometries>
+<library_nodes>{nodes}</library_nodes>
+<library_visual_scenes><visual_scene id="scene">
+<node id="n"><scale>1 1 -1</scale><translate>0 0 3</translate>
+<instance_geometry url="#g"><bind_material><technique_common>
+<instance_material symbol="s" target="#m"/></technique_common></bind_material></instance_geometry></node>{extra}
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#scene"/></scene></COLLADA>
+"""
+
+
+def _write(tmp_path: Path, texture: str = "t.png", nodes: str = "", extra: str = "") -> Path:
+    (tmp_path / "a.dae").write_text(DOCUMENT.format(texture=texture, nodes=nodes, extra=extra))
+    return tmp_path / "a.dae"
+
+
+def test_unit_up_axis_texture_and_mirroring_node_are_honoured(tmp_path: Path) -> None:
+    Image.new("RGB", (2, 2), (9, 8, 7)).save(tmp_path / "t.png")
+    mesh = read_mesh(_write(tmp_path))
+    (part,) = mesh.parts
+    assert (mesh.unit_m, mesh.up) == (0.0254, "z")
+    np.testing.assert_allclose(part.bounds, [[0, 0, -3], [1, 1, -3]], atol=1e-6)
+    np.testing.assert_allclose(part.face_normals, [[0, 0, -1]] * 2, atol=1e-6)
+    assert part.visual.material.baseColorTexture.getpixel((0, 0)) == (9, 8, 7)
+
+
+def test_texture_outside_the_folder_is_not_read(tmp_path: Path) -> None:
+    (tmp_path / "inputs").mkdir()
+    Image.new("RGB", (2, 2)).save(tmp_path / "secret.png")
+    mesh = read_mesh(_write(tmp_path / "inputs", texture="../secret.png"))
+    assert mesh.parts[0].visual.material.baseColorTexture is None
+    assert "outside" in mesh.findings[0]
+
+
+def test_document_type_with_entities_is_refused(tmp_path: Path) -> None:
+    path = _write(tmp_path)
+    bomb = '<!DOCTYPE x [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;">]>'
+    path.write_text(path.read_text().replace("<COLLADA", bomb + "<COLLADA", 1))
+    with pytest.raises(InputError, match="document type"):
+        read_mesh(path)
+
+
+def test_nodes_that_stand_for_billions_are_refused_at_once(tmp_path: Path) -> None:
+    rows = [f'<node id="k{i}">' + f'<instance_node url="#k{i + 1}"/>' * 10 + "</node>" for i in range(12)]
+    last = '<node id="k12"><instance_geometry url="#g"/></node>'
+    path = _write(tmp_path, nodes="".join(rows) + last, extra='<node><instance_node url="#k0"/></node>')
+    with pytest.raises(InputError, match="more than 20000 parts"):
+        read_mesh(path)
+
+
+def test_skinned_document_is_refused_as_animated(tmp_path: Path) -> None:
+    with pytest.raises(InputError) as caught:
+        read_mesh(_write(tmp_path, extra='<node><instance_controller url="#c"/></node>'))
+    assert caught.value.reason == "animated"
+
+
+def test_dae_of_trimesh_keeps_its_volume(tmp_path: Path) -> None:
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    sphere.export(tmp_path / "a.dae")
+    assert sum(part.volume for part in read_mesh(tmp_path / "a.dae").parts) == pytest.approx(sphere.volume, rel=1e-5)
+
+
+@pytest.mark.shared_data
+def test_sponge_reads_as_trimesh_reads_it(shared_data: Path) -> None:
+    path = shared_data / "meshes/sponge/textured.dae"
+    mesh = read_mesh(path)
+    assert (mesh.unit_m, mesh.up, len(mesh.parts)) == (1.0, "z", 1)
+    theirs = trimesh.load_mesh(path)
+    assert mesh.parts[0].area == pytest.approx(theirs.area, rel=1e-6)
+    np.testing.assert_allclose(mesh.parts[0].bounds, theirs.bounds, atol=1e-6)

@@ -1,0 +1,93 @@
+"""The caption and points stages: what they hand to the annotator, and what they accept from it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from handmade import candidates, mug, visual
+from manitwin.config import CaptionConfig, PointsConfig
+from manitwin.engine.stage import Draft, Item
+from manitwin.errors import BadReply
+from manitwin.formats.glb import write_glb
+from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
+from manitwin.models.annotators.rules import RulesAnnotator
+from manitwin.pipeline.caption import CaptionStage
+from manitwin.pipeline.points import PointsStage
+from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.twin.record import FunctionalPoint, GraspPoint, Language
+
+GRIPPER = ParallelGripper("test", "0", 0.08, 0.1, 50.0, 1.0, (0.01, 0.01), (), (), "a test")
+
+
+@pytest.fixture
+def draft(tmp_path: Path) -> Draft:
+    mesh = mug()
+    (tmp_path / "visual.glb").write_bytes(write_glb([visual(mesh, baseColorFactor=[200, 10, 10, 255])]))
+    np.savez(tmp_path / "solid.npz", vertices=mesh.vertices, faces=mesh.faces)
+    for folder in ("views", "marked"):
+        (tmp_path / folder).mkdir()
+    positions, normals = candidates(mesh)
+    fields = {
+        "physical": {
+            "material": "ceramic",
+            "scale_applied": 1.0,
+            "extents_m": mesh.extents.tolist(),
+            "center_of_mass_m": mesh.center_mass.tolist(),
+        },
+        "candidates": {"positions_m": positions.tolist(), "normals": normals.tolist()},
+        "visible_candidates": [list(range(42))],
+        "cameras": [],
+    }
+    paths = {key: tmp_path / key for key in ("visual.glb", "solid.npz", "views/", "marked/")}
+    return Draft("id", Item(file=None, name="red mug"), 0, fields, paths)
+
+
+def test_the_caption_stage_returns_language(draft: Draft, tmp_path: Path) -> None:
+    fields = CaptionStage(CaptionConfig(), RulesAnnotator()).run(draft, tmp_path)
+    language = Language(**json.loads(json.dumps(fields["language"])))
+    assert (language.category, language.color, language.material) == ("mug", "red", "ceramic")
+
+
+def test_the_points_stage_returns_candidates_at_their_places(draft: Draft, tmp_path: Path) -> None:
+    points = PointsStage(PointsConfig(), RulesAnnotator(), GRIPPER).run(draft, tmp_path)["points"]
+    json.dumps(points, allow_nan=False)
+    positions = draft.field("candidates")["positions_m"]
+    functional = [FunctionalPoint(**point) for point in points["functional"]]
+    for point in [*functional, *(GraspPoint(**point) for point in points["grasp"])]:
+        assert point.position_m == positions[point.candidate]
+
+
+class Changes(RulesAnnotator):
+    """The rules, with their selection changed."""
+
+    def __init__(self, change):
+        self._change = change
+
+    def select_points(self, request: PointsRequest) -> SelectedPoints:
+        """Answer as the rules do, changed."""
+        return self._change(super().select_points(request))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s: replace(s, grasp=s.grasp[:1]), "1 grasp points, not 2 to 3"),
+        (lambda s: replace(s, functional=s.functional[:1] * 2), "not different ones below 42"),
+        (
+            lambda s: replace(s, grasp=(s.grasp[0], s.grasp[1].model_copy(update={"candidate": 42}))),
+            "not different ones below 42",
+        ),
+        (
+            lambda s: replace(s, grasp=(s.grasp[0], s.grasp[1].model_copy(update={"position_m": [0, 0, 9]}))),
+            "g1 is not at its candidate",
+        ),
+    ],
+)
+def test_points_that_are_no_candidates_are_no_answer(draft: Draft, tmp_path: Path, change, message: str) -> None:
+    with pytest.raises(BadReply, match=message):
+        PointsStage(PointsConfig(), Changes(change), GRIPPER).run(draft, tmp_path)

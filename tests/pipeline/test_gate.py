@@ -1,0 +1,124 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from manitwin.config import GateConfig
+from manitwin.engine.stage import Draft, Item
+from manitwin.errors import Rejected
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.textures import make_part, pbr_material
+from manitwin.models.annotators.protocol import QualityVerdict, Subject
+from manitwin.pipeline.gate import GateStage
+from manitwin.twin.record import REJECTION_REASONS
+
+
+class _Eye:
+    """An annotator that only judges quality."""
+
+    name, needs = "eye", "vlm"
+
+    def __init__(self, verdict: QualityVerdict):
+        self.verdict = verdict
+        self.subject: Subject | None = None
+
+    def model_for(self, question: str) -> str:
+        return "v1"
+
+    def expected_usd(self, question: str) -> float:
+        return 0.0
+
+    def judge_quality(self, subject: Subject) -> QualityVerdict:
+        self.subject = subject
+        return self.verdict
+
+
+def _box(x: float = 0.0, side: float = 0.05) -> trimesh.Trimesh:
+    return trimesh.creation.box((side, side, side)).apply_translation((x, 0, side / 2))
+
+
+def _draft(folder: Path, mesh: trimesh.Trimesh, *, metric: bool = True, watertight: bool = True) -> Draft:
+    np.savez(folder / "canonical.npz", vertices=np.array(mesh.vertices), faces=np.array(mesh.faces, dtype=np.int64))
+    part = make_part(mesh.vertices, mesh.faces, material=pbr_material(name="grey"), name="box")
+    (folder / "canonical.glb").write_bytes(write_glb([part], max_texture_size=64))
+    (folder / "views").mkdir()
+    for index in range(8):
+        (folder / "views" / f"rgb_{index:02d}.webp").touch()
+    geometry = {"metric": metric, "watertight": watertight, "repairs": ["closed 3 holes"]}
+    paths = {name: folder / name for name in ("canonical.npz", "canonical.glb")} | {"views/": folder / "views"}
+    return Draft("id", Item(file=None, name="box"), 0, {"geometry": geometry, "cameras": []}, paths)
+
+
+def _gate(draft: Draft, folder: Path, annotator: _Eye | None = None) -> dict[str, dict]:
+    checks = GateStage(GateConfig(), annotator).run(draft, folder)["gate"]["checks"]
+    json.dumps(checks, allow_nan=False)
+    return {check["name"]: check for check in checks}
+
+
+def _rejection(draft: Draft, folder: Path, annotator: _Eye | None = None) -> Rejected:
+    with pytest.raises(Rejected) as caught:
+        GateStage(GateConfig(), annotator).run(draft, folder)
+    assert caught.value.stage == "gate" and caught.value.reason in REJECTION_REASONS["gate"]
+    return caught.value
+
+
+def test_box_passes_and_what_no_eye_saw_is_not_passed(tmp_path: Path) -> None:
+    checks = _gate(_draft(tmp_path, _box()), tmp_path)
+    passed = {name: check["passed"] for name, check in checks.items()}
+    assert passed == {
+        "watertight": True, "positive_volume": True, "plausible_size": True, "single_object": True,
+        "one_coherent_object": None, "visual_quality": None,
+    }  # fmt: skip
+    assert checks["visual_quality"]["message"].startswith("not judged")
+    assert checks["positive_volume"]["value"] == pytest.approx(0.05 / 3)
+
+
+def test_open_mesh_is_rejected_with_what_was_tried(tmp_path: Path) -> None:
+    rejection = _rejection(_draft(tmp_path, _box(), watertight=False), tmp_path)
+    assert rejection.reason == "not_watertight" and "closed 3 holes" in rejection.detail
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_film_and_inside_out_solid_are_degenerate(tmp_path: Path, flat: bool) -> None:
+    mesh = trimesh.creation.box((0.1, 0.1, 1e-6)) if flat else _box()
+    if not flat:
+        mesh.invert()
+    assert _rejection(_draft(tmp_path, mesh), tmp_path).reason == "degenerate"
+
+
+@pytest.mark.parametrize("side_m", [0.004, 1.2])
+def test_size_is_judged_only_where_it_is_known(tmp_path: Path, side_m: float) -> None:
+    draft = _draft(tmp_path, _box(side=side_m))
+    assert _rejection(draft, tmp_path).reason == "absurd_size"
+    draft.fields["geometry"]["metric"] = False
+    assert _gate(draft, tmp_path)["plausible_size"]["passed"] is None
+
+
+def test_four_things_side_by_side_are_rejected_with_their_number(tmp_path: Path) -> None:
+    four = trimesh.util.concatenate([_box(0.08 * i) for i in range(4)])
+    rejection = _rejection(_draft(tmp_path, four), tmp_path)
+    assert rejection.reason == "several_objects" and rejection.detail.startswith("4 separate objects")
+
+
+def test_specks_are_told_and_do_not_reject(tmp_path: Path) -> None:
+    checks = _gate(_draft(tmp_path, trimesh.util.concatenate([_box(), _box(0.1, side=0.002)])), tmp_path)
+    assert checks["single_object"]["passed"] and checks["single_object"]["message"] == "1 small parts float apart"
+
+
+def test_eye_sees_the_subject_and_its_no_rejects(tmp_path: Path) -> None:
+    draft = _draft(tmp_path, _box())
+    good = _Eye(QualityVerdict(True, True, "a clean box"))
+    checks = _gate(draft, tmp_path, good)
+    assert checks["visual_quality"]["passed"] and checks["one_coherent_object"]["passed"]
+    assert good.subject is not None and len(good.subject.views) == 8 and len(good.subject.parts) == 1
+    torn = _rejection(draft, tmp_path, _Eye(QualityVerdict(True, False, "torn texture")))
+    assert torn.reason == "poor_quality" and "torn texture" in torn.detail
+    assert _rejection(draft, tmp_path, _Eye(QualityVerdict(False, None, "two boxes"))).reason == "several_objects"
+
+
+def test_backend_and_model_are_part_of_the_stage_key() -> None:
+    stage = GateStage(GateConfig(), _Eye(QualityVerdict(None, None, "")))
+    assert (stage.backend, stage.model) == ("eye", "v1")
+    assert (GateStage(GateConfig()).backend, GateStage(GateConfig()).model) == ("geometry", None)

@@ -1,0 +1,28 @@
+import dataclasses
+from pathlib import Path
+
+from manitwin.engine.stage import Item
+from manitwin.pipeline.identity import twin_id
+
+
+def test_identity_depends_on_bytes_name_units_and_up_only(tmp_path: Path) -> None:
+    file, copy, other = tmp_path / "a.stl", tmp_path / "b.stl", tmp_path / "c.stl"
+    file.write_bytes(b"same")
+    copy.write_bytes(b"same")
+    other.write_bytes(b"other")
+    item = Item(file=str(file))
+    assert twin_id(item) == twin_id(Item(file=str(copy), license="CC0-1.0", attribution="somebody"))
+    changed = [
+        Item(file=str(other)),
+        *(dataclasses.replace(item, **c) for c in ({"name": "mug"}, {"units": "mm"}, {"up": "y"})),
+    ]
+    assert len({twin_id(item), *map(twin_id, changed)}) == 5
+
+
+def test_changed_texture_is_another_twin(tmp_path: Path) -> None:
+    (tmp_path / "a.obj").write_text("mtllib a.mtl\n")
+    (tmp_path / "a.mtl").write_text("newmtl m\nmap_Kd wood grain.png\n")
+    (tmp_path / "wood grain.png").write_bytes(b"1")
+    before = twin_id(Item(file=str(tmp_path / "a.obj")))
+    (tmp_path / "wood grain.png").write_bytes(b"2")
+    assert twin_id(Item(file=str(tmp_path / "a.obj"))) != before

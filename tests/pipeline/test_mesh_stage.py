@@ -1,0 +1,157 @@
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import trimesh
+
+from manitwin.config import MeshConfig
+from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.errors import InputError
+from manitwin.formats.glb import read_glb
+from manitwin.geometry.cavity import find_opening
+from manitwin.pipeline.mesh import MeshStage
+
+
+def _run(path: Path, folder: Path, **item: Any) -> tuple[dict[str, Any], trimesh.Trimesh, list[trimesh.Trimesh]]:
+    folder.mkdir(exist_ok=True)
+    fields = MeshStage(MeshConfig()).run(Draft("id", Item(str(path), **item), 0), folder)
+    arrays = np.load(folder / "canonical.npz")
+    solid = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+    return fields["geometry"], solid, read_glb(folder / "canonical.glb")
+
+
+def _check(geometry: dict[str, Any], solid: trimesh.Trimesh, parts: list[trimesh.Trimesh]) -> None:
+    json.dumps(geometry, allow_nan=False)
+    points = np.vstack([part.vertices for part in parts])
+    np.testing.assert_allclose([points.min(0), points.max(0)], solid.bounds, atol=1e-4)
+    np.testing.assert_allclose(solid.bounds[0][:2], -solid.bounds[1][:2], atol=1e-9)
+    assert solid.bounds[0][2] == pytest.approx(0, abs=1e-12)
+    assert geometry["watertight"] and solid.is_watertight and solid.is_winding_consistent and solid.volume > 0
+    assert (geometry["vertices"], geometry["faces"]) == (len(solid.vertices), len(solid.faces))
+
+
+def test_stage_fits_the_protocol() -> None:
+    assert isinstance(MeshStage(MeshConfig()), Stage)
+
+
+@pytest.mark.shared_data
+def test_mug_of_the_shared_data_stands_with_its_volume_of_134_ml(shared_data: Path, tmp_path: Path) -> None:
+    geometry, solid, parts = _run(shared_data / "meshes/mug_ycb/white_mug.obj", tmp_path, name="mug")
+    _check(geometry, solid, parts)
+    assert solid.volume == pytest.approx(134e-6, abs=1e-6)  # the reference study's figure
+    opening = find_opening(solid)
+    assert opening is not None and opening.axis[2] > 0.999
+    assert (geometry["metric"], geometry["units"], geometry["up"], geometry["euler_number"]) == (
+        True,
+        "assumed",
+        "z",
+        0,
+    )
+
+
+@pytest.mark.shared_data
+def test_y_up_gltf_bowl_opens_upward(shared_data: Path, tmp_path: Path) -> None:
+    geometry, solid, parts = _run(shared_data / "meshes/bowl_evo/evo_bowl.gltf", tmp_path)
+    _check(geometry, solid, parts)
+    np.testing.assert_allclose(solid.extents, [0.1468, 0.1469, 0.0613], atol=1e-4)
+    assert (geometry["units"], geometry["up"]) == ("declared", "y")
+
+
+@pytest.mark.shared_data
+def test_millimetres_are_noticed_and_said(shared_data: Path, tmp_path: Path) -> None:
+    geometry, solid, parts = _run(shared_data / "bad/millimetres.obj", tmp_path)
+    _check(geometry, solid, parts)
+    assert solid.extents.max() == pytest.approx(0.2401, abs=3e-4)
+    assert geometry["unit_factor"] == 0.001
+    assert any("millimetres" in finding for finding in geometry["findings"])
+
+
+@pytest.mark.shared_data
+def test_unit_given_by_the_user_is_used_without_a_finding(shared_data: Path, tmp_path: Path) -> None:
+    geometry, solid, _ = _run(shared_data / "bad/millimetres.obj", tmp_path, units="mm")
+    assert solid.extents.max() == pytest.approx(0.2401, abs=3e-4)
+    assert (geometry["metric"], geometry["units"], geometry["findings"]) == (True, "user", [])
+
+
+@pytest.mark.shared_data
+def test_damaged_dinosaur_is_repaired_to_the_volume_of_the_sound_one(shared_data: Path, tmp_path: Path) -> None:
+    geometry, solid, parts = _run(shared_data / "bad/nonmanifold.obj", tmp_path, name="toy dinosaur")
+    _check(geometry, solid, parts)
+    sound = trimesh.load_mesh(
+        shared_data / "meshes/toy_dinosaur/dinosaur_figure.obj", process=True, merge_norm=True, merge_tex=True
+    )
+    assert solid.volume == pytest.approx(sound.volume, rel=0.03)
+    assert len(geometry["repairs"]) >= 3
+
+
+@pytest.mark.shared_data
+def test_box_without_texture_has_its_size(shared_data: Path, tmp_path: Path) -> None:
+    geometry, solid, parts = _run(shared_data / "bad/missing_texture.obj", tmp_path)
+    _check(geometry, solid, parts)
+    np.testing.assert_allclose(np.sort(solid.extents), [0.02, 0.06, 0.09], atol=1e-9)
+    assert solid.volume == pytest.approx(0.02 * 0.06 * 0.09)
+    assert any("gone.mtl" in finding for finding in geometry["findings"])
+
+
+@pytest.mark.shared_data
+def test_scene_of_four_objects_is_read_whole(shared_data: Path, tmp_path: Path) -> None:
+    geometry, solid, parts = _run(shared_data / "bad/scene_four_objects.glb", tmp_path)
+    assert geometry["components"] == len(parts) == 4
+    points = np.vstack([part.vertices for part in parts])
+    np.testing.assert_allclose([points.min(0), points.max(0)], solid.bounds, atol=1e-4)
+
+
+@pytest.mark.shared_data
+@pytest.mark.parametrize(("name", "reason"), [("nan_vertices.obj", "not_finite"), ("zero_faces.obj", "no_faces")])
+def test_hopeless_inputs_are_refused(shared_data: Path, tmp_path: Path, name: str, reason: str) -> None:
+    with pytest.raises(InputError) as caught:
+        _run(shared_data / "bad" / name, tmp_path)
+    assert (caught.value.stage, caught.value.reason) == ("input", reason)
+
+
+@pytest.mark.shared_data
+def test_same_input_gives_the_same_bytes(shared_data: Path, tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        _run(shared_data / "meshes/sponge/textured.dae", tmp_path / name, name="sponge")
+    for artifact in ("canonical.glb", "canonical.npz"):
+        assert (tmp_path / "one" / artifact).read_bytes() == (tmp_path / "two" / artifact).read_bytes()
+
+
+@pytest.mark.shared_data
+def test_generated_mesh_is_metric_only_where_its_generator_says_so(shared_data: Path, tmp_path: Path) -> None:
+    path = shared_data / "meshes/salt_shaker/salt_shaker.glb"
+    for metric in (False, True):
+        draft = Draft(
+            "id", Item(str(tmp_path / "photo.jpg")), 0, {"generation": {"metric": metric}}, {"generated.glb": path}
+        )
+        assert MeshStage(MeshConfig()).run(draft, tmp_path)["geometry"]["metric"] is metric
+
+
+@pytest.mark.shared_data
+@pytest.mark.slow
+@pytest.mark.parametrize("named", [True, False])
+def test_all_shared_meshes_rest_as_a_person_would_put_them_down(shared_data: Path, tmp_path: Path, named: bool) -> None:
+    """Heights in metres, checked by eye on pictures: upright for what stands, flat for what lies."""
+    heights = {
+        "mug_ycb": 0.0807, "bowl_evo": 0.0613, "plate_8in": 0.0178, "mustard_bottle": 0.1913, "fuze_bottle": 0.2151,
+        "tomato_soup_can": 0.1018, "cracker_box": 0.2134, "gelatin_box": 0.030, "banana": 0.0363, "fork": 0.0156,
+        "spoon": 0.0219, "phillips_screwdriver": 0.0355, "scissors": 0.0154, "large_clamp": 0.0378,
+        "large_marker": 0.0188, "frypan_8in": 0.0479, "headset": 0.0964, "can_opener": 0.0633, "utensil_holder": 0.1736,
+        "mallet": 0.0605 if named else 0.0962, "spatula": 0.0249, "toy_dinosaur": 0.1332, "sneaker": 0.1593,
+        "sponge": 0.036, "salt_shaker": 0.125,
+    }  # fmt: skip
+    openings = {"mug_ycb", "bowl_evo", "plate_8in", "frypan_8in", "utensil_holder", "sneaker"}
+    with (shared_data / "manifest.csv").open() as stream:
+        rows = [row for row in csv.DictReader(stream) if row["kind"] == "mesh"]
+    for row in rows:
+        key = row["file"].split("/")[1]
+        geometry, solid, parts = _run(shared_data / row["file"], tmp_path, name=row["category"] if named else None)
+        _check(geometry, solid, parts)
+        assert solid.extents[2] == pytest.approx(heights[key], abs=6e-4), key
+        opening = find_opening(solid)
+        assert (opening is not None and opening.axis[2] > 0.99) == (key in openings), key

@@ -1,0 +1,84 @@
+"""A name is suggested where it would change something, by what the record says."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from manitwin.pipeline.name_hint import NAME_HINT, name_would_help
+from manitwin.pipeline.recipe import ending_of
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.record import REJECTION_REASONS, TwinRecord
+from manitwin.twin.store import RECORD, parse_record
+from record_overlay import overlaid
+from twin_folders import write_accepted, write_rejected
+
+UNKNOWN = {"mass_kg": {"source": "prior:unknown"}, "friction_static": {"source": "prior:unknown"}}
+SEEN = {"mass_kg": {"source": "vlm:qwen"}, "friction_static": {"source": "vlm:qwen"}}
+
+
+def accepted(root: Path, name: str | None, physical: dict[str, Any]) -> TwinRecord:
+    folder = root / twin_name(write_accepted(root, 1))
+    return changed(folder, {"name": name, "physical": physical})
+
+
+def rejected(
+    root: Path,
+    reason: str,
+    *,
+    name: str | None = None,
+    metric: bool = False,
+    backend: str = "rules",
+    lifted: bool = False,
+) -> TwinRecord:
+    folder = root / twin_name(write_rejected(root, 2))
+    stage = next(stage for stage, reasons in REJECTION_REASONS.items() if reason in reasons)
+    ran = {"physical": {"version": "1", "backend": backend, "model": None}}
+    ran |= {"generate": {"version": "1", "backend": "lift", "model": None}} if lifted else {}
+    checks = [{"name": "plausible_size", "passed": True if metric else None}]
+    said = {"stage": stage, "reason": reason, "detail": "so"}
+    return changed(
+        folder, {"name": name, "rejection": said, "provenance": {"stages": ran}, "quality": {"checks": checks}}
+    )
+
+
+def changed(folder: Path, changes: dict[str, Any]) -> TwinRecord:
+    return parse_record(json.dumps(overlaid(json.loads((folder / RECORD).read_bytes()), changes)).encode())
+
+
+def test_an_accepted_nameless_twin_of_the_prior_of_anything_is_weak(tmp_path: Path) -> None:
+    assert name_would_help(accepted(tmp_path, None, UNKNOWN))
+    assert not name_would_help(accepted(tmp_path, "mug", UNKNOWN)), "it has a name"
+    assert not name_would_help(accepted(tmp_path, None, SEEN)), "a model has seen what it is"
+
+
+@pytest.mark.parametrize("reason", ["too_wide", "too_thin", "no_proposal", "none_held"])
+def test_a_guessed_size_may_have_rejected_it(tmp_path: Path, reason: str) -> None:
+    assert name_would_help(rejected(tmp_path, reason))
+    assert not name_would_help(rejected(tmp_path, reason, name="mug"))
+    assert not name_would_help(rejected(tmp_path, reason, backend="openai"))
+    assert name_would_help(rejected(tmp_path, reason, metric=True)) == (reason == "none_held"), (
+        "of the mass that is left"
+    )
+
+
+def test_a_name_changes_nothing_about_a_bad_file_or_photo(tmp_path: Path) -> None:
+    for reason in set().union(*(REJECTION_REASONS[stage] for stage in ("input", "generate", "gate"))):
+        assert not name_would_help(rejected(tmp_path, reason)), reason
+
+
+def test_other_reasons_that_a_name_has_a_say_in(tmp_path: Path) -> None:
+    assert name_would_help(rejected(tmp_path, "implausible_mass", backend="openai"))
+    assert name_would_help(rejected(tmp_path, "no_stable_pose", lifted=True))
+    assert not name_would_help(rejected(tmp_path, "no_stable_pose")), "a mesh stands as it stands"
+
+
+def test_the_result_line_says_it(tmp_path: Path) -> None:
+    weak = ending_of(accepted(tmp_path, None, UNKNOWN))
+    assert weak.detail_and_hint == f"{weak.detail}; {NAME_HINT}" and "--name (mug, fork, ...)" in NAME_HINT
+    assert ending_of(rejected(tmp_path, "too_wide")).detail_and_hint == f"so; {NAME_HINT}"
+    named = ending_of(accepted(tmp_path, "mug", UNKNOWN))
+    assert named.detail_and_hint == named.detail and "--name" not in named.detail_and_hint

@@ -1,0 +1,130 @@
+"""The physical stage: scale, mass properties and plausibility, against closed forms."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from handmade import cup, cylinder, visual
+from manitwin.config import PhysicalConfig
+from manitwin.engine.stage import Draft, Item
+from manitwin.errors import BadReply, Rejected
+from manitwin.formats.glb import read_glb, write_glb
+from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
+from manitwin.models.annotators.rules import RulesAnnotator
+from manitwin.pipeline.object_arrays import load_solid
+from manitwin.pipeline.physical import PhysicalStage
+from manitwin.twin.record import Estimate, Physical
+
+
+class Says(RulesAnnotator):
+    """The rules, with some answers replaced by those of a test."""
+
+    def __init__(self, **answers: object):
+        self._answers = answers
+
+    def estimate_physical(self, subject: Subject) -> PhysicalEstimates:
+        """Answer as the rules do, but for what the test says."""
+        return replace(super().estimate_physical(subject), **self._answers)
+
+
+def said(value: float, source: str = "vlm:test") -> Estimate:
+    return Estimate(value=value, low=value / 2, high=value * 2, source=source)
+
+
+def run(
+    mesh: trimesh.Trimesh, folder: Path, name: str | None, metric: bool = True, annotator: RulesAnnotator | None = None
+) -> Physical:
+    (folder / "views").mkdir(exist_ok=True)
+    part = visual(mesh, baseColorFactor=[200, 10, 10, 255])
+    (folder / "canonical.glb").write_bytes(write_glb([part]))
+    np.savez(folder / "canonical.npz", vertices=mesh.vertices, faces=mesh.faces)
+    paths = {key: folder / key for key in ("canonical.glb", "canonical.npz", "views/")}
+    draft = Draft("id", Item(file=None, name=name), 0, {"geometry": {"metric": metric}, "cameras": []}, paths)
+    fields = PhysicalStage(PhysicalConfig(), annotator or RulesAnnotator()).run(draft, folder)
+    json.dumps(fields, allow_nan=False)
+    return Physical(**fields["physical"])
+
+
+def test_a_cups_center_of_mass_and_inertia_are_those_of_its_walls(tmp_path: Path) -> None:
+    physical = run(cup(0.04, 0.1, 0.003), tmp_path, "cup", annotator=Says(mass_kg=said(0.2)))
+    # A tube and a floor disc: volume, height of the centre, and moments about it.
+    outer, inner, height, floor = 0.04, 0.037, 0.1, 0.003
+    tube, disc = np.pi * (outer**2 - inner**2) * (height - floor), np.pi * outer**2 * floor
+    density = 0.2 / (tube + disc)
+    center = (tube * (height + floor) / 2 + disc * floor / 2) / (tube + disc)
+    about_axis = density * (tube * (outer**2 + inner**2) / 2 + disc * outer**2 / 2)
+    assert physical.center_of_mass_m == pytest.approx([0, 0, center], abs=2e-4)
+    assert physical.inertia_kg_m2[2][2] == pytest.approx(about_axis, rel=0.01)
+    assert physical.density_kg_m3 == pytest.approx(density, rel=0.01)
+    assert physical.mass_distribution == "solid" and physical.center_of_mass_uncertainty_m < 0.003
+
+
+def test_a_metric_mesh_keeps_its_size_and_its_file(tmp_path: Path) -> None:
+    physical = run(cup(), tmp_path, "cup")
+    assert physical.scale_applied == 1.0
+    assert physical.extents_m == pytest.approx([0.08, 0.08, 0.1], abs=1e-6)
+    assert (tmp_path / "visual.glb").read_bytes() == (tmp_path / "canonical.glb").read_bytes()
+
+
+def test_a_mesh_of_no_known_scale_gets_the_longest_axis_of_such_a_thing(tmp_path: Path) -> None:
+    giant = cylinder(1.0, 3.0)
+    physical = run(giant, tmp_path, "soda can", metric=False)
+    longest = lookup("soda can").longest_axis_m.typical
+    assert physical.scale_applied == pytest.approx(longest / 3.0, rel=1e-6)
+    assert max(physical.obb.extents_m) == pytest.approx(longest)
+    assert np.array(physical.obb.obb_to_object)[:3, 3] == pytest.approx([0, 0, longest / 2], abs=1e-9)
+    assert load_solid(tmp_path / "solid.npz").extents == pytest.approx(np.array([2, 2, 3]) * longest / 3)
+    assert read_glb(tmp_path / "visual.glb")[0].extents == pytest.approx(np.array([2, 2, 3]) * longest / 3, rel=1e-5)
+    assert lookup("soda can").mass_kg.low <= physical.mass_kg.value <= lookup("soda can").mass_kg.high
+
+
+def test_a_hollow_ball_is_a_shell(tmp_path: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.033)
+    ball.apply_translation([0, 0, 0.033])
+    physical = run(ball, tmp_path, "tennis ball")
+    assert physical.mass_distribution == "shell"
+    # a thin sphere at the middle of its 3 mm wall: 2/3 m r^2
+    assert physical.inertia_kg_m2[0][0] == pytest.approx(2 / 3 * physical.mass_kg.value * 0.0315**2, rel=0.02)
+    assert physical.mass_kg.value == pytest.approx(0.058, rel=0.05)  # ITF: 56.0 to 59.4 g
+
+
+def test_a_size_that_no_such_thing_has_is_rejected(tmp_path: Path) -> None:
+    with pytest.raises(Rejected, match=r"0\.9.* m long, but a mug has 0\.08 to 0\.16 m") as raised:
+        run(cup(0.4, 0.9, 0.03), tmp_path, "mug")
+    assert raised.value.reason == "implausible_size"
+
+
+def test_without_a_name_any_size_goes(tmp_path: Path) -> None:
+    assert run(cup(0.4, 0.9, 0.03), tmp_path, None).mass_kg.source == "prior:unknown"
+
+
+def test_a_mass_that_no_such_thing_has_is_rejected_unless_confirmed(tmp_path: Path) -> None:
+    with pytest.raises(Rejected) as raised:
+        run(cup(), tmp_path, "cup", annotator=Says(mass_kg=said(9.0)))
+    assert raised.value.reason == "implausible_mass"
+    assert run(cup(), tmp_path, "cup", annotator=Says(mass_kg=said(9.0, "measured"))).mass_kg.value == 9.0
+
+
+def test_a_density_that_no_matter_has_is_rejected_without_a_name_too(tmp_path: Path) -> None:
+    with pytest.raises(Rejected, match="kg/m3") as raised:
+        run(cylinder(0.01, 0.02), tmp_path, None, annotator=Says(mass_kg=said(5.0)))
+    assert raised.value.reason == "implausible_mass"
+
+
+def test_mass_from_density_alone_is_density_times_volume(tmp_path: Path) -> None:
+    mesh = cylinder(0.03, 0.1)
+    physical = run(mesh, tmp_path, None, annotator=Says(mass_kg=None, bulk_density_kg_m3=said(500.0)))
+    assert physical.mass_kg.source == "density*volume"
+    assert physical.mass_kg.value == pytest.approx(500 * mesh.volume)
+
+
+def test_an_answer_without_mass_or_density_is_no_answer(tmp_path: Path) -> None:
+    with pytest.raises(BadReply, match="neither a mass nor a bulk density"):
+        run(cup(), tmp_path, None, annotator=Says(mass_kg=None, bulk_density_kg_m3=None))
