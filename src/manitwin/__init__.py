@@ -9,24 +9,51 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from manitwin.api import BuildReport, build, export_twin, load, load_scene, schema, statistics_connection
-    from manitwin.assets.audit.run import Audited
-    from manitwin.assets.audit.run import audit as audit_assets
+    from manitwin.api import (
+        BuildReport,
+        EpisodesReport,
+        build,
+        export_scene,
+        export_twin,
+        find_scenes,
+        import_assets,
+        load,
+        load_scene,
+        make_episodes,
+        make_layouts,
+        render_episodes,
+        schema,
+        statistics_connection,
+        write_index,
+        write_statistics,
+    )
+    from manitwin.assets.audit.run import Audited, audit_assets
+    from manitwin.assets.importers.importer import Imported
     from manitwin.config import BuildConfig, load_config
     from manitwin.dataset.index.dataset import Dataset
     from manitwin.dataset.index.near_duplicates import NearDuplicates, near_duplicates
     from manitwin.dataset.index.query import Index
     from manitwin.dataset.index.twins import Twins
-    from manitwin.dataset.publish.publish import Published
-    from manitwin.dataset.publish.publish import publish as publish_dataset
+    from manitwin.dataset.publish.publish import Published, publish_dataset
     from manitwin.dataset.publish.unpack import unpack_shard
     from manitwin.episodes.hdf5_file import EpisodeFile
     from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
     from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
-    from manitwin.errors import BackendError, ManiTwinError, Rejected, TwinError, UsageError
+    from manitwin.errors import (
+        AssetError,
+        BackendError,
+        ConfigError,
+        EpisodesError,
+        ExportError,
+        ManiTwinError,
+        Rejected,
+        TwinError,
+        UsageError,
+    )
     from manitwin.physics.sapien.robot import SapienRobot
     from manitwin.robots.load import load_robot
     from manitwin.robots.robot import Robot
+    from manitwin.scenes.app_config import LayoutsConfig, PicturesConfig, TrajectoriesConfig
     from manitwin.scenes.loaded_scene import Scene
     from manitwin.twin.loaded_twin import Grasps, Twin
     from manitwin.twin.record import TwinRecord
@@ -34,23 +61,32 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "AssetError",
     "Audited",
     "BackendError",
     "BuildConfig",
     "BuildReport",
+    "ConfigError",
     "Dataset",
     "EpisodeFile",
+    "EpisodesError",
+    "EpisodesReport",
+    "ExportError",
     "Grasps",
+    "Imported",
     "Index",
+    "LayoutsConfig",
     "LeRobotSet",
     "ManiTwinError",
     "NearDuplicates",
+    "PicturesConfig",
     "Published",
     "PublishedEpisodes",
     "Rejected",
     "Robot",
     "SapienRobot",
     "Scene",
+    "TrajectoriesConfig",
     "Twin",
     "TwinError",
     "TwinRecord",
@@ -59,43 +95,103 @@ __all__ = [
     "__version__",
     "audit_assets",
     "build",
+    "export_scene",
     "export_twin",
+    "find_scenes",
+    "import_assets",
     "load",
     "load_config",
     "load_robot",
     "load_scene",
+    "make_episodes",
+    "make_layouts",
     "near_duplicates",
     "publish_dataset",
     "publish_episodes",
     "read_lerobot",
+    "render_episodes",
     "schema",
     "statistics_connection",
     "unpack_shard",
+    "write_index",
+    "write_statistics",
 ]
 
 _DEFINED_IN = {
-    "manitwin.api": ("BuildReport", "build", "export_twin", "load", "load_scene", "schema", "statistics_connection"),
-    "manitwin.episodes.hdf5_file": ("EpisodeFile",),
-    "manitwin.episodes.lerobot.read": ("LeRobotSet", "read_lerobot"),
-    "manitwin.episodes.publication.publish": ("PublishedEpisodes", "publish_episodes"),
-    "manitwin.assets.audit.run": ("Audited", "audit_assets"),
-    "manitwin.config": ("BuildConfig", "load_config"),
-    "manitwin.errors": ("BackendError", "ManiTwinError", "Rejected", "TwinError", "UsageError"),
+    "manitwin.api": (
+        "BuildReport",
+        "EpisodesReport",
+        "build",
+        "export_scene",
+        "export_twin",
+        "find_scenes",
+        "import_assets",
+        "load",
+        "load_scene",
+        "make_episodes",
+        "make_layouts",
+        "render_episodes",
+        "schema",
+        "statistics_connection",
+        "write_index",
+        "write_statistics",
+    ),
+    "manitwin.assets.audit.run": (
+        "Audited",
+        "audit_assets",
+    ),
+    "manitwin.assets.importers.importer": ("Imported",),
+    "manitwin.config": (
+        "BuildConfig",
+        "load_config",
+    ),
     "manitwin.dataset.index.dataset": ("Dataset",),
-    "manitwin.dataset.index.near_duplicates": ("NearDuplicates", "near_duplicates"),
+    "manitwin.dataset.index.near_duplicates": (
+        "NearDuplicates",
+        "near_duplicates",
+    ),
     "manitwin.dataset.index.query": ("Index",),
     "manitwin.dataset.index.twins": ("Twins",),
-    "manitwin.twin.loaded_twin": ("Grasps", "Twin"),
-    "manitwin.dataset.publish.publish": ("Published", "publish_dataset"),
+    "manitwin.dataset.publish.publish": (
+        "Published",
+        "publish_dataset",
+    ),
     "manitwin.dataset.publish.unpack": ("unpack_shard",),
+    "manitwin.episodes.hdf5_file": ("EpisodeFile",),
+    "manitwin.episodes.lerobot.read": (
+        "LeRobotSet",
+        "read_lerobot",
+    ),
+    "manitwin.episodes.publication.publish": (
+        "PublishedEpisodes",
+        "publish_episodes",
+    ),
+    "manitwin.errors": (
+        "AssetError",
+        "BackendError",
+        "ConfigError",
+        "EpisodesError",
+        "ExportError",
+        "ManiTwinError",
+        "Rejected",
+        "TwinError",
+        "UsageError",
+    ),
+    "manitwin.physics.sapien.robot": ("SapienRobot",),
     "manitwin.robots.load": ("load_robot",),
     "manitwin.robots.robot": ("Robot",),
-    "manitwin.physics.sapien.robot": ("SapienRobot",),
+    "manitwin.scenes.app_config": (
+        "LayoutsConfig",
+        "PicturesConfig",
+        "TrajectoriesConfig",
+    ),
     "manitwin.scenes.loaded_scene": ("Scene",),
+    "manitwin.twin.loaded_twin": (
+        "Grasps",
+        "Twin",
+    ),
     "manitwin.twin.record": ("TwinRecord",),
 }
-_NAMED_THERE = {"audit_assets": "audit", "publish_dataset": "publish"}
-"""The names that these functions have in their modules."""
 
 
 def __getattr__(name: str) -> Any:
@@ -109,7 +205,7 @@ def __getattr__(name: str) -> Any:
     from importlib import import_module
 
     module = next(module for module, names in _DEFINED_IN.items() if name in names)
-    return getattr(import_module(module), _NAMED_THERE.get(name, name))
+    return getattr(import_module(module), name)
 
 
 def __dir__() -> list[str]:

@@ -1,4 +1,4 @@
-"""What a program imports: build twins and load them."""
+"""The functions of ``manitwin``: build twins, make scenes and episodes of them, load, export, import and count them."""
 
 from __future__ import annotations
 
@@ -6,19 +6,27 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from manitwin.errors import UsageError
 
 if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     import duckdb
 
-    from manitwin.config import BuildConfig
+    from manitwin.assets.asset import Format
+    from manitwin.assets.importers.importer import Imported
+    from manitwin.config import BuildConfig, RunConfig
+    from manitwin.dataset.index.rebuild import Rebuilt
+    from manitwin.dataset.statistics.report import WrittenReport
     from manitwin.engine.events import OnStage
     from manitwin.engine.stage import Item
+    from manitwin.episodes.collect import AttemptTotals
+    from manitwin.episodes.retirement import Retirement
     from manitwin.pipeline.build_item import ItemResult
+    from manitwin.pipeline.dataset_run import ExecutorName, RunReport
     from manitwin.pipeline.folder_listing import FolderListing
     from manitwin.pipeline.manifest import Notes
+    from manitwin.scenes.app_config import LayoutsConfig, PicturesConfig, TrajectoriesConfig
     from manitwin.scenes.loaded_scene import Scene
     from manitwin.twin.loaded_twin import Twin
     from manitwin.twin.record import TwinRecord
@@ -228,15 +236,216 @@ def export_twin(
     return {name: write(content, name, out, license_allow=license_allow) for name in formats}
 
 
+def import_assets(
+    paths: str | Path | Iterable[str | Path], out: str | Path, *, format: Format | Literal["auto"] = "auto"
+) -> list[Imported]:
+    """Import all assets at and below ``paths`` into folders below ``out`` that ``build`` takes; return what became of each.
+
+    An asset that cannot be read has an ``error`` and no folder. Nothing is written over. Raises UsageError for a path that is
+    not there, and where a folder of another kind has an asset's name.
+    """
+    from manitwin.assets.importers.importer import import_assets as imported
+
+    given = [paths] if isinstance(paths, str | Path) else paths
+    return list(imported([Path(path) for path in given], Path(out), format=format))
+
+
+Settings = TypeVar("Settings", "LayoutsConfig", "TrajectoriesConfig", "PicturesConfig")
+
+
+def _settings(kind: type[Settings], config: Settings | str | Path | None, jobs: int | None) -> Settings:
+    """Return an application's settings: given, of a TOML file, or the default ones; raises ConfigError and UsageError."""
+    from manitwin.config import load_config
+
+    if jobs is not None and jobs < 1:
+        raise UsageError(f"jobs is {jobs}; give 1 or more")
+    settings = (
+        config if isinstance(config, kind) else kind() if config is None else load_config(Path(str(config)), kind)
+    )
+    return settings if jobs is None else settings.model_copy(update={"run": _with_slots(settings.run, jobs)})
+
+
+def _with_slots(run: RunConfig, jobs: int) -> RunConfig:
+    return run.model_copy(update={"cpu": jobs})
+
+
+def make_layouts(
+    dataset: str | Path,
+    out: str | Path,
+    count: int = 100,
+    *,
+    config: LayoutsConfig | str | Path | None = None,
+    jobs: int | None = None,
+    executor: ExecutorName = "local",
+    address: str | None = None,
+) -> RunReport:
+    """Sample ``count`` scenes of a data set's twins at rest below ``out``; those that are there stay (docs/layouts.md).
+
+    ``config``: the settings or a TOML file of them; with its ``pictures`` each scene is drawn. ``jobs``: how many processes,
+    by default one a core. ``find_scenes`` lists the accepted ones. Raises UsageError for a data set without twins, categories
+    that it has not, scenes of other settings at ``out``, or where another run is at work there.
+    """
+    from manitwin.scenes.app_config import LayoutsConfig
+    from manitwin.scenes.layouts.run import make_layouts as make
+
+    settings = _settings(LayoutsConfig, config, jobs)
+    return make(dataset, out, count, settings, executor=executor, address=address)
+
+
+def find_scenes(place: str | Path) -> list[Path]:
+    """Return the files of the scenes at ``place``: a file, a scene's folder, or all that ``make_layouts`` wrote there.
+
+    Raises UsageError where there is none.
+    """
+    from manitwin.scenes.scene_folders import scene_files
+
+    found = scene_files(Path(place))
+    if not found:
+        raise UsageError(f"{place}: no scene there; `manitwin layout DATASET -o {place}` makes some")
+    return found
+
+
+def export_scene(scene: Scene | str | Path, to: str | Iterable[str], out: str | Path) -> dict[str, Path]:
+    """Write a scene in formats (``"mjcf"``, ``["mjcf", "usd"]``, ``"all"``) below ``out``; return the file to open of each.
+
+    An earlier export there is replaced. Raises UsageError for an unknown format and a scene or twin that is not there,
+    ExportError for what cannot be written.
+    """
+    from manitwin.assets.writers.write import write_exported
+    from manitwin.errors import choose_from
+    from manitwin.scenes.layouts.export_mjcf import export_mjcf
+    from manitwin.scenes.layouts.export_usd import export_usd
+
+    exporters = {"mjcf": export_mjcf, "usd": export_usd}
+    asked = [to] if isinstance(to, str) else list(to)
+    names = list(exporters) if "all" in asked else asked
+    for name in names:
+        if name not in exporters:
+            raise UsageError(choose_from("format of a scene", name, exporters))
+    loaded = load_scene(scene) if isinstance(scene, str | Path) else scene
+    place = Path(out) / loaded.record.scene_id
+    return {name: write_exported(exporters[name](loaded), place / name) for name in names}
+
+
+@dataclass(frozen=True)
+class EpisodesReport:
+    """The outcome of ``make_episodes``.
+
+    ``totals`` and ``lines``, the same in words, are None and empty where the run has not ended; ``retired`` are all grasps
+    that fail end to end, ``newly_retired`` how many of them were retired just now.
+    """
+
+    run: RunReport
+    totals: AttemptTotals | None = None
+    lines: list[str] = field(default_factory=list)
+    retired: list[Retirement] = field(default_factory=list)
+    newly_retired: int = 0
+
+
+def make_episodes(
+    source: str | Path,
+    out: str | Path,
+    count: int = 100,
+    *,
+    config: TrajectoriesConfig | str | Path | None = None,
+    twins: str | Path | None = None,
+    formats: Iterable[str] = ("lerobot", "maniskill"),
+    retire: bool = True,
+    jobs: int | None = None,
+    executor: ExecutorName = "local",
+    address: str | None = None,
+) -> EpisodesReport:
+    """Attempt ``count`` pick-and-place episodes with the twins of a data set or in scenes, and keep what succeeded.
+
+    ``out`` gets ``attempts.parquet`` and the data sets of ``formats`` (docs/episodes.md); episodes that are there stay.
+    ``twins``: where the twins of scenes are now. ``retire`` marks grasps that fail in their twins' records.
+    Raises UsageError for a source without twins or scenes, an unknown robot or format, an ``out`` made with other settings,
+    or where another run is at work there.
+    """
+    from manitwin.episodes.collect import chosen_formats, collect
+    from manitwin.episodes.run import make_episodes as make_batches
+    from manitwin.episodes.run import retire_failing
+    from manitwin.scenes.app_config import TrajectoriesConfig
+
+    settings, wanted = _settings(TrajectoriesConfig, config, jobs), chosen_formats(",".join(formats))
+    run = make_batches(source, out, count, settings, twins=twins, executor=executor, address=address)
+    if run.exit_code == 4:
+        return EpisodesReport(run)
+    collected = collect(Path(out), wanted)
+    retired, fresh = retire_failing(Path(out)) if retire else ([], 0)
+    return EpisodesReport(run, collected.totals, collected.lines, retired, fresh)
+
+
+def render_episodes(
+    episodes: str | Path,
+    *,
+    config: PicturesConfig | str | Path | None = None,
+    twins: str | Path | None = None,
+    jobs: int | None = None,
+    executor: ExecutorName = "local",
+    address: str | None = None,
+) -> RunReport:
+    """Draw the kept episodes of a folder by showing their states again, and write its LeRobot data set with the films.
+
+    ``twins``: where their twins are now. What is drawn already stays. Raises EpisodesError where there are no episodes,
+    UsageError for an unknown camera, RendererMissing, and Unavailable without an encoder.
+    """
+    from manitwin.episodes.render_run import draw_episodes, write_with_pictures
+    from manitwin.episodes.video import require_encoder
+    from manitwin.render.device import require_renderer
+    from manitwin.scenes.app_config import PicturesConfig
+
+    settings = _settings(PicturesConfig, config, jobs)
+    if executor != "ray":
+        require_renderer()
+        require_encoder(settings.codec)
+    report = draw_episodes(Path(episodes), settings, twins=twins, executor=executor, address=address)
+    if report.exit_code != 4:
+        write_with_pictures(Path(episodes), settings.cameras)
+    return report
+
+
+def write_index(dataset: str | Path, *, jobs: int | None = None) -> Rebuilt:
+    """Write the index of a data set again from its twins alone, in ``jobs`` processes; the old one serves until then.
+
+    Raises UsageError where there is no data set, TwinError where a process dies: nothing has changed then.
+    """
+    from manitwin.dataset.index.rebuild import rebuild
+    from manitwin.twin.dataset_root import TWINS, DatasetRoot
+
+    root = DatasetRoot(dataset)
+    if not root.exists(TWINS):
+        raise UsageError(f"{dataset}: no data set ({TWINS}/ is missing); give the folder or URL of one")
+    return rebuild(root, jobs=jobs or os.cpu_count() or 1)
+
+
+def write_statistics(dataset: str | Path, out: str | Path | None = None) -> WrittenReport:
+    """Write the statistics of a data set, or of a folder of episodes, as a page, its figures, and its numbers with their SQL.
+
+    ``out`` None: ``statistics/`` below it. Raises UsageError where a data set has no index.
+    """
+    from manitwin.dataset.statistics.report import WrittenReport, write_dataset_report
+    from manitwin.episodes.attempts_table import ATTEMPTS
+    from manitwin.twin.dataset_root import DatasetRoot
+
+    root = DatasetRoot(dataset)
+    if root.local is None or not root.exists(ATTEMPTS):
+        return write_dataset_report(root, None if out is None else Path(out))
+    from manitwin.episodes.statistics.report import episode_statistics
+
+    report = episode_statistics(root.local)
+    return WrittenReport(str(report.write(Path(out or root.local / "statistics"))), report.summary.rstrip("."))
+
+
 def statistics_connection(dataset: str | Path) -> duckdb.DuckDBPyConnection:
     """Return DuckDB with the tables of a data set's index and the macros of ``manitwin stats``, for queries of its report.
 
     Raises UsageError where there is no index.
     """
-    from manitwin.dataset.statistics.tables import Tables
+    from manitwin.dataset.statistics.tables import ReportTables
     from manitwin.twin.dataset_root import DatasetRoot
 
-    return Tables.of_index(DatasetRoot(dataset)).connection
+    return ReportTables.of_index(DatasetRoot(dataset)).connection
 
 
 def schema() -> dict[str, Any]:

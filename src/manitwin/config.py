@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, cast
+from typing import Annotated, Any, Literal, TypeVar, cast, overload
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
@@ -299,9 +299,16 @@ class BuildConfig(Section):
     run: RunConfig = RunConfig()
 
 
-def load_config(path: Path) -> BuildConfig:
-    """Read a TOML file of settings; raises ConfigError naming the key, the nearest valid one and all of them."""
-    return validated(BuildConfig, read_toml(path), str(path))
+@overload
+def load_config(path: str | Path) -> BuildConfig: ...
+@overload
+def load_config(path: str | Path, kind: type[Kind]) -> Kind: ...
+def load_config(path: str | Path, kind: Any = BuildConfig) -> Any:
+    """Read a TOML file of settings: of a build, or of another ``kind``, such as ``LayoutsConfig``.
+
+    Raises ConfigError naming the key, the nearest valid one and all of them.
+    """
+    return validated(kind, read_toml(Path(path)), str(path))
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from exported_twins import content
-from manitwin.assets.audit.run import audit
+from manitwin.assets.audit.run import audit_assets
 from manitwin.assets.importers.importer import import_assets
 from manitwin.assets.read import read_asset
 from manitwin.assets.writers.content import TwinContent
@@ -63,7 +63,7 @@ def exports(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("format", READABLE)
 def test_audit_and_import_find_the_licence_of_an_export(exports: Path, tmp_path: Path, format: str) -> None:
-    (audited,) = audit([exports / format], select=["LIC"])
+    (audited,) = audit_assets([exports / format], select=["LIC"])
     assert audited.format is not None and audited.findings == ()
     (imported,) = import_assets([exports / format], tmp_path)
     assert imported.record is not None, imported.error
@@ -77,7 +77,7 @@ def test_an_export_of_unknown_licence_is_still_found_wanting(tmp_path: Path) -> 
     twin = content(tmp_path / "twin", source={"license": "unknown", "attribution": None})
     for format in READABLE:
         write_export(twin, format, tmp_path / "out")
-    found = audit([tmp_path / "out"], select=["LIC"])
+    found = audit_assets([tmp_path / "out"], select=["LIC"])
     assert len(found) == len(READABLE)
     assert {finding.code for one in found for finding in one.findings} == {"LIC001"}
     assert all(len(one.findings) == 1 for one in found)

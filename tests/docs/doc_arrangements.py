@@ -30,7 +30,7 @@ class Arrangement:
 
 SLOW = (
     r"\bmanitwin (build|run|layout|trajectories|render|stats|publish|prompts)\b",
-    r"\bmanitwin\.build\(",
+    r"\bmanitwin\.(build|make_layouts|make_episodes|write_statistics)\(",
     r"\b(twins|SCENES|EPISODES)\b",
 )
 """Steps that take many seconds, or want a folder that does."""
@@ -109,7 +109,13 @@ PAGES: dict[str, Arrangement] = {
     "docs/publish.md": Arrangement(
         slow=(r"\bOUT(_EPISODES)?\b",), blocks={"^OUT/": "tree OUT", "^OUT_EPISODES/": "tree OUT_EPISODES"}
     ),
-    "docs/python.md": Arrangement(rewritten={r'name="mug"\)': 'name="mug", quick=True)'}),
+    "docs/python.md": Arrangement(
+        rewritten={
+            r'name="mug"\)': 'name="mug", quick=True)',
+            r'"layouts", 20,': '"layouts", 2,',
+            r'"demonstrations", 50,': '"demonstrations", 2,',
+        },
+    ),
     "docs/robots.md": Arrangement(blocks={"my_arm": "robot my_arm/my_arm.toml"}),
     "docs/runs.md": Arrangement(
         rewritten={r" --watch": "", "mug_0042.glb": "mug.glb"},  # watching ends with the watcher

@@ -34,3 +34,12 @@ def scene_ids(root: Path) -> list[str]:
     if not found:
         raise UsageError(f"{root}: no scene there; `manitwin layout DATASET -o {root}` makes some")
     return found
+
+
+def scene_files(place: Path) -> list[Path]:
+    """Return the scene files at a place: a scene's file, that of a scene's folder, or all of a run; none where it has none."""
+    if place.is_file():
+        return [place] if place.name == SCENE else []
+    if (place / SCENE).is_file():
+        return [place / SCENE]
+    return sorted((place / SCENES).glob(f"*/*/{SCENE}"))

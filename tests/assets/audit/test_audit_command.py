@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 from manitwin.assets.audit.finding import Finding
 from manitwin.assets.audit.report import explanation, json_of, sarif_of, summary, text_of
 from manitwin.assets.audit.rules import RULES
-from manitwin.assets.audit.run import Audited, audit, audit_path
+from manitwin.assets.audit.run import Audited, audit_assets, audit_path
 from manitwin.assets.audit.select import rule_of, select_rules
 from manitwin.assets.read import read_asset
 from manitwin.cli.commands.audit import audit as audit_command
@@ -157,7 +157,7 @@ def test_many_assets_give_the_same_in_one_process_and_in_two(tmp_path: Path) -> 
     write_urdf(tmp_path / "good")
     write_urdf(tmp_path / "placeholder", inertial=PLACEHOLDER)
     (tmp_path / "broken.urdf").write_text("<robot name='x'>")
-    one, two = (audit([tmp_path], jobs=jobs) for jobs in (1, 2))
+    one, two = (audit_assets([tmp_path], jobs=jobs) for jobs in (1, 2))
     assert one == two
     codes = {Path(each.asset).relative_to(tmp_path).parts[0]: {f.code for f in each.findings} for each in one}
     assert codes == {"broken.urdf": {"FIL001"}, "good": set(), "placeholder": {"INE004", "COM003"}, "twins": set()}
@@ -165,7 +165,7 @@ def test_many_assets_give_the_same_in_one_process_and_in_two(tmp_path: Path) -> 
 
 def test_path_that_is_not_there_is_wrong_use(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"nowhere.*no such file"):
-        audit([tmp_path / "nowhere"])
+        audit_assets([tmp_path / "nowhere"])
 
 
 def test_fix_writes_the_inertia_of_the_hulls_and_keeps_the_old_file(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from made_twins import make_dataset
 
-from manitwin.dataset.publish.publish import publish
+from manitwin.dataset.publish.publish import publish_dataset
 
 
 @pytest.fixture(scope="session")
@@ -20,5 +20,5 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def published(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Its publication, at most two twins a shard. Read only."""
     out = tmp_path_factory.mktemp("published") / "small-set"
-    publish(dataset, out, twins_per_shard=2)
+    publish_dataset(dataset, out, twins_per_shard=2)
     return out

@@ -15,7 +15,7 @@ import pytest
 from made_twins import CORNERS_M
 
 from manitwin.dataset.publish.card import size, size_category
-from manitwin.dataset.publish.publish import publish
+from manitwin.dataset.publish.publish import publish_dataset
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.store import read_record
 
@@ -117,7 +117,7 @@ def test_front_matter_is_what_the_hub_reads(published: Path) -> None:
 def test_name_with_quotes_and_markup_stays_a_name(dataset: Path, tmp_path: Path) -> None:
     from huggingface_hub import DatasetCard
 
-    publish(dataset, tmp_path / "out", name='Bob\'s "mugs": <b>1</b> | é')
+    publish_dataset(dataset, tmp_path / "out", name='Bob\'s "mugs": <b>1</b> | é')
     text = (tmp_path / "out" / "README.md").read_text()
     assert DatasetCard(text).data.pretty_name == 'Bob\'s "mugs": <b>1</b> | é'
     assert "<b>" not in text.split("---", 2)[2]

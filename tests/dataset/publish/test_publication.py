@@ -12,7 +12,7 @@ from made_twins import index, make_twin
 
 import manitwin.dataset.publish.publish as module
 from manitwin.dataset.publish.publication import EPISODES, Publication
-from manitwin.dataset.publish.publish import ShardDone, publish
+from manitwin.dataset.publish.publish import ShardDone, publish_dataset
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -38,10 +38,10 @@ def test_sums_name_every_file_and_its_digest(published: Path) -> None:
 def test_interrupted_publication_goes_on_where_it_stopped(dataset: Path, published: Path, tmp_path: Path) -> None:
     out = tmp_path / "small-set"
     with pytest.raises(KeyboardInterrupt):
-        publish(dataset, out, twins_per_shard=2, on_shard=stop_after(2))
+        publish_dataset(dataset, out, twins_per_shard=2, on_shard=stop_after(2))
     assert len(list(out.rglob("*.tar"))) == 2 and not (out / "SHA256SUMS").exists()
     kept: list[str] = []
-    done = publish(
+    done = publish_dataset(
         dataset, out, twins_per_shard=2, on_shard=lambda shard: kept.append(shard.name) if shard.kept else None
     )
     assert done.kept_shards == 2 and kept == ["data/mug/mug-000000.tar", "data/mug/mug-000001.tar"]
@@ -51,11 +51,11 @@ def test_interrupted_publication_goes_on_where_it_stopped(dataset: Path, publish
 def test_one_that_an_older_version_began_goes_on(dataset: Path, published: Path, tmp_path: Path) -> None:
     out = tmp_path / "small-set"
     with pytest.raises(KeyboardInterrupt):
-        publish(dataset, out, twins_per_shard=2, on_shard=stop_after(1))
+        publish_dataset(dataset, out, twins_per_shard=2, on_shard=stop_after(1))
     (out / ".publish" / "started").write_bytes(b"")  # as it was when there were twins alone
     with pytest.raises(UsageError, match="a publication of twins was begun there"):
         Publication(DatasetRoot(out), EPISODES).begin()
-    assert publish(dataset, out, twins_per_shard=2).kept_shards == 1
+    assert publish_dataset(dataset, out, twins_per_shard=2).kept_shards == 1
     assert files_below(out) == files_below(published)
 
 
@@ -71,22 +71,22 @@ def test_full_disk_leaves_no_half_shard(
 
     monkeypatch.setattr(module, "write_shard", full)
     with pytest.raises(UsageError, match="No space left"):
-        publish(dataset, out, twins_per_shard=2)
+        publish_dataset(dataset, out, twins_per_shard=2)
     assert list(files_below(out)) == [".publish/started"]
     monkeypatch.setattr(module, "write_shard", whole)
-    publish(dataset, out, twins_per_shard=2)
+    publish_dataset(dataset, out, twins_per_shard=2)
     assert files_below(out) == files_below(published)
 
 
 def test_killed_publication_leaves_nothing_that_counts(dataset: Path, published: Path, tmp_path: Path) -> None:
     out = tmp_path / "small-set"
     with pytest.raises(KeyboardInterrupt):
-        publish(dataset, out, twins_per_shard=2, on_shard=stop_after(1))
+        publish_dataset(dataset, out, twins_per_shard=2, on_shard=stop_after(1))
     half = out / ".publish" / "incoming-1" / "shard.tar"
     half.parent.mkdir()
     half.write_bytes(b"half")
     (out / "data" / "mug" / "mug-000000.tar").write_bytes(b"cut")  # its receipt says that it is larger
-    assert publish(dataset, out, twins_per_shard=2).kept_shards == 0
+    assert publish_dataset(dataset, out, twins_per_shard=2).kept_shards == 0
     assert files_below(out) == files_below(published)
 
 
@@ -95,18 +95,18 @@ def test_grown_data_set_rewrites_only_the_shards_that_change(tmp_path: Path) -> 
     for number, category in enumerate(("bowl", "cup", "mug")):
         make_twin(root, f"a{number}", category)
     index(root)
-    publish(root, out)
+    publish_dataset(root, out)
     sums = (out / "SHA256SUMS").read_bytes()
-    again = publish(root, out)
+    again = publish_dataset(root, out)
     assert again.kept_shards == 3 and (out / "SHA256SUMS").read_bytes() == sums
     shutil.rmtree(root / "twins" / "a1" / "a1")  # the cup goes, a mug comes
     make_twin(root, "b0", "mug")
     shutil.rmtree(root / "index")
     index(root)
-    grown = publish(root, out)
+    grown = publish_dataset(root, out)
     assert (grown.twins, grown.shards, grown.kept_shards) == (3, 2, 1)
     assert not (out / "data" / "cup").exists() and not (out / ".publish").exists()
-    publish(root, tmp_path / "fresh" / "out")
+    publish_dataset(root, tmp_path / "fresh" / "out")
     assert files_below(out) == files_below(tmp_path / "fresh" / "out")
 
 
@@ -115,31 +115,31 @@ def test_folder_of_something_else_is_not_touched(dataset: Path, tmp_path: Path) 
     for out in (tmp_path, dataset):
         before = files_below(out)
         with pytest.raises(UsageError, match="not empty"):
-            publish(dataset, out)
+            publish_dataset(dataset, out)
         assert files_below(out) == before
     (tmp_path / "thesis.txt").rename(tmp_path / ".gitattributes")  # a fresh clone of a repository
-    publish(dataset, tmp_path)
+    publish_dataset(dataset, tmp_path)
     assert (tmp_path / ".gitattributes").read_text() == "mine"
 
 
 def test_stale_or_missing_index_is_said(tmp_path: Path) -> None:
     root = tmp_path / "set"
     with pytest.raises(UsageError, match="twins/"):
-        publish(root, tmp_path / "out")
+        publish_dataset(root, tmp_path / "out")
     make_twin(root, "a0")
     with pytest.raises(UsageError, match="has no index; run manitwin index"):
-        publish(root, tmp_path / "out")
+        publish_dataset(root, tmp_path / "out")
     index(root)
     make_twin(root, "a1")
     with pytest.raises(UsageError, match="lacks 1 finished"):
-        publish(root, tmp_path / "out")
+        publish_dataset(root, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("wrong", [{"shard_size_mb": 0}, {"shard_size_mb": 20_001}, {"twins_per_shard": 0}])
 def test_senseless_bounds_are_refused(dataset: Path, tmp_path: Path, wrong: dict[str, int]) -> None:
     with pytest.raises(UsageError, match="give 1"):
-        publish(dataset, tmp_path / "out", **wrong)
+        publish_dataset(dataset, tmp_path / "out", **wrong)
 
 
 def test_from_one_url_to_another_gives_the_same_bytes(dataset: Path, published: Path) -> None:
@@ -148,8 +148,8 @@ def test_from_one_url_to_another_gives_the_same_bytes(dataset: Path, published: 
         memory.pipe_file(f"/from/{name}", content)
     try:
         with pytest.raises(KeyboardInterrupt):
-            publish("memory://from", "memory://to/small-set", twins_per_shard=2, on_shard=stop_after(1))
-        done = publish("memory://from", "memory://to/small-set", twins_per_shard=2)
+            publish_dataset("memory://from", "memory://to/small-set", twins_per_shard=2, on_shard=stop_after(1))
+        done = publish_dataset("memory://from", "memory://to/small-set", twins_per_shard=2)
         found = {path.removeprefix("/to/small-set/"): memory.cat_file(path) for path in memory.find("/to/small-set")}
     finally:
         memory.store.clear()

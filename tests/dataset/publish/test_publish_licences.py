@@ -7,7 +7,7 @@ import pytest
 
 from manitwin.dataset.publish.hub_license import hub_license
 from manitwin.dataset.publish.licences import licenses_page, select, without_attribution
-from manitwin.dataset.publish.publish import publish
+from manitwin.dataset.publish.publish import publish_dataset
 from manitwin.errors import UsageError
 
 ROWS: list[dict[str, Any]] = [
@@ -99,6 +99,6 @@ def test_page_names_author_and_twins_of_every_licence(published: Path) -> None:
 
 
 def test_what_stays_here_is_counted(dataset: Path, tmp_path: Path) -> None:
-    done = publish(dataset, tmp_path / "out", license_allow=["CC0-1.0"])
+    done = publish_dataset(dataset, tmp_path / "out", license_allow=["CC0-1.0"])
     assert (done.twins, done.left_out, done.rejected) == (1, {"CC-BY-4.0": 5, "unknown": 1}, 1)
     assert [p.name for p in (tmp_path / "out").rglob("*.tar")] == ["salad-bowl-000000.tar"]

@@ -12,7 +12,7 @@ import pytest
 from made_twins import index, make_dataset, make_twin
 
 from manitwin.dataset.publish.privacy import check_part, places_of
-from manitwin.dataset.publish.publish import publish
+from manitwin.dataset.publish.publish import publish_dataset
 from manitwin.errors import TwinError
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import read_record, seal
@@ -67,10 +67,10 @@ def test_folder_of_a_person_in_a_twins_words_is_refused(tmp_path: Path, words: s
     make_twin(root, "a0", prompt=words)
     index(root)
     if not refused:
-        publish(root, tmp_path / "out")
+        publish_dataset(root, tmp_path / "out")
         return
     with pytest.raises(TwinError, match=r"a0/twin\.json: names the folder"):
-        publish(root, tmp_path / "out")
+        publish_dataset(root, tmp_path / "out")
     assert not list((tmp_path / "out").rglob("*.tar"))
 
 
@@ -88,4 +88,4 @@ def test_source_with_a_folder_in_its_name_is_refused(tmp_path: Path) -> None:
     seal(folder, {**record, "source": {**record["source"], "file": "photos/source.zip"}})
     index(root)
     with pytest.raises(TwinError, match="not a file's name"):
-        publish(root, tmp_path / "out")
+        publish_dataset(root, tmp_path / "out")

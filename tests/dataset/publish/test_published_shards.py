@@ -17,7 +17,7 @@ from made_twins import index, make_twin
 
 import manitwin
 from manitwin.dataset.index.parts import indexed_twins, write_part
-from manitwin.dataset.publish.publish import publish
+from manitwin.dataset.publish.publish import publish_dataset
 from manitwin.dataset.publish.shard_plan import archive_bytes
 from manitwin.dataset.publish.unpack import unpack_shard
 from manitwin.errors import TwinError, UsageError
@@ -88,7 +88,7 @@ def test_shard_is_no_larger_than_planned(tmp_path: Path) -> None:
     for number in range(12):
         make_twin(root, f"{number:016x}", source_bytes=200_000 * (number % 3))
     index(root)
-    publish(root, tmp_path / "out", shard_size_mb=1)
+    publish_dataset(root, tmp_path / "out", shard_size_mb=1)
     sizes = [shard.stat().st_size for shard in shards_of(tmp_path / "out")]
     assert len(sizes) > 1 and max(sizes) <= 10**6 and sum(sizes) > 2_000_000
     assert all(size == archive_bytes(size - 1024) for size in sizes)
@@ -108,7 +108,7 @@ def test_unpacked_twins_pass_verification_and_can_be_indexed(dataset: Path, publ
 
 
 def test_same_twins_give_the_same_bytes(dataset: Path, published: Path, tmp_path: Path) -> None:
-    publish(dataset, tmp_path / "small-set", twins_per_shard=2)
+    publish_dataset(dataset, tmp_path / "small-set", twins_per_shard=2)
     for path in sorted(p for p in published.rglob("*") if p.is_file()):
         assert (tmp_path / "small-set" / path.relative_to(published)).read_bytes() == path.read_bytes(), path.name
 
@@ -127,5 +127,5 @@ def test_damaged_or_newer_twin_stops_the_publication(tmp_path: Path, what: str) 
         seal(folder, {**record, "name": "other"})
     error, words = (UsageError, "manitwin index") if what == "newer" else (TwinError, "card.png")
     with pytest.raises(error, match=words):
-        publish(root, tmp_path / "out")
+        publish_dataset(root, tmp_path / "out")
     assert not (tmp_path / "out" / "SHA256SUMS").exists() and not list((tmp_path / "out").rglob("*.tar"))

@@ -15,9 +15,8 @@ from typer.testing import CliRunner
 from manitwin.cli.commands.stats import stats
 from manitwin.dataset.index.merge import write_rows
 from manitwin.dataset.index.part_list import PartList
-from manitwin.dataset.statistics.of_dataset import FOLDER, write_statistics
-from manitwin.dataset.statistics.report import FIGURES, NUMBERS, REPORT, collect
-from manitwin.dataset.statistics.tables import Tables
+from manitwin.dataset.statistics.report import FIGURES, FOLDER, NUMBERS, REPORT, collect, write_dataset_report
+from manitwin.dataset.statistics.tables import ReportTables
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -37,19 +36,19 @@ def dataset(url: str, accepted: int, rejected: int, parts: int) -> DatasetRoot:
 
 
 def test_numbers_do_not_depend_on_how_rows_are_spread_over_parts(tmp_path: Path) -> None:
-    one = collect(Tables.of_index(dataset(str(tmp_path / "one"), 40, 15, parts=1)))
-    many = collect(Tables.of_index(dataset(str(tmp_path / "many"), 40, 15, parts=5)))
+    one = collect(ReportTables.of_index(dataset(str(tmp_path / "one"), 40, 15, parts=1)))
+    many = collect(ReportTables.of_index(dataset(str(tmp_path / "many"), 40, 15, parts=5)))
     assert {name: result.rows for name, result in one.items()} == {name: result.rows for name, result in many.items()}
     assert one["totals"].only["items"] == 55
 
 
 def test_report_goes_into_the_data_set_also_behind_a_url(tmp_path: Path) -> None:
     local = dataset(str(tmp_path / "some set"), 6, 2, parts=2)
-    said = write_statistics(local)
+    said = write_dataset_report(local)
     assert said.page == str(tmp_path / "some set" / FOLDER / REPORT)
     assert said.summary == "8 items: 6 accepted, 2 rejected"
     remote = dataset("memory://statistics/some set", 6, 2, parts=2)
-    said = write_statistics(remote)
+    said = write_dataset_report(remote)
     assert said.page == f"memory://statistics/some set/{FOLDER}/{REPORT}"
     assert f"{FOLDER}/{FIGURES}/sizes.svg" in remote.names_below(FOLDER)
     assert remote.read_bytes(f"{FOLDER}/{REPORT}") == local.read_bytes(f"{FOLDER}/{REPORT}")
@@ -57,7 +56,7 @@ def test_report_goes_into_the_data_set_also_behind_a_url(tmp_path: Path) -> None
 
 
 def test_report_lists_near_duplicates_of_the_index(tmp_path: Path) -> None:
-    write_statistics(dataset(str(tmp_path / "set"), 4, 0, parts=1))
+    write_dataset_report(dataset(str(tmp_path / "set"), 4, 0, parts=1))
     near = json.loads((tmp_path / "set" / FOLDER / NUMBERS).read_text())["near_duplicates"]
     assert near["pairs"] == 0, "random shapes are not alike"
     assert "near_duplicates" in near["found_by"]
@@ -65,7 +64,7 @@ def test_report_lists_near_duplicates_of_the_index(tmp_path: Path) -> None:
 
 def test_data_set_without_an_index_is_said_to_have_none(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="has no index; run manitwin index"):
-        write_statistics(DatasetRoot(tmp_path))
+        write_dataset_report(DatasetRoot(tmp_path))
     assert not (tmp_path / FOLDER).exists()
 
 

@@ -14,7 +14,7 @@ from synthetic_index import identities, synthetic_tables
 
 from manitwin.dataset.statistics import cost_queries, grasp_queries, object_queries, stage_queries
 from manitwin.dataset.statistics.query import Query, Row
-from manitwin.dataset.statistics.tables import Tables
+from manitwin.dataset.statistics.tables import ReportTables
 from manitwin.models.annotators.priors import load_priors
 from manitwin.twin.record import REJECTION_REASONS
 
@@ -27,8 +27,8 @@ def arrow() -> dict[str, pa.Table]:
 
 
 @pytest.fixture(scope="module")
-def tables(arrow: dict[str, pa.Table]) -> Tables:
-    return Tables(arrow)
+def tables(arrow: dict[str, pa.Table]) -> ReportTables:
+    return ReportTables(arrow)
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +36,7 @@ def rows(arrow: dict[str, pa.Table]) -> dict[str, Rows]:
     return {name: table.to_pylist() for name, table in arrow.items()}
 
 
-def by(tables: Tables, query: Query, key: str) -> dict[str, Row]:
+def by(tables: ReportTables, query: Query, key: str) -> dict[str, Row]:
     return {row[key]: row for row in tables.result(query).rows}
 
 
@@ -45,7 +45,7 @@ def own(grasp: Row) -> bool:
 
 
 @pytest.mark.parametrize("passed, count", [(0, 7), (7, 7), (1, 3), (150, 210), (99_999, 100_000)])
-def test_interval_of_a_share_is_that_of_scipy(tables: Tables, passed: int, count: int) -> None:
+def test_interval_of_a_share_is_that_of_scipy(tables: ReportTables, passed: int, count: int) -> None:
     low, high = tables.connection.execute(
         f"SELECT wilson_low({passed}, {count}), wilson_high({passed}, {count})"
     ).fetchall()[0]
@@ -53,11 +53,13 @@ def test_interval_of_a_share_is_that_of_scipy(tables: Tables, passed: int, count
     assert (low, high) == pytest.approx((expected.low, expected.high), abs=1e-9)
 
 
-def test_share_of_nothing_has_no_interval(tables: Tables) -> None:
+def test_share_of_nothing_has_no_interval(tables: ReportTables) -> None:
     assert tables.connection.execute("SELECT wilson_low(0, 0), wilson_high(0, 0)").fetchall() == [(None, None)]
 
 
-def test_every_item_leaves_at_one_stage_and_meshes_enter_no_generation(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_every_item_leaves_at_one_stage_and_meshes_enter_no_generation(
+    tables: ReportTables, rows: dict[str, Rows]
+) -> None:
     found = by(tables, stage_queries.SUCCESS_BY_STAGE, "stage")
     assert list(found) == list(REJECTION_REASONS)
     rejected = Counter(row["stage"] for row in rows["rejections"])
@@ -74,14 +76,14 @@ def test_every_item_leaves_at_one_stage_and_meshes_enter_no_generation(tables: T
     assert found["placement"]["passed"] == left == len(rows["twins"])
 
 
-def test_reasons_add_up_to_all_rejections(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_reasons_add_up_to_all_rejections(tables: ReportTables, rows: dict[str, Rows]) -> None:
     found = tables.result(stage_queries.REJECTIONS_BY_REASON).rows
     counted = Counter((row["stage"], row["reason"]) for row in rows["rejections"])
     assert {(row["stage"], row["reason"]): row["items"] for row in found} == dict(counted)
     assert sum(row["share_of_rejected"] for row in found) == pytest.approx(1)
 
 
-def test_grasps_per_object_are_numpys_quantiles(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_grasps_per_object_are_numpys_quantiles(tables: ReportTables, rows: dict[str, Rows]) -> None:
     found = by(tables, grasp_queries.GRASPS_PER_OBJECT, "quantity")
     verified = np.array([row["verified"] for row in rows["twins"]], float)
     row = found["verified"]
@@ -91,7 +93,7 @@ def test_grasps_per_object_are_numpys_quantiles(tables: Tables, rows: dict[str, 
     )
 
 
-def test_rate_of_all_grasps_is_the_same_by_twin_and_by_grasp(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_rate_of_all_grasps_is_the_same_by_twin_and_by_grasp(tables: ReportTables, rows: dict[str, Rows]) -> None:
     pooled = by(tables, grasp_queries.VERIFICATION_RATE, "proposals")
     gripper = tables.result(grasp_queries.BY_GRIPPER).only
     assert pooled["filtered by points and diversity"]["rate"] == gripper["rate"]
@@ -101,7 +103,9 @@ def test_rate_of_all_grasps_is_the_same_by_twin_and_by_grasp(tables: Tables, row
     assert gripper["rate"] == pytest.approx(np.mean([grasp["verified"] for grasp in grasps]))
 
 
-def test_interval_of_the_pooled_rate_holds_what_resampling_objects_gives(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_interval_of_the_pooled_rate_holds_what_resampling_objects_gives(
+    tables: ReportTables, rows: dict[str, Rows]
+) -> None:
     row = by(tables, grasp_queries.VERIFICATION_RATE, "proposals")["filtered by points and diversity"]
     tried, held = (np.array([twin[key] for twin in rows["twins"]], float) for key in ("simulated", "verified"))
     picks = np.random.default_rng(0).integers(0, len(tried), (4000, len(tried)))
@@ -111,7 +115,7 @@ def test_interval_of_the_pooled_rate_holds_what_resampling_objects_gives(tables:
     assert row["high"] - row["low"] > 2 * (binomial.high - binomial.low), "grasps of one object are alike"
 
 
-def test_outcomes_are_those_of_failed_grasps_without_the_controls(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_outcomes_are_those_of_failed_grasps_without_the_controls(tables: ReportTables, rows: dict[str, Rows]) -> None:
     found = by(tables, grasp_queries.OUTCOMES, "outcome")
     failed = [grasp for grasp in rows["grasps"] if grasp["outcome"] != "held"]
     assert {k: row["filtered"] for k, row in found.items()} == dict(Counter(g["outcome"] for g in failed if own(g)))
@@ -119,7 +123,7 @@ def test_outcomes_are_those_of_failed_grasps_without_the_controls(tables: Tables
     assert {k: row["unfiltered_sample"] for k, row in found.items()} == dict(sample)
 
 
-def test_grasps_go_to_the_type_of_their_own_twins_point(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_grasps_go_to_the_type_of_their_own_twins_point(tables: ReportTables, rows: dict[str, Rows]) -> None:
     types = {
         (point["twin_id"], point["point_id"]): point["type"] for point in rows["points"] if point["role"] == "grasp"
     }
@@ -127,7 +131,7 @@ def test_grasps_go_to_the_type_of_their_own_twins_point(tables: Tables, rows: di
     assert {k: row["simulated"] for k, row in by(tables, grasp_queries.BY_GRASP_TYPE, "type").items()} == dict(counted)
 
 
-def test_kappa_is_that_of_the_table_of_controls(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_kappa_is_that_of_the_table_of_controls(tables: ReportTables, rows: dict[str, Rows]) -> None:
     controls = [grasp for grasp in rows["grasps"] if grasp["proposer"].endswith(":jittered")]
     first = np.array([grasp["outcome"] == "held" for grasp in controls])
     second = np.array([grasp["holds_in_second_engine"] for grasp in controls])
@@ -140,14 +144,14 @@ def test_kappa_is_that_of_the_table_of_controls(tables: Tables, rows: dict[str, 
     assert found["kappa"] == pytest.approx((np.trace(table) - by_chance) / (1 - by_chance))
 
 
-def test_robust_share_is_of_twins_that_were_repeated(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_robust_share_is_of_twins_that_were_repeated(tables: ReportTables, rows: dict[str, Rows]) -> None:
     tried = [twin for twin in rows["twins"] if twin["robust"] is not None]
     assert 0 < len(tried) < len(rows["twins"])
     expected = sum(twin["robust"] for twin in tried) / sum(twin["verified"] for twin in tried)
     assert tables.result(grasp_queries.ROBUST).only["robust_share"] == pytest.approx(expected)
 
 
-def test_histograms_count_every_object_in_its_step(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_histograms_count_every_object_in_its_step(tables: ReportTables, rows: dict[str, Rows]) -> None:
     sides = np.array([twin["longest_m"] for twin in rows["twins"]])
     found = tables.result(object_queries.SIZE_HISTOGRAM).rows
     for row in found:
@@ -161,13 +165,15 @@ def test_values_on_an_edge_are_in_the_step_above_it() -> None:
     twins = arrow["twins"]
     for name, values in (("longest_m", [0.1, 1.0]), ("mass_kg", [0.1, 1.0]), ("success_rate", [0.3, 1.0])):
         twins = twins.set_column(twins.column_names.index(name), name, pa.array(values))
-    tables = Tables({**arrow, "twins": twins})
+    tables = ReportTables({**arrow, "twins": twins})
     assert [r["step"] for r in tables.result(object_queries.SIZE_HISTOGRAM).rows] == [-object_queries.SIZE_STEPS, 0]
     assert [r["step"] for r in tables.result(object_queries.MASS_HISTOGRAM).rows] == [-object_queries.MASS_STEPS, 0]
     assert [r["step"] for r in tables.result(grasp_queries.RATE_HISTOGRAM).rows] == [6, 19]
 
 
-def test_terms_are_counted_once_a_twin_without_brackets_and_measurements(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_terms_are_counted_once_a_twin_without_brackets_and_measurements(
+    tables: ReportTables, rows: dict[str, Rows]
+) -> None:
     words = {query.name: query for query in object_queries.WORDS}
     colors = by(tables, words["words_color"], "term")
     both = sum(twin["color"] == "dark grey (61 %), black (12 %)" for twin in rows["twins"])
@@ -175,7 +181,7 @@ def test_terms_are_counted_once_a_twin_without_brackets_and_measurements(tables:
     assert set(by(tables, words["words_size"], "term")) == {"palm-sized", "hand-sized", "medium-sized", "large"}
 
 
-def test_share_inside_the_prior_is_that_of_the_package(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_share_inside_the_prior_is_that_of_the_package(tables: ReportTables, rows: dict[str, Rows]) -> None:
     found = by(tables, object_queries.mass_in_prior(object_queries.priors_of(["mug", "no such thing"])), "category")
     prior = load_priors()["mug"]
     masses = [twin["mass_kg"] for twin in rows["twins"] if twin["category"] == "mug"]
@@ -184,7 +190,7 @@ def test_share_inside_the_prior_is_that_of_the_package(tables: Tables, rows: dic
     assert found["mug"]["mass_inside"] == pytest.approx(np.mean(inside))
 
 
-def test_cost_by_stage_adds_up_to_the_total(tables: Tables, rows: dict[str, Rows]) -> None:
+def test_cost_by_stage_adds_up_to_the_total(tables: ReportTables, rows: dict[str, Rows]) -> None:
     stages = by(tables, cost_queries.COST_BY_STAGE, "stage")
     total = by(tables, cost_queries.COST, "quantity")
     cpu = sum(row["cpu_seconds"] for row in rows["stages"])
@@ -203,13 +209,15 @@ def test_same_source_lists_accepted_and_rejected_together() -> None:
     arrow["rejections"] = rejections.set_column(
         rejections.column_names.index("source_sha256"), "source_sha256", sources
     )
-    (row,) = Tables(arrow).result(stage_queries.SAME_SOURCE).rows
+    (row,) = ReportTables(arrow).result(stage_queries.SAME_SOURCE).rows
     ids = {arrow["twins"]["twin_id"][0].as_py(), arrow["rejections"]["twin_id"][0].as_py()}
     assert row["items"] == 2 and set(row["twin_ids"].split(", ")) == ids
 
 
 def test_scatter_is_sampled_by_the_stated_seed() -> None:
-    small = {row["twin_id"] for row in Tables(synthetic_tables(3000, 0)).result(object_queries.MASS_AND_SIZE).rows}
+    small = {
+        row["twin_id"] for row in ReportTables(synthetic_tables(3000, 0)).result(object_queries.MASS_AND_SIZE).rows
+    }
     assert len(small) == object_queries.SAMPLE
     expected = sorted(identities(3000, "twin"), key=_md5_with_seed)[: object_queries.SAMPLE]
     assert small == set(expected)

@@ -19,7 +19,7 @@ from synthetic_index import synthetic_tables
 
 from manitwin.dataset.index.near_duplicates import NearDuplicates, NearPair
 from manitwin.dataset.statistics.report import FIGURES, NO_TWIN, NUMBERS, REPORT, write_report
-from manitwin.dataset.statistics.tables import Tables
+from manitwin.dataset.statistics.tables import ReportTables
 
 NAMES = (
     *("$x^2$", "<script>alert(1)</script>", "& \"quoted\" 'single'", "茶杯", 'id="x" #4477aa', "line\nbreak\x07bell"),
@@ -28,7 +28,7 @@ NAMES = (
 
 
 def written(out: Path, tables: dict[str, pa.Table], **more: Any) -> str:
-    write_report(Tables(tables), out, title="Statistics of a set", **more)
+    write_report(ReportTables(tables), out, title="Statistics of a set", **more)
     return (out / REPORT).read_text()
 
 
@@ -216,7 +216,7 @@ def test_users_settings_of_matplotlib_change_nothing(report: Path, tmp_path: Pat
 @pytest.mark.slow
 def test_hundred_thousand_twins_take_less_than_a_minute(tmp_path: Path) -> None:
     names = tuple(f"category {number}" for number in range(502)) + NAMES
-    tables = Tables(synthetic_tables(100_000, 40_000, category_names=names))
+    tables = ReportTables(synthetic_tables(100_000, 40_000, category_names=names))
     start = time.process_time()
     write_report(tables, tmp_path, title="Statistics of a large set")
     assert time.process_time() - start < 60

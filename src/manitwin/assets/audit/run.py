@@ -161,7 +161,7 @@ def _result(path: Path, future: Any, codes: tuple[str, ...]) -> Audited:
         return _unread(path, cause, [RULES_BY_CODE[code] for code in codes])
 
 
-def audit(
+def audit_assets(
     paths: Iterable[Path | str],
     *,
     select: Iterable[str] = (),

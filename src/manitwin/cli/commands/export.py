@@ -43,10 +43,10 @@ def export(
     """Write twins as MJCF, URDF, SDF, USD and GLB, and for RoboTwin, ManiSkill, Isaac Lab and graspers; scenes as MJCF, USD."""
     from manitwin.assets.writers.licenses import allowed_licenses
     from manitwin.assets.writers.registry import chosen_formats
-    from manitwin.cli.commands.export_scenes import export_scenes, scene_files
+    from manitwin.cli.commands.export_scenes import export_scenes, scenes_among
     from manitwin.errors import UsageError
 
-    if scenes := scene_files(twins):
+    if scenes := scenes_among(twins):
         if license_allow is not None:
             raise UsageError("--license-allow is for twins; export those of a scene by themselves to have them judged")
         export_scenes(scenes, out, to)

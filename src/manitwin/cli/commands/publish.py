@@ -46,7 +46,7 @@ def publish(
     name: Annotated[str | None, typer.Option(help="What the card calls it; default: the name of OUT.")] = None,
 ) -> None:
     """Write a data set as WebDataset shards, Parquet tables and a card; or episodes as a LeRobot data set with a card."""
-    from manitwin.dataset.publish.publish import publish as publish_dataset
+    from manitwin.dataset.publish.publish import publish_dataset
     from manitwin.episodes.attempts_table import ATTEMPTS
     from manitwin.errors import UsageError
     from manitwin.twin.dataset_root import DatasetRoot

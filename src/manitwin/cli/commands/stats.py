@@ -31,7 +31,7 @@ def stats(
     ] = None,
 ) -> None:
     """Write the statistics of a data set, or of episodes: a page, its figures, and its numbers with the SQL of each."""
-    from manitwin.dataset.statistics.of_dataset import write_statistics
+    from manitwin.dataset.statistics.report import write_dataset_report
     from manitwin.episodes.attempts_table import ATTEMPTS
     from manitwin.twin.dataset_root import DatasetRoot
 
@@ -43,5 +43,5 @@ def stats(
         out_console.print(report.text(), markup=False, soft_wrap=True)
         out_console.print(str(report.write(out or root.local / "statistics")), markup=False)
         return
-    written = write_statistics(root, out)
+    written = write_dataset_report(root, out)
     out_console.print(f"{written.summary}: {written.page}", markup=False)

@@ -12,7 +12,7 @@ import pyarrow.compute as pc
 import pyarrow.dataset as pads
 from pyarrow.fs import FSSpecHandler, LocalFileSystem, PyFileSystem
 
-from manitwin.dataset.index.part_list import Part
+from manitwin.dataset.index.part_list import IndexPart
 from manitwin.dataset.index.tables import TABLES, joined, parquet
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -28,7 +28,7 @@ def file_system(root: DatasetRoot) -> Any:
     return LocalFileSystem() if root.local is not None else PyFileSystem(FSSpecHandler(root.fs))
 
 
-def files_of(root: DatasetRoot, parts: Sequence[Part]) -> Files:
+def files_of(root: DatasetRoot, parts: Sequence[IndexPart]) -> Files:
     """Return the files of parts by table."""
     return {table: [root.full(part.file(table)) for part in parts] for table in TABLES}
 
@@ -64,10 +64,10 @@ def merged(
         yield {table: joined(table, [read_rows(files, table, fs, where=within)]) for table in TABLES}
 
 
-def write_rows(root: DatasetRoot, number: int, rows: Mapping[str, pa.Table]) -> Part:
+def write_rows(root: DatasetRoot, number: int, rows: Mapping[str, pa.Table]) -> IndexPart:
     """Write the tables of a part, each file whole; the part counts from when the list of parts names it."""
     ids = [twin_id for table in ("twins", "rejections") for twin_id in rows[table]["twin_id"].to_pylist()]
-    part = Part(f"{number:06d}", {table: len(rows[table]) for table in TABLES}, min(ids), max(ids))
+    part = IndexPart(f"{number:06d}", {table: len(rows[table]) for table in TABLES}, min(ids), max(ids))
     for table in TABLES:
         root.write_bytes(part.file(table), parquet(rows[table]))
     return part

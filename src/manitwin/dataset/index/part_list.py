@@ -16,7 +16,7 @@ PARTS = f"{INDEX}/parts.json"
 
 
 @dataclass(frozen=True)
-class Part:
+class IndexPart:
     """Rows of some twins, in one file a table.
 
     ``rows`` are those of each table. All ids lie between ``first`` and ``last``, which other parts may overlap; which they
@@ -42,7 +42,7 @@ class Part:
 class PartList:
     """The parts that count, by their first id; ``next`` numbers the next one: no name is used twice."""
 
-    parts: tuple[Part, ...] = ()
+    parts: tuple[IndexPart, ...] = ()
     next: int = 0
     schema_id: str = field(default=SCHEMA_ID)
 
@@ -66,7 +66,7 @@ def read_part_list(root: DatasetRoot) -> PartList | None:
         return None
     try:
         data = json.loads(content)
-        parts = tuple(Part(**part) for part in data["parts"])
+        parts = tuple(IndexPart(**part) for part in data["parts"])
         found = PartList(parts, data["next"], data["schema_id"])
     except (ValueError, KeyError, TypeError) as error:
         raise UsageError(f"{root.full(PARTS)}: cannot be read ({error}); run manitwin index {root.url}") from error
@@ -77,7 +77,7 @@ def read_part_list(root: DatasetRoot) -> PartList | None:
     return found
 
 
-def in_order_of_twins(parts: Iterable[Part]) -> tuple[Part, ...]:
+def in_order_of_twins(parts: Iterable[IndexPart]) -> tuple[IndexPart, ...]:
     """Return parts as the list keeps them."""
     return tuple(sorted(parts, key=lambda part: (part.first, part.last, part.name)))
 

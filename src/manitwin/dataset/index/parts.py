@@ -15,7 +15,7 @@ from math import log
 import pyarrow as pa
 
 from manitwin.dataset.index.merge import PART_ROWS, file_system, files_of, merged, read_rows, twin_ids, write_rows
-from manitwin.dataset.index.part_list import Part, PartList, in_order_of_twins, read_part_list, sweep
+from manitwin.dataset.index.part_list import IndexPart, PartList, in_order_of_twins, read_part_list, sweep
 from manitwin.dataset.index.rows import FILES, rows_of
 from manitwin.dataset.index.tables import TABLES, joined
 from manitwin.dataset.index.twin_files import local_files
@@ -37,7 +37,7 @@ class IndexTables:
         compact(root)
 
 
-def write_part(root: DatasetRoot, ids: Iterable[str]) -> Part | None:
+def write_part(root: DatasetRoot, ids: Iterable[str]) -> IndexPart | None:
     """Index finished twins, new or built again, as one more part; returns it, or None where no ids are given.
 
     A twin that an older part has is taken out of it: that part is written again, under another name. Where that makes
@@ -61,7 +61,7 @@ def write_part(root: DatasetRoot, ids: Iterable[str]) -> Part | None:
     return part
 
 
-def compact(root: DatasetRoot) -> list[Part]:
+def compact(root: DatasetRoot) -> list[IndexPart]:
     """Merge all parts into few large ones that do not overlap; returns them. An index that is so already stays as it is."""
     before = read_part_list(root) or PartList()
     sweep(root, before)
@@ -104,9 +104,9 @@ def _is_compact(parts: PartList) -> bool:
     return apart and len(ordered) <= max(1, -(-parts.rows("grasps") // PART_ROWS))
 
 
-def _alike(parts: Sequence[Part]) -> list[Part]:
+def _alike(parts: Sequence[IndexPart]) -> list[IndexPart]:
     """Return parts of one order of size, where there are enough of them to merge; full ones are left alone."""
-    by_size: dict[int, list[Part]] = {}
+    by_size: dict[int, list[IndexPart]] = {}
     for part in parts:
         if part.rows["grasps"] < PART_ROWS // 2:
             by_size.setdefault(int(log(sum(part.rows.values()), MERGE_WIDTH)), []).append(part)
@@ -120,7 +120,7 @@ class _Writer:
         self.root, self.fs = root, file_system(root)
         self.parts, self.next = list(before.parts), before.next
 
-    def parts_with(self, ids: list[str]) -> list[Part]:
+    def parts_with(self, ids: list[str]) -> list[IndexPart]:
         """Return the parts that have any of the ids (sorted)."""
         near = [part for part in self.parts if part.first <= ids[-1] and ids[0] <= part.last] if ids else []
         wanted = set(ids)
@@ -131,7 +131,7 @@ class _Writer:
         self.parts.append(write_rows(self.root, self.next, rows))
         self.next += 1
 
-    def replace(self, parts: list[Part], without: frozenset[str] = frozenset()) -> None:
+    def replace(self, parts: list[IndexPart], without: frozenset[str] = frozenset()) -> None:
         """Write the rows of parts again, merged, without those of some twins."""
         grasps = sum(part.rows["grasps"] for part in parts)
         for rows in merged(files_of(self.root, parts), self.fs, grasps, without=without):

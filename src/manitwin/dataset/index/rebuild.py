@@ -11,7 +11,7 @@ from pebble import ProcessExpired, ProcessPool
 from pyarrow.fs import LocalFileSystem
 
 from manitwin.dataset.index.merge import merged, write_rows
-from manitwin.dataset.index.part_list import INDEX, Part, PartList, in_order_of_twins, sweep
+from manitwin.dataset.index.part_list import INDEX, IndexPart, PartList, in_order_of_twins, sweep
 from manitwin.dataset.index.parts import rows_of_twins
 from manitwin.dataset.index.tables import TABLES, joined, parquet
 from manitwin.engine.main_module import WorkerContext, hidden_main_module
@@ -26,7 +26,7 @@ CHUNK = 64
 class Rebuilt:
     """The parts of a new index, and a line for every twin's folder that could not be read and is not in it."""
 
-    parts: list[Part]
+    parts: list[IndexPart]
     unreadable: list[str]
 
     def rows(self, table: str) -> int:
@@ -58,7 +58,7 @@ def rebuild(
     ids = list(root.twin_ids())
     on_start(len(ids))
     chunks = [ids[start : start + CHUNK] for start in range(0, len(ids), CHUNK)]
-    parts: list[Part] = []
+    parts: list[IndexPart] = []
     unreadable: list[str] = []
     number = _first_unused_number(root)
     with hidden_main_module(), tempfile.TemporaryDirectory(prefix="manitwin-index-") as scratch:

@@ -70,7 +70,7 @@ class Published:
     rehearsals: int = 0
 
 
-def publish(
+def publish_dataset(
     dataset: str | Path,
     out: str | Path,
     *,

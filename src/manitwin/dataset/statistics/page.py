@@ -26,7 +26,7 @@ class NearPairs:
     found_by: str
 
 
-Part = Result | Figure | tuple[Figure, ...] | NearPairs
+SectionPart = Result | Figure | tuple[Figure, ...] | NearPairs
 """What a section consists of: a table, a figure, or figures side by side."""
 
 _SHOWN_PAIRS = 40
@@ -39,13 +39,13 @@ _PAIR_COLUMNS = (
 
 
 @dataclass(frozen=True)
-class Section:
+class ReportSection:
     """A headed part of the page; ``empty`` is said where it has nothing to show."""
 
     anchor: str
     title: str
     empty: str
-    parts: tuple[Part, ...]
+    parts: tuple[SectionPart, ...]
 
 
 class Page:
@@ -56,7 +56,7 @@ class Page:
         self.prelude, self.drawn = prelude, drawn
         self.tables = self.figures = 0
 
-    def html(self, title: str, lead: Sequence[str], sections: Sequence[Section]) -> str:
+    def html(self, title: str, lead: Sequence[str], sections: Sequence[ReportSection]) -> str:
         """Return the whole page."""
         style = resources.files("manitwin.dataset.statistics").joinpath("report.css").read_text(encoding="utf-8")
         links = "".join(f'<li><a href="#{s.anchor}">{escape(s.title)}</a></li>' for s in sections)
@@ -70,11 +70,11 @@ class Page:
             + f"{self._reproduce()}</main>\n</body>\n</html>\n"
         )
 
-    def _section(self, section: Section) -> str:
+    def _section(self, section: ReportSection) -> str:
         body = "".join(self._part(part) for part in section.parts) or f'<p class="none">{escape(section.empty)}</p>\n'
         return f'<section id="{section.anchor}">\n<h2>{escape(section.title)}</h2>\n{body}</section>\n'
 
-    def _part(self, part: Part) -> str:
+    def _part(self, part: SectionPart) -> str:
         if isinstance(part, Result):
             return self._table(part)
         if isinstance(part, Figure):

@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from pathlib import Path
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path, PurePosixPath
 from typing import Any
 
-from manitwin.dataset.index.near_duplicates import MAX_SHAPE_DISTANCE, MAX_SIZE_RATIO, NearDuplicates
+from manitwin.dataset.index.near_duplicates import MAX_SHAPE_DISTANCE, MAX_SIZE_RATIO, NearDuplicates, near_duplicates
+from manitwin.dataset.index.query import Index
 from manitwin.dataset.statistics import cost_queries as costs
 from manitwin.dataset.statistics import grasp_queries as grasps
 from manitwin.dataset.statistics import object_queries as objects
 from manitwin.dataset.statistics import stage_queries as stages
 from manitwin.dataset.statistics.figures import bars, histograms, masses, words
-from manitwin.dataset.statistics.page import NearPairs, Page, Part, Section
+from manitwin.dataset.statistics.page import NearPairs, Page, ReportSection, SectionPart
 from manitwin.dataset.statistics.query import Query, Result
 from manitwin.dataset.statistics.style import Figure, drawing
-from manitwin.dataset.statistics.tables import PRELUDE, Tables
+from manitwin.dataset.statistics.tables import PRELUDE, ReportTables
+from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, write_bytes_atomically
 
-REPORT, NUMBERS, FIGURES = "report.html", "statistics.json", "figures"
+FOLDER, REPORT, NUMBERS, FIGURES = "statistics", "report.html", "statistics.json", "figures"
 SCHEMA_VERSION = 1
 MOST_PAIRS = 1000
 """So many pairs of near-duplicates are written, the nearest; the call that finds all is written with them."""
@@ -38,7 +41,33 @@ QUERIES: tuple[Query, ...] = (
 """All queries but ``mass_in_prior``, whose priors are those of the categories found."""
 
 
-def collect(tables: Tables) -> dict[str, Result]:
+@dataclass(frozen=True)
+class WrittenReport:
+    """A report that is in its place: the path or URL of its page, and its first sentence without the full stop."""
+
+    page: str
+    summary: str
+
+
+def write_dataset_report(root: DatasetRoot, out: Path | None = None) -> WrittenReport:
+    """Write the report of a data set to a folder, by default ``statistics/`` of the data set.
+
+    Raises UsageError where the data set has no index.
+    """
+    tables = ReportTables.of_index(root)
+    duplicates = near_duplicates(Index(root))
+    title = f"Statistics of {PurePosixPath(root.path).name or root.url}"
+    if out is None and root.local is None:
+        with tempfile.TemporaryDirectory() as scratch:
+            fresh = Path(scratch) / FOLDER
+            summary = write_report(tables, fresh, title=title, duplicates=duplicates)
+            root.put_folder(fresh, FOLDER)
+        return WrittenReport(f"{root.url.rstrip('/')}/{FOLDER}/{REPORT}", summary)
+    folder = out or Path(root.full(FOLDER))
+    return WrittenReport(str(folder / REPORT), write_report(tables, folder, title=title, duplicates=duplicates))
+
+
+def collect(tables: ReportTables) -> dict[str, Result]:
     """Return the result of every query by its name."""
     results = {query.name: tables.result(query) for query in QUERIES}
     found = objects.priors_of(row["category"] for row in results["categories"].rows)
@@ -59,7 +88,7 @@ def numbers(results: dict[str, Result], near: NearPairs | None) -> dict[str, Any
     }
 
 
-def write_report(tables: Tables, out: Path, *, title: str, duplicates: NearDuplicates | None = None) -> str:
+def write_report(tables: ReportTables, out: Path, *, title: str, duplicates: NearDuplicates | None = None) -> str:
     """Write ``out/report.html``, ``out/statistics.json`` and ``out/figures/*.svg``; return the page's first sentence.
 
     The same tables give the same bytes. Figures of an earlier report that this one does not have are removed.
@@ -105,11 +134,13 @@ def draw(results: dict[str, Result]) -> dict[str, Figure | None]:
     return {**figures, **clouds}
 
 
-def sections(results: dict[str, Result], figures: dict[str, Figure | None], near: NearPairs | None) -> list[Section]:
+def sections(
+    results: dict[str, Result], figures: dict[str, Figure | None], near: NearPairs | None
+) -> list[ReportSection]:
     """Return the report's sections with their tables and figures in order."""
 
-    def section(anchor: str, title: str, *parts: str | tuple[str, ...], empty: str = NO_TWIN) -> Section:
-        chosen: list[Part] = []
+    def section(anchor: str, title: str, *parts: str | tuple[str, ...], empty: str = NO_TWIN) -> ReportSection:
+        chosen: list[SectionPart] = []
         for part in parts:
             if isinstance(part, tuple):
                 chosen.append(tuple(figure for name in part if (figure := figures[name]) is not None))
@@ -118,7 +149,7 @@ def sections(results: dict[str, Result], figures: dict[str, Figure | None], near
                 chosen += [figure] if figure else []
             else:
                 chosen.append(results[part])
-        return Section(anchor, title, empty, tuple(chosen))
+        return ReportSection(anchor, title, empty, tuple(chosen))
 
     accepted = results["totals"].only["accepted"] > 0
     about_twins = [
@@ -148,9 +179,9 @@ def sections(results: dict[str, Result], figures: dict[str, Figure | None], near
             *("outcome", "Accepted and rejected", "totals", "figure:success_by_stage", "success_by_stage"),
             *("figure:rejections", "rejections_by_reason", "beside_the_paper"),
         ),
-        *(about_twins if accepted else [Section("twins", "Twins", NO_TWIN, ())]),
+        *(about_twins if accepted else [ReportSection("twins", "Twins", NO_TWIN, ())]),
         section("cost", "Time and money", "cost", "figure:cost_by_stage", "cost_by_stage"),
-        Section(origin.anchor, origin.title, origin.empty, (*origin.parts, *([near] if near else []))),
+        ReportSection(origin.anchor, origin.title, origin.empty, (*origin.parts, *([near] if near else []))),
         rest,
     ]
 

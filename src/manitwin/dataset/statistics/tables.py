@@ -30,7 +30,7 @@ CREATE OR REPLACE TEMP MACRO own(proposer) AS NOT unfiltered(proposer) AND NOT j
 """
 
 
-class Tables:
+class ReportTables:
     """Answer the report's queries from the tables of an index."""
 
     def __init__(self, tables: Mapping[str, pa.Table | str], file_system: AbstractFileSystem | None = None):
@@ -55,7 +55,7 @@ class Tables:
         self.connection.execute(PRELUDE)
 
     @classmethod
-    def of_index(cls, root: DatasetRoot) -> Tables:
+    def of_index(cls, root: DatasetRoot) -> ReportTables:
         """Open a data set's index; raises UsageError where it has none."""
         parts = Index(root).parts.parts
         tables: dict[str, pa.Table | str] = {}

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from manitwin.dataset.statistics.page import Part, Section
+from manitwin.dataset.statistics.page import ReportSection, SectionPart
 from manitwin.dataset.statistics.query import Result
 from manitwin.dataset.statistics.style import Figure, drawing
 from manitwin.episodes.attempts_table import ATTEMPTS
@@ -100,9 +100,9 @@ class EpisodeReport:
         }
         return figures, lengths[1] if lengths else None
 
-    def _sections(self, figures: dict[str, Figure | None]) -> list[Section]:
-        def parts(*names: str) -> tuple[Part, ...]:
-            found: list[Part] = []
+    def _sections(self, figures: dict[str, Figure | None]) -> list[ReportSection]:
+        def parts(*names: str) -> tuple[SectionPart, ...]:
+            found: list[SectionPart] = []
             for name in names:
                 if not name.startswith("figure:"):
                     found.append(self.results[name])
@@ -113,22 +113,26 @@ class EpisodeReport:
         beside = tuple(figure for name in ("lengths", "placement") if (figure := figures[name]))
         nothing = "There is nothing to count."
         return [
-            Section("attempts", "Attempts", nothing, parts("funnel", "figure:outcomes", "outcomes", "plan_failures")),
-            Section("paper", "Beside the paper", nothing, parts("beside_the_paper")),
-            Section(
+            ReportSection(
+                "attempts", "Attempts", nothing, parts("funnel", "figure:outcomes", "outcomes", "plan_failures")
+            ),
+            ReportSection("paper", "Beside the paper", nothing, parts("beside_the_paper")),
+            ReportSection(
                 *("success", "Success", nothing),
                 parts(*("by_robot", "figure:categories", "by_category", "by_grasp_type", "by_others", "by_object")),
             ),
-            Section("never", "Objects without a kept episode", "Every object has one.", _filled(parts("never_kept"))),
-            Section(
+            ReportSection(
+                "never", "Objects without a kept episode", "Every object has one.", _filled(parts("never_kept"))
+            ),
+            ReportSection(
                 *("episodes", "Lengths, placement and joints", "No episode was kept."),
                 (*((beside,) if beside else ()), *parts("lengths", "placement", "joints")),
             ),
-            Section("grasps", "Grasps", nothing, parts("grasps", "failed_grasps")),
+            ReportSection("grasps", "Grasps", nothing, parts("grasps", "failed_grasps")),
         ]
 
 
-def _filled(parts: Sequence[Part]) -> tuple[Part, ...]:
+def _filled(parts: Sequence[SectionPart]) -> tuple[SectionPart, ...]:
     return tuple(part for part in parts if not isinstance(part, Result) or part.rows)
 
 
