@@ -126,7 +126,7 @@ def test_every_reason_for_a_rejection_has_a_remedy() -> None:
 
 def reasons_of_layouts() -> set[str]:
     """The words in the code of layouts that are given as a reason."""
-    tree = ast.parse((Path(manitwin.__path__[0]) / "apps/layouts/sample.py").read_text())
+    tree = ast.parse((Path(manitwin.__path__[0]) / "scenes/layouts/sample.py").read_text())
     given: list[ast.expr] = [
         node.args[0] for node in ast.walk(tree) if isinstance(node, ast.Call) and ast.unparse(node.func) == "Rejected"
     ]

@@ -84,8 +84,8 @@ def test_hand_presses_with_its_force_from_lift_to_lower_and_carries_all_of_the_w
 def test_same_problem_gives_the_same_bytes_in_this_process_and_in_another() -> None:
     first, second = (digest(recording) for _, recording in (run(problem()), run(problem())) if recording is not None)
     assert first == second
-    path = os.pathsep.join([str(TESTS), str(TESTS / "apps" / "trajectories"), os.environ.get("PYTHONPATH", "")])
-    script = TESTS / "apps" / "trajectories" / "brick_episodes.py"
+    path = os.pathsep.join([str(TESTS), str(TESTS / "episodes"), os.environ.get("PYTHONPATH", "")])
+    script = TESTS / "episodes" / "brick_episodes.py"
     other = subprocess.run(
         [sys.executable, script], env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=True
     )

@@ -225,7 +225,7 @@ def test_fix_turns_nearly_right_axes_into_a_rotation_and_leaves_mirrored_ones(tm
 
 
 def test_page_of_the_rules_is_that_of_the_code() -> None:
-    root = Path(__file__).resolve().parent.parent.parent
+    root = Path(__file__).resolve().parents[3]
     done = subprocess.run(
         [sys.executable, root / "docs" / "make_audit_page.py", "--check"], capture_output=True, text=True
     )

@@ -26,7 +26,7 @@ HAND = load_gripper("allegro")
 assert isinstance(HAND, MultiFingerGripper)
 POSTURES = {posture.name: posture for posture in HAND.postures}
 SETTINGS = TrialSettings(force_n=HAND.force_n, finger_friction=HAND.finger_friction)
-SHIPPED = Path(str(resources.files("manitwin.physics") / "grippers" / "allegro.toml"))
+SHIPPED = Path(str(resources.files("manitwin.robots.grippers") / "definitions" / "allegro.toml"))
 
 
 def try_one(
