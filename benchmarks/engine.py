@@ -20,7 +20,7 @@ from manitwin.engine.events import ItemEnded
 from manitwin.engine.executors.local import LocalExecutor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.engine.stage import Item
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.rehearsal import RehearsalRecipe
 
 EVERY = 500

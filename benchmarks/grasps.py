@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.config import BuildConfig
-from manitwin.engine.stage import Draft, Item
+from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import StageCost, run_stage
 from manitwin.errors import Rejected
 from manitwin.pipeline.identity import twin_id
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import stages_for
 
 LAST_STAGE = "verify"
@@ -63,7 +64,7 @@ def measure(name: str, item: Item, work: Path, seed: int) -> tuple[int, int, flo
     costs: dict[str, StageCost] = {}
     try:
         for stage in stages_for("mesh", config):
-            costs[stage.name] = run_stage(stage, draft, work / draft.twin_id)
+            costs[stage.name] = run_stage(stage, draft, work / draft.item_id)
             if stage.name == LAST_STAGE:
                 break
     except Rejected as answer:

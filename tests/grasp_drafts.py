@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import run_stage
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.trial import TrialResult, TrialSettings
+from manitwin.pipeline.item import Item
 from manitwin.robots.grippers.gripper import load_gripper
 
 PANDA = load_gripper("panda")

@@ -13,9 +13,9 @@ import pytest
 from PIL import Image
 
 from manitwin.engine.ledger.ledger import Ledger, read_ledger
-from manitwin.engine.stage import Item
 from manitwin.errors import UsageError
 from manitwin.pipeline import dataset_run
+from manitwin.pipeline.item import Item
 
 
 def manitwin(*arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:

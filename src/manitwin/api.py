@@ -19,12 +19,12 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.dataset.index.rebuild import Rebuilt
     from manitwin.dataset.statistics.report import WrittenReport
     from manitwin.engine.events import OnStage
-    from manitwin.engine.stage import Item
     from manitwin.episodes.collect import AttemptTotals
     from manitwin.episodes.retirement import Retirement
     from manitwin.pipeline.build_item import ItemResult
     from manitwin.pipeline.dataset_run import ExecutorName, RunReport
     from manitwin.pipeline.folder_listing import FolderListing
+    from manitwin.pipeline.item import Item
     from manitwin.pipeline.manifest import Notes
     from manitwin.scenes.app_config import LayoutsConfig, PicturesConfig, TrajectoriesConfig
     from manitwin.scenes.loaded_scene import Scene

@@ -45,8 +45,8 @@ class InterruptsWhenTakenDown:
 
 def rehearse() -> None:
     from manitwin.config import RunConfig
-    from manitwin.engine.stage import Item
     from manitwin.pipeline.dataset_run import drive, local_log
+    from manitwin.pipeline.item import Item
     from manitwin.pipeline.rehearsal import RehearsalRecipe
     from manitwin.twin.dataset_root import DatasetRoot
 

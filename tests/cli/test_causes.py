@@ -13,8 +13,8 @@ from manitwin.api import BuildReport
 from manitwin.cli.causes import REMEDIES, cause_lines, group_causes
 from manitwin.cli.why import causes_of_build
 from manitwin.engine.ledger.unaccepted import Unaccepted
-from manitwin.engine.stage import Item
 from manitwin.pipeline.build_item import ItemResult
+from manitwin.pipeline.item import Item
 from manitwin.twin.record import REJECTION_REASONS
 
 

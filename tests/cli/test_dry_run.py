@@ -26,9 +26,9 @@ from manitwin.cli.dry_run import (
 from manitwin.cli.main import app
 from manitwin.config import BuildConfig
 from manitwin.engine.ledger.ledger import LEDGER, ItemState, Ledger
-from manitwin.engine.stage import Item
 from manitwin.errors import UsageError
 from manitwin.pipeline.dataset_run import ledger_path
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import TwinRecipe
 from manitwin.twin.dataset_root import DatasetRoot
 

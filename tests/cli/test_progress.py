@@ -10,8 +10,9 @@ from rich.console import Console
 
 from manitwin.cli.progress import RunProgress, ShownProgress, duration
 from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageStarted
-from manitwin.engine.stage import Item
 from manitwin.engine.stage_parts import StagePart
+from manitwin.engine.task import Task
+from manitwin.pipeline.item import Item
 
 
 class Clock:
@@ -22,12 +23,12 @@ class Clock:
         return self.now_s
 
 
-def item(number: int) -> Item:
-    return Item(file=None, text=f"thing {number}")
+def task(number: int) -> Task[Item]:
+    return Task(number, Item(file=None, text=f"thing {number}"), f"{number:04d}")
 
 
 def ended(number: int, state: str = "accepted", found: bool = False) -> ItemEnded:
-    return ItemEnded(number, item(number), f"{number:04d}", state, "", found)  # type: ignore[arg-type]
+    return ItemEnded(task(number), state, "", found)  # type: ignore[arg-type]
 
 
 def test_line_counts_what_ended_and_names_the_stages_at_work() -> None:
@@ -35,10 +36,10 @@ def test_line_counts_what_ended_and_names_the_stages_at_work() -> None:
     assert progress.line() == "preparing"
     progress.start(10, 8)
     for number in (1, 2, 3):
-        progress.stage(StageStarted(item(number), "films"))
-    progress.stage(StageEnded(item(3), "films", "done", 1.0))
+        progress.stage(StageStarted(task(number), "films"))
+    progress.stage(StageEnded(task(3), "films", "done", 1.0))
     progress.item_ended(ended(3, "rejected"))
-    progress.stage(StageStarted(item(4), "assemble"))
+    progress.stage(StageStarted(task(4), "assemble"))
     assert progress.line() == "3 of 10 batches; 1 rejected; under way: 2 films, 1 assemble"
 
 
@@ -58,12 +59,12 @@ def test_long_stages_count_by_what_they_have_done() -> None:
     clock = Clock()
     progress = RunProgress("batches", clock)
     progress.start(4)
-    progress.stage(StageStarted(item(0), "films"))
+    progress.stage(StageStarted(task(0), "films"))
     clock.now_s = 60.0
-    progress.stage(StageAdvanced(item(0), "films", StagePart(40, 800, "frames")))
+    progress.stage(StageAdvanced(task(0), "films", StagePart(40, 800, "frames")))
     assert progress.left_s() is None, "a twentieth of one item is too little to go by"
     clock.now_s = 120.0
-    progress.stage(StageAdvanced(item(0), "films", StagePart(400, 800, "frames")))
+    progress.stage(StageAdvanced(task(0), "films", StagePart(400, 800, "frames")))
     assert progress.left_s() == 120.0 / 0.5 * 3.5
     assert progress.line() == "0 of 4 batches; about 14 min left; under way: 1 films (400 of 800 frames)"
     progress.item_ended(ended(0))
@@ -73,12 +74,12 @@ def test_long_stages_count_by_what_they_have_done() -> None:
 def test_what_is_heard_of_an_item_after_its_end_is_ignored() -> None:
     progress = RunProgress("items", Clock())
     progress.start(2)
-    progress.stage(StageStarted(item(0), "views"))
+    progress.stage(StageStarted(task(0), "views"))
     progress.item_ended(ended(0, "failed"))
-    progress.stage(StageStarted(item(0), "views"))
-    progress.stage(StageAdvanced(item(0), "views", StagePart(1, 2, "pictures")))
+    progress.stage(StageStarted(task(0), "views"))
+    progress.stage(StageAdvanced(task(0), "views", StagePart(1, 2, "pictures")))
     assert progress.line() == "1 of 2 items; 1 failed" and progress.parts_done == 0
-    progress.stage(StageStarted(item(1), "views"))
+    progress.stage(StageStarted(task(1), "views"))
     assert progress.line() == "1 of 2 items; 1 failed; under way: 1 views"
 
 

@@ -38,7 +38,7 @@ def work() -> None:
     from manitwin.twin.dataset_root import DatasetRoot
     from manitwin.pipeline.dataset_run import drive, local_log
     from manitwin.pipeline.rehearsal import RehearsalRecipe
-    from manitwin.engine.stage import Item
+    from manitwin.pipeline.item import Item
 
     root = DatasetRoot("data")
     items = [Item(file=None, text=text) for text in ("good", "reject:b", "raise:a")]

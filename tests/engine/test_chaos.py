@@ -18,8 +18,8 @@ from rehearsals import Rehearsed, rehearse, runs
 
 from manitwin.config import RunConfig
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.engine.stage import Item
 from manitwin.errors import UsageError
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.rehearsal import RehearsalRecipe
 
 SLOTS = 2
@@ -62,7 +62,7 @@ def test_a_mesh_that_crashes_native_code_costs_itself_alone(tmp_path: Path, reci
 def test_killed_workers_cost_an_attempt_of_what_they_were_at(tmp_path: Path, recipe: RehearsalRecipe) -> None:
     gate = tmp_path / "gate"
     free, held = [f"item {n}" for n in range(6)], [f"item {n} wait:b:{gate}" for n in range(6, 8)]
-    held_ids = [recipe.identify(Item(file=None, text=text)).twin_id for text in held]
+    held_ids = [recipe.identify(Item(file=None, text=text)).item_id for text in held]
     killed: list[int] = []
 
     def kill_twice() -> None:

@@ -26,7 +26,7 @@ def folders(root: Path) -> set[str]:
 def test_every_item_ends_once_with_a_folder_and_a_row_in_the_tables(tmp_path: Path, recipe: RehearsalRecipe) -> None:
     run = rehearse(tmp_path / "d", [f"item {n}" for n in range(7)] + ["bad reject:b"], recipe=recipe)
     assert run.result.stopped is None and run.result.left == 0 and run.wrong == []
-    assert sorted(event.number for event in run.ended) == list(range(1, 9))
+    assert sorted(event.task.number for event in run.ended) == list(range(1, 9))
     assert sorted(run.states.values()) == ["accepted"] * 7 + ["rejected"]
     assert len(folders(tmp_path / "d")) == 8
     assert set(indexed_twins(run.root)) == folders(tmp_path / "d")
@@ -37,7 +37,7 @@ def test_every_item_ends_once_with_a_folder_and_a_row_in_the_tables(tmp_path: Pa
 def test_a_second_run_does_nothing(tmp_path: Path, recipe: RehearsalRecipe) -> None:
     rehearse(tmp_path / "d", ["one", "two"], recipe=recipe)
     again = rehearse(tmp_path / "d", ["one", "two", "three"], recipe=recipe)
-    assert [event.item.text for event in again.ended] == ["three"]
+    assert [event.task.payload.text for event in again.ended] == ["three"]
     assert set(runs(tmp_path / "log").values()) == {1}
 
 
@@ -46,7 +46,7 @@ def test_a_changed_stage_is_done_again_with_what_follows_and_nothing_else(
 ) -> None:
     first = rehearse(tmp_path / "d", ["one", "bad reject:a"], recipe=recipe)
     changed = rehearse(tmp_path / "d", recipe=replace(recipe, versions=(("b", "2"),)))
-    twins = {event.item.text: event.twin_id for event in first.ended}
+    twins = {event.task.payload.text: event.task.item_id for event in first.ended}
     counts = runs(tmp_path / "log")
     assert {stage: counts[twins["one"], stage] for stage in "abc"} == {"a": 1, "b": 2, "c": 2}
     assert counts[twins["bad reject:a"], "b"] == 0, "what a rejects, b never sees"
@@ -57,7 +57,7 @@ def test_a_changed_stage_is_done_again_with_what_follows_and_nothing_else(
 
 
 def test_two_items_of_one_twin_make_one_folder(tmp_path: Path, recipe: RehearsalRecipe) -> None:
-    from manitwin.engine.stage import Item
+    from manitwin.pipeline.item import Item
 
     run = rehearse(tmp_path / "d", ["same"], recipe=recipe)
     assert run.states == {"same": "accepted"}
@@ -139,7 +139,7 @@ def test_a_lost_folder_is_found_missing_and_made_again_from_its_stages(tmp_path:
     from manitwin.engine.ledger.ledger import Ledger
 
     run = rehearse(tmp_path / "d", ["one", "two"], recipe=recipe)
-    shutil.rmtree(tmp_path / "d" / twin_name(run.ended[0].twin_id))
+    shutil.rmtree(tmp_path / "d" / twin_name(run.ended[0].task.item_id))
     ledger = Ledger(tmp_path / "d" / "ledger.sqlite")
     found = list(disagreements(ledger, run.root, True))
     assert len(found) == 1 and "no folder" in found[0].what
@@ -157,7 +157,7 @@ def test_a_result_that_is_not_there_is_done_again(tmp_path: Path, recipe: Rehear
     from manitwin.engine.ledger.ledger import Ledger
 
     run = rehearse(tmp_path / "d", ["one"], recipe=recipe)
-    next((tmp_path / "d" / ".work" / run.ended[0].twin_id / "b").glob("*/result.json")).write_text("{ half")
+    next((tmp_path / "d" / ".work" / run.ended[0].task.item_id / "b").glob("*/result.json")).write_text("{ half")
     ledger = Ledger(tmp_path / "d" / "ledger.sqlite")
     assert [f.what for f in disagreements(ledger, run.root, True)] == [
         "item 1, stage b: done in the ledger, and its result is not there"

@@ -58,7 +58,7 @@ def test_what_was_charged_in_vain_is_part_of_the_twins_cost(tmp_path: Path, faul
     done = rehearse(tmp_path / "d", recipe=recipe)
     assert set(done.states.values()) == {"accepted"}
     tries = {"unavailable": 2, "limited": 3, "denied": 2}[fault]
-    assert recorded_usd(done, done.ended[0].twin_id) == pytest.approx(0.02 * tries)
+    assert recorded_usd(done, done.ended[0].task.item_id) == pytest.approx(0.02 * tries)
 
 
 def test_a_refused_key_stops_the_run_and_costs_no_attempt(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ def test_a_folder_on_an_object_store_is_whole_or_has_no_record(s3: str, tmp_path
     root = DatasetRoot(s3)
     recipe = RehearsalRecipe()
     run = rehearse(s3, ["one"], recipe=recipe, ledger_folder=tmp_path / "here")
-    name = twin_name(run.ended[0].twin_id)
+    name = twin_name(run.ended[0].task.item_id)
     copy = root.fetch_folder(name, tmp_path / "copy")
     record = parse_record((copy / "twin.json").read_bytes())
     assert {file: sha256_of_file(copy / file) for file in record.files} == record.files

@@ -5,9 +5,10 @@ import pytest
 from pydantic import BaseModel
 
 from manitwin.engine.charges import charge, counted, note_rehearsal
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import lost_usd, run_stage, stage_key
 from manitwin.errors import ManiTwinError, Rejected, Unavailable
+from manitwin.pipeline.item import Item
 
 
 class Settings(BaseModel):

@@ -9,8 +9,8 @@ import pytest
 
 from manitwin.engine.jobs import Failure, WriteTables
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.engine.stage import Item
 from manitwin.engine.table_writer import TableWriter
+from manitwin.pipeline.item import Item
 
 BROKEN = Failure("error", "the part is broken")
 

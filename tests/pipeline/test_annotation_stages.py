@@ -11,12 +11,13 @@ import pytest
 
 from handmade import candidates, mug, visual
 from manitwin.config import CaptionConfig, PointsConfig
-from manitwin.engine.stage import Draft, Item
+from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
 from manitwin.formats.glb import write_glb
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.pipeline.caption import CaptionStage
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.points import PointsStage
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.record import FunctionalPoint, GraspPoint, Language

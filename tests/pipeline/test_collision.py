@@ -5,9 +5,10 @@ import pytest
 import trimesh
 
 from manitwin.config import CollisionConfig
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.errors import Rejected
 from manitwin.pipeline.collision import CollisionStage
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_arrays import load_hulls
 from manitwin.twin.record import Hulls
 from manitwin.twin.store import canonical_json

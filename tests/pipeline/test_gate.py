@@ -6,12 +6,13 @@ import pytest
 import trimesh
 
 from manitwin.config import GateConfig
-from manitwin.engine.stage import Draft, Item
+from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.models.annotators.protocol import QualityVerdict, Subject
 from manitwin.pipeline.gate import GateStage
+from manitwin.pipeline.item import Item
 from manitwin.twin.record import REJECTION_REASONS
 
 

@@ -9,11 +9,11 @@ import pytest
 from foreign_assets import given_record
 from grasp_drafts import box_draft
 from manitwin.config import GraspConfig
-from manitwin.engine.stage import Item
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.graspers.antipodal import AntipodalGrasper
 from manitwin.pipeline.given_grasps import given_proposals
 from manitwin.pipeline.grasps import GraspsStage
+from manitwin.pipeline.item import Item
 from manitwin.robots.grippers.gripper import load_gripper
 
 PANDA = load_gripper("panda")
@@ -64,7 +64,7 @@ def test_given_grasps_join_the_proposals_under_their_own_name(tmp_path: Path) ->
     # the box stands on z = 0: one grasp fits, the other lies above it
     given = given_record(grasps=[grasps_of(PANDA.name, [0.08, 0.5], [True, True])])
     (tmp_path / "import.json").write_text(given.model_dump_json())
-    draft.item = Item(file="box.glb", name="box", given=str(tmp_path / "import.json"))
+    draft.payload = Item(file="box.glb", name="box", given=str(tmp_path / "import.json"))
     draft.fields["geometry"] = {"input_to_object": GLTF_TO_OBJECT.tolist()}
     fields = GraspsStage(settings, AntipodalGrasper(), PANDA).run(draft, after)["proposals"]
     plain, joined = np.load(before / "proposals.npz"), np.load(after / "proposals.npz")

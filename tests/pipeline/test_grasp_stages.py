@@ -153,7 +153,7 @@ def test_same_seed_writes_the_same_bytes(bar: Draft, tmp_path: Path) -> None:
 def test_without_second_engine_and_robustness_the_columns_are_empty_and_the_verdicts_the_same(
     bar: Draft, tmp_path: Path
 ) -> None:
-    quick = Draft("box", bar.item, bar.seed, dict(bar.fields), dict(bar.paths))
+    quick = Draft("box", bar.payload, bar.seed, dict(bar.fields), dict(bar.paths))
     for name in ("second_opinion", "robustness"):
         del quick.fields[name], quick.paths[f"{name}.npz"]
     run_all(quick, tmp_path, RecordGraspsStage(SECOND, [(PANDA, "")]))
@@ -210,7 +210,7 @@ def test_two_grippers_share_a_table_and_what_one_can_hold_of_the_others_points_i
     bar: Draft, tmp_path: Path
 ) -> None:
     robotiq = load_gripper("robotiq_2f85")
-    draft = Draft("box", bar.item, bar.seed, dict(bar.fields), dict(bar.paths))
+    draft = Draft("box", bar.payload, bar.seed, dict(bar.fields), dict(bar.paths))
     few = [
         grasps_stage(FEW, robotiq, "-robotiq_2f85"),
         VerifyStage(VERIFY, SAPIEN, robotiq, "-robotiq_2f85"),
@@ -245,7 +245,7 @@ def test_object_of_which_nothing_holds_is_rejected_with_the_failures(bar: Draft,
 
 def test_another_gripper_of_which_nothing_holds_is_counted_and_not_rejected(bar: Draft, tmp_path: Path) -> None:
     nothing = Scripted(lambda pose, settings: "drops")
-    draft = Draft("box", bar.item, bar.seed, dict(bar.fields), dict(bar.paths))
+    draft = Draft("box", bar.payload, bar.seed, dict(bar.fields), dict(bar.paths))
     robotiq, suffix = load_gripper("robotiq_2f85"), "-robotiq_2f85"
     stages = [grasps_stage(FEW, robotiq, suffix), VerifyStage(VERIFY, nothing, robotiq, suffix)]
     stages += [SecondOpinionStage(SECOND, VERIFY, nothing, nothing, robotiq, suffix)]

@@ -1,8 +1,8 @@
 import dataclasses
 from pathlib import Path
 
-from manitwin.engine.stage import Item
 from manitwin.pipeline.identity import twin_id
+from manitwin.pipeline.item import Item
 
 
 def test_identity_depends_on_bytes_name_units_and_up_only(tmp_path: Path) -> None:

@@ -10,10 +10,11 @@ import pytest
 import trimesh
 
 from manitwin.config import MeshConfig
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.errors import InputError
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.cavity import find_opening
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.mesh import MeshStage
 
 

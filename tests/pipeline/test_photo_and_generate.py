@@ -10,11 +10,12 @@ import pytest
 from PIL import Image
 
 from manitwin.config import GenerateConfig, MattingConfig
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.errors import InputError, Unsupported
 from manitwin.formats.glb import read_glb
 from manitwin.models.generators.lift import LiftGenerator
 from manitwin.pipeline.generate import GenerateStage
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
 
 SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "bottle.jpg"

@@ -12,12 +12,13 @@ import trimesh
 
 from handmade import cup, cylinder, visual
 from manitwin.config import PhysicalConfig
-from manitwin.engine.stage import Draft, Item
+from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply, Rejected
 from manitwin.formats.glb import read_glb, write_glb
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.rules import RulesAnnotator
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_arrays import load_solid
 from manitwin.pipeline.physical import PhysicalStage
 from manitwin.twin.record import Estimate, Physical

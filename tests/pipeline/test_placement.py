@@ -8,12 +8,13 @@ import trimesh
 from scipy.optimize import minimize
 
 from manitwin.config import CollisionConfig, PlacementConfig
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.errors import Rejected
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.pipeline.collision import CollisionStage
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_arrays import load_hulls
 from manitwin.pipeline.placement import PlacementStage
 from manitwin.twin.record import Placement

@@ -10,11 +10,12 @@ import trimesh
 from PIL import Image
 
 from manitwin.config import CandidatesConfig, ViewsConfig
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.distance import distance_to_surface
 from manitwin.pipeline.candidates import CandidatesStage
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.views import ViewsStage
 from manitwin.render.cameras import Camera, project
 from manitwin.render.markers import DOT
@@ -113,6 +114,6 @@ def test_solid_that_left_its_surface_is_rejected(made: tuple[Path, Draft], tmp_p
     _, draft = made
     mesh = cup().apply_scale(SCALE)
     np.savez(tmp_path / "solid.npz", vertices=mesh.vertices * 0.8 + np.array([0, 0, 0.012]), faces=mesh.faces)
-    other = Draft("cup", draft.item, 7, draft.fields, {**draft.paths, "solid.npz": tmp_path / "solid.npz"})
+    other = Draft("cup", draft.payload, 7, draft.fields, {**draft.paths, "solid.npz": tmp_path / "solid.npz"})
     with pytest.raises(Rejected, match="degenerate"):
         CandidatesStage(CandidatesConfig()).run(other, tmp_path)

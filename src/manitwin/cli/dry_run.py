@@ -12,10 +12,10 @@ from typing import Literal, get_args
 from manitwin.config import BuildConfig
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.engine.recipe import Recipe
-from manitwin.engine.stage import Item
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import check_header
 from manitwin.pipeline.dataset_run import copy_ledger
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import TwinRecipe, estimate_usd
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD
@@ -132,7 +132,7 @@ def _planned_by(ledger: Ledger, planner: _Planner) -> list[PlannedItem]:
     planner.seen.update(twin_id for _, twin_id, _, state, _, _ in rows if twin_id is not None and state != "open")
     planned = []
     for number, twin_id, kind, state, reason, detail in rows:
-        item = ledger.item(number)
+        item = Item.from_json(ledger.payload(number))
         if state == "open":
             planned.append(planner.plan(item))
             continue
@@ -169,7 +169,7 @@ class _Planner:
 
     def plan(self, item: Item) -> PlannedItem:
         identity = self._recipe.identify(item)
-        twin_id, kind = identity.twin_id, identity.kind
+        twin_id, kind = identity.item_id, identity.kind
         if twin_id in self.seen:
             return PlannedItem(item, twin_id, kind, "duplicate", "the same input as another one")
         self.seen.add(twin_id)

@@ -13,7 +13,7 @@ from manitwin.cli.json_output import print_document
 
 if TYPE_CHECKING:
     from manitwin.cli.dry_run import Plan, PlannedItem
-    from manitwin.engine.stage import Item
+    from manitwin.pipeline.item import Item
 
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say what would be done, and about what it would cost; write nothing.")
@@ -58,12 +58,10 @@ def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:
 
 
 def _line(planned: PlannedItem) -> str:
-    from manitwin.engine.events import title
-
     item = planned.item
     given = _given(item, planned.kind)
     detail = f": {planned.detail}" if planned.detail else ""
-    return f"{WORDS[planned.state]:<17} {planned.kind or '?':<5} {title(item)}{f' ({given})' if given else ''}{detail}"
+    return f"{WORDS[planned.state]:<17} {planned.kind or '?':<5} {item.title}{f' ({given})' if given else ''}{detail}"
 
 
 def _given(item: Item, kind: str | None) -> str:

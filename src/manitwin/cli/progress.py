@@ -17,8 +17,8 @@ from rich.table import Table
 from rich.text import Text
 
 from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageEvent, StageStarted
-from manitwin.engine.stage import Item
 from manitwin.engine.stage_parts import StagePart
+from manitwin.engine.task import Payload
 
 LINE_EVERY_S = 30.0
 """Between two lines where nobody looks at a terminal."""
@@ -39,9 +39,9 @@ class RunProgress:
         self.total = self.before = 0
         self.counts: Counter[str] = Counter()
         self._found = 0
-        self._under_way: dict[Item, str] = {}
-        self._ended: set[int] = set()  # hashes of the items: 100,000 items would take ten times the memory
-        self._parts: dict[Item, StagePart] = {}
+        self._under_way: dict[Payload, str] = {}
+        self._ended: set[int] = set()  # hashes of the payloads: 100,000 items would take ten times the memory
+        self._parts: dict[Payload, StagePart] = {}
         self._started_at: float | None = None
 
     @property
@@ -63,26 +63,26 @@ class RunProgress:
     def stage(self, event: StageEvent) -> None:
         """Note that a stage of an item began or ended; of one that has ended, a worker's word may come late."""
         with self._lock:
-            if hash(event.item) in self._ended:
+            if hash(event.task.payload) in self._ended:
                 return
             if isinstance(event, StageStarted):
-                self._under_way[event.item] = event.stage
+                self._under_way[event.task.payload] = event.stage
             elif isinstance(event, StageAdvanced):
-                self._parts[event.item] = event.part
+                self._parts[event.task.payload] = event.part
             elif isinstance(event, StageEnded):
-                self._forget(event.item)
+                self._forget(event.task.payload)
 
-    def ended(self, item: Item, state: str, found: bool = False) -> None:
+    def ended(self, payload: Payload, state: str, found: bool = False) -> None:
         """Note what became of an item; one that was ``found`` finished says nothing of how long others take."""
         with self._lock:
-            self._forget(item)
-            self._ended.add(hash(item))
+            self._forget(payload)
+            self._ended.add(hash(payload))
             self.counts[state] += 1
             self._found += found
 
     def item_ended(self, event: ItemEnded) -> None:
         """Note the event of an engine's run."""
-        self.ended(event.item, event.state, event.found)
+        self.ended(event.task.payload, event.state, event.found)
 
     def left_s(self) -> float | None:
         """Return about how many seconds are left at the rate until now; None until three items were worked on.
@@ -95,9 +95,9 @@ class RunProgress:
             return None
         return (self._clock() - self._started_at) / worked * max(0.0, self.total - self.done - parts)
 
-    def _forget(self, item: Item) -> None:
-        self._under_way.pop(item, None)
-        self._parts.pop(item, None)
+    def _forget(self, payload: Payload) -> None:
+        self._under_way.pop(payload, None)
+        self._parts.pop(payload, None)
 
     def _stages(self) -> str:
         stages = Counter(self._under_way.values())

@@ -34,12 +34,11 @@ def _print(causes: list[Cause], again: str, others: str, skip: int = 0) -> None:
 def causes_of_build(report: BuildReport) -> list[Cause]:
     """Return why inputs of a build were not accepted, the most frequent cause first."""
     from manitwin.cli.causes import group_causes
-    from manitwin.engine.events import title
     from manitwin.engine.ledger.unaccepted import Unaccepted
 
     return group_causes(
         Unaccepted(
-            title(result.item),
+            result.item.title,
             result.status,
             result.reason,
             f"{result.error}: {result.detail}" if result.error else result.detail,

@@ -27,23 +27,23 @@ class Announcer:
 
     def stage_started(self, flight: Flight) -> None:
         """Tell that the next stage of an item was given to a worker."""
-        self._stage(StageStarted(flight.opened.item, flight.stage, flight.twin_id))
+        self._stage(StageStarted(flight.task, flight.stage))
 
     def stages_advanced(self, parts: Mapping[int, StagePart], running: Mapping[int, Flight | None]) -> None:
         """Tell what part of each stage is done, by the ticket of its job; of a job that runs no more nothing is told."""
         for ticket, part in parts.items():
             if flight := running.get(ticket):
-                self._on_stage(StageAdvanced(flight.opened.item, flight.stage, part))
+                self._on_stage(StageAdvanced(flight.task, flight.stage, part))
 
     def stage_ended(
         self, flight: Flight, stage: str, state: StageState, seconds: float = 0.0, detail: str = "", trace: str = ""
     ) -> None:
         """Tell that a stage has ended, or waits to be tried again."""
-        self._stage(StageEnded(flight.opened.item, stage, state, seconds, detail, flight.twin_id, trace))
+        self._stage(StageEnded(flight.task, stage, state, seconds, detail, trace))
 
-    def item_ended(self, flight: Flight, twin_id: str, state: ItemState, detail: str, found: bool = False) -> None:
+    def item_ended(self, flight: Flight, state: ItemState, detail: str, found: bool = False) -> None:
         """Tell what became of an item."""
-        event = ItemEnded(flight.number, flight.opened.item, twin_id, state, detail, found)
+        event = ItemEnded(flight.task, state, detail, found)
         log_item(event)
         self._on_ended(event)
 

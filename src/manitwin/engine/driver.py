@@ -9,7 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from typing import get_args
 
@@ -26,6 +26,7 @@ from manitwin.engine.recipe import Ending, Recipe
 from manitwin.engine.stage_order import ASSEMBLE, INPUT
 from manitwin.engine.stage_runner import StageRun
 from manitwin.engine.table_writer import TableWriter
+from manitwin.engine.task import Task
 from manitwin.twin.loggers import RUN
 
 RESOURCES: tuple[Resource, ...] = get_args(Resource)
@@ -42,7 +43,7 @@ class RunResult:
 
 
 class Driver:
-    """One run over a ledger's open items; ``sweep`` deletes what a worker left half-made of a twin that is given up."""
+    """One run over a ledger's open items; ``sweep`` deletes what a worker left half-made of an item that is given up."""
 
     def __init__(
         self,
@@ -51,7 +52,7 @@ class Driver:
         recipe: Recipe,
         settings: RunConfig,
         on_ended: Callable[[ItemEnded], None] = lambda event: None,
-        sweep: Callable[[str], None] = lambda twin_id: None,
+        sweep: Callable[[str], None] = lambda item_id: None,
         clock: Callable[[], float] = time.monotonic,
         max_cost_usd: float | None = None,
         on_stage: OnStage = lambda event: None,
@@ -138,7 +139,8 @@ class Driver:
             for item in opened:
                 self._last_number = item.number
                 self._flights += 1
-                self._queue(Flight(item))
+                task = Task(item.number, self.recipe.payload.from_json(item.payload))
+                self._queue(Flight(task, item.attempts))
 
     def _queue(self, flight: Flight) -> None:
         heappush(self._queues[flight.needs], (flight.priority, flight))
@@ -217,13 +219,14 @@ class Driver:
             error=answer,
         )  # fmt: skip
         self._announcer.stage_ended(flight, INPUT, "done" if answer is None else "rejected", detail=answer or "")
-        other = self.ledger.identify(flight.number, reply.twin_id, reply.kind)
+        other = self.ledger.identify(flight.number, reply.item_id, reply.kind)
+        flight.task = replace(flight.task, item_id=reply.item_id)
         if other is not None:
             self._flights -= 1
             detail = f"the same input as item {other}"
-            self._announcer.item_ended(flight, reply.twin_id, "duplicate", detail)
+            self._announcer.item_ended(flight, "duplicate", detail)
             return
-        flight.twin_id, flight.kind, flight.rejected = reply.twin_id, reply.kind, reply.rejected
+        flight.kind, flight.rejected = reply.kind, reply.rejected
         if reply.kind not in self._plans:
             self._plans[reply.kind] = [PlannedStage.of(stage) for stage in self.recipe.stages(reply.kind)]
         flight.plan = self._plans[reply.kind]
@@ -253,7 +256,7 @@ class Driver:
             flight.number, ending.status, recipe_sha256=self.recipe.sha256, reason=ending.reason, detail=ending.detail,
             revision=ending.revision,
         )  # fmt: skip
-        self._announcer.item_ended(flight, flight.twin_id, ending.status, ending.detail_and_hint, found)
+        self._announcer.item_ended(flight, ending.status, ending.detail_and_hint, found)
 
     def _failed(self, flight: Flight, gate: Gate, failure: Failure) -> None:
         """Try again later, or soon, or no more: what a service or the disk does is not the item's fault."""
@@ -261,7 +264,7 @@ class Driver:
         patient = failure.kind in ("unavailable", "rate_limited", "denied", "no_space")
         if patient or (attempts < self.settings.attempts and failure.kind != "unsupported"):
             counted = attempts - 1 if patient else attempts
-            flight.opened.attempts[stage] = counted
+            flight.attempts[stage] = counted
             self.ledger.stage_ended(number, stage, "waiting", attempts=counted, error=failure.message)
             self._announcer.stage_ended(flight, stage, "waiting", 0.0, failure.message, failure.trace)
             if failure.kind == "unavailable":
@@ -275,12 +278,12 @@ class Driver:
             self._queue(flight)
             return
         self._flights -= 1
-        if flight.twin_id:
-            self._sweep(flight.twin_id)
+        if flight.task.item_id:
+            self._sweep(flight.task.item_id)
         self.ledger.stage_ended(number, stage, "failed", attempts=attempts, error=failure.message)
         self._announcer.stage_ended(flight, stage, "failed", 0.0, failure.message, failure.trace)
         detail = f"{stage} failed {attempts} times: {failure.message}"
         self.ledger.item_ended(
             number, "failed", recipe_sha256=self.recipe.sha256, reason=FAILED_AS.get(failure.kind, "error"), detail=detail
         )  # fmt: skip
-        self._announcer.item_ended(flight, flight.twin_id, "failed", detail)
+        self._announcer.item_ended(flight, "failed", detail)

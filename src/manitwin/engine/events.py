@@ -5,12 +5,11 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 from manitwin.engine.ledger.ledger import ItemState
-from manitwin.engine.stage import Item
 from manitwin.engine.stage_parts import StagePart
+from manitwin.engine.task import Task
 from manitwin.twin.loggers import RUN
 
 StageState = Literal["done", "there already", "rejected", "waiting", "failed"]
@@ -20,16 +19,15 @@ StageState = Literal["done", "there already", "rejected", "waiting", "failed"]
 class StageStarted:
     """A stage of an item was given to a worker."""
 
-    item: Item
+    task: Task
     stage: str
-    twin_id: str = ""
 
 
 @dataclass(frozen=True)
 class StageAdvanced:
     """A long stage of an item has done a part of what it does."""
 
-    item: Item
+    task: Task
     stage: str
     part: StagePart
 
@@ -38,12 +36,11 @@ class StageAdvanced:
 class StageEnded:
     """A stage of an item has ended, or waits to be tried again; ``trace`` is the traceback of what went wrong, if any."""
 
-    item: Item
+    task: Task
     stage: str
     state: StageState
     seconds: float = 0.0
     detail: str = ""
-    twin_id: str = ""
     trace: str = ""
 
 
@@ -51,9 +48,7 @@ class StageEnded:
 class ItemEnded:
     """What became of one item; ``found`` where its folder was there already."""
 
-    number: int
-    item: Item
-    twin_id: str
+    task: Task
     state: ItemState
     detail: str
     found: bool = False
@@ -64,14 +59,9 @@ OnStage = Callable[[StageEvent], None]
 """Hears of stages: one that begins, has done a part, or has ended."""
 
 
-def title(item: Item) -> str:
-    """Return a short name of an item for a person."""
-    return Path(item.file).name if item.file else f"'{(item.text or '')[:40]}'"
-
-
 def log_stage(event: StageStarted | StageEnded) -> None:
     """Tell the log of a stage that began or ended."""
-    of = f"{event.stage} of {title(event.item)}" + (f" ({event.twin_id})" if event.twin_id else "")
+    of = f"{event.stage} of {event.task.payload.title}" + (f" ({event.task.item_id})" if event.task.item_id else "")
     if isinstance(event, StageStarted):
         RUN.debug("%s begins", of)
         return
@@ -86,4 +76,5 @@ def log_stage(event: StageStarted | StageEnded) -> None:
 def log_item(event: ItemEnded) -> None:
     """Tell the log what became of an item."""
     found = " (there already)" if event.found else ""
-    RUN.info("item %d %s %s %s%s: %s", event.number, title(event.item), event.twin_id, event.state, found, event.detail)
+    task = event.task
+    RUN.info("item %d %s %s %s%s: %s", task.number, task.payload.title, task.item_id, event.state, found, event.detail)

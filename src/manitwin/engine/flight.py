@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from manitwin.config import Resource
 from manitwin.engine.jobs import Finish, Job, RunStage, StageRejected, Survey
-from manitwin.engine.ledger.ledger import OpenItem
 from manitwin.engine.stage import PaidStage, Stage
 from manitwin.engine.stage_order import ASSEMBLE, INPUT
+from manitwin.engine.task import Task
 from manitwin.engine.work import StageKey
 
 
@@ -28,10 +28,13 @@ class PlannedStage:
 
 @dataclass
 class Flight:
-    """Where an item stands; ``plan`` names its stages and what each needs, once its kind is known."""
+    """Where an item stands; ``plan`` names its stages and what each needs, once its kind is known.
 
-    opened: OpenItem
-    twin_id: str = ""
+    ``attempts`` counts how often stages that are not done were tried, in earlier runs as well.
+    """
+
+    task: Task
+    attempts: dict[str, int] = field(default_factory=dict)
     kind: str = ""
     plan: list[PlannedStage] | None = None
     done: list[StageKey] = field(default_factory=list)
@@ -41,7 +44,7 @@ class Flight:
     @property
     def number(self) -> int:
         """The item's number in the ledger."""
-        return self.opened.number
+        return self.task.number
 
     @property
     def stage(self) -> str:
@@ -69,14 +72,13 @@ class Flight:
 
     def attempt(self, stage: str) -> int:
         """Return which attempt at a stage the next one is, from 1."""
-        return self.opened.attempts.get(stage, 0) + 1
+        return self.attempts.get(stage, 0) + 1
 
     def job(self) -> Job:
         """Return the next job."""
-        item, stage = self.opened.item, self.stage
+        stage = self.stage
         if stage == INPUT:
-            return Survey(self.number, item)
+            return Survey(self.task)
         if stage == ASSEMBLE:
-            return Finish(self.number, item, self.twin_id, self.kind, tuple(self.done), self.last, self.rejected)
-        position = len(self.done)
-        return RunStage(self.number, item, self.twin_id, self.kind, position, stage, self.needs, tuple(self.done))
+            return Finish(self.task, self.kind, tuple(self.done), self.last, self.rejected)
+        return RunStage(self.task, self.kind, len(self.done), stage, self.needs, tuple(self.done))

@@ -8,8 +8,8 @@ from typing import Literal
 
 from manitwin.config import Resource
 from manitwin.engine.recipe import Ending, Recipe
-from manitwin.engine.stage import Item
 from manitwin.engine.stage_runner import StageCost, StageRun
+from manitwin.engine.task import Task
 from manitwin.engine.work import StageKey
 from manitwin.errors import Rejected
 
@@ -30,10 +30,9 @@ class WorkerSetup:
 
 @dataclass(frozen=True)
 class Survey:
-    """Find out whose twin an item is and what of it is there already."""
+    """Find the id of what a task makes, and what of it is there already."""
 
-    number: int
-    item: Item
+    task: Task
     needs: Resource = "cpu"
 
 
@@ -41,7 +40,7 @@ class Survey:
 class Surveyed:
     """What is there: the finished folder's ending, or the stages that need not run again."""
 
-    twin_id: str
+    item_id: str
     kind: str
     ending: Ending | None = None
     done: tuple[tuple[str, StageRun], ...] = ()
@@ -52,9 +51,7 @@ class Surveyed:
 class RunStage:
     """Run the stage at a position of an item's list, given the results of those before it."""
 
-    number: int
-    item: Item
-    twin_id: str
+    task: Task
     kind: str
     position: int
     stage: str
@@ -76,9 +73,7 @@ class StageRejected:
 class Finish:
     """Put the finished folder together; ``stage`` is the last one that ran."""
 
-    number: int
-    item: Item
-    twin_id: str
+    task: Task
     kind: str
     done: tuple[StageKey, ...]
     stage: str
@@ -88,9 +83,9 @@ class Finish:
 
 @dataclass(frozen=True)
 class WriteTables:
-    """Add finished twins to the index; with none, merge its parts into few."""
+    """Add finished folders to the tables; with none, merge what was added in parts."""
 
-    twin_ids: tuple[str, ...]
+    item_ids: tuple[str, ...]
     needs: Resource = "cpu"
 
 

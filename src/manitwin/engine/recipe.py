@@ -1,6 +1,6 @@
-"""What a run makes of each item: the engine's border to the pipeline, and to the applications.
+"""Recipes: what a run makes of each item. They are the engine's border to the pipeline, and to the applications.
 
-The engine speaks of twins; an application's recipe makes a folder of its own kind under the same rules, by an id of its own.
+A twin, a layout, a batch of episodes and its pictures are each a folder that is finished once its record is in it.
 """
 
 from __future__ import annotations
@@ -8,10 +8,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
+from manitwin.engine.task import Payload
 from manitwin.errors import Rejected
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -37,9 +38,9 @@ class Ending:
 
 @dataclass(frozen=True)
 class Identity:
-    """Whose twin an item is, the kind of its input, and why nothing can be made of it where that is so."""
+    """The id of what a task makes, the kind of its input, and why nothing can be made of it where that is so."""
 
-    twin_id: str
+    item_id: str
     kind: str
     rejected: Rejected | None = None
 
@@ -79,12 +80,17 @@ class Recipe(Protocol):
         """The file that makes a folder a finished one; it is written last."""
         ...
 
-    def folder_of(self, twin_id: str) -> str:
+    @property
+    def payload(self) -> type[Payload]:
+        """The type of what its tasks ask for."""
+        ...
+
+    def folder_of(self, item_id: str) -> str:
         """Return the name of an item's finished folder below the data set's root."""
         ...
 
-    def identify(self, item: Item) -> Identity:
-        """Tell whose twin an item is, from its bytes."""
+    def identify(self, payload: Any) -> Identity:
+        """Return the id of what is asked for; of files by their bytes."""
         ...
 
     def stages(self, kind: str) -> list[Stage]:

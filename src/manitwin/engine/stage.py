@@ -1,4 +1,4 @@
-"""What a stage is, and the handle on a twin in the making that it works on.
+"""The protocol of a stage, and the handle that it works on: what the stages before it have made of an item.
 
 Artifacts have names. A bare word (``physical``) is a field: JSON. A name with a suffix (``solid.npz``) is a file, one that
 ends in ``/`` (``views/``) a folder. Each is written by exactly one stage and read by those that declare it; a name in
@@ -10,12 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from pathlib import Path
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Any, Generic, Protocol, runtime_checkable
 
 from pydantic import BaseModel
 
 from manitwin.config import Resource
 from manitwin.engine.job_memory import JobMemory, NoMemory
+from manitwin.engine.task import PayloadT
 from manitwin.errors import ManiTwinError
 
 
@@ -24,34 +25,18 @@ def is_field(name: str) -> bool:
     return not name.endswith("/") and "." not in name
 
 
-@dataclass(frozen=True)
-class Item:
-    """One input as the user gave it.
-
-    ``file`` is an absolute path, or None where ``text`` is given. ``units`` and ``up`` are what the user said ('auto': unsaid).
-    ``given`` is the import.json beside an imported mesh: what another tool says of it.
-    """
-
-    file: str | None
-    text: str | None = None
-    name: str | None = None
-    units: Literal["m", "cm", "mm", "auto"] = "auto"
-    up: Literal["y", "z", "auto"] = "auto"
-    license: str | None = None
-    attribution: str | None = None
-    given: str | None = None
-
-
 @dataclass
-class Draft:
-    """A twin in the making: fields and paths with their digests, by artifact name. Cheap to send to another process.
+class Draft(Generic[PayloadT]):
+    """An item in the making: fields and paths with their digests, by artifact name. Cheap to send to another process.
+
+    ``payload`` is what its task asks for.
 
     ``jobs`` remembers what was asked of services that are paid by the job. ``rehearsed`` are the stages, among those whose
     results are here and those that these were made of, whose backend was a rehearsal server (``manitwin fake``).
     """
 
-    twin_id: str
-    item: Item
+    item_id: str
+    payload: PayloadT
     seed: int
     fields: dict[str, Any] = dataclass_field(default_factory=dict)
     paths: dict[str, Path] = dataclass_field(default_factory=dict)
@@ -83,7 +68,7 @@ class Stage(Protocol):
     """One step of the paper.
 
     ``run`` writes its files below ``folder`` under their artifact names, and returns its fields. It may raise ``Rejected``.
-    It is a pure function of what it ``reads``, ``settings``, ``backend``, ``model``, ``draft.item`` and ``draft.seed``.
+    It is a pure function of what it ``reads``, ``settings``, ``backend``, ``model``, ``draft.payload`` and ``draft.seed``.
     """
 
     @property

@@ -1,4 +1,4 @@
-"""Run one stage, or take its result up again: results live in ``.work/<twin_id>/<stage>/<key>``, by what decided them.
+"""Run one stage, or take its result up again: results live in ``.work/<item_id>/<stage>/<key>``, by what decided them.
 
 ``result.json`` beside a stage's files holds its fields, the digests of all that it wrote, what it cost, and, where its backend or
 that of a stage before it was a rehearsal server, the names of these stages.
@@ -54,7 +54,7 @@ class StageRun:
 def stage_key(stage: Stage, draft: Draft) -> str:
     """Return the hash of everything that decides a stage's result: same key, same bytes."""
     decides = {
-        "twin": draft.twin_id,
+        "twin": draft.item_id,
         "name": stage.name,
         "version": stage.version,
         "settings": stage.settings.model_dump(mode="json"),

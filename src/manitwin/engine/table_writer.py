@@ -43,8 +43,8 @@ class TableWriter:
                 return f"{reply.message}; {MAKE_ROOM}"
             if self._failures >= self._attempts:
                 return f"the index cannot be written: {reply.message}; `manitwin check` says what is wrong"
-        elif job is not None and job.twin_ids:
-            self._ledger.indexed(job.twin_ids)
+        elif job is not None and job.item_ids:
+            self._ledger.indexed(job.item_ids)
             self._failures = 0
         else:
             self._merged = True
@@ -52,8 +52,8 @@ class TableWriter:
 
     def _of_unwritten_twins(self) -> WriteTables | None:
         self._ended = 0
-        twin_ids = tuple(self._ledger.not_indexed(10 * self._every))
-        return self._begun(WriteTables(twin_ids)) if twin_ids else None
+        item_ids = tuple(self._ledger.not_indexed(10 * self._every))
+        return self._begun(WriteTables(item_ids)) if item_ids else None
 
     def _begun(self, job: WriteTables) -> WriteTables:
         self._under_way = job

@@ -23,10 +23,10 @@ class WorkFolder:
     Owns: the local folder. Of a URL it holds copies: a result is complete there once its ``result.json`` is, which goes last.
     """
 
-    def __init__(self, root: DatasetRoot, twin_id: str, cache: Path):
-        self.root, self.name = root, f"{WORK}/{twin_id}"
-        self.place = (root.local or cache) / WORK / twin_id
-        self.fresh = self.place.with_name(f"{twin_id}.finished")  # where the finished folder is put together
+    def __init__(self, root: DatasetRoot, item_id: str, cache: Path):
+        self.root, self.name = root, f"{WORK}/{item_id}"
+        self.place = (root.local or cache) / WORK / item_id
+        self.fresh = self.place.with_name(f"{item_id}.finished")  # where the finished folder is put together
 
     def has(self, stage: str, key: str) -> bool:
         """Tell whether a result is there."""

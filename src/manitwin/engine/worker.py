@@ -23,9 +23,10 @@ from manitwin.engine.jobs import (
     WriteTables,
 )
 from manitwin.engine.recipe import Ending
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_order import INPUT
 from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, lost_usd
+from manitwin.engine.task import Payload
 from manitwin.engine.work import WorkFolder
 from manitwin.errors import AccessDenied, BackendError, ManiTwinError, RateLimited, Rejected, Unavailable, Unsupported
 from manitwin.twin.dataset_root import DatasetRoot
@@ -87,12 +88,12 @@ class Worker:
         return self._stages[kind]
 
     def _survey(self, job: Survey) -> Surveyed:
-        identity = self.setup.recipe.identify(job.item)
-        ending = self._ending(identity.twin_id)
+        identity = self.setup.recipe.identify(job.task.payload)
+        ending = self._ending(identity.item_id)
         if identity.rejected is not None:
             rejected = StageRejected(identity.rejected, StageCost(0.0, 0.0, 0.0))
-            return Surveyed(identity.twin_id, identity.kind, ending, rejected=rejected)
-        work, draft = self._work(identity.twin_id), self._draft(identity.twin_id, job.item)
+            return Surveyed(identity.item_id, identity.kind, ending, rejected=rejected)
+        work, draft = self._work(identity.item_id), self._draft(identity.item_id, job.task.payload)
         work.sweep()
         done: list[tuple[str, StageRun]] = []
         for stage in self.stages(identity.kind):
@@ -100,16 +101,20 @@ class Worker:
             if found is None:
                 break
             done.append((stage.name, found))
-        return Surveyed(identity.twin_id, identity.kind, ending, tuple(done))
+        return Surveyed(identity.item_id, identity.kind, ending, tuple(done))
 
-    def _ending(self, twin_id: str) -> Ending | None:
+    def _ending(self, item_id: str) -> Ending | None:
         recipe = self.setup.recipe
-        name = f"{recipe.folder_of(twin_id)}/{recipe.record}"
+        name = f"{recipe.folder_of(item_id)}/{recipe.record}"
         return recipe.ending_of(self.root.read_bytes(name)) if self.root.exists(name) else None
 
     def _run(self, job: RunStage) -> StageRun | StageRejected:
         stages = self.stages(job.kind)
-        stage, work, draft = stages[job.position], self._work(job.twin_id), self._draft(job.twin_id, job.item)
+        stage, work, draft = (
+            stages[job.position],
+            self._work(job.task.item_id),
+            self._draft(job.task.item_id, job.task.payload),
+        )
         work.sweep()  # of a worker that died at it
         wanted = {name.removesuffix("?") for name in stage.reads}
         writers = {s.name for s in stages if wanted & set(s.writes)}
@@ -123,8 +128,8 @@ class Worker:
             return StageRejected(answer, cost, rehearsed=stage.name in draft.rehearsed)
 
     def _finish(self, job: Finish) -> Ending:
-        stages, work = {s.name: s for s in self.stages(job.kind)}, self._work(job.twin_id)
-        draft = self._draft(job.twin_id, job.item)
+        stages, work = {s.name: s for s in self.stages(job.kind)}, self._work(job.task.item_id)
+        draft = self._draft(job.task.item_id, job.task.payload)
         costs = work.load(draft, job.done, stages, None)
         answer = None if job.rejected is None else job.rejected.answer
         if job.rejected is not None and job.stage != INPUT:
@@ -132,7 +137,7 @@ class Worker:
             draft.rehearsed.update([job.stage] if job.rejected.rehearsed else [])
         try:
             ending = self.setup.recipe.finish(draft, job.kind, costs, answer, job.stage, work.fresh)
-            self.root.put_folder(work.fresh, self.setup.recipe.folder_of(job.twin_id), self.setup.recipe.record)
+            self.root.put_folder(work.fresh, self.setup.recipe.folder_of(job.task.item_id), self.setup.recipe.record)
         finally:
             shutil.rmtree(work.fresh, ignore_errors=True)
         if not self.setup.keep_work:
@@ -143,19 +148,19 @@ class Worker:
         tables = self.setup.recipe.tables
         if tables is None:
             raise ManiTwinError("a run of a recipe without tables was asked to write them")
-        if job.twin_ids:
-            tables.add(self.root, job.twin_ids)
+        if job.item_ids:
+            tables.add(self.root, job.item_ids)
         else:
             tables.merge(self.root)
 
-    def _work(self, twin_id: str) -> WorkFolder:
-        work = WorkFolder(self.root, twin_id, self.setup.cache)
+    def _work(self, item_id: str) -> WorkFolder:
+        work = WorkFolder(self.root, item_id, self.setup.cache)
         work.place.mkdir(parents=True, exist_ok=True)
         return work
 
-    def _draft(self, twin_id: str, item: Item) -> Draft:
-        jobs = RootJobMemory(self.root, f"{WORK}/{twin_id}/{JOBS}")
-        return Draft(twin_id, item, self.setup.recipe.seed, jobs=jobs)
+    def _draft(self, item_id: str, payload: Payload) -> Draft:
+        jobs = RootJobMemory(self.root, f"{WORK}/{item_id}/{JOBS}")
+        return Draft(item_id, payload, self.setup.recipe.seed, jobs=jobs)
 
 
 def _line(error: Exception) -> str:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import heapq
 import itertools
 import json
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
-from manitwin.engine.stage import Item
+from manitwin.engine.folder_recipe import FolderRecord
+from manitwin.engine.task import Payload
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.twin.store import sha256_of_json
 
@@ -23,7 +24,7 @@ REMEDY_OF_REPEATS = "an older version made these in steps; make the episodes aga
 
 
 @dataclass(frozen=True)
-class Batch:
+class Batch(Payload):
     """Some episodes of a twin on a table, or of a scene, by their numbers in the whole: ``count`` from ``first`` in steps."""
 
     robot: str
@@ -46,20 +47,21 @@ class Batch:
     @property
     def batch_id(self) -> str:
         """An id by what is asked."""
-        return sha256_of_json(self._said())[:16]
+        return sha256_of_json(self.to_json())[:16]
 
-    def item(self) -> Item:
-        """Return the batch as an item of a run."""
-        return Item(file=None, text=json.dumps(self._said(), sort_keys=True))
+    @property
+    def title(self) -> str:
+        """The numbers of its episodes, and the id of its twin or scene."""
+        return f"episodes {self.numbers[0]} to {self.numbers[-1]} of {self.of}"
 
     @classmethod
-    def of_item(cls, item: Item) -> Batch:
-        """Return the batch that an item asks for."""
-        return cls(**json.loads(item.text or ""))
+    def from_json(cls, fields: Mapping[str, Any]) -> Batch:
+        """Return the batch that a ledger keeps; those of earlier versions kept its JSON as a text."""
+        return cls(**(json.loads(fields["text"]) if "text" in fields else fields))
 
-    def _said(self) -> dict[str, Any]:
+    def to_json(self) -> dict[str, Any]:
         """Return its fields; ``step`` only where it is not 1, so that batches of older versions keep their ids."""
-        fields = asdict(self)
+        fields = super().to_json()
         return fields if self.step != 1 else {name: value for name, value in fields.items() if name != "step"}
 
 
@@ -116,18 +118,19 @@ def _runs(numbers: Sequence[int], size: int) -> Iterator[range]:
         start = end
 
 
-class BatchRecord(BaseModel):
+def batch_name(batch_id: str) -> str:
+    """Return a batch's folder below the root of the episodes, and that of its pictures below theirs."""
+    return f"{BATCHES}/{batch_id[:2]}/{batch_id}"
+
+
+class BatchRecord(FolderRecord):
     """``batch.json``: what the batch was, what became of its attempts, and the digests of its files.
 
     ``twins`` has the ids of all twins that were set up in it, with the revisions that they had then.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
     schema_version: int
     batch_id: str
-    config_sha256: str
-    revision: str
     twins: dict[str, str]
     attempted: int
     planned: int

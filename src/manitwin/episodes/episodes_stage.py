@@ -108,9 +108,9 @@ class EpisodesStage:
     def _read_grasps(self, twin_id: str) -> dict[str, TargetGrasp]:
         return {each.grasp.grasp_id: each for each in usable_grasps(self._twin(twin_id), self._robot.gripper)}
 
-    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
-        """Make the batch that the item asks for."""
-        batch = Batch.of_item(draft.item)
+    def run(self, draft: Draft[Batch], folder: Path) -> dict[str, Any]:
+        """Make the batch."""
+        batch = draft.payload
         attempts: list[Attempt] = []
         twins: dict[str, str] = {}
         write_episodes(folder / EPISODES, self._episodes(draft, batch, attempts, twins))
@@ -124,7 +124,7 @@ class EpisodesStage:
         return {"batch": {"twins": dict(sorted(twins.items())), **counts}}
 
     def _episodes(
-        self, draft: Draft, batch: Batch, attempts: list[Attempt], twins: dict[str, str]
+        self, draft: Draft[Batch], batch: Batch, attempts: list[Attempt], twins: dict[str, str]
     ) -> Iterator[StoredEpisode]:
         """Yield those that are kept, one at a time; all attempts are added to ``attempts``."""
         for number in batch.numbers:

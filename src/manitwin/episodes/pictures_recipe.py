@@ -4,49 +4,64 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
 
 from manitwin.config import Resource
+from manitwin.engine.folder_recipe import FolderRecipe, FolderRecord
 from manitwin.engine.recipe import Ending, Identity
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_parts import tell_part
 from manitwin.engine.stage_runner import StageCost
-from manitwin.episodes.batch import BATCHES
+from manitwin.engine.task import Payload
+from manitwin.episodes.batch import batch_name
 from manitwin.episodes.cameras import NamedCamera, named_cameras
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
 from manitwin.episodes.replay_pictures import Replay, twin_drawable
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.video import EpisodesVideo
-from manitwin.errors import EpisodesError, ManiTwinError, Rejected
+from manitwin.errors import EpisodesError, Rejected
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.app_config import PicturesConfig
 from manitwin.scenes.furniture_pictures import lighting_of
 from manitwin.scenes.scene import Furniture, Light
-from manitwin.twin.store import canonical_json, sha256_of_file, sha256_of_json, write_bytes_atomically
+from manitwin.twin.store import digests_below, sha256_of_json
 from manitwin.twin.twin_source import TwinSource
 
 PICTURES_RECORD = "pictures.json"
 FILMS = "films/"
 
 
-class PicturesRecord(BaseModel):
-    """``pictures.json``: at which frame of its camera's film each episode begins."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+@dataclass(frozen=True)
+class BatchDrawing(Payload):
+    """A batch whose kept episodes are to be drawn."""
 
     batch_id: str
-    config_sha256: str
-    revision: str
+
+    @property
+    def title(self) -> str:
+        """The batch's id."""
+        return f"pictures of {self.batch_id}"
+
+    @classmethod
+    def from_json(cls, fields: Mapping[str, Any]) -> BatchDrawing:
+        """Return the batch that a ledger keeps; those of earlier versions kept its id as a text."""
+        return cls(fields["text"] if "text" in fields else fields["batch_id"])
+
+
+class PicturesRecord(FolderRecord):
+    """``pictures.json``: at which frame of its camera's film each episode begins."""
+
+    batch_id: str
     first_frames: dict[str, int]
     files: dict[str, str]
 
@@ -72,12 +87,12 @@ class PicturesStage:
     def _robot(self) -> Robot:
         return load_robot(self._robot_name)
 
-    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+    def run(self, draft: Draft[BatchDrawing], folder: Path) -> dict[str, Any]:
         """Write ``films/<camera>.mp4``, return the field ``first_frames``."""
         cameras = named_cameras(self.settings.cameras, self._robot)
         first_frames: dict[str, int] = {}
         (folder / FILMS).mkdir()
-        with ExitStack() as stack, EpisodeFile(self._episodes / batch_name(draft.twin_id) / EPISODES) as file:
+        with ExitStack() as stack, EpisodeFile(self._episodes / batch_name(draft.payload.batch_id) / EPISODES) as file:
             films = [stack.enter_context(self._film(folder / FILMS, camera)) for camera in cameras if len(file)]
             self._drawn, self._to_draw = 0, sum(episode.recording.steps for episode in file)
             for episode in file:
@@ -111,8 +126,13 @@ class PicturesStage:
 
 
 @dataclass(frozen=True)
-class PicturesRecipe:
+class PicturesRecipe(FolderRecipe[PicturesRecord]):
     """Films of the batches of ``episodes``, of twins in ``dataset``, with a robot by name or file."""
+
+    payload: ClassVar[type[BatchDrawing]] = BatchDrawing
+    record: ClassVar[str] = PICTURES_RECORD
+    record_type: ClassVar[type[PicturesRecord]] = PicturesRecord
+    can_reject: ClassVar[bool] = False
 
     config: PicturesConfig
     episodes: str
@@ -125,61 +145,33 @@ class PicturesRecipe:
         return sha256_of_json([self.config.model_dump(mode="json", exclude={"run"}), PicturesStage.version])
 
     @property
-    def tables(self) -> None:
-        """There are none."""
-
-    @property
     def seed(self) -> int:
         """Nothing is random but the furniture's looks, which are the episode's own."""
         return 0
 
-    @property
-    def record(self) -> str:
-        """The record of a batch's pictures."""
-        return PICTURES_RECORD
-
-    def folder_of(self, twin_id: str) -> str:
+    def folder_of(self, item_id: str) -> str:
         """Return the folder of a batch's pictures."""
-        return batch_name(twin_id)
+        return batch_name(item_id)
 
-    def identify(self, item: Item) -> Identity:
+    def identify(self, payload: BatchDrawing) -> Identity:
         """Return the batch's id."""
-        return Identity(item.text or "", "films")
+        return Identity(payload.batch_id, "films")
 
     def stages(self, kind: str) -> list[Stage]:
         """Return the one stage."""
         return [PicturesStage(self.config, self.episodes, self.dataset, self.robot)]
 
-    def finish(
+    def write(
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
-    ) -> Ending:
+    ) -> PicturesRecord:
         """Write the folder of a batch's pictures."""
-        if rejected is not None:
-            raise ManiTwinError(f"batch {draft.twin_id}: {rejected}; pictures are never rejected")
-        shutil.rmtree(fresh, ignore_errors=True)
-        shutil.copytree(draft.path(FILMS), fresh)
-        said: dict[str, Any] = {
-            "batch_id": draft.twin_id,
-            "config_sha256": self.sha256,
-            "first_frames": draft.field("first_frames"),
-            "files": {path.name: sha256_of_file(path) for path in sorted(fresh.iterdir())},
-        }
-        record = PicturesRecord(**said, revision=sha256_of_json(said))
-        write_bytes_atomically(fresh / PICTURES_RECORD, canonical_json(record.model_dump(mode="json")).encode())
-        return _ending(record)
+        shutil.copytree(draft.path(FILMS), fresh, dirs_exist_ok=True)
+        said = {"batch_id": draft.item_id, "first_frames": draft.field("first_frames"), "files": digests_below(fresh)}
+        return self.seal(fresh, said)
 
-    def ending_of(self, record: bytes) -> Ending | None:
-        """Return how a batch ended; None where this recipe would make other pictures."""
-        try:
-            pictures = PicturesRecord(**json.loads(record))
-        except (ValueError, ValidationError):
-            return None
-        return _ending(pictures) if pictures.config_sha256 == self.sha256 else None
-
-
-def batch_name(batch_id: str) -> str:
-    """Return a batch's folder below the root of the episodes, and that of its pictures below theirs."""
-    return f"{BATCHES}/{batch_id[:2]}/{batch_id}"
+    def ending(self, record: PicturesRecord) -> Ending:
+        """Return how a record of pictures says that its batch ended."""
+        return Ending("accepted", record.revision, None, f"{len(record.first_frames)} episodes drawn")
 
 
 def read_pictures(folder: Path) -> PicturesRecord:
@@ -189,7 +181,3 @@ def read_pictures(folder: Path) -> PicturesRecord:
         return PicturesRecord(**json.loads(path.read_bytes()))
     except (OSError, ValueError) as error:
         raise EpisodesError(f"{path}: no record of pictures ({error}); run manitwin render again") from error
-
-
-def _ending(record: PicturesRecord) -> Ending:
-    return Ending("accepted", record.revision, None, f"{len(record.first_frames)} episodes drawn")

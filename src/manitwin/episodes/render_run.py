@@ -7,12 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 from manitwin.engine.events import ItemEnded, OnStage
-from manitwin.engine.stage import Item
+from manitwin.episodes.batch import batch_name
 from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.collect import LEROBOT, batch_folders, stored_episodes
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
 from manitwin.episodes.lerobot.write import Written, write_lerobot
-from manitwin.episodes.pictures_recipe import PicturesRecipe, batch_name, read_pictures
+from manitwin.episodes.pictures_recipe import BatchDrawing, PicturesRecipe, read_pictures
 from manitwin.errors import EpisodesError
 from manitwin.pipeline.dataset_run import CONFIG, ExecutorName, RunReport, drive
 from manitwin.robots.load import load_robot
@@ -43,11 +43,11 @@ def draw_episodes(
     named_cameras(config.cameras, load_robot(said["robot"]))
     dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
     TwinSource(dataset)
-    items = (Item(file=None, text=folder.name) for folder in batch_folders(out))
+    drawings = (BatchDrawing(folder.name) for folder in batch_folders(out))
     recipe = PicturesRecipe(config, str(out.resolve()), dataset, said["robot"])
     return drive(
         recipe,
-        items,
+        drawings,
         DatasetRoot(out / PICTURES),
         config.run,
         configuration={"kind": PICTURES, **config.model_dump(mode="json")},

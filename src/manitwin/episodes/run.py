@@ -9,7 +9,6 @@ from pathlib import Path
 
 from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.ledger.ledger import read_ledger
-from manitwin.engine.stage import Item
 from manitwin.episodes.attempts_table import ATTEMPTS, read_attempts
 from manitwin.episodes.batch import Batch, batches
 from manitwin.episodes.recipe import EpisodesRecipe
@@ -115,7 +114,7 @@ def make_episodes(
     except UsageError as error:
         raise UsageError(f"{root.url}: {error}") from error
     report = drive(
-        EpisodesRecipe(config, source.dataset, source.scenes), (batch.item() for batch in deal), root, config.run,
+        EpisodesRecipe(config, source.dataset, source.scenes), deal, root, config.run,
         configuration=configuration, executor=executor, address=address, on_start=on_start, on_stage=on_stage,
         on_ended=on_ended,
     )  # fmt: skip
@@ -134,7 +133,7 @@ def _batches_there(root: DatasetRoot) -> list[Batch]:
         return []
     with read_ledger(path) as ledger:
         rows = ledger.execute("SELECT item FROM items WHERE state <> 'duplicate' ORDER BY number")
-        return [Batch.of_item(Item(**json.loads(text))) for (text,) in rows]
+        return [Batch.from_json(json.loads(text)) for (text,) in rows]
 
 
 def retire_failing(out: Path) -> tuple[list[Retirement], int]:

@@ -15,6 +15,7 @@ from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import Rejected
 from manitwin.formats.source_files import pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.quality import rehearsal_checks
 from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
 from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
@@ -22,7 +23,7 @@ from manitwin.twin.version import installed_version
 
 
 def assemble(
-    draft: Draft,
+    draft: Draft[Item],
     *,
     kind: str,
     stages: list[Stage],
@@ -32,17 +33,15 @@ def assemble(
     rejecting_stage: str | None,
     fresh: Path,
 ) -> TwinRecord:
-    """Write the twin's folder at ``fresh``, to be renamed into place; returns its record.
+    """Write the twin's folder into the empty folder ``fresh``, to be renamed into place; returns its record.
 
     ``stages`` are those that ran, the rejecting one included. Where ``rejected`` is given, only the source and the reason
     are kept.
     """
-    shutil.rmtree(fresh, ignore_errors=True)
-    fresh.mkdir(parents=True)
     source = _write_source(draft, kind, fresh)
     record: dict[str, Any] = {
-        "twin_id": draft.twin_id,
-        "name": draft.item.name,
+        "twin_id": draft.item_id,
+        "name": draft.payload.name,
         "status": "rejected" if rejected else "accepted",
         "rejection": _rejection(rejected, rejecting_stage).model_dump() if rejected else None,
         "source": source,
@@ -65,7 +64,7 @@ def assemble(
     return seal(fresh, record)
 
 
-def _provenance(stage: Stage, draft: Draft) -> dict[str, Any]:
+def _provenance(stage: Stage, draft: Draft[Item]) -> dict[str, Any]:
     return {
         "version": stage.version,
         "backend": stage.backend,
@@ -74,20 +73,20 @@ def _provenance(stage: Stage, draft: Draft) -> dict[str, Any]:
     }
 
 
-def _checks_so_far(draft: Draft) -> list[dict[str, Any]]:
+def _checks_so_far(draft: Draft[Item]) -> list[dict[str, Any]]:
     """Return the checks of a twin that was rejected; those of an accepted one take their place."""
     return [*(check.model_dump() for check in rehearsal_checks(draft)), *draft.fields.get("gate", {}).get("checks", [])]
 
 
-def _model(stage: Stage, draft: Draft) -> str | None:
+def _model(stage: Stage, draft: Draft[Item]) -> str | None:
     """Return which model did a stage; a generator may know it only afterwards (lift: the primitive that fits)."""
     if stage.name == "generate" and "generation" in draft.fields:
         return stage.model or draft.field("generation")["model"]
     return stage.model
 
 
-def _write_source(draft: Draft, kind: str, folder: Path) -> dict[str, Any]:
-    item = draft.item
+def _write_source(draft: Draft[Item], kind: str, folder: Path) -> dict[str, Any]:
+    item = draft.payload
     if item.file is None:
         name, content = "prompt.txt", (item.text or "").encode()
     else:
@@ -111,7 +110,7 @@ def _rejection(rejected: Rejected, stage: str | None) -> Rejection:
     return Rejection(stage=named, reason=rejected.reason, detail=rejected.detail)
 
 
-def _write_accepted(draft: Draft, folder: Path) -> None:
+def _write_accepted(draft: Draft[Item], folder: Path) -> None:
     for name in ("visual.glb", "grasps.parquet", "card.png"):
         shutil.copyfile(draft.path(name), folder / name)
     (folder / "views").mkdir()
@@ -124,7 +123,7 @@ def _write_accepted(draft: Draft, folder: Path) -> None:
             (folder / "collision" / f"hull_{index:02d}.obj").write_bytes(hull_to_obj(hulls[name]))
 
 
-def _accepted_sections(draft: Draft) -> dict[str, Any]:
+def _accepted_sections(draft: Draft[Item]) -> dict[str, Any]:
     geometry, collision, points = draft.field("geometry"), draft.field("collision"), draft.field("points")
     mesh = {key: geometry[key] for key in ("vertices", "faces", "watertight", "components", "euler_number", "repairs")}
     with np.load(draft.path("solid.npz")) as solid:

@@ -16,11 +16,13 @@ from manitwin.config import BuildConfig
 from manitwin.engine.events import OnStage, StageEnded, StageStarted, StageState
 from manitwin.engine.job_memory import RootJobMemory
 from manitwin.engine.recipe import Ending, Identity
-from manitwin.engine.stage import Draft, Item
+from manitwin.engine.stage import Draft
 from manitwin.engine.stage_order import INPUT
 from manitwin.engine.stage_runner import JOBS, StageCost, lost_usd, run_stage
+from manitwin.engine.task import Task
 from manitwin.engine.worker import NO_SPACE
 from manitwin.errors import AccessDenied, ManiTwinError, RateLimited, Rejected, Unavailable
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import TwinRecipe, expected_usd
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import RECORD, WORK, replace_folder
@@ -61,11 +63,11 @@ def build_item(
     """
     recipe = TwinRecipe(config)
     identity = recipe.identify(item)
-    place = out / identity.twin_id
+    place = out / identity.item_id
     done = recipe.ending_of((place / RECORD).read_bytes()) if (place / RECORD).is_file() else None
     if done is not None:
-        return ItemResult(item, identity.twin_id, done.status, _line(done), place, reused=True, reason=done.reason)
-    work = out / WORK / identity.twin_id
+        return ItemResult(item, identity.item_id, done.status, _line(done), place, reused=True, reason=done.reason)
+    work = out / WORK / identity.item_id
     work.mkdir(parents=True, exist_ok=True)
     try:
         may_spend(expected_usd(recipe.stages(identity.kind)))
@@ -73,15 +75,15 @@ def build_item(
             ending = _build(item, identity, recipe, work, on_stage)
             replace_folder(_fresh(work), place)
     except ManiTwinError as error:
-        return ItemResult(item, identity.twin_id, "unfinished", str(error), None, error=type(error).__name__)
+        return ItemResult(item, identity.item_id, "unfinished", str(error), None, error=type(error).__name__)
     except BlockingIOError as error:
-        return ItemResult(item, identity.twin_id, "unfinished", str(error), None)
+        return ItemResult(item, identity.item_id, "unfinished", str(error), None)
     except Exception as error:
         report = work / REPORT
         report.write_text(traceback.format_exc())
         detail = f"a defect in manitwin: {type(error).__name__}: {error}; the traceback is in {report}"
-        return ItemResult(item, identity.twin_id, "unfinished", " ".join(detail.split()), None)
-    return ItemResult(item, identity.twin_id, ending.status, _line(ending), place, reason=ending.reason)
+        return ItemResult(item, identity.item_id, "unfinished", " ".join(detail.split()), None)
+    return ItemResult(item, identity.item_id, ending.status, _line(ending), place, reason=ending.reason)
 
 
 @contextmanager
@@ -99,11 +101,12 @@ def _only_one(work: Path) -> Iterator[None]:
 
 
 def _build(item: Item, identity: Identity, recipe: TwinRecipe, work: Path, on_stage: OnStage) -> Ending:
-    draft = Draft(identity.twin_id, item, recipe.seed, jobs=RootJobMemory(DatasetRoot(work), JOBS))
+    task = Task(0, item, identity.item_id)
+    draft = Draft(identity.item_id, item, recipe.seed, jobs=RootJobMemory(DatasetRoot(work), JOBS))
     costs: dict[str, StageCost] = {}
     rejected, last = identity.rejected, INPUT
     for stage in recipe.stages(identity.kind) if rejected is None else []:
-        on_stage(StageStarted(item, stage.name, draft.twin_id))
+        on_stage(StageStarted(task, stage.name))
         last, started, cpu_started = stage.name, time.perf_counter(), time.process_time()
         try:
             ran = run_stage(stage, draft, work)
@@ -111,24 +114,24 @@ def _build(item: Item, identity: Identity, recipe: TwinRecipe, work: Path, on_st
             rejected = answer
             seconds = time.perf_counter() - started
             costs[last] = StageCost(seconds, time.process_time() - cpu_started, lost_usd(work / last))
-            on_stage(StageEnded(item, last, "rejected", seconds, str(answer), draft.twin_id))
+            on_stage(StageEnded(task, last, "rejected", seconds, str(answer)))
             break
         except Exception as error:
-            on_stage(_failed(item, last, draft.twin_id, time.perf_counter() - started, error))
+            on_stage(_failed(task, last, time.perf_counter() - started, error))
             raise
         costs[last] = ran.cost
         seconds = 0.0 if ran.reused else ran.cost.seconds
         how: StageState = "there already" if ran.reused else "done"
-        on_stage(StageEnded(item, last, how, seconds, twin_id=draft.twin_id))
+        on_stage(StageEnded(task, last, how, seconds))
     return recipe.finish(draft, identity.kind, costs, rejected, last, _fresh(work))
 
 
-def _failed(item: Item, stage: str, twin_id: str, seconds: float, error: Exception) -> StageEnded:
+def _failed(task: Task[Item], stage: str, seconds: float, error: Exception) -> StageEnded:
     """Return that a stage failed, or waits where a service or room on the disk is missing: the item is not to blame."""
     missing = isinstance(error, Unavailable | RateLimited | AccessDenied) or getattr(error, "errno", None) in NO_SPACE
     detail = " ".join(f"{type(error).__name__}: {error}".split())
     trace = "" if isinstance(error, ManiTwinError) else traceback.format_exc()
-    return StageEnded(item, stage, "waiting" if missing else "failed", seconds, detail, twin_id, trace)
+    return StageEnded(task, stage, "waiting" if missing else "failed", seconds, detail, trace)
 
 
 def _fresh(work: Path) -> Path:

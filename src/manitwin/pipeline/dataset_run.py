@@ -24,7 +24,7 @@ from manitwin.engine.executor import Executor, InlineExecutor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.ledger.ledger import LEDGER, Ledger, read_ledger
 from manitwin.engine.recipe import Recipe, Tables
-from manitwin.engine.stage import Item
+from manitwin.engine.task import Payload
 from manitwin.engine.work import WorkFolder
 from manitwin.errors import UsageError, choose_from
 from manitwin.formats.output_folder import require_writable_folder
@@ -125,7 +125,7 @@ def run(
 
 def drive(
     recipe: Recipe,
-    items: Iterable[Item],
+    payloads: Iterable[Payload],
     root: DatasetRoot,
     settings: RunConfig,
     *,
@@ -138,16 +138,16 @@ def drive(
     on_stage: OnStage = lambda event: None,
     on_ended: Callable[[ItemEnded], None] = lambda event: None,
 ) -> RunReport:
-    """Add items to the ledger below a root and make of each what the recipe says, until all have ended.
+    """Add tasks to the ledger below a root and make of each what the recipe says, until all have ended.
 
-    ``configuration`` is left beside the ledger. What was remarked while items were read is in ``remarks``,
+    ``configuration`` is left beside the ledger. What was remarked while they were read is in ``remarks``,
     and how many were there already is added to it. Raises
     UsageError for wrong arguments, or where another run is at work there.
     """
     if executor not in EXECUTORS:
         raise UsageError(choose_from("executor", executor, EXECUTORS))
     path = local_ledger(root)
-    ledger, given, new = _opened_with(items, path)
+    ledger, given, new = _opened_with(payloads, recipe, path)
     try:
         if remarks is not None and given > new:
             remarks.append(f"{given - new} of {given} items were in the data set already")
@@ -170,12 +170,13 @@ def drive(
         _LedgerCopy(root, path).upload()
 
 
-def _opened_with(items: Iterable[Item], path: Path) -> tuple[Ledger, int, int]:
+def _opened_with(payloads: Iterable[Payload], recipe: Recipe, path: Path) -> tuple[Ledger, int, int]:
     """Open the ledger and add items to it; returns how many were given and are new. Where that fails, a new one is removed."""
     made_folder = not path.parent.exists()
     ledger = Ledger(path)
     try:
-        return ledger, *ledger.add_items(items)
+        ledger.restate(recipe.payload.from_json)
+        return ledger, *ledger.add_items(payloads)
     except BaseException:
         ledger.close(remove_new=True)
         if made_folder:

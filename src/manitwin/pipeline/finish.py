@@ -14,6 +14,7 @@ from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_arrays import load_hulls, load_solid
 from manitwin.pipeline.quality import quality_checks
 from manitwin.render.card import CardText, make_card
@@ -51,7 +52,7 @@ class FinishStage:
     def __init__(self, settings: FinishConfig, gripper: Gripper):
         self.settings, self.gripper = settings, gripper
 
-    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+    def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Draw the card of an accepted twin."""
         photo = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
         card = make_card(
@@ -62,7 +63,7 @@ class FinishStage:
             grasps=self._card_grasps(draft.path("grasps.parquet")),
             text=card_text(draft),
             photo=photo,
-            prompt=draft.item.text,
+            prompt=draft.payload.text,
         )
         (folder / "card.png").write_bytes(card)
         return {"quality": {"checks": quality_checks(draft)}}
@@ -94,7 +95,7 @@ def _card_points(points: dict[str, Any]) -> list[CardPoint]:
     return functional + grasp
 
 
-def card_text(draft: Draft) -> CardText:
+def card_text(draft: Draft[Item]) -> CardText:
     """Write a card's words: what it is, size, mass, friction, grasps, and where the numbers come from."""
     language, physical, grasps = (draft.field(name) for name in ("language", "physical", "grasps"))
     mass, friction = physical["mass_kg"], physical["friction_static"]
@@ -105,7 +106,7 @@ def card_text(draft: Draft) -> CardText:
         ("grasps held", f"{grasps['verified']} of {grasps['simulated']}"),
     )
     made_by = f"made by {draft.field('generation')['generator']}" if "generation" in draft.fields else "mesh given"
-    footer = f"{draft.twin_id}   {made_by}   mass: {mass['source']}   friction: {friction['source']}"
+    footer = f"{draft.item_id}   {made_by}   mass: {mass['source']}   friction: {friction['source']}"
     stamp = "REHEARSAL" if draft.rehearsed else None
     return CardText(language["category"], language["caption"], facts, footer, stamp)
 

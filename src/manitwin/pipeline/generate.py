@@ -13,6 +13,7 @@ from manitwin.engine.stage import Draft
 from manitwin.models.generators.mesh_file import as_glb
 from manitwin.models.generators.protocol import GenerationRequest, Generator
 from manitwin.models.generators.run import run_generator
+from manitwin.pipeline.item import Item
 
 
 class GenerateStage:
@@ -32,10 +33,10 @@ class GenerateStage:
         self.needs: Resource = generator.needs
         self.expected_usd = generator.usd_per_job
 
-    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+    def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Generate; raises Rejected ``generator_failed``, or BackendError where the generator cannot work now."""
         rgba = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
-        request = GenerationRequest(rgba=rgba, text=draft.item.text, name=draft.item.name, seed=draft.seed)
+        request = GenerationRequest(rgba=rgba, text=draft.payload.text, name=draft.payload.name, seed=draft.seed)
         made = run_generator(
             self.generator, request, folder, settings=self.settings, jobs=draft.jobs, submit_again=self._submit_again
         )

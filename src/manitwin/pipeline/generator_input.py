@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from manitwin.config import BuildConfig
-from manitwin.engine.stage import Item
 from manitwin.errors import Rejected, Unavailable
 from manitwin.formats.sniff import sniff
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked
 from manitwin.models.registry import backends, create, factory
+from manitwin.pipeline.item import Item
 
 
 def refusal(config: BuildConfig) -> Callable[[Item], str | None]:

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from manitwin.engine.stage import Item
 from manitwin.formats.source_files import side_files
+from manitwin.pipeline.item import Item
 from manitwin.twin.store import sha256_of_file, sha256_of_json
 
 ID_DIGITS = 16

@@ -10,10 +10,10 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, TextIO, cast, get_args
 
-from manitwin.engine.stage import Item
 from manitwin.errors import UsageError, choose_from
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
 from manitwin.pipeline.folder_listing import FolderListing, list_folder
+from manitwin.pipeline.item import Item
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported, read_import_record
 
 MANIFEST_SUFFIXES = frozenset({".csv", ".jsonl"})

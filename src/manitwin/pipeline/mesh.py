@@ -22,6 +22,7 @@ from manitwin.geometry.canonical.up import UpChoice, choose_up
 from manitwin.geometry.repair.cascade import RepairResult, repair
 from manitwin.geometry.repair.components import connected_parts
 from manitwin.models.annotators.priors import Prior, lookup
+from manitwin.pipeline.item import Item
 
 _GENERATED = "generated.glb"
 _TURNED_DEG = 10.0  # less is a scan that stands a little off its base, not another pose
@@ -41,14 +42,14 @@ class MeshStage:
     def __init__(self, settings: MeshConfig):
         self.settings = settings
 
-    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+    def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Write ``canonical.glb`` and ``canonical.npz`` (vertices (V, 3) m, faces (F, 3)); return ``geometry``.
 
         Raises InputError where the file cannot be read.
         """
         generated = _GENERATED in draft.paths
         file = read_mesh(_input_path(draft, generated), limits=self._limits())
-        prior = lookup(draft.item.name)
+        prior = lookup(draft.payload.name)
         unit = _unit(file, draft, generated, prior)
         parts = [bake_transform(part, np.diag([unit.factor, unit.factor, unit.factor, 1.0])) for part in file.parts]
         result = repair(_soup(parts), **self.settings.repair.model_dump())
@@ -66,7 +67,7 @@ class MeshStage:
         (folder / "canonical.glb").write_bytes(write_glb(shown, max_texture_size=self.settings.max_texture_size))
         np.savez(folder / "canonical.npz", vertices=np.asarray(solid.vertices), faces=np.asarray(solid.faces, np.int64))
         geometry = _geometry(file, unit, chosen, result, solid)
-        if draft.item.given is not None:  # what else is given of the mesh has to follow it
+        if draft.payload.given is not None:  # what else is given of the mesh has to follow it
             geometry["input_to_object"] = (to_object @ np.diag([unit.factor] * 3 + [1.0])).tolist()
         return {"geometry": geometry}
 
@@ -74,22 +75,22 @@ class MeshStage:
         return MeshLimits(self.settings.max_bytes, self.settings.max_faces, self.settings.max_texture_pixels)
 
 
-def _input_path(draft: Draft, generated: bool) -> Path:
+def _input_path(draft: Draft[Item], generated: bool) -> Path:
     if generated:
         return draft.path(_GENERATED)
-    if draft.item.file is None:
+    if draft.payload.file is None:
         raise InputError("empty", "no mesh file and nothing generated; give a file")
-    return Path(draft.item.file)
+    return Path(draft.payload.file)
 
 
-def _said_up(draft: Draft, generated: bool) -> Literal["y", "z", "auto"]:
+def _said_up(draft: Draft[Item], generated: bool) -> Literal["y", "z", "auto"]:
     """Return the up axis as the user said it, or as a generator did that sets its meshes down by itself."""
     if not generated:
-        return draft.item.up
+        return draft.payload.up
     return "y" if draft.field("generation").get("rests", False) else "auto"
 
 
-def _unit(file: MeshFile, draft: Draft, generated: bool, prior: Prior | None) -> LengthUnit:
+def _unit(file: MeshFile, draft: Draft[Item], generated: bool, prior: Prior | None) -> LengthUnit:
     points = np.concatenate([part.vertices[np.unique(part.faces)] for part in file.parts])
     longest = float(np.ptp(points, axis=0).max())
     if generated:
@@ -97,7 +98,7 @@ def _unit(file: MeshFile, draft: Draft, generated: bool, prior: Prior | None) ->
         metric = bool(draft.field("generation").get("metric", False))
         return LengthUnit(file.unit_m or 1.0, metric, "declared" if metric else "unknown", None)
     usual = None if prior is None else (prior.longest_axis_m.low, prior.longest_axis_m.high)
-    return decide_unit(longest, user=draft.item.units, file_unit_m=file.unit_m, expected_m=usual)
+    return decide_unit(longest, user=draft.payload.units, file_unit_m=file.unit_m, expected_m=usual)
 
 
 def _soup(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:

@@ -13,6 +13,7 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import InputError
 from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
+from manitwin.pipeline.item import Item
 
 
 class PhotoStage:
@@ -29,11 +30,11 @@ class PhotoStage:
     def __init__(self, settings: MattingConfig):
         self.settings = settings
 
-    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+    def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
-        if draft.item.file is None:
+        if draft.payload.file is None:
             raise InputError("empty", "no image file; give one")
-        path, settings = Path(draft.item.file), self.settings
+        path, settings = Path(draft.payload.file), self.settings
         photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px)
         matte = matte_photo(
             photo.pixels,

@@ -17,6 +17,7 @@ from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
 from manitwin.models.annotators.priors import Interval, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.subject import findings_of, read_subject
 from manitwin.twin.record import Estimate, OrientedBox, Physical
 
@@ -43,7 +44,7 @@ class PhysicalStage:
         self.needs: Resource = annotator.needs
         self.expected_usd = annotator.expected_usd("physical")
 
-    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+    def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Write ``visual.glb`` and ``solid.npz`` in true metres; return ``physical`` and what speaks against it.
 
         Raises Rejected where size, mass or density are beyond what a thing of this name has, BadReply where the
@@ -57,8 +58,8 @@ class PhysicalStage:
         obb_extents, obb_to_object[:3, 3] = obb_extents * scale, obb_to_object[:3, 3] * scale
         solid = trimesh.Trimesh(subject.solid.vertices * scale, subject.solid.faces, process=False)
         mass = mass_estimate(estimates, float(solid.volume))
-        self._check_size(draft.item.name, float(obb_extents.max()), estimates.longest_axis_m)
-        self._check_mass(draft.item.name, mass, float(solid.volume))
+        self._check_size(draft.payload.name, float(obb_extents.max()), estimates.longest_axis_m)
+        self._check_mass(draft.payload.name, mass, float(solid.volume))
         parts = [bake_transform(part, np.diag([scale, scale, scale, 1.0])) for part in subject.parts]
         _write_meshes(draft, folder, solid, parts, scale, self.settings.max_texture_size)
         properties, uncertainty = spread_mass(solid, mass.value, estimates.wall_thickness_m)
@@ -143,7 +144,7 @@ def spread_mass(solid: trimesh.Trimesh, mass_kg: float, wall_thickness_m: float 
 
 
 def _write_meshes(
-    draft: Draft,
+    draft: Draft[Item],
     folder: Path,
     solid: trimesh.Trimesh,
     parts: list[trimesh.Trimesh],

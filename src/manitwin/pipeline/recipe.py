@@ -5,14 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, cast
+from typing import ClassVar, Literal, cast
 
 from manitwin.config import BuildConfig
+from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.recipe import Ending, Identity, Tables
-from manitwin.engine.stage import Draft, Item, PaidStage, Stage
+from manitwin.engine.stage import Draft, PaidStage, Stage
 from manitwin.engine.stage_order import INPUT
 from manitwin.engine.stage_runner import StageCost
-from manitwin.errors import Rejected, TwinError, UsageError
+from manitwin.errors import Rejected, UsageError
 from manitwin.formats.sniff import sniff
 from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.annotators.given import KeepsGiven
@@ -27,6 +28,7 @@ from manitwin.pipeline.generate import GenerateStage
 from manitwin.pipeline.grasps import GraspsStage
 from manitwin.pipeline.gripper_kinds import KINDS
 from manitwin.pipeline.identity import twin_id
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.mesh import MeshStage
 from manitwin.pipeline.name_hint import NAME_HINT, name_would_help
 from manitwin.pipeline.photo import PhotoStage
@@ -166,8 +168,11 @@ def _decided_by(stage: Stage | StageProvenance) -> tuple[str, str, str | None]:
 
 
 @dataclass(frozen=True)
-class TwinRecipe:
+class TwinRecipe(FolderRecipe[TwinRecord]):
     """What the engine makes of an item: a twin. ``tables`` are kept of the twins while a run goes on."""
+
+    payload: ClassVar[type[Item]] = Item
+    record: ClassVar[str] = RECORD
 
     config: BuildConfig
     tables: Tables | None = None
@@ -187,54 +192,51 @@ class TwinRecipe:
         """The seed of everything random."""
         return self.config.seed
 
-    @property
-    def record(self) -> str:
-        """The record of a twin."""
-        return RECORD
-
-    def folder_of(self, twin_id: str) -> str:
+    def folder_of(self, item_id: str) -> str:
         """Return the twin's folder."""
-        return twin_name(twin_id)
+        return twin_name(item_id)
 
-    def identify(self, item: Item) -> Identity:
+    def identify(self, payload: Item) -> Identity:
         """Return the id by the input's bytes, and its kind by what they are, not by what they claim to be."""
-        identity = twin_id(item)
-        if item.file is None:
+        identity = twin_id(payload)
+        if payload.file is None:
             return Identity(identity, "text")
         try:
-            return Identity(identity, sniff(Path(item.file)).kind)
+            return Identity(identity, sniff(Path(payload.file)).kind)
         except Rejected as answer:
-            return Identity(identity, _claimed_kind(item), answer)
+            return Identity(identity, _claimed_kind(payload), answer)
 
     def stages(self, kind: str) -> list[Stage]:
         """Return the stages of the paper's pipeline for a kind of input, in order."""
         return stages_for(cast(Kind, kind), self.config)
 
-    def finish(
+    def parse(self, record: bytes) -> TwinRecord:
+        """Read a twin's record; raises TwinError for one that is unreadable or of another version: it is built again."""
+        return parse_record(record)
+
+    def is_current(self, record: TwinRecord) -> bool:
+        """Tell whether this recipe would make the same twin."""
+        return is_current(record, self.config)
+
+    def ending(self, record: TwinRecord) -> Ending:
+        """Return how a twin's record says that its item ended."""
+        return ending_of(record)
+
+    def write(
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
-    ) -> Ending:
+    ) -> TwinRecord:
         """Write the twin's folder."""
         names = [*costs, *([stage] if rejected is not None and stage != INPUT else [])]
-        ran = [s for s in self.stages(kind) if s.name in names]
-        record = assemble(
+        return assemble(
             draft,
             kind=kind,
-            stages=ran,
+            stages=[s for s in self.stages(kind) if s.name in names],
             costs=costs,
             config_sha256=config_sha256(self.config),
             rejected=rejected,
             rejecting_stage=stage,
             fresh=fresh,
         )
-        return ending_of(record)
-
-    def ending_of(self, record: bytes) -> Ending | None:
-        """Return how a finished twin ended; None where this recipe would make another one."""
-        try:
-            twin = parse_record(record)
-        except TwinError:
-            return None  # unreadable or of another version: built again
-        return ending_of(twin) if is_current(twin, self.config) else None
 
 
 def ending_of(record: TwinRecord) -> Ending:

@@ -20,27 +20,27 @@ Every run of a stage adds a line ``<twin_id> <stage>`` to the recipe's log, so t
 
 from __future__ import annotations
 
-import json
-import shutil
 import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, ClassVar, NoReturn
 
 from pydantic import BaseModel
 
 from manitwin.config import Resource
 from manitwin.engine.charges import charge
+from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.recipe import Ending, Identity, Tables
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_parts import tell_part
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import AccessDenied, RateLimited, Rejected, Unavailable
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.rehearsal_cube import CUBE, cube_files
 from manitwin.twin.dataset_root import twin_name
-from manitwin.twin.record import SCHEMA_VERSION
-from manitwin.twin.store import RECORD, RUN, canonical_json, seal, sha256_of_json, write_bytes_atomically
+from manitwin.twin.record import SCHEMA_VERSION, TwinRecord
+from manitwin.twin.store import RECORD, RUN, canonical_json, parse_record, seal, sha256_of_json, write_bytes_atomically
 
 
 class RehearsalSettings(BaseModel):
@@ -64,16 +64,16 @@ class RehearsedStage:
         self.settings = RehearsalSettings(bytes=size)
         self._log = log
 
-    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+    def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Do as the item says; raises what it says."""
         if self._log is not None:
             with self._log.open("a") as stream:
-                stream.write(f"{draft.twin_id} {self.name}\n")
-        for word in (draft.item.text or "").split():
+                stream.write(f"{draft.item_id} {self.name}\n")
+        for word in (draft.payload.text or "").split():
             what, _, where = word.partition(":")
             stage, _, more = where.partition(":")
             if stage == self.name:
-                self._act(what, more, draft.twin_id)
+                self._act(what, more, draft.item_id)
         if self.settings.bytes:
             (folder / f"{self.name}.bin").write_bytes(b"\0" * self.settings.bytes)
         return {self.name: {"version": self.version, "after": [draft.field(name) for name in self.reads][-1:]}}
@@ -113,11 +113,14 @@ def _hang() -> NoReturn:
 
 
 @dataclass(frozen=True)
-class RehearsalRecipe:
+class RehearsalRecipe(FolderRecipe[TwinRecord]):
     """Stages by name and what they need, each reading the one before it; ``size`` bytes each leaves as a file.
 
     ``usd`` is what those are expected to cost that do not run on cores.
     """
+
+    payload: ClassVar[type[Item]] = Item
+    record: ClassVar[str] = RECORD
 
     plan: tuple[tuple[str, Resource], ...] = (("a", "cpu"), ("b", "cpu"), ("c", "cpu"))
     versions: tuple[tuple[str, str], ...] = ()
@@ -132,18 +135,13 @@ class RehearsalRecipe:
         """The digest of what decides the results."""
         return sha256_of_json([self.plan, self.versions, self.size, self.seed])
 
-    @property
-    def record(self) -> str:
-        """The record of a twin."""
-        return RECORD
-
-    def folder_of(self, twin_id: str) -> str:
+    def folder_of(self, item_id: str) -> str:
         """Return the twin's folder."""
-        return twin_name(twin_id)
+        return twin_name(item_id)
 
-    def identify(self, item: Item) -> Identity:
+    def identify(self, payload: Item) -> Identity:
         """Return the hash of the text."""
-        return Identity(sha256_of_json([item.text, item.name])[:16], "text")
+        return Identity(sha256_of_json([payload.text, payload.name])[:16], "text")
 
     def stages(self, kind: str) -> list[Stage]:
         """Return the stages."""
@@ -161,44 +159,48 @@ class RehearsalRecipe:
             for at, (name, needs) in enumerate(self.plan)
         ]
 
-    def finish(
-        self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
-    ) -> Ending:
+    def parse(self, record: bytes) -> TwinRecord:
+        """Read a twin's record."""
+        return parse_record(record)
+
+    def is_current(self, record: TwinRecord) -> bool:
+        """Tell whether a folder is of this very recipe."""
+        return record.provenance.config_sha256 == self.sha256
+
+    def ending(self, record: TwinRecord) -> Ending:
+        """Return how a record says that its item ended."""
+        if record.rejection is None:
+            return Ending("accepted", record.revision, None, "")
+        return Ending("rejected", record.revision, record.rejection.reason, record.rejection.detail)
+
+    def write(
+        self,
+        draft: Draft[Item],
+        kind: str,
+        costs: dict[str, StageCost],
+        rejected: Rejected | None,
+        stage: str,
+        fresh: Path,
+    ) -> TwinRecord:
         """Write a folder with a valid record."""
-        shutil.rmtree(fresh, ignore_errors=True)
-        fresh.mkdir(parents=True)
-        content = rehearsed_record(draft, self.sha256, rejected)
         costs_json = {"stages": {name: vars(cost) for name, cost in costs.items()}, "host": {}}
         write_bytes_atomically(fresh / RUN, canonical_json(costs_json).encode())
-        (fresh / "prompt.txt").write_text(draft.item.text or "")
+        (fresh / "prompt.txt").write_text(draft.payload.text or "")
         if rejected is None:
             for name, file in cube_files().items():
                 (fresh / name).write_bytes(file)
-        record = seal(fresh, content)
-        if rejected is None:
-            return Ending("accepted", record.revision, None, "")
-        return Ending("rejected", record.revision, rejected.reason, rejected.detail)
-
-    def ending_of(self, record: bytes) -> Ending | None:
-        """Return how a folder of this very recipe ended."""
-        data = json.loads(record)
-        if data["provenance"]["config_sha256"] != self.sha256:
-            return None
-        rejection = data["rejection"]
-        if rejection is None:
-            return Ending("accepted", data["revision"], None, "")
-        return Ending("rejected", data["revision"], rejection["reason"], rejection["detail"])
+        return seal(fresh, rehearsed_record(draft, self.sha256, rejected))
 
 
-def rehearsed_record(draft: Draft, recipe_sha256: str, rejected: Rejected | None) -> dict[str, Any]:
+def rehearsed_record(draft: Draft[Item], recipe_sha256: str, rejected: Rejected | None) -> dict[str, Any]:
     """Return the content of a record: all a rehearsal can say of a twin is that it was rejected, or that it is a cube."""
     common = {
         "schema_version": SCHEMA_VERSION,
-        "twin_id": draft.twin_id,
-        "name": draft.item.name,
+        "twin_id": draft.item_id,
+        "name": draft.payload.name,
         "status": "rejected" if rejected else "accepted",
         "rejection": rejected and {"stage": "gate", "reason": rejected.reason, "detail": rejected.detail},
-        "source": {"kind": "text", "file": "prompt.txt", "sha256": sha256_of_json(draft.item.text), "license": "CC0-1.0"},
+        "source": {"kind": "text", "file": "prompt.txt", "sha256": sha256_of_json(draft.payload.text), "license": "CC0-1.0"},
         "provenance": {"manitwin_version": "rehearsal", "config_sha256": recipe_sha256, "seed": draft.seed, "stages": {}},
         "quality": {"checks": []},
     }  # fmt: skip

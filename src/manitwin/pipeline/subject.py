@@ -10,18 +10,19 @@ from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.models.annotators.protocol import PhysicalEstimates, SelectedPoints, Subject
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_arrays import load_solid
 from manitwin.render.cameras import Camera
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
 
-def read_subject(draft: Draft, *, solid: str, visual: str, metric: bool, scale: float = 1.0) -> Subject:
+def read_subject(draft: Draft[Item], *, solid: str, visual: str, metric: bool, scale: float = 1.0) -> Subject:
     """Read the subject of a draft; ``solid`` and ``visual`` name the artifacts that hold the meshes.
 
     ``scale`` is how much larger these are than the canonical mesh, which the views were taken of.
     """
     return Subject(
-        name=draft.item.name,
+        name=draft.payload.name,
         solid=load_solid(draft.path(solid)),
         parts=tuple(read_glb(draft.path(visual))),
         metric=metric,
@@ -32,11 +33,11 @@ def read_subject(draft: Draft, *, solid: str, visual: str, metric: bool, scale: 
     )
 
 
-def read_given(draft: Draft) -> ImportRecord | None:
+def read_given(draft: Draft[Item]) -> ImportRecord | None:
     """Return what an imported asset gives, moved as the mesh stage moved its mesh; None for every other input."""
-    if draft.item.given is None:
+    if draft.payload.given is None:
         return None
-    record = read_import_record(Path(draft.item.given))
+    record = read_import_record(Path(draft.payload.given))
     return record.moved(np.array(draft.field("geometry")["input_to_object"]) @ OBJECT_TO_GLTF)
 
 

@@ -20,10 +20,10 @@ from manitwin.engine.events import OnStage, StageEnded, StageStarted, StageState
 from manitwin.engine.executors.child_processes import die_with, spared_from_interrupts
 from manitwin.engine.executors.one_thread import one_thread_each
 from manitwin.engine.main_module import WorkerContext, hidden_main_module
-from manitwin.engine.stage import Item
 from manitwin.errors import Unavailable
 from manitwin.pipeline.build_item import ItemResult, build_item
 from manitwin.pipeline.identity import twin_id
+from manitwin.pipeline.item import Item
 
 POLL_S = 0.2
 
@@ -152,12 +152,12 @@ def _listen(events: Any, on_stage: OnStage, stop: threading.Event) -> None:
         except (EOFError, OSError):
             return
         if isinstance(event, StageStarted):
-            under_way[event.item] = event
+            under_way[event.task.payload] = event
         else:
-            begun = under_way.pop(event.item, None)
+            begun = under_way.pop(event.item if isinstance(event, _CutOff) else event.task.payload, None)
             if isinstance(event, _CutOff):
                 if begun is None:
                     continue
-                event = StageEnded(event.item, begun.stage, event.state, detail=event.cause, twin_id=begun.twin_id)
+                event = StageEnded(begun.task, begun.stage, event.state, detail=event.cause)
         log_stage(event)
         on_stage(event)

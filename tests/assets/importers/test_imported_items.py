@@ -12,10 +12,10 @@ from foreign_assets import mug_urdf
 from manitwin.assets.importers.importer import import_assets
 from manitwin.cli.commands.import_ import import_
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.engine.stage import Item
 from manitwin.errors import UsageError
 from manitwin.formats.source_files import pack_source
 from manitwin.pipeline.identity import twin_id
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.manifest import collect_items
 
 
@@ -73,7 +73,7 @@ def test_ledger_of_before_knows_its_items_again(tmp_path: Path) -> None:
     fields = {name: value for name, value in dataclasses.asdict(item).items() if name != "given"}
     ledger.connection.execute("INSERT INTO items (item) VALUES (?)", (json.dumps(fields, sort_keys=True),))
     ledger.add_items([item, dataclasses.replace(item, given="/data/import.json")])
-    assert [open_item.item for open_item in ledger.next_open(0, 10)] == [
+    assert [Item.from_json(open_item.payload) for open_item in ledger.next_open(0, 10)] == [
         item,
         dataclasses.replace(item, given="/data/import.json"),
     ]

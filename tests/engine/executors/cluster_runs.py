@@ -18,8 +18,9 @@ from manitwin.engine.events import ItemEnded
 from manitwin.engine.executors.ray_cluster import RayExecutor
 from manitwin.engine.jobs import RunStage, WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.engine.stage import Item
+from manitwin.engine.task import Task
 from manitwin.pipeline.dataset_run import sweep as sweep_work
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.rehearsal import RehearsalRecipe
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -91,7 +92,7 @@ def executor_for(root: Path, recipe: RehearsalRecipe, address: str, **values: An
 def stage_job(number: int, text: str, recipe: RehearsalRecipe, stage: str = "a") -> RunStage:
     """The first stage of an item."""
     item = Item(file=None, text=text)
-    return RunStage(number, item, recipe.identify(item).twin_id, "text", 0, stage, recipe.plan[0][1], ())
+    return RunStage(Task(number, item, recipe.identify(item).item_id), "text", 0, stage, recipe.plan[0][1], ())
 
 
 def replies(executor: RayExecutor, count: int, within_s: float = 60) -> Iterator[tuple[int, Any]]:

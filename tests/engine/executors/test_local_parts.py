@@ -13,10 +13,10 @@ from manitwin.engine.executors.local import LocalExecutor
 from manitwin.engine.executors.part_notes import parts_noted, read_notes
 from manitwin.engine.flight import Flight
 from manitwin.engine.jobs import Failure, RunStage, WorkerSetup
-from manitwin.engine.ledger.ledger import OpenItem
-from manitwin.engine.stage import Item
 from manitwin.engine.stage_parts import StagePart, heard_by, tell_part
+from manitwin.engine.task import Task
 from manitwin.pipeline.dataset_run import drive
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.rehearsal import RehearsalRecipe
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -37,11 +37,11 @@ def test_a_run_tells_what_part_of_a_stage_is_done_while_it_runs(tmp_path: Path) 
     assert report.counts["accepted"] == 1
     of_b = [event for event in events if event.stage == "b"]
     assert isinstance(of_b[0], StageStarted) and isinstance(of_b[-1], StageEnded)
-    assert of_b[1:-1] and set(of_b[1:-1]) == {StageAdvanced(item, "b", StagePart(1, 2, "things"))}
+    assert of_b[1:-1] and set(of_b[1:-1]) == {StageAdvanced(of_b[0].task, "b", StagePart(1, 2, "things"))}
 
 
 def test_parts_of_a_worker_that_took_too_long_are_forgotten(tmp_path: Path) -> None:
-    job = RunStage(1, Item(file=None, text="hang:a"), "0" * 32, "text", 0, "a", "cpu", ())
+    job = RunStage(Task(1, Item(file=None, text="hang:a"), "0" * 32), "text", 0, "a", "cpu", ())
     setup = WorkerSetup(str(tmp_path), RehearsalRecipe(), tmp_path, False)
     with LocalExecutor(setup, RunConfig(cpu=1, stage_timeout_s=1)) as executor:
         notes = Path(executor._stacks.name)
@@ -59,9 +59,9 @@ def test_parts_count_for_the_attempt_that_says_them(tmp_path: Path) -> None:
     heard: list[StageEvent] = []
     announcer = Announcer(heard.append, lambda event: None)
     item = Item(file=None, text="thing")
-    again = Flight(OpenItem(1, item, {"input": 1}))
+    again = Flight(Task(1, item), {"input": 1})
     announcer.stages_advanced({4: StagePart(1, 2, "things"), 5: StagePart(0, 2, "things")}, {5: again, 6: None})
-    assert heard == [StageAdvanced(item, "input", StagePart(0, 2, "things"))]
+    assert heard == [StageAdvanced(again.task, "input", StagePart(0, 2, "things"))]
 
 
 def test_a_note_that_cannot_be_written_does_not_end_the_stage(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -21,7 +21,7 @@ def test_a_crash_costs_its_item_alone(connected: str, tmp_path: Path, recipe: Re
     texts = [f"good {n}" for n in range(8)] + ["once segfault-once:c", *failing]
     ran = run(tmp_path, texts, recipe=recipe, address=connected)
     assert {text: state for text, state in ran.states.items() if state != "accepted"} == failing
-    assert max(Counter(event.number for event in ran.ended).values()) == 1, "each ended once"
+    assert max(Counter(event.task.number for event in ran.ended).values()) == 1, "each ended once"
     crash = ran.errors["poisoned segfault:b", "b"] or ""
     assert "Segmentation fault" in crash and "rehearsal.py" in crash, "the native stack is kept"
     assert (ran.attempts["poisoned segfault:b", "b"], ran.attempts["once segfault-once:c", "c"]) == (3, 2)
@@ -51,7 +51,7 @@ def test_items_that_wait_for_a_service_hold_no_core(connected: str, tmp_path: Pa
     others = {f"good {n} reject:a" for n in range(8)}
 
     def heard(event: ItemEnded) -> None:
-        order.append(event.item.text or "")
+        order.append(event.task.payload.text or "")
         if len(order) == len(others):
             down.unlink()
             threading.Timer(1.0, limit.unlink).start()

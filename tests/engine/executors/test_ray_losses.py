@@ -30,7 +30,7 @@ def test_a_node_that_dies_takes_no_item_along(
         if len(ended) == 10:
             machines.kill(second)
             killed_after.append(len(times_run(tmp_path / "log")))
-        ended.append(event.number)
+        ended.append(event.task.number)
 
     ended: list[int] = []
     texts = [f"{n} sleep:a:0.1 sleep:b:0.3 sleep:c:0.1" for n in range(40)]
@@ -53,7 +53,7 @@ from manitwin.engine.jobs import WorkerSetup
 from manitwin.pipeline.rehearsal import RehearsalRecipe
 from manitwin.engine.executors.ray_cluster import RayExecutor
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.engine.stage import Item
+from manitwin.pipeline.item import Item
 
 address, root, log, count, gate = sys.argv[1:]
 recipe = RehearsalRecipe((("a", "cpu"), ("b", "cpu"), ("c", "cpu")), log=Path(log))

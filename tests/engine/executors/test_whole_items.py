@@ -12,10 +12,11 @@ import trimesh
 
 from manitwin.config import BuildConfig
 from manitwin.engine.events import StageEnded, StageEvent, StageStarted
-from manitwin.engine.stage import Item
+from manitwin.engine.task import Task
 from manitwin.errors import BadReply, Unavailable
 from manitwin.pipeline import build_item as module
 from manitwin.pipeline.build_item import build_item
+from manitwin.pipeline.item import Item
 from manitwin.pipeline.whole_items import _CutOff, _listen, build_all
 
 
@@ -48,7 +49,7 @@ def test_a_stage_that_raises_is_told_to_have_ended(
     assert result.status == "unfinished"
     assert isinstance(begun, StageStarted) and isinstance(ended, StageEnded) and ended.stage == begun.stage
     assert ended.state == state and str(error) in ended.detail and bool(ended.trace) is traced
-    assert ended.twin_id == result.twin_id
+    assert ended.task.item_id == result.twin_id
 
 
 def test_a_worker_that_dies_ends_its_stage(tmp_path: Path, box: Item) -> None:
@@ -70,10 +71,10 @@ def test_a_worker_that_dies_ends_its_stage(tmp_path: Path, box: Item) -> None:
 def test_what_was_said_before_the_end_is_heard(box: Item) -> None:
     events: queue.Queue[object] = queue.Queue()
     heard: list[StageEvent] = []
-    events.put(StageStarted(box, "views"))
+    events.put(StageStarted(Task(0, box), "views"))
     events.put(_CutOff(box, "failed", "it died"))
     events.put(_CutOff(box, "failed", "nothing was under way"))
     stop = threading.Event()
     stop.set()
     _listen(events, heard.append, stop)
-    assert heard == [StageStarted(box, "views"), StageEnded(box, "views", "failed", detail="it died")]
+    assert heard == [StageStarted(Task(0, box), "views"), StageEnded(Task(0, box), "views", "failed", detail="it died")]

@@ -12,8 +12,8 @@ from manitwin.engine.ledger.ledger import Ledger, read_ledger
 from manitwin.engine.ledger.lock import is_written
 from manitwin.engine.ledger.migrations import MIGRATIONS
 from manitwin.engine.ledger.progress import read_progress, read_story
-from manitwin.engine.stage import Item
 from manitwin.errors import UsageError
+from manitwin.pipeline.item import Item
 
 
 @pytest.fixture

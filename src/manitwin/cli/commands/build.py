@@ -119,12 +119,10 @@ def _print_report(report: BuildReport, out: Path) -> None:
 
 
 def _print_result(result: ItemResult) -> None:
-    from manitwin.engine.events import title
-
     again = " (already there)" if result.reused else ""
     shown = result.folder / "card.png" if result.folder is not None and result.status == "accepted" else result.folder
     where = f" -> {shown}" if shown is not None else ""
-    line = f"{result.status:<10} {title(result.item)}: {result.detail}{again}{where}"
+    line = f"{result.status:<10} {result.item.title}: {result.detail}{again}{where}"
     # what has not been made is an error, though a person who looks on reads of it among the other items
     console = error_console if out_console.quiet and result.status == "unfinished" else out_console
     console.print(line, style=STYLES[result.status], markup=False)

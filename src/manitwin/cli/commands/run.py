@@ -150,8 +150,7 @@ def _print_report(report: RunReport, dataset: str) -> None:
 
 
 def _print_item(event: ItemEnded) -> None:
-    from manitwin.engine.events import title
-
-    item = event.item
     style = STYLES.get(event.state, "")
-    out_console.print(f"{event.state:<10} {event.twin_id} {title(item)}: {event.detail}", markup=False, style=style)
+    out_console.print(
+        f"{event.state:<10} {event.task.item_id} {event.task.payload.title}: {event.detail}", markup=False, style=style
+    )

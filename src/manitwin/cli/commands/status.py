@@ -136,9 +136,10 @@ def _view(progress: Progress) -> RenderableType:
 
 
 def _print_story(story: ItemStory) -> None:
-    given = {key: value for key, value in story.item.items() if value is not None}
+    from manitwin.engine.ledger.progress import told
+
     lines = [
-        f"item {story.number}: " + ", ".join(f"{key} {value}" for key, value in given.items()),
+        f"item {story.number}: {told(story.item)}",
         f"twin {story.twin_id or 'not known yet'}, {story.state}"
         + (f" ({story.reason})" if story.reason else "")
         + (f": {story.detail}" if story.detail else ""),

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import sqlite3
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 from manitwin.engine.ledger.lock import hold_lock, is_written, lock_file
 from manitwin.engine.ledger.migrations import migrate
-from manitwin.engine.stage import Item
+from manitwin.engine.task import Payload
 from manitwin.errors import BackendError, UsageError
 
 ItemState = Literal["open", "accepted", "rejected", "failed", "duplicate"]
@@ -28,10 +28,10 @@ class LedgerFull(BackendError):
 
 @dataclass(frozen=True)
 class OpenItem:
-    """An item that has not ended, with how often each of its stages was tried."""
+    """An item that has not ended, with the JSON of its payload and how often each of its stages was tried."""
 
     number: int
-    item: Item
+    payload: dict[str, Any]
     attempts: dict[str, int]
 
 
@@ -102,14 +102,13 @@ class Ledger:
                 lock_file(self.path).unlink()
             self._lock.close()
 
-    def add_items(self, items: Iterable[Item]) -> tuple[int, int]:
+    def add_items(self, payloads: Iterable[Payload]) -> tuple[int, int]:
         """Add items that are not there yet, in order, all or none; returns how many were given and how many are new."""
         given, before = 0, self.connection.total_changes
         self.commit()
         try:
-            for item in items:
-                text = json.dumps(_fields(item), sort_keys=True)
-                self.connection.execute("INSERT OR IGNORE INTO items (item) VALUES (?)", (text,))
+            for payload in payloads:
+                self.connection.execute("INSERT OR IGNORE INTO items (item) VALUES (?)", (_text(payload),))
                 given += 1
         except BaseException:
             self.connection.execute("ROLLBACK")
@@ -117,6 +116,19 @@ class Ledger:
             raise
         self.commit()
         return given, self.connection.total_changes - before
+
+    def restate(self, read: Callable[[Mapping[str, Any]], Payload]) -> None:
+        """Rewrite payloads that an earlier version wrote in another form; all of a ledger have one form, so the first tells.
+
+        ``read`` reads both forms.
+        """
+        rows = self.connection.execute("SELECT number, item FROM items ORDER BY number")
+        first = rows.fetchone()
+        if first is None or _text(read(json.loads(first[1]))) == first[1]:
+            return
+        restated = [(_text(read(json.loads(text))), number) for number, text in (first, *rows)]
+        self.connection.executemany("UPDATE items SET item = ? WHERE number = ?", restated)
+        self.commit()
 
     def begin_run(self, recipe_sha256: str) -> int:
         """Note the begin of a run: what an earlier one left running was cut off, which is nobody's failed attempt.
@@ -145,12 +157,12 @@ class Ledger:
         rows = self.connection.execute(
             "SELECT number, item FROM items WHERE state = 'open' AND number > ? ORDER BY number LIMIT ?", (after, count)
         ).fetchall()
-        return [OpenItem(number, Item(**json.loads(item)), self._attempts(number)) for number, item in rows]
+        return [OpenItem(number, json.loads(text), self._attempts(number)) for number, text in rows]
 
-    def item(self, number: int) -> Item:
-        """Return an item as it was given."""
+    def payload(self, number: int) -> dict[str, Any]:
+        """Return the JSON of an item's payload."""
         (text,) = self.connection.execute("SELECT item FROM items WHERE number = ?", (number,)).fetchone()
-        return Item(**json.loads(text))
+        return dict(json.loads(text))
 
     def _attempts(self, number: int) -> dict[str, int]:
         rows = self.connection.execute(
@@ -263,10 +275,8 @@ class Ledger:
         self.connection.executemany("UPDATE items SET indexed = 1 WHERE twin_id = ?", ((i,) for i in twin_ids))
 
 
-def _fields(item: Item) -> dict[str, Any]:
-    """Return an item's fields as the ledger keeps them; of those that came later, only what is said: old rows stay equal."""
-    fields = asdict(item)
-    return fields if item.given is not None else {name: value for name, value in fields.items() if name != "given"}
+def _text(payload: Payload) -> str:
+    return json.dumps(payload.to_json(), sort_keys=True)
 
 
 @contextmanager

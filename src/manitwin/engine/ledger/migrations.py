@@ -10,7 +10,7 @@ MIGRATIONS = (
     """
     CREATE TABLE items (
         number INTEGER PRIMARY KEY,
-        item TEXT NOT NULL UNIQUE,           -- the input as it was given, JSON
+        item TEXT NOT NULL UNIQUE,           -- the payload of its task, JSON
         twin_id TEXT,                        -- known once its bytes were read
         kind TEXT,
         state TEXT NOT NULL DEFAULT 'open',  -- open, accepted, rejected, failed, duplicate

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import sqlite3
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from manitwin.engine.ledger.ledger import ITEM_STATES, StageRow, stage_rows
 from manitwin.engine.stage_order import place_in_pipeline
@@ -49,7 +51,7 @@ class ItemStory:
     """All that the ledger knows of one item."""
 
     number: int
-    item: dict[str, str | None]
+    item: dict[str, Any]
     twin_id: str | None
     state: str
     reason: str | None
@@ -124,9 +126,7 @@ def read_story(connection: sqlite3.Connection, which: str) -> ItemStory:
             continue
         rows = connection.execute(f"SELECT {columns} FROM items WHERE {condition} LIMIT 6", (value,)).fetchall()
         if len(rows) > 1:
-            near = "; ".join(
-                f"{row['number']} {row['twin_id'] or ''} {_given(json.loads(row['item']))}" for row in rows
-            )
+            near = "; ".join(f"{row['number']} {row['twin_id'] or ''} {told(json.loads(row['item']))}" for row in rows)
             raise UsageError(f"{which}: several items are meant: {near}; give one's number or id")
         if rows:
             row = rows[0]
@@ -137,5 +137,6 @@ def read_story(connection: sqlite3.Connection, which: str) -> ItemStory:
     raise UsageError(f"{which}: no such item; give its number, its twin's id, or a part of its file's name")
 
 
-def _given(item: dict[str, str | None]) -> str:
-    return str(item.get("file") or item.get("text") or "")
+def told(payload: Mapping[str, Any]) -> str:
+    """Return what a payload says, in a line for a person."""
+    return ", ".join(f"{key} {value}" for key, value in payload.items() if value is not None)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +11,7 @@ from pydantic import BaseModel
 
 from manitwin.config import Resource
 from manitwin.engine.stage import Draft
+from manitwin.engine.task import Payload
 from manitwin.scenes.app_config import LayoutsConfig, LayoutSettings
 from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.layouts.sample import sample_layout
@@ -19,8 +22,25 @@ from manitwin.twin.twin_source import TwinSource
 PICTURES = "pictures/"
 
 
+@dataclass(frozen=True)
+class LayoutNumber(Payload):
+    """The number of a layout to sample, from 0."""
+
+    number: int
+
+    @property
+    def title(self) -> str:
+        """The layout's number in words."""
+        return f"layout {self.number}"
+
+    @classmethod
+    def from_json(cls, fields: Mapping[str, Any]) -> LayoutNumber:
+        """Return the number that a ledger keeps; those of earlier versions kept it as the text ``layout 17``."""
+        return cls(int(fields["text"].split()[-1]) if "text" in fields else fields["number"])
+
+
 class LayoutStage:
-    """Sample the layout of an item's number."""
+    """Sample the layout of a number."""
 
     name = "layout"
     version = "1"
@@ -34,9 +54,9 @@ class LayoutStage:
         self.settings: BaseModel = settings
         self._layout, self._dataset = settings, dataset
 
-    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+    def run(self, draft: Draft[LayoutNumber], folder: Path) -> dict[str, Any]:
         """Write the scene; raises Rejected where none could be made."""
-        number = int((draft.item.text or "").split()[-1])
+        number = draft.payload.number
         write_scene(sample_layout(pool_of(self._dataset), self._layout, draft.seed, number), folder)
         return {}
 

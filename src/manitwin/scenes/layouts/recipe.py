@@ -2,47 +2,44 @@
 
 from __future__ import annotations
 
-import json
 import shutil
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import ClassVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
-
+from manitwin.engine.folder_recipe import FolderRecipe, FolderRecord
 from manitwin.engine.recipe import Ending, Identity
-from manitwin.engine.stage import Draft, Item, Stage
+from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import Rejected
 from manitwin.scenes.app_config import LayoutsConfig
-from manitwin.scenes.layouts.layout_stages import PICTURES, LayoutStage, PicturesStage
+from manitwin.scenes.layouts.layout_stages import PICTURES, LayoutNumber, LayoutStage, PicturesStage
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_file import parse_scene
 from manitwin.scenes.scene_folders import scene_name
-from manitwin.twin.store import canonical_json, sha256_of_json, write_bytes_atomically
+from manitwin.twin.store import sha256_of_json
 
 LAYOUT_RECORD = "layout.json"
 LAYOUT_SCHEMA_VERSION = 1
 
 
-class LayoutRecord(BaseModel):
+class LayoutRecord(FolderRecord):
     """``layout.json``: how the sampling of a layout ended; ``reason`` is that of a rejection."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     schema_version: int
     scene_id: str
-    config_sha256: str
-    revision: str
     reason: str | None
     detail: str
 
 
 @dataclass(frozen=True)
-class LayoutsRecipe:
+class LayoutsRecipe(FolderRecipe[LayoutRecord]):
     """Layouts of the twins of ``dataset``, one for each number."""
+
+    payload: ClassVar[type[LayoutNumber]] = LayoutNumber
+    record: ClassVar[str] = LAYOUT_RECORD
+    record_type: ClassVar[type[LayoutRecord]] = LayoutRecord
 
     config: LayoutsConfig
     dataset: str
@@ -54,30 +51,17 @@ class LayoutsRecipe:
         return sha256_of_json([decides, LayoutStage.version, PicturesStage.version])
 
     @property
-    def tables(self) -> None:
-        """There are none."""
-
-    @property
     def seed(self) -> int:
         """The seed of everything random."""
         return self.config.seed
 
-    @property
-    def record(self) -> str:
-        """The record of a layout, accepted or rejected."""
-        return LAYOUT_RECORD
-
-    def items(self, count: int) -> Iterator[Item]:
-        """Yield the first so many layouts as items of a run."""
-        return (Item(file=None, text=f"layout {number}") for number in range(count))
-
-    def folder_of(self, twin_id: str) -> str:
+    def folder_of(self, item_id: str) -> str:
         """Return the scene's folder."""
-        return scene_name(twin_id)
+        return scene_name(item_id)
 
-    def identify(self, item: Item) -> Identity:
+    def identify(self, payload: LayoutNumber) -> Identity:
         """Return the scene's id."""
-        return Identity(f"layout_{self.seed}_{_number(item):06d}", "layout")
+        return Identity(f"layout_{self.seed}_{payload.number:06d}", "layout")
 
     def stages(self, kind: str) -> list[Stage]:
         """Return the sampling, and the drawing where pictures are wanted."""
@@ -86,43 +70,26 @@ class LayoutsRecipe:
             stages.append(PicturesStage(self.config, self.dataset))
         return stages
 
-    def finish(
+    def write(
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
-    ) -> Ending:
-        """Write the layout's folder."""
-        shutil.rmtree(fresh, ignore_errors=True)
-        fresh.mkdir(parents=True)
-        detail = "" if rejected is None else rejected.detail
+    ) -> LayoutRecord:
+        """Write the layout's folder: its scene, and its pictures where there are any; nothing of one that was rejected."""
+        detail, scene_bytes = "" if rejected is None else rejected.detail, b""
         if rejected is None:
-            shutil.copyfile(draft.path(SCENE), fresh / SCENE)
-            scene = parse_scene((fresh / SCENE).read_bytes())
+            scene_bytes = draft.path(SCENE).read_bytes()
+            (fresh / SCENE).write_bytes(scene_bytes)
+            scene = parse_scene(scene_bytes)
             detail = f"{len(scene.objects)} objects on a {scene.furniture.kind}, {scene.repairs} repairs"
             if PICTURES in draft.paths:
                 shutil.copytree(draft.path(PICTURES), fresh / PICTURES)
-        said: dict[str, Any] = {
+        said = {
             "schema_version": LAYOUT_SCHEMA_VERSION,
-            "scene_id": draft.twin_id,
-            "config_sha256": self.sha256,
+            "scene_id": draft.item_id,
             "reason": None if rejected is None else rejected.reason,
             "detail": detail,
         }
-        scene_bytes = draft.path(SCENE).read_bytes() if rejected is None else b""
-        record = LayoutRecord(**said, revision=sha256_of_json([said, scene_bytes.decode()]))
-        write_bytes_atomically(fresh / LAYOUT_RECORD, canonical_json(record.model_dump(mode="json")).encode())
-        return _ending(record)
+        return self.seal(fresh, said, decided_by=scene_bytes.decode())
 
-    def ending_of(self, record: bytes) -> Ending | None:
-        """Return how a layout ended; None where this recipe would make another one."""
-        try:
-            layout = LayoutRecord(**json.loads(record))
-        except (ValueError, ValidationError):
-            return None
-        return _ending(layout) if layout.config_sha256 == self.sha256 else None
-
-
-def _ending(record: LayoutRecord) -> Ending:
-    return Ending("rejected" if record.reason else "accepted", record.revision, record.reason, record.detail)
-
-
-def _number(item: Item) -> int:
-    return int((item.text or "").split()[-1])
+    def ending(self, record: LayoutRecord) -> Ending:
+        """Return how a layout's record says that it ended."""
+        return Ending("rejected" if record.reason else "accepted", record.revision, record.reason, record.detail)

@@ -13,6 +13,7 @@ from manitwin.errors import UsageError
 from manitwin.pipeline.dataset_run import ExecutorName, RunReport, drive, local_ledger
 from manitwin.scenes.app_config import LayoutsConfig
 from manitwin.scenes.earlier_settings import check_settings, earlier_settings
+from manitwin.scenes.layouts.layout_stages import LayoutNumber
 from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.layouts.recipe import LayoutsRecipe
 from manitwin.scenes.scene import SCENE
@@ -80,7 +81,7 @@ def make_layouts(
         on_start(items, opened)
 
     return drive(
-        recipe, recipe.items(count), root, config.run, configuration=configuration, executor=executor,
+        recipe, map(LayoutNumber, range(count)), root, config.run, configuration=configuration, executor=executor,
         address=address, on_start=started, on_stage=on_stage, on_ended=on_ended,
     )  # fmt: skip
 

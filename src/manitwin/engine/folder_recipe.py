@@ -1,0 +1,91 @@
+"""The part that all recipes share: a folder is written afresh, its record last, and a finished one says how it ended."""
+
+from __future__ import annotations
+
+import shutil
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import Any, ClassVar, Generic, TypeVar
+
+from pydantic import BaseModel, ConfigDict
+
+from manitwin.engine.recipe import Ending, Tables
+from manitwin.engine.stage import Draft
+from manitwin.engine.stage_runner import StageCost
+from manitwin.engine.task import Payload
+from manitwin.errors import ManiTwinError, Rejected
+from manitwin.twin.store import canonical_json, sha256_of_json, write_bytes_atomically
+
+
+class FolderRecord(BaseModel):
+    """The record of a finished folder: the digest of the recipe that made it, and a revision by all that decides the folder."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    config_sha256: str
+    revision: str
+
+
+RecordT = TypeVar("RecordT", bound=BaseModel)
+
+
+class FolderRecipe(ABC, Generic[RecordT]):
+    """A recipe whose results are folders with a record of one type, called ``record``, in which no tables are kept.
+
+    Records that are not of ``FolderRecord`` override ``parse`` and ``is_current``.
+    """
+
+    payload: ClassVar[type[Payload]]
+    record: ClassVar[str]
+    record_type: ClassVar[type[BaseModel]]
+    can_reject: ClassVar[bool] = True
+    tables: Tables | None = None
+
+    @property
+    @abstractmethod
+    def sha256(self) -> str:
+        """The digest of everything in it that decides a result."""
+
+    @abstractmethod
+    def ending(self, record: RecordT) -> Ending:
+        """Return how a record says that its item ended."""
+
+    @abstractmethod
+    def write(
+        self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
+    ) -> RecordT:
+        """Write the files and the record into the empty folder ``fresh``; ``stage`` is the last one that ran."""
+
+    def parse(self, record: bytes) -> RecordT:
+        """Read a record; raises ValueError or ManiTwinError where it cannot be read."""
+        return self.record_type.model_validate_json(record)  # type: ignore[return-value]
+
+    def is_current(self, record: RecordT) -> bool:
+        """Tell whether this recipe would make the same folder."""
+        return isinstance(record, FolderRecord) and record.config_sha256 == self.sha256
+
+    def finish(
+        self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
+    ) -> Ending:
+        """Write the finished folder at ``fresh``; raises ManiTwinError for a rejection where there can be none."""
+        if rejected is not None and not self.can_reject:
+            raise ManiTwinError(f"{kind} {draft.item_id}: {rejected}; it cannot be rejected as a whole")
+        shutil.rmtree(fresh, ignore_errors=True)
+        fresh.mkdir(parents=True)
+        return self.ending(self.write(draft, kind, costs, rejected, stage, fresh))
+
+    def ending_of(self, record: bytes) -> Ending | None:
+        """Return how a finished folder ended; None where it cannot be read, or this recipe would make another one."""
+        try:
+            read = self.parse(record)
+        except (ValueError, ManiTwinError):
+            return None
+        return self.ending(read) if self.is_current(read) else None
+
+    def seal(self, fresh: Path, said: dict[str, Any], *, decided_by: Any = None) -> RecordT:
+        """Write the record last: what is said of the folder, and its revision, by ``decided_by`` as well where that is given."""
+        said = {**said, "config_sha256": self.sha256}
+        revision = sha256_of_json(said if decided_by is None else [said, decided_by])
+        record: Any = self.record_type(**said, revision=revision)
+        write_bytes_atomically(fresh / self.record, canonical_json(record.model_dump(mode="json")).encode())
+        return record

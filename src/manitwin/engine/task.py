@@ -1,0 +1,39 @@
+"""A task of a run, and what it asks for: the engine carries payloads between processes and never looks into them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Generic, Self, TypeVar
+
+
+@dataclass(frozen=True)
+class Payload(ABC):
+    """What a task asks for: a frozen dataclass of JSON values, so that it is hashable, picklable and kept in a ledger."""
+
+    @property
+    @abstractmethod
+    def title(self) -> str:
+        """A short name for a person."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the fields as a ledger keeps them: the same payload gives the same ones in every version."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, fields: Mapping[str, Any]) -> Self:
+        """Return the payload that a ledger of this version or an earlier one keeps."""
+        return cls(**fields)
+
+
+PayloadT = TypeVar("PayloadT", bound=Payload)
+
+
+@dataclass(frozen=True)
+class Task(Generic[PayloadT]):
+    """One item of a run by its number in the ledger; ``item_id`` names what it makes, and is empty until that is known."""
+
+    number: int
+    payload: PayloadT
+    item_id: str = ""
