@@ -105,9 +105,9 @@ def test_generated_hand_weighs_what_its_file_says_and_balances_on_the_approach_a
 
 
 def test_generated_inertia_of_one_box_is_the_closed_form():
+    from manitwin.robots.assembly import generated_hand
     from manitwin.robots.grippers.box import Box
     from manitwin.robots.grippers.parallel import ParallelGripper
-    from manitwin.robots.mounted_hand import generated_hand
 
     cube = Box((0.0, 0.0, 0.05), (0.01, 0.02, 0.03))
     gripper = ParallelGripper("g", "", 0.1, 0.1, 1.0, 1.0, (0.01, 0.01), (cube,), (cube,), "")

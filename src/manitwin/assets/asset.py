@@ -33,7 +33,7 @@ class CollisionShape:
 
 @dataclass(frozen=True)
 class Inertial:
-    """What the files declare: the centre of mass and ``inertia_kg_m2 (3, 3)`` about it, both along the asset's axes."""
+    """The declared mass properties: the centre of mass and ``inertia_kg_m2 (3, 3)`` about it, both along the asset's axes."""
 
     mass_kg: float | None = None
     center_of_mass_m: np.ndarray | None = None
@@ -108,3 +108,24 @@ class Asset:
     files: tuple[Path, ...] = ()
     missing_files: tuple[str, ...] = ()
     remarks: tuple[str, ...] = field(default=())
+
+
+def combined_inertial(bodies: list[Inertial]) -> Inertial:
+    """Return rigidly joined bodies, all with mass and centre, as one (the parallel axis theorem)."""
+    if len(bodies) == 1:
+        return bodies[0]
+    masses = np.array([body.mass_kg for body in bodies], float)
+    total = float(masses.sum())
+    centers = [body.center_of_mass_m for body in bodies]
+    if total == 0 or any(center is None for center in centers):
+        return Inertial(total)
+    points = np.array(centers, float)
+    center = masses @ points / total
+    if any(body.inertia_kg_m2 is None for body in bodies):
+        return Inertial(total, center)
+    offsets = points - center
+    moved = [
+        np.asarray(body.inertia_kg_m2) + mass * ((offset @ offset) * np.eye(3) - np.outer(offset, offset))
+        for body, mass, offset in zip(bodies, masses, offsets, strict=True)
+    ]
+    return Inertial(total, center, np.sum(moved, axis=0))

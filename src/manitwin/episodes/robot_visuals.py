@@ -7,20 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.render.drawable import Drawable, drawable
 from manitwin.robots.links import links_of_urdf, poses_at
 from manitwin.robots.robot import Robot
+from manitwin.robots.urdf import UrdfTree
 
 
 @lru_cache(maxsize=4)
 def _visuals(urdf: str) -> dict[str, tuple[trimesh.Trimesh, ...]]:
-    element = etree.fromstring(urdf.encode(), etree.XMLParser(resolve_entities=False, no_network=True))
-    shapes = LinkShapes(Path("robot.urdf"), element, AssetFiles(Path(Path.cwd().anchor)))
-    parts = {link.get("name"): tuple(shapes.visual(link, np.eye(4))) for link in element.findall("link")}
+    tree = UrdfTree.of_text(urdf)
+    shapes = LinkShapes(tree, Path("robot.urdf"), AssetFiles(Path(Path.cwd().anchor)))
+    parts = {name: tuple(shapes.visual(link, np.eye(4))) for name, link in tree.links.items()}
     return {name: found for name, found in parts.items() if found}
 
 

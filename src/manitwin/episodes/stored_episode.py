@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import xml.etree.ElementTree as ElementTree
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -11,6 +10,7 @@ from manitwin.episodes.attempt import Attempt
 from manitwin.episodes.recording import Recording
 from manitwin.errors import EpisodesError
 from manitwin.robots.robot import Robot
+from manitwin.robots.urdf import UrdfTree
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class StoredEpisode:
 def recorded_robot(robot: Robot) -> RecordedRobot:
     """Return what is stored of a robot; the limits of its joints are those of its URDF."""
     limits = {
-        joint.get("name"): (float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0)))
-        for joint in ElementTree.fromstring(robot.urdf).iter("joint")
+        name: (float(limit.get("lower", 0.0)), float(limit.get("upper", 0.0)))
+        for name, joint in UrdfTree.of_text(robot.urdf).joints.items()
         if (limit := joint.find("limit")) is not None
     }
     arm = [limits[name] for name in robot.arm_joints]

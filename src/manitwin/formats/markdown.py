@@ -1,4 +1,4 @@
-"""Words and numbers as Markdown."""
+"""Words of others as one line, and words and numbers as Markdown."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ import re
 from collections.abc import Sequence
 
 
+def one_line(text: str) -> str:
+    """Return text as one printable line: what is not printable (controls, lone surrogates, line breaks) becomes a space."""
+    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
+
+
 def markdown_escaped(text: str) -> str:
     """Return words of an outsider as one line that Markdown and HTML show as it is; what is not printable becomes a space."""
-    printable = "".join(letter if letter.isprintable() else " " for letter in text)
-    return re.sub(r"([\\`*_\[\]|#])", r"\\\1", html.escape(" ".join(printable.split()), quote=False))
+    return re.sub(r"([\\`*_\[\]|#])", r"\\\1", html.escape(one_line(text), quote=False))
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]], *, align: str = "") -> list[str]:

@@ -1,37 +1,106 @@
-"""XML that others wrote: no document type, no entities, no network; every number finite."""
+"""XML in and out: what others wrote is read without document type, entities, includes or network; what is written is the same
+bytes for the same content.
+
+All XML of the package is parsed here.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from xml.parsers import expat
 
 import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
-from scipy.spatial.transform import Rotation
 
-from manitwin.errors import AssetError
-from manitwin.geometry.poses import transform
+from manitwin.errors import AssetError, ExportError
+from manitwin.formats.markdown import one_line
 
 MAX_XML_BYTES = 64 << 20
 MAX_NUMBER = 1e9  # no length, mass or moment of an object that a gripper meets comes near
 
+Refusal = Callable[[str], Exception]
+"""Makes the error for a message: an error class of the border that reads, or a function."""
 
-def parse_xml(path: Path, tag: str) -> etree._Element:
-    """Parse a file whose root element must be ``tag``; raises AssetError naming the file and what is wrong with it."""
+
+def read_xml(
+    path: Path, tag: str, *, name: str | None = None, refusal: Refusal = AssetError, comments: bool = True
+) -> etree._Element:
+    """Return the root element of a file, which must be ``tag``; raises ``refusal`` of what is wrong with it.
+
+    ``name`` is what messages call the file: its own name by default.
+    """
+    name = name or path.name
     try:
         if path.stat().st_size > MAX_XML_BYTES:
-            raise AssetError(f"{path.name}: more than {MAX_XML_BYTES >> 20} MiB of XML; it is no single object")
-        parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, remove_comments=False)
-        root = etree.fromstring(path.read_bytes(), parser)
+            raise refusal(f"{name}: more than {MAX_XML_BYTES >> 20} MiB of XML; it is no single object")
+        data = path.read_bytes()
     except OSError as error:
-        raise AssetError(f"{path.name}: {error.strerror or error}; check the path") from error
+        raise refusal(f"{name}: {error.strerror or error}; check the path") from error
+    return parse_xml(data, tag, name, refusal=refusal, comments=comments)
+
+
+def parse_xml(
+    data: bytes | str,
+    tag: str,
+    name: str,
+    *,
+    refusal: Refusal = AssetError,
+    comments: bool = True,
+    max_bytes: int | None = MAX_XML_BYTES,
+) -> etree._Element:
+    """Return the root element of a document, which must be ``tag`` in any namespace.
+
+    Raises ``refusal`` of a message that begins with ``name``: broken XML, another root, a document type, or more than
+    ``max_bytes`` (None: the caller has limited them, and texts may be long too). Entities and XIncludes stay as they are
+    written, nothing else is opened.
+    """
+    data = data.encode() if isinstance(data, str) else data
+    if max_bytes is not None and len(data) > max_bytes:
+        raise refusal(f"{name}: more than {max_bytes >> 20} MiB of XML; it is no single object")
+    parser = etree.XMLParser(
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        remove_comments=not comments,
+        huge_tree=max_bytes is None,
+    )
+    try:
+        if _declares_document_type(data):
+            raise refusal(f"{name}: its XML declares a document type, which is not read; remove it")
+        root = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
-        raise AssetError(f"{path.name}: its XML is broken ({' '.join(str(error).split())[:120]}); mend it") from error
+        raise refusal(f"{name}: its XML is broken ({' '.join(str(error).split())[:120]}); mend it") from error
     if root.getroottree().docinfo.doctype:
-        raise AssetError(f"{path.name}: its XML declares a document type, which is not read; remove it")
-    if root.tag != tag:
-        raise AssetError(f"{path.name}: its XML is <{str(root.tag)[:40]}>, not <{tag}>")
+        raise refusal(f"{name}: its XML declares a document type, which is not read; remove it")
+    if etree.QName(root).localname != tag:
+        raise refusal(f"{name}: its XML is <{str(root.tag)[:40]}>, not <{tag}>; give a file of that kind")
     return root
+
+
+class _Found(Exception):
+    """Ends expat's parsing."""
+
+
+def _declares_document_type(data: bytes) -> bool:
+    """Look for a document type above the root element, before any entity in it could be put in."""
+    parser = expat.ParserCreate()
+    found: list[bool] = []
+
+    def end(declared: bool) -> None:
+        found.append(declared)
+        raise _Found
+
+    parser.StartDoctypeDeclHandler = lambda *_: end(True)
+    parser.StartElementHandler = lambda *_: end(False)
+    try:
+        parser.Parse(data, True)
+    except _Found:
+        return found[0]
+    except (expat.ExpatError, ValueError, LookupError):  # broken, or an encoding that it does not know: lxml says so
+        return False
+    return False
 
 
 def number(text: str | None, what: str) -> float:
@@ -53,18 +122,6 @@ def numbers(text: str | None, count: int, what: str) -> np.ndarray:
     return np.array([number(word, what) for word in words])
 
 
-def origin_of(element: etree._Element, what: str) -> np.ndarray:
-    """Return the ``<origin xyz rpy>`` of a URDF element as ``(4, 4)``; identity where it has none (URDF specification).
-
-    Roll, pitch and yaw turn about fixed axes x, y, z in that order.
-    """
-    origin = element.find("origin")
-    if origin is None:
-        return np.eye(4)
-    rotation = Rotation.from_euler("xyz", numbers(origin.get("rpy", "0 0 0"), 3, f"{what} rpy")).as_matrix()
-    return transform(rotation, numbers(origin.get("xyz", "0 0 0"), 3, f"{what} xyz"))
-
-
 def text_of(element: etree._Element, path: str) -> str | None:
     """Return the text of a descendant in one line without quotes around it, or None where it is empty."""
     text = " ".join((element.findtext(path) or "").split()).strip("\"'")
@@ -76,3 +133,51 @@ def comments_before(root: etree._Element) -> tuple[str, ...]:
     above = [n.text for n in reversed(list(root.itersiblings(preceding=True))) if n.tag is etree.Comment]
     below = [n.text for n in root.iterchildren(etree.Comment)]
     return tuple(" ".join((text or "").split()) for text in [*above, *below])
+
+
+def new_element(tag: str, **attributes: str) -> etree._Element:
+    """Return an element without parent; attributes keep the order in which they are given."""
+    return etree.Element(tag, attributes)
+
+
+def add(parent: etree._Element, tag: str, text: str | None = None, **attributes: str) -> etree._Element:
+    """Append an element and return it; attributes keep the order in which they are given."""
+    element = etree.SubElement(parent, tag, attributes)
+    element.text = text
+    return element
+
+
+def number_text(*values: float) -> str:
+    """Return numbers as the shortest text that reads back as the same ones. Raises ExportError for one that is not finite."""
+    for value in values:
+        if not math.isfinite(value):
+            raise ExportError(f"{value} is no number that a simulator can use; build the twin again")
+    return " ".join(repr(float(value) + 0.0) for value in values)  # + 0.0: no negative zero
+
+
+def document(root: etree._Element, comments: Iterable[str]) -> bytes:
+    """Return the indented document with ``comments`` above everything else in its root element."""
+    for position, text in enumerate(comments):
+        root.insert(position, etree.Comment(f" {_without_double_hyphen(one_line(text))} "))
+    etree.indent(root)
+    data: bytes = etree.tostring(root, xml_declaration=True, encoding="utf-8", pretty_print=True)
+    return data
+
+
+def edited_document(root: etree._Element) -> bytes:
+    """Return a document that was parsed and edited, with all around its root element as it was."""
+    data: bytes = etree.tostring(root.getroottree(), xml_declaration=True, encoding="utf-8")
+    return data
+
+
+def xml_text(element: etree._Element) -> str:
+    """Return an element as text without declaration."""
+    text: str = etree.tostring(element, encoding="unicode")
+    return text
+
+
+def _without_double_hyphen(text: str) -> str:
+    """Return text for a comment, which ends at two hyphens (XML 1.0, section 2.5) and may not end with one."""
+    while "--" in text:
+        text = text.replace("--", "- -")
+    return text.rstrip("-")

@@ -1,21 +1,30 @@
-"""A robot's TOML file: which URDF, which joints and hand, where home is, how fast it may move."""
+"""A robot's TOML file: its URDF, joints, hand, home and speeds; and the files that it names.
+
+They lie below the TOML file's folder and nowhere else, or in an installed distribution.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import os
 import tomllib
+from dataclasses import dataclass
 from importlib import resources
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, Field, ValidationError, field_validator
 
-from manitwin.errors import UsageError, choose_from
+from manitwin.errors import ConfigError, Unavailable, UsageError, choose_from
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.robots.grippers.fields import STRICT
 
 UNIT_TOLERANCE = 1e-6
+PACKAGE, FILE = "package://", "file://"
+MAX_FILE_BYTES = 64 << 20
+"""The largest mesh of the shipped robots' 98 files is 1.4 MB."""
 
 
 class PoseField(BaseModel):
@@ -139,18 +148,84 @@ def definition_path(name_or_path: str) -> Path:
 
 
 def read_definition(path: Path) -> tuple[RobotDefinition, str]:
-    """Read a robot's file and its SHA-256; raises UsageError naming the file and the key that is wrong."""
+    """Read a robot's file and its SHA-256; raises ConfigError naming the file and the key that is wrong."""
     content = path.read_bytes()
     try:
         definition = RobotDefinition.model_validate(tomllib.loads(content.decode()))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"robot file {path}: not TOML: {error}") from error
+        raise ConfigError(f"robot file {path}: not TOML: {error}") from error
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])
-        raise UsageError(f"robot file {path}: {where}: {first['msg']}") from error
+        raise ConfigError(f"robot file {path}: {where}: {first['msg']}") from error
     if len(definition.home_rad) != len(definition.arm_joints):
-        raise UsageError(
+        raise ConfigError(
             f"robot file {path}: home_rad wants {len(definition.arm_joints)} values, one for each arm joint"
         )
     return definition, hashlib.sha256(content).hexdigest()
+
+
+@dataclass(frozen=True)
+class UrdfFiles:
+    """A URDF's own path, its SRDF's, the folder of its packages, and the folder that none of its files may leave.
+
+    The files of an ``installed`` distribution may be links into the installer's cache.
+    """
+
+    urdf: Path
+    srdf: Path | None
+    package_folder: Path
+    boundary: Path
+    installed: bool
+
+    def mesh(self, name: str) -> Path:
+        """Return where a mesh of the URDF is; raises ConfigError where it is missing, too large or outside."""
+        if name.startswith(PACKAGE):
+            wanted = self.package_folder / name.removeprefix(PACKAGE).lstrip("/")
+        else:
+            wanted = self.urdf.parent / name.removeprefix(FILE)
+        return _inside(wanted, self.boundary, self.installed, f"{self.urdf.name}: mesh {name[:120]!r}")
+
+
+def urdf_files(field: UrdfField, folder: Path, robot: str) -> UrdfFiles:
+    """Return the places that a robot's file names.
+
+    Raises Unavailable where the distribution is not installed, ConfigError where a file is not there or leaves its folder.
+    """
+    installed = field.distribution is not None
+    root = _distribution_folder(field, robot) if installed else folder
+    packages = _inside(root / field.package_folder, root, installed, f"robot {robot}: package_folder", directory=True)
+    urdf = _inside(root / field.file, root, installed, f"robot {robot}: URDF {field.file!r}")
+    srdf = None
+    if field.srdf is not None:
+        srdf = _inside(root / field.srdf, root, installed, f"robot {robot}: SRDF {field.srdf!r}")
+    return UrdfFiles(urdf, srdf, packages, packages if installed else root, installed)
+
+
+def _distribution_folder(field: UrdfField, robot: str) -> Path:
+    remedy = f"pip install 'manitwin[{field.extra}]'" if field.extra else f"pip install {field.distribution}"
+    try:
+        return Path(str(distribution(str(field.distribution)).locate_file("")))
+    except PackageNotFoundError as error:
+        raise Unavailable(f"robot {robot} wants the files of {field.distribution}: {remedy}") from error
+
+
+def _inside(path: Path, boundary: Path, links_allowed: bool, what: str, directory: bool = False) -> Path:
+    """Return an absolute path below the boundary, where its links lead too unless they are allowed to; else raise ConfigError."""
+    try:
+        plain, limit = (Path(os.path.normpath(one.absolute())) for one in (path, boundary))
+        inside = plain.is_relative_to(limit)
+        inside = inside and (links_allowed or path.resolve().is_relative_to(boundary.resolve()))
+        there = inside and (plain.is_dir() if directory else plain.is_file())
+        too_large = there and plain.stat().st_size > MAX_FILE_BYTES
+    except (OSError, ValueError) as error:  # a name that no file system can hold
+        raise ConfigError(f"{what} cannot be a file: {error}; mend the name") from error
+    if not inside:
+        raise ConfigError(f"{what} leaves {boundary}; put it below that folder")
+    if not there:
+        raise ConfigError(f"{what} is not there: looked for {plain}; put it there, or mend the name")
+    if too_large:
+        raise ConfigError(
+            f"{what} is larger than {MAX_FILE_BYTES >> 20} MiB, which no robot's file is; make it smaller"
+        )
+    return plain

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.errors import Unavailable, UsageError
+from manitwin.errors import ConfigError, Unavailable
 from manitwin.formats.shared_libraries import import_remedy
+from manitwin.formats.xml_file import read_xml
 from manitwin.robots.definition import RobotDefinition
-from manitwin.robots.grippers.urdf import LinkShape
-from manitwin.robots.links import links_of_urdf
-from manitwin.robots.urdf_tree import UrdfTree, child_of, parent_of, parse_xml
+from manitwin.robots.links import LinkShape, links_of_urdf
+from manitwin.robots.urdf import UrdfTree, child_of, parent_of
 
 STATES = 300
 CONTACT_SHARE = 0.9
@@ -73,12 +73,12 @@ def _within_hand(tree: UrdfTree, finger_joints: tuple[str, str]) -> set[tuple[st
 
 def _of_srdf(path: Path, tree: UrdfTree) -> set[tuple[str, str]]:
     found = set()
-    for element in parse_xml(path).findall("disable_collisions"):
+    for element in read_xml(path, "robot", name=str(path), refusal=ConfigError).findall("disable_collisions"):
         first, second = element.get("link1"), element.get("link2")
         if first in tree.links and second in tree.links:
             found.add(_pair(first, second))
     if not found:
-        raise UsageError(f"{path}: no pair of the robot's links in it; leave srdf out, and the pairs are computed")
+        raise ConfigError(f"{path}: no pair of the robot's links in it; leave srdf out, and the pairs are computed")
     return found
 
 

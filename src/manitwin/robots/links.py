@@ -1,51 +1,168 @@
-"""The links of a whole robot with their collision shapes as convex hulls, read once per process."""
+"""The links of a robot or a hand as simulation takes them: joints, mass properties and convex collision shapes."""
 
 from __future__ import annotations
 
-import tempfile
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from lxml import etree  # type: ignore[import-untyped]
+from scipy.spatial.transform import Rotation
 
-from manitwin.errors import UsageError
-from manitwin.geometry.poses import inverse, transform_points
+from manitwin.formats.xml_file import read_xml
+from manitwin.geometry.poses import inverse, rotation_between, transform, transform_points
 from manitwin.geometry.rigid_body import principal_frame
-from manitwin.robots.grippers.urdf import Link, link_poses, read_urdf
-from manitwin.robots.urdf_tree import UrdfTree
+from manitwin.robots.urdf import UrdfTree, geometry_of, inertial_of, origin_of, parent_of, values_of
+
+MESH_SUFFIXES = (".stl", ".obj", ".dae", ".ply", ".glb", ".gltf")
+
+
+@dataclass(frozen=True)
+class LinkShape:
+    """A convex collision shape of a link: a box (``half_extents_m``), a sphere (``radius_m``) or ``corners_m (V, 3)``."""
+
+    shape_to_link: np.ndarray
+    half_extents_m: np.ndarray | None = None
+    radius_m: float | None = None
+    corners_m: np.ndarray | None = None
+
+    def bounding_box(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``(box_to_link (4, 4), half_extents_m (3,))`` of a box around the shape."""
+        if self.half_extents_m is not None:
+            return self.shape_to_link, self.half_extents_m
+        if self.radius_m is not None:
+            return self.shape_to_link, np.full(3, self.radius_m)
+        if self.corners_m is None:
+            raise AssertionError("a shape is a box, a sphere or corners")
+        low, high = self.corners_m.min(0), self.corners_m.max(0)
+        return self.shape_to_link @ transform(translation=(low + high) / 2), (high - low) / 2
+
+
+@dataclass(frozen=True)
+class Link:
+    """A link with the joint that holds it.
+
+    ``parent`` is the index of its parent (-1: the root), ``joint_to_parent`` the joint's frame, whose X axis is the joint's
+    axis, in the parent's, and ``joint_to_link`` the same frame in the link's own. ``limits`` are rad, or m for a
+    prismatic joint.
+    """
+
+    name: str
+    parent: int
+    joint: str
+    joint_type: str
+    joint_to_parent: np.ndarray
+    joint_to_link: np.ndarray
+    limits: tuple[float, float]
+    mass_kg: float
+    center_of_mass_m: np.ndarray
+    moments_kg_m2: np.ndarray
+    principal_axes: np.ndarray
+    shapes: tuple[LinkShape, ...]
+
+
+def links_of(tree: UrdfTree, find_mesh: Callable[[str], Path]) -> tuple[Link, ...]:
+    """Return a checked URDF's links, parents before children; meshes, which ``find_mesh`` finds, become their convex hulls.
+
+    Visuals are left. Raises the tree's error where a joint has no limits, or a mesh no hull.
+    """
+    holders = {joint.find("child").get("link"): name for name, joint in tree.joints.items()}
+    order = tree.below(tree.roots()[0])
+    return tuple(_link(tree, find_mesh, name, holders.get(name), order) for name in order)
+
+
+def _link(
+    tree: UrdfTree, find_mesh: Callable[[str], Path], name: str, holder: str | None, order: tuple[str, ...]
+) -> Link:
+    element = tree.links[name]
+    shapes = tuple(
+        _shape(tree, find_mesh, collision, f"link {name!r} collision {index}")
+        for index, collision in enumerate(element.findall("collision"))
+    )
+    mass_kg, center_m, inertia = _mass_properties(element)
+    moments, axes = principal_frame(inertia)
+    common = (mass_kg, center_m, moments, axes, shapes)
+    if holder is None:
+        return Link(name, -1, "", "fixed", np.eye(4), np.eye(4), (0.0, 0.0), *common)
+    joint = tree.joints[holder]
+    limits, axis = (-np.inf, np.inf), joint.find("axis")
+    if joint.get("type") in ("revolute", "prismatic"):
+        limit = joint.find("limit")
+        if limit is None or limit.get("lower") is None or limit.get("upper") is None:
+            raise tree.refuse(f"joint {holder!r}", "lacks lower or upper of its <limit>", "give both")
+        limits = float(limit.get("lower")), float(limit.get("upper"))
+    direction = np.zeros(3) if axis is None else values_of(axis, "xyz")
+    if not direction.any():  # without one it is X; a fixed joint may write zeros
+        direction = np.array([1.0, 0, 0])
+    along_axis = transform(rotation_between(np.array([1.0, 0, 0]), direction / np.linalg.norm(direction)))
+    parent = order.index(parent_of(joint))
+    return Link(name, parent, holder, joint.get("type"), origin_of(joint) @ along_axis, along_axis, limits, *common)
+
+
+def _mass_properties(link: etree._Element) -> tuple[float, np.ndarray, np.ndarray]:
+    """Return a link's mass, centre of mass and inertia about it along the link's axes; zeros where it declares none."""
+    declared = inertial_of(link)
+    if declared is None:
+        return 0.0, np.zeros(3), np.zeros((3, 3))
+    mass_kg, pose, tensor = declared
+    assert mass_kg is not None and tensor is not None, "checked when the URDF was read"
+    return mass_kg, pose[:3, 3], pose[:3, :3] @ tensor @ pose[:3, :3].T
+
+
+def _shape(tree: UrdfTree, find_mesh: Callable[[str], Path], collision: etree._Element, where: str) -> LinkShape:
+    pose, shape = origin_of(collision), geometry_of(collision)
+    if shape.tag == "box":
+        return LinkShape(pose, half_extents_m=values_of(shape, "size") / 2)
+    if shape.tag == "sphere":
+        return LinkShape(pose, radius_m=float(shape.get("radius")))
+    if shape.tag == "cylinder":
+        cylinder = trimesh.creation.cylinder(float(shape.get("radius")), float(shape.get("length")), sections=24)
+        return LinkShape(pose, corners_m=np.asarray(cylinder.vertices))
+    hull = _hull(tree, find_mesh(shape.get("filename")), where)
+    return LinkShape(pose, corners_m=hull * values_of(shape, "scale", "1 1 1"))
+
+
+def _hull(tree: UrdfTree, path: Path, where: str) -> np.ndarray:
+    """Return the corners of a mesh's convex hull ``(V, 3)``."""
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        raise tree.refuse(f"the mesh of {where}", f"is {path}", f"valid are {', '.join(MESH_SUFFIXES)}")
+    if path.suffix.lower() == ".dae":
+        read_xml(path, "COLLADA", name=str(path), refusal=tree.error)  # no entities for the library that reads it
+    try:
+        return np.asarray(trimesh.convex.convex_hull(trimesh.load_mesh(path)).vertices)
+    except Exception as error:  # mesh readers raise whatever they stumble over
+        reason = " ".join(str(error).split())[:120]
+        raise tree.refuse(
+            f"the mesh of {where}, {path},", f"has no convex hull ({reason})", "mend or replace it"
+        ) from error
 
 
 @lru_cache(maxsize=16)
 def links_of_urdf(urdf: str) -> tuple[Link, ...]:
     """Return the links of a robot's URDF text, parents first; meshes, named by absolute path, as their convex hulls.
 
-    Raises UsageError where a mesh cannot be read.
+    Raises ConfigError where a mesh cannot be read.
     """
-    with tempfile.TemporaryDirectory(prefix="manitwin_robot_") as folder:
-        path = Path(folder) / "robot.urdf"
-        path.write_text(urdf)
-        try:
-            return read_urdf(path, Path(path.anchor))
-        except UsageError:
-            raise
-        except Exception as error:  # mesh readers raise whatever they stumble over, without the file's name
-            reason = " ".join(str(error).split())[:120]
-            name = _unreadable_mesh(urdf)
-            raise UsageError(f"{name}: no mesh that has a convex hull ({reason}); mend or replace it") from error
+    return links_of(UrdfTree.of_text(urdf), Path)
 
 
-def _unreadable_mesh(urdf: str) -> str:
-    """Return the first collision mesh that has no hull."""
-    meshes = UrdfTree("robot", etree.fromstring(urdf)).collision_meshes()
-    for path in meshes:
-        try:
-            trimesh.convex.convex_hull(trimesh.load_mesh(path))
-        except Exception:  # as above
-            return str(path)
-    return "a collision mesh"
+def link_poses(links: tuple[Link, ...], joints: dict[str, float]) -> np.ndarray:
+    """Return the poses ``(L, 4, 4)`` of all links in the root's frame, at joint angles (rad, or m) by name, else zero."""
+    poses = np.empty((len(links), 4, 4))
+    for index, link in enumerate(links):
+        moved = np.eye(4)
+        value = joints.get(link.joint, 0.0)
+        if link.joint_type == "prismatic":
+            moved[0, 3] = value
+        elif link.joint_type != "fixed":
+            moved[:3, :3] = Rotation.from_rotvec([value, 0, 0]).as_matrix()
+        # rotation axis X of the joint's frame, which the link carries along
+        link_to_parent = link.joint_to_parent @ moved @ np.linalg.inv(link.joint_to_link)
+        poses[index] = link_to_parent if link.parent < 0 else poses[link.parent] @ link_to_parent
+    return poses
 
 
 def poses_at(links: tuple[Link, ...], joints: dict[str, float]) -> dict[str, np.ndarray]:

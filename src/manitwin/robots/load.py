@@ -9,8 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
-from manitwin.errors import UsageError
+from manitwin.errors import ConfigError
 from manitwin.geometry.poses import inverse
+from manitwin.robots.assembly import (
+    SIDES,
+    finger_joint,
+    fix_other_joints,
+    generated_hand,
+    limits_of,
+    mount,
+    palm_link,
+    settle_arm_joints,
+    settle_finger_joints,
+)
 from manitwin.robots.definition import (
     GeneratedHand,
     MergedHand,
@@ -18,16 +29,14 @@ from manitwin.robots.definition import (
     definition_path,
     read_definition,
     shipped_robots,
+    urdf_files,
 )
 from manitwin.robots.disabled_pairs import disabled_pairs
 from manitwin.robots.grippers.gripper import load_gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
-from manitwin.robots.joints import fix_other_joints, limits_of, settle_arm_joints, settle_finger_joints
 from manitwin.robots.links import links_of_urdf, poses_at
-from manitwin.robots.mounted_hand import SIDES, finger_joint, generated_hand, mount, palm_link
 from manitwin.robots.robot import Robot, Workspace
-from manitwin.robots.urdf_files import urdf_files
-from manitwin.robots.urdf_tree import UrdfTree, child_of, parent_of, read_tree
+from manitwin.robots.urdf import UrdfTree, child_of, parent_of, read_urdf
 
 __all__ = ["load_robot", "shipped_robots"]
 
@@ -49,7 +58,7 @@ class _Hand:
 def load_robot(name_or_path: str) -> Robot:
     """Load a robot by its shipped name or from a TOML file.
 
-    Raises UsageError naming the file, what is wrong and what would be valid; Unavailable where the robot's files come with
+    Raises ConfigError naming the file, what is wrong and what would be valid; Unavailable where the robot's files come with
     an extra that is not installed.
     """
     path = definition_path(name_or_path)
@@ -65,10 +74,10 @@ def _load(path: Path) -> Robot:
     definition, sha256 = read_definition(path)
     gripper = _gripper(definition.hand.gripper, path.parent)
     files = urdf_files(definition.urdf, path.parent, definition.name)
-    tree = read_tree(files.urdf)
+    tree = _read_tree(files.urdf)
     tree.keep_below(definition.base_link)
     names_in_files = tree.text()
-    tree.use_meshes(files)
+    tree.use_meshes(files.mesh)
     hand, hand_names_in_files = _mount_hand(tree, definition, gripper, path.parent)
     settle_arm_joints(tree, definition.arm_joints, hand.tip_link, definition.limits_rad)
     settle_finger_joints(tree, hand.finger_joints, gripper.opening_m / 2)
@@ -99,11 +108,20 @@ def _load(path: Path) -> Robot:
     return robot
 
 
+def _read_tree(path: Path) -> UrdfTree:
+    """Read a URDF without its transmissions, plugins and controllers."""
+    tree = read_urdf(path)
+    for element in list(tree.element):
+        if element.tag not in ("link", "joint", "material"):
+            tree.element.remove(element)
+    return tree
+
+
 def _gripper(name: str, folder: Path) -> ParallelGripper:
     if name.endswith(".toml"):
         path = (folder / name).resolve()
         if not path.is_relative_to(folder.resolve()) or not path.is_file():
-            raise UsageError(f"gripper file {name} is not below {folder}; put it there, or name one of the shipped")
+            raise ConfigError(f"gripper file {name} is not below {folder}; put it there, or name one of the shipped")
         return of_kind(load_gripper(str(path)), ParallelGripper)
     return of_kind(load_gripper(name), ParallelGripper)
 
@@ -121,10 +139,10 @@ def _mount_hand(
     names_in_files = ""
     if isinstance(hand, MergedHand):
         files = urdf_files(hand.urdf, folder, definition.name)
-        added = read_tree(files.urdf)
+        added = _read_tree(files.urdf)
         added.keep_below(hand.root_link)
         names_in_files = added.text()
-        added.use_meshes(files)
+        added.use_meshes(files.mesh)
         mount(tree, added, hand.mount_link, hand.root_link, hand.root_to_mount.matrix())
     tree.link(hand.tip_link)
     return _Hand(hand.tip_link, hand.finger_joints, hand.gripper_to_tip.matrix()), names_in_files
@@ -133,7 +151,7 @@ def _mount_hand(
 def _palm(tree: UrdfTree, finger_joints: tuple[str, str]) -> str:
     first, second = (parent_of(tree.joint(name)) for name in finger_joints)
     if first != second:
-        raise UsageError(f"{tree.name}: the fingers hang from {first} and {second}; they must hang from one link")
+        raise ConfigError(f"{tree.name}: the fingers hang from {first} and {second}; they must hang from one link")
     return first
 
 
@@ -141,13 +159,13 @@ def _check_home(tree: UrdfTree, definition: RobotDefinition) -> None:
     for name, value in zip(definition.arm_joints, definition.home_rad, strict=True):
         lower, upper = (float(limits_of(tree, (name,), key)[0]) for key in ("lower", "upper"))
         if not lower <= value <= upper:
-            raise UsageError(
+            raise ConfigError(
                 f"robot {definition.name}: home_rad of {name} is {value:g}; its limits are {lower:g} to {upper:g}"
             )
 
 
 def _check_hand(robot: Robot) -> None:
-    """Raise UsageError where the fingers do not close along X or do not end where the gripper's file says."""
+    """Raise ConfigError where the fingers do not close along X or do not end where the gripper's file says."""
     links = links_of_urdf(robot.urdf)
     poses = poses_at(links, {})
     to_grasp = inverse(poses[robot.tip_link] @ robot.gripper_to_tip)
@@ -156,7 +174,7 @@ def _check_hand(robot: Robot) -> None:
         link = next(link for link in links if link.joint == joint)
         axis = to_grasp[:3, :3] @ poses[link.name][:3, :3] @ link.joint_to_link[:3, 0]
         if abs(sign * axis[0] - 1) > AXIS_TOLERANCE:
-            raise UsageError(
+            raise ConfigError(
                 f"robot {robot.name}: {joint} opens along {axis.round(3).tolist()} of the grasp frame, not along "
                 f"{'+X' if sign > 0 else '-X'}; mend gripper_to_tip or the order of finger_joints"
             )
@@ -165,10 +183,10 @@ def _check_hand(robot: Robot) -> None:
             box = to_grasp @ poses[link.name] @ box_to_link
             furthest_m.append(float(box[2, 3] + np.abs(box[2, :3]) @ half_m))
     if not furthest_m:
-        raise UsageError(f"robot {robot.name}: its fingers have no collision shapes; give them some")
+        raise ConfigError(f"robot {robot.name}: its fingers have no collision shapes; give them some")
     wanted_m = robot.gripper.tip_depth_m + robot.gripper.pad_half_extents_m[1]
     if abs(max(furthest_m) - wanted_m) > TIP_TOLERANCE_M:
-        raise UsageError(
+        raise ConfigError(
             f"robot {robot.name}: its fingers end {max(furthest_m):.4f} m along +Z of the grasp frame, the gripper's at "
             f"{wanted_m:.4f}; mend gripper_to_tip or name another gripper"
         )

@@ -10,13 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset import Asset
 from manitwin.assets.audit.convex_shapes import ConvexShapes
 from manitwin.assets.detect import only_file, robotwin_data
 from manitwin.assets.readers.robotwin_data import FRAME_KEYS, read_json
-from manitwin.formats.xml_file import parse_xml
+from manitwin.formats.xml_file import add, edited_document, new_element, read_xml
 from manitwin.twin.store import write_bytes_atomically
 
 NEARLY = 0.05
@@ -38,7 +37,7 @@ def write_missing_inertial(asset: Asset) -> str:
     if mass is None or not mass > 0 or not len(shapes):
         return "not fixed: it needs a mass above zero and collision shapes"
     file = only_file(asset.path) if asset.path.is_dir() else asset.path
-    root = parse_xml(file, "robot")
+    root = read_xml(file, "robot")
     links = root.findall("link")
     if len(links) != 1:
         return f"not fixed: {len(links)} links, and only the whole object's mass is known"
@@ -48,7 +47,7 @@ def write_missing_inertial(asset: Asset) -> str:
     done = _complete(inertial, asset, shapes, mass)
     if not done:
         return "not fixed: nothing is left out"
-    _replace(file, etree.tostring(root.getroottree(), xml_declaration=True, encoding="utf-8"))
+    _replace(file, edited_document(root))
     return f"{file.name}: wrote {' and '.join(done)} of the collision shapes, evenly filled (the old file: {file.name}.orig)"
 
 
@@ -61,7 +60,7 @@ def _complete(inertial: Any, asset: Asset, shapes: ConvexShapes, mass_kg: float)
     solid = shapes.uniform
     tensor, inertia = asset.inertial.inertia_kg_m2, inertial.find("inertia")
     if inertial.find("origin") is None:
-        origin = etree.Element("origin", xyz=_numbers(solid.center_of_mass_m), rpy="0 0 0")
+        origin = new_element("origin", xyz=_numbers(solid.center_of_mass_m), rpy="0 0 0")
         origin.tail = inertial.text
         inertial.insert(0, origin)
         done.append("the centre of mass")
@@ -69,7 +68,7 @@ def _complete(inertial: Any, asset: Asset, shapes: ConvexShapes, mass_kg: float)
         return []
     if inertia is None or (tensor is not None and np.allclose(tensor, np.eye(3), atol=1e-9)):
         if inertia is None:
-            inertia = etree.SubElement(inertial, "inertia")
+            inertia = add(inertial, "inertia")
             inertia.tail = inertial.tail
         for name, row, column in _MOMENTS:
             inertia.set(name, repr(float(mass_kg * solid.inertia_per_kg_m2[row, column])))

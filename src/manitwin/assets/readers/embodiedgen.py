@@ -9,9 +9,9 @@ import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset import Asset, Contact
-from manitwin.assets.readers.urdf import UrdfTree, asset_of, open_urdf
-from manitwin.assets.readers.urdf_contact import gazebo_friction
-from manitwin.formats.xml_file import number, origin_of, text_of
+from manitwin.assets.readers.urdf import UrdfObject, asset_of, gazebo_friction, open_urdf
+from manitwin.formats.xml_file import number, text_of
+from manitwin.robots.urdf import origin_of
 
 _RANGES = (("mass", "kg"), ("height", "m"))
 _FAILED = (1.0, 1.0, 1.0, 1.0)  # what URDFGenerator writes for mass and height where its model did not answer
@@ -26,43 +26,43 @@ def read(path: Path) -> Asset:
     visual's origin (older versions) the mesh's Y axis is up.
     Source: embodied_gen/validators/urdf_convertor.py of HorizonRobotics/EmbodiedGen.
     """
-    tree = open_urdf(path)
-    asset = asset_of(tree, path, contact=_contact(tree))
-    info = tree.robot.find(".//extra_info")
+    found = open_urdf(path)
+    asset = asset_of(found, path, contact=_contact(found))
+    info = found.tree.element.find(".//extra_info")
     remarks = list(asset.remarks)
     up = asset.up
-    if not _is_turned(tree):
+    if not _is_turned(found):
         up = "y"
         remarks.append("its mesh is not turned upright, as older versions leave it: the Y axis is up")
-    remarks += _quality(tree.robot)
+    remarks += _quality(found.tree.element)
     category: str | None = None
     captions: tuple[str, ...] = ()
     if info is not None:
         category = _said(text_of(info, "category"))
         description = _said(text_of(info, "description"))
         captions = () if description is None else (description,)
-        remarks += _ranges(tree, info)
-        remarks += _height(tree, info, asset, "yz".index(up) + 1)
+        remarks += _ranges(found, info)
+        remarks += _height(found, info, asset, "yz".index(up) + 1)
     return replace(asset, format="embodiedgen", up=up, category=category, captions=captions, remarks=tuple(remarks))
 
 
-def _contact(tree: UrdfTree) -> Contact:
-    gazebo = gazebo_friction(tree.file, tree.robot, [link for link, _ in tree.links])
+def _contact(found: UrdfObject) -> Contact:
+    gazebo = gazebo_friction(found)
     return Contact() if gazebo is None else Contact(gazebo[0], gazebo[1])
 
 
-def _is_turned(tree: UrdfTree) -> bool:
-    visuals = [visual for link, _ in tree.links for visual in link.findall("visual")]
-    return any(not np.allclose(origin_of(visual, tree.file.name)[:3, :3], np.eye(3)) for visual in visuals)
+def _is_turned(found: UrdfObject) -> bool:
+    visuals = [visual for link, _ in found.links for visual in link.findall("visual")]
+    return any(not np.allclose(origin_of(visual)[:3, :3], np.eye(3)) for visual in visuals)
 
 
-def _ranges(tree: UrdfTree, info: etree._Element) -> list[str]:
+def _ranges(found: UrdfObject, info: etree._Element) -> list[str]:
     """Return what the annotator answered as intervals; a failed answer leaves one metre and one kilogram."""
     remarks, values = [], []
     for quantity, unit in _RANGES:
         low, high = (info.find(f"{bound}_{quantity}") for bound in ("min", "max"))
         if low is not None and high is not None:
-            pair = [number(text_of(e, "."), f"{tree.file.name}: {e.tag}") for e in (low, high)]
+            pair = [number(text_of(e, "."), f"{found.file.name}: {e.tag}") for e in (low, high)]
             values += pair
             remarks.append(f"its annotator said {quantity} {pair[0]:g} to {pair[1]:g} {unit}")
     if tuple(values) == _FAILED:
@@ -70,11 +70,11 @@ def _ranges(tree: UrdfTree, info: etree._Element) -> list[str]:
     return remarks
 
 
-def _height(tree: UrdfTree, info: etree._Element, asset: Asset, axis: int) -> list[str]:
+def _height(found: UrdfObject, info: etree._Element, asset: Asset, axis: int) -> list[str]:
     element = info.find("real_height")
     if element is None or not asset.visual:
         return []
-    said = number(text_of(element, "."), f"{tree.file.name}: real_height")
+    said = number(text_of(element, "."), f"{found.file.name}: real_height")
     points = np.concatenate([part.vertices for part in asset.visual])
     height_m = float(np.ptp(points[:, axis]))
     if said > 0 and abs(height_m / said - 1) > _HEIGHT_OFF:

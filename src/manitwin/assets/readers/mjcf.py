@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.assets.asset import Asset, Contact, Inertial
+from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.readers.mjcf_shapes import BodyShapes
 from manitwin.assets.readers.mjcf_source import MjcfSource, open_mjcf
 from manitwin.assets.readers.mjcf_spec import compiled
-from manitwin.assets.readers.urdf_inertial import combined
 from manitwin.errors import AssetError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
@@ -90,7 +89,7 @@ def _declared_inertial(
     massive = [(index, pose) for index, pose in bodies if model.body_mass[index] > 0]
     explicit = [index for index, _ in bodies if by_index[index].explicitinertial and not forced]
     if explicit and all(index in explicit for index, _ in massive):
-        return combined([_inertial(model, index, pose) for index, pose in bodies if index in explicit])
+        return combined_inertial([_inertial(model, index, pose) for index, pose in bodies if index in explicit])
     if explicit or not source.writes(("mass", "density")):
         return Inertial()
     files.remark("its mass follows from a mass or density written for its geoms; centre and inertia are MuJoCo's own")

@@ -10,7 +10,7 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.errors import AssetError
-from manitwin.formats.xml_file import MAX_NUMBER, comments_before, parse_xml
+from manitwin.formats.xml_file import MAX_NUMBER, comments_before, read_xml
 
 _SECTIONS = frozenset({"compiler", "default", "asset", "worldbody"})
 _ASSETS = frozenset({"mesh", "material", "texture"})
@@ -39,7 +39,7 @@ class MjcfSource:
 
 def open_mjcf(file: Path, files: AssetFiles) -> MjcfSource:
     """Parse an MJCF file and put its includes in; raises AssetError for what is broken or not read."""
-    root = parse_xml(file, "mujoco")
+    root = read_xml(file, "mujoco")
     comments = comments_before(root)
     _put_in_includes(file, root, files)
     if sum(1 for _ in root.iter()) > _MAX_ELEMENTS:
@@ -71,7 +71,7 @@ def _put_in_includes(file: Path, root: etree._Element, files: AssetFiles) -> Non
             raise AssetError(f"{file.name}: includes {name[:80]!r} twice, or too many files")
         done.add(found)
         tag = "mujocoinclude" if b"<mujocoinclude" in found.read_bytes()[:65536] else "mujoco"
-        included = parse_xml(found, tag)
+        included = read_xml(found, tag)
         parent, position = include.getparent(), include.getparent().index(include)
         parent.remove(include)
         for offset, child in enumerate(list(included)):

@@ -9,7 +9,6 @@ from typing import Any
 import mujoco
 import numpy as np
 import trimesh
-from lxml import etree  # type: ignore[import-untyped]
 from PIL import Image
 
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles, joined
@@ -17,6 +16,7 @@ from manitwin.assets.readers.mjcf_source import MjcfSource
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, decode_texture
+from manitwin.formats.xml_file import xml_text
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
@@ -42,7 +42,7 @@ def compiled(source: MjcfSource, files: AssetFiles) -> CompiledMjcf:
     """
     name = source.file.name
     try:
-        spec = mujoco.MjSpec.from_string(etree.tostring(source.root, encoding="unicode"))
+        spec = mujoco.MjSpec.from_string(xml_text(source.root))
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         raise AssetError(f"{name}: MuJoCo cannot read it: {_line(error)}") from error
     spec.compiler.fusestatic = False  # both would take away bodies and geoms that the file has

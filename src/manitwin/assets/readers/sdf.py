@@ -8,15 +8,14 @@ from pathlib import Path
 import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.asset import Asset, Contact, Inertial
+from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.readers.sdf_poses import ModelFrames, pose_of
 from manitwin.assets.readers.sdf_shapes import SdfShapes
-from manitwin.assets.readers.urdf_inertial import combined
 from manitwin.errors import AssetError
-from manitwin.formats.xml_file import comments_before, number, parse_xml, text_of
+from manitwin.formats.xml_file import comments_before, number, read_xml, text_of
 
 MAIN_FILE, CONFIG_FILE = "model.sdf", "model.config"
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -51,11 +50,11 @@ def open_sdf(path: Path) -> SdfModel:
     file = path
     if path.is_dir():
         file = path / MAIN_FILE if (path / MAIN_FILE).is_file() else only_file(path)
-    root = parse_xml(file, "sdf")
+    root = read_xml(file, "sdf")
     files = AssetFiles(file.parent)
     files.used.add(file.resolve())
     config = file.parent / CONFIG_FILE
-    beside = parse_xml(config, "model") if config.is_file() else None
+    beside = read_xml(config, "model") if config.is_file() else None
     if beside is not None:
         files.used.add(config.resolve())
     model = _only_model(file, root, files)
@@ -137,7 +136,7 @@ def _rigid_links(
 def _declared_inertial(opened: SdfModel) -> Inertial:
     found = [_of_link(opened, link) for link in opened.links if link.find("inertial") is not None]
     with_mass = [entry for entry in found if entry.mass_kg is not None]
-    return combined(with_mass) if with_mass else found[0] if found else Inertial()
+    return combined_inertial(with_mass) if with_mass else found[0] if found else Inertial()
 
 
 def _of_link(opened: SdfModel, link: etree._Element) -> Inertial:

@@ -8,23 +8,38 @@ from pathlib import Path
 import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.asset import Asset, Contact
+from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence
-from manitwin.assets.readers.urdf_contact import declared_contact
-from manitwin.assets.readers.urdf_inertial import declared_inertial
 from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.errors import AssetError
-from manitwin.formats.xml_file import comments_before, origin_of, parse_xml
+from manitwin.formats.xml_file import comments_before, number
+from manitwin.robots.urdf import (
+    JOINT_TYPES,
+    UrdfRules,
+    UrdfTree,
+    child_of,
+    inertial_of,
+    origin_of,
+    parent_of,
+    read_urdf,
+)
+
+RULES = UrdfRules(
+    error=AssetError,
+    joint_types=(*JOINT_TYPES, "floating", "planar"),
+    geometries=("box", "capsule", "cylinder", "mesh", "sphere"),
+    simulated=False,
+)
 
 
 @dataclass(frozen=True)
-class UrdfTree:
-    """A URDF with the links of the object that is read, each with its pose in the first one's frame."""
+class UrdfObject:
+    """The object in a URDF that is read: its links, each with its pose in the first one's frame."""
 
     file: Path
-    robot: etree._Element
+    tree: UrdfTree
     links: tuple[tuple[etree._Element, np.ndarray], ...]
     files: AssetFiles
 
@@ -39,39 +54,98 @@ def read(path: Path) -> Asset:
     return asset_of(open_urdf(path), path)
 
 
-def open_urdf(path: Path) -> UrdfTree:
+def open_urdf(path: Path) -> UrdfObject:
     """Parse a URDF and choose the object in it; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
-    robot = parse_xml(file, "robot")
+    tree = read_urdf(file, RULES, file.name)
     files = AssetFiles(path if path.is_dir() else _package_of(file))
     files.used.add(file.resolve())
-    return UrdfTree(file, robot, _rigid_links(file, robot, files), files)
+    return UrdfObject(file, tree, _rigid_links(tree, files), files)
 
 
-def asset_of(tree: UrdfTree, path: Path, contact: Contact | None = None) -> Asset:
+def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> Asset:
     """Return the asset that a URDF's elements describe; ``contact`` stands in for what they say of friction."""
-    shapes = LinkShapes(tree.file, tree.robot, tree.files)
-    visual = [part for link, pose in tree.links for part in shapes.visual(link, pose)]
-    collision = [shape for link, pose in tree.links for shape in shapes.collision(link, pose)]
-    if not visual and not collision and not tree.files.missing:
-        raise AssetError(f"{tree.file.name}: no link of it has a shape")
-    licence, attribution = stated_licence(comments_before(tree.robot))
+    shapes = LinkShapes(found.tree, found.file, found.files)
+    visual = [part for link, pose in found.links for part in shapes.visual(link, pose)]
+    collision = [shape for link, pose in found.links for shape in shapes.collision(link, pose)]
+    if not visual and not collision and not found.files.missing:
+        raise found.tree.refuse("", "no link of it has a shape", "give it a visual or a collision shape")
+    licence, attribution = stated_licence(comments_before(found.tree.element))
     return Asset(
         format="urdf",
         path=path,
-        name=tree.robot.get("name") or tree.file.stem,
+        name=found.tree.element.get("name") or found.file.stem,
         visual=tuple(visual),
         collision=tuple(collision),
         up="z",
         unit_m=1.0,
-        inertial=declared_inertial(tree.file, tree.links),
-        contact=contact or declared_contact(tree.file, tree.robot, [link for link, _ in tree.links], tree.files),
+        inertial=declared_inertial(found.links),
+        contact=contact or _declared_contact(found),
         license=licence,
         attribution=attribution,
-        files=tree.files.sorted_files(),
-        missing_files=tree.files.missing_names(),
-        remarks=tuple(tree.files.remarks),
+        files=found.files.sorted_files(),
+        missing_files=found.files.missing_names(),
+        remarks=tuple(found.files.remarks),
     )
+
+
+def declared_inertial(links: tuple[tuple[etree._Element, np.ndarray], ...]) -> Inertial:
+    """Return the mass, the centre of mass and the inertia about it of links with their poses, as declared.
+
+    Links without <inertial> count nothing; the inertia is None where one with a mass gives none.
+    """
+    found = []
+    for link, link_to_asset in links:
+        declared = inertial_of(link)
+        if declared is not None:
+            mass_kg, inertial_to_link, tensor = declared
+            pose = link_to_asset @ inertial_to_link
+            turned = None if tensor is None else pose[:3, :3] @ tensor @ pose[:3, :3].T
+            found.append(Inertial(mass_kg, pose[:3, 3], turned))
+    with_mass = [entry for entry in found if entry.mass_kg is not None]
+    if not with_mass:
+        return found[0] if found else Inertial()
+    return combined_inertial(with_mass)
+
+
+def _declared_contact(found: UrdfObject) -> Contact:
+    """Return the first of PyBullet's <contact>, a <gazebo> in a collision, and a <gazebo reference>.
+
+    PyBullet's lateral_friction is the one coefficient of a body, sticking or sliding. Gazebo's mu1 and mu2 are two
+    directions of one coefficient (SDF specification, friction/ode): the first is taken, with a remark where they differ.
+    """
+    for link, _ in found.links:
+        contact = link.find("contact")
+        if contact is not None:
+            friction, restitution = (_value(found, contact.find(tag)) for tag in ("lateral_friction", "restitution"))
+            return Contact(friction, friction, restitution)
+    gazebo = gazebo_friction(found)
+    if gazebo is None:
+        return Contact()
+    first, second = gazebo
+    if second is not None and second != first:
+        found.files.remark(f"mu1 {first} and mu2 {second} are two directions in Gazebo; the first was taken")
+    return Contact(first, None)
+
+
+def gazebo_friction(found: UrdfObject) -> tuple[float, float | None] | None:
+    """Return mu1 and mu2 of the first <gazebo> of the object's links that has mu1, None where none has."""
+    names = {link.get("name") for link, _ in found.links}
+    inside = [element for link, _ in found.links for element in link.iter("gazebo")]
+    beside = [element for element in found.tree.element.findall("gazebo") if element.get("reference") in names]
+    for element in [*inside, *beside]:
+        first = element.find("mu1")
+        if first is not None:
+            second = element.find("mu2")
+            return (
+                number(first.text, f"{found.file.name}: mu1"),
+                None if second is None else number(second.text, f"{found.file.name}: mu2"),
+            )
+    return None
+
+
+def _value(found: UrdfObject, element: etree._Element | None) -> float | None:
+    return None if element is None else number(element.get("value"), f"{found.file.name}: {element.tag}")
 
 
 def _package_of(file: Path) -> Path:
@@ -82,40 +156,29 @@ def _package_of(file: Path) -> Path:
     return folder
 
 
-def _rigid_links(file: Path, robot: etree._Element, files: AssetFiles) -> tuple[tuple[etree._Element, np.ndarray], ...]:
+def _rigid_links(tree: UrdfTree, files: AssetFiles) -> tuple[tuple[etree._Element, np.ndarray], ...]:
     """Return the links of the first rigid group that has a shape, with their poses in the group's first link."""
-    links = {link.get("name"): link for link in robot.findall("link")}
-    if not links:
-        raise AssetError(f"{file.name}: it has no <link>")
-    children: dict[str, list[tuple[str, str, np.ndarray]]] = {name: [] for name in links}
-    held: dict[str, str] = {}
-    for joint in robot.findall("joint"):
-        ends = [joint.find(tag) for tag in ("parent", "child")]
-        parent, child = ("" if end is None else end.get("link", "") for end in ends)
-        if parent not in links or child not in links or child in held:
-            raise AssetError(
-                f"{file.name}: joint {joint.get('name')!r} joins no two of its links, or a link that has a parent already"
-            )
-        kind = joint.get("type") or ""
-        held[child] = f"{joint.get('name')} ({kind})"
-        children[parent].append((child, kind, origin_of(joint, f"{file.name}: joint {joint.get('name')}")))
+    links, heads = tree.links, tree.roots()
+    held = {child_of(joint): joint for joint in tree.joints.values()}
+    children: dict[str, list[str]] = {name: [] for name in links}
+    for child, joint in held.items():
+        children[parent_of(joint)].append(child)
     groups: list[list[tuple[str, np.ndarray]]] = []
-    heads = [name for name in links if name not in held]
     for head in heads:  # grows by the links behind joints that move
         group = [(head, np.eye(4))]
         for name, pose in group:
-            for child, kind, child_to_parent in children[name]:
-                if kind == "fixed":
-                    group.append((child, pose @ child_to_parent))
+            for child in children[name]:
+                if held[child].get("type") == "fixed":
+                    group.append((child, pose @ origin_of(held[child])))
                 else:
                     heads.append(child)
         groups.append(group)
-    if sum(len(group) for group in groups) < len(links):
-        raise AssetError(f"{file.name}: its joints go in a circle")
     shaped = [group for group in groups if any(_has_shape(links[name]) for name, _ in group)]
     for group in shaped[1:]:
-        joint_name = held.get(group[0][0])
-        how = f"moves by joint {joint_name}" if joint_name else "is joined to nothing"
+        holder = held.get(group[0][0])
+        how = "is joined to nothing"
+        if holder is not None:
+            how = f"moves by joint {holder.get('name')} ({holder.get('type')})"
         files.remark(f"link {group[0][0]!r} {how} and was left out: one rigid object is read")
     chosen = shaped[0] if shaped else groups[0]
     return tuple((links[name], pose) for name, pose in chosen)

@@ -12,9 +12,8 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import AssetFiles, joined
-from manitwin.errors import AssetError
 from manitwin.formats.meshes.textures import bake_transform, make_part, pbr_material, srgb_to_linear
-from manitwin.formats.xml_file import number, numbers, origin_of
+from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
 _PACKAGE = "package://"
 _BARE_MESHES = (".stl",)  # a mesh that has a colour of its own keeps it
@@ -23,22 +22,18 @@ _BARE_MESHES = (".stl",)  # a mesh that has a colour of its own keeps it
 class LinkShapes:
     """Reads shapes of the links of one URDF."""
 
-    def __init__(self, file: Path, robot: etree._Element, files: AssetFiles):
-        self._file, self._files = file, files
-        self._colors = {
-            material.get("name"): color
-            for material in robot.iter("material")
-            if (color := self._rgba(material)) is not None
-        }
+    def __init__(self, tree: UrdfTree, file: Path, files: AssetFiles):
+        self._tree, self._file, self._files = tree, file, files
+        materials = [*tree.element.findall("material"), *tree.element.iterfind("link/visual/material")]
+        self._colors = {each.get("name"): color for each in materials if (color := _rgba(each)) is not None}
 
     def visual(self, link: etree._Element, link_to_asset: np.ndarray) -> Iterator[trimesh.Trimesh]:
         """Yield a link's visual parts in the asset's axes."""
         for index, element in enumerate(link.findall("visual")):
-            what = f"{self._file.name}: link {link.get('name')} visual {index}"
-            color = self._color(element)
-            for part in self._parts(element, what, color):
+            to_asset = link_to_asset @ origin_of(element) @ _scale(element)
+            for part in self._parts(element, f"link {link.get('name')!r} visual {index}", self._color(element)):
                 part.metadata["name"] = str(part.metadata["name"])
-                yield bake_transform(part, link_to_asset @ origin_of(element, what) @ self._scale(element, what))
+                yield bake_transform(part, to_asset)
 
     def collision(self, link: etree._Element, link_to_asset: np.ndarray) -> Iterator[CollisionShape]:
         """Yield a link's collision shapes in the asset's axes.
@@ -46,19 +41,22 @@ class LinkShapes:
         A mesh counts as its convex hull: PyBullet, SAPIEN and MuJoCo take it so unless they are told otherwise.
         """
         for index, element in enumerate(link.findall("collision")):
-            what = f"{self._file.name}: link {link.get('name')} collision {index}"
-            to_asset = link_to_asset @ origin_of(element, what) @ self._scale(element, what)
-            parts = [bake_transform(part, to_asset) for part in self._parts(element, what, None)]
+            to_asset = link_to_asset @ origin_of(element) @ _scale(element)
+            where = f"link {link.get('name')!r} collision {index}"
+            parts = [bake_transform(part, to_asset) for part in self._parts(element, where, None)]
             if parts:
                 vertices, faces = joined(parts)
                 name = element.get("name") or f"{link.get('name')}_{index:02d}"
                 yield CollisionShape(name, vertices, faces, convex=True, file=self._mesh_file(element))
 
-    def _parts(self, element: etree._Element, what: str, color: np.ndarray | None) -> list[trimesh.Trimesh]:
-        shape = _shape(element, what)
+    def _parts(self, element: etree._Element, where: str, color: np.ndarray | None) -> list[trimesh.Trimesh]:
+        shape = geometry_of(element)
         if shape.tag == "mesh":
             return self._mesh_parts(shape, color)
-        solid = _primitive(shape, what)
+        for key in ("size", "radius", "length"):
+            if not all(values_of(shape, key) > 0):
+                raise self._tree.refuse(where, f"has <{shape.tag} {key}={shape.get(key)!r}>, not above zero", "mend it")
+        solid = _primitive(shape)
         self._files.count(len(solid.faces))
         return [make_part(solid.vertices, solid.faces, material=plain_material(color), name=str(shape.tag))]
 
@@ -96,57 +94,32 @@ class LinkShapes:
         paths = [path.resolve() for path in self._candidates(shape.get("filename") or "")]
         return next((path for path in paths if path in self._files.used), None)
 
-    @staticmethod
-    def _scale(element: etree._Element, what: str) -> np.ndarray:
-        mesh = element.find("geometry/mesh")
-        scale = None if mesh is None else mesh.get("scale")
-        return np.eye(4) if scale is None else np.diag([*_scale_numbers(scale, what), 1.0])
-
     def _color(self, element: etree._Element) -> np.ndarray | None:
         material = element.find("material")
         if material is None:
             return None
-        own = self._rgba(material)
+        own = _rgba(material)
         return own if own is not None else self._colors.get(material.get("name"))
 
-    def _rgba(self, material: etree._Element) -> np.ndarray | None:
-        color = material.find("color")
-        if color is None:
-            return None
-        return numbers(color.get("rgba"), 4, f"{self._file.name}: material {material.get('name')}")
+
+def _scale(element: etree._Element) -> np.ndarray:
+    """Return a mesh's scale as a transform ``(4, 4)``; older exporters write one factor."""
+    mesh = element.find("geometry/mesh")
+    return np.eye(4) if mesh is None else np.diag([*(np.ones(3) * values_of(mesh, "scale", "1")), 1.0])
 
 
-def _shape(element: etree._Element, what: str) -> etree._Element:
-    geometry = element.find("geometry")
-    shapes = [] if geometry is None else list(geometry.iterchildren(tag="*"))
-    if len(shapes) != 1:
-        raise AssetError(f"{what}: its <geometry> holds {len(shapes)} shapes, not one")
-    return shapes[0]
+def _rgba(material: etree._Element) -> np.ndarray | None:
+    color = material.find("color")
+    return None if color is None else values_of(color, "rgba")
 
 
-def _primitive(shape: etree._Element, what: str) -> trimesh.Trimesh:
+def _primitive(shape: etree._Element) -> trimesh.Trimesh:
     if shape.tag == "box":
-        size = numbers(shape.get("size"), 3, f"{what} size")
-        return primitives.box(np.array([_positive(str(side), f"{what} size") for side in size]))
+        return primitives.box(values_of(shape, "size"))
     if shape.tag == "sphere":
-        return primitives.sphere(_positive(shape.get("radius"), f"{what} radius"))
-    if shape.tag in ("cylinder", "capsule"):
-        build = primitives.cylinder if shape.tag == "cylinder" else primitives.capsule
-        return build(_positive(shape.get("radius"), f"{what} radius"), _positive(shape.get("length"), f"{what} length"))
-    raise AssetError(f"{what}: shape <{shape.tag}> is unknown; valid: box, capsule, cylinder, mesh, sphere")
-
-
-def _positive(text: str | None, what: str) -> float:
-    value = number(text, what)
-    if value <= 0:
-        raise AssetError(f"{what}: {value} is not above zero")
-    return value
-
-
-def _scale_numbers(text: str, what: str) -> np.ndarray:
-    if len(text.split()) == 1:  # older exporters write one factor
-        return np.repeat(numbers(text, 1, f"{what} scale"), 3)
-    return numbers(text, 3, f"{what} scale")
+        return primitives.sphere(float(shape.get("radius")))
+    build = primitives.cylinder if shape.tag == "cylinder" else primitives.capsule
+    return build(float(shape.get("radius")), float(shape.get("length")))
 
 
 def plain_material(rgba: np.ndarray | None) -> trimesh.visual.material.PBRMaterial:

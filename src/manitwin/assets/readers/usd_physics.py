@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 from pxr import Sdf, Usd, UsdPhysics, UsdShade
 
-from manitwin.assets.asset import Contact, Inertial
-from manitwin.assets.readers.urdf_inertial import combined
+from manitwin.assets.asset import Contact, Inertial, combined_inertial
 from manitwin.assets.readers.usd_shapes import StageShapes
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshSource
@@ -38,7 +37,7 @@ def declared_inertial(stage: Usd.Stage, shapes: StageShapes, unit_m: float, sour
         elif body.inertia_kg_m2 is not None or body.center_of_mass_m is not None:
             source.find(f"{prim.GetName()} has a centre of mass or an inertia and no mass")
     _remark_bodies(shapes, with_mass, bodies, source)
-    return combined(bodies) if bodies else Inertial()
+    return combined_inertial(bodies) if bodies else Inertial()
 
 
 def declared_contact(shapes: StageShapes, source: MeshSource) -> Contact:

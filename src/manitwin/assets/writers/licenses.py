@@ -5,15 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from manitwin.errors import ExportError, UsageError
+from manitwin.formats.markdown import one_line
 from manitwin.twin.record import TwinRecord
 
 LICENSE_FILE = "LICENSE.txt"
 UNKNOWN = "unknown"
-
-
-def one_line(text: str) -> str:
-    """Return text as one printable line: what is not printable (controls, lone surrogates, line breaks) becomes a space."""
-    return " ".join("".join(c if c.isprintable() else " " for c in text).split())
 
 
 def license_of(record: TwinRecord) -> str:

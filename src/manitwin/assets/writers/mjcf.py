@@ -16,7 +16,7 @@ from manitwin.assets.writers.inertial import inertial_of
 from manitwin.assets.writers.licenses import provenance_lines
 from manitwin.assets.writers.mesh_files import VisualPart, hull_files, lost_maps, visual_parts
 from manitwin.assets.writers.physics_json import PHYSICS_FILE, physics_file
-from manitwin.assets.writers.xml_document import add, document, numbers
+from manitwin.formats.xml_file import add, document, new_element, number_text
 from manitwin.physics.mujoco.body import ROLLING_FRICTION_M, TORSIONAL_FRICTION_M
 
 ASSETS = "assets"
@@ -30,7 +30,7 @@ def export(twin: TwinContent) -> Exported:
     parts = visual_parts(twin, ASSETS)
     kept = [part for part in parts if part.places >= MIN_VERTICES]
     hulls = hull_files(twin, ASSETS)
-    root = etree.Element("mujoco", model=twin.name)
+    root = new_element("mujoco", model=twin.name)
     _add_assets(root, kept, list(hulls))
     _add_body(root, twin, kept, list(hulls))
     files = {f"{twin.name}.xml": document(root, provenance_lines(twin.record)), PHYSICS_FILE: physics_file(twin)}
@@ -53,9 +53,9 @@ def _add_assets(root: etree._Element, parts: list[VisualPart], hulls: list[str])
     asset = add(root, "asset")
     for part in parts:
         material = {
-            "rgba": numbers(*part.rgba),
-            "metallic": numbers(part.metallic),
-            "roughness": numbers(part.roughness),
+            "rgba": number_text(*part.rgba),
+            "metallic": number_text(part.metallic),
+            "roughness": number_text(part.roughness),
         }
         if part.texture is not None:
             add(asset, "texture", type="2d", name=part.name, file=part.texture)
@@ -75,16 +75,16 @@ def _add_body(root: etree._Element, twin: TwinContent, parts: list[VisualPart], 
     add(
         body,
         "inertial",
-        pos=numbers(*inertial.center_of_mass_m),
-        mass=numbers(inertial.mass_kg),
-        fullinertia=numbers(*(tensor[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))),
+        pos=number_text(*inertial.center_of_mass_m),
+        mass=number_text(inertial.mass_kg),
+        fullinertia=number_text(*(tensor[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))),
     )
     for part in parts:
         add(
             body, "geom", name=part.name, type="mesh", mesh=part.name, material=part.name, group=VISUAL_GROUP,
             contype="0", conaffinity="0", mass="0",
         )  # fmt: skip
-    friction = numbers(twin.physical.friction_static.value, TORSIONAL_FRICTION_M, ROLLING_FRICTION_M)
+    friction = number_text(twin.physical.friction_static.value, TORSIONAL_FRICTION_M, ROLLING_FRICTION_M)
     for hull in (PurePosixPath(each).stem for each in hulls):
         add(
             body, "geom", name=hull, type="mesh", mesh=hull, group=COLLISION_GROUP,

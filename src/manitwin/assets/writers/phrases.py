@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from manitwin.assets.writers.licenses import one_line
 from manitwin.errors import ExportError
+from manitwin.formats.markdown import one_line
 from manitwin.twin.record import Language
 
 _MAX_WORDS = 20

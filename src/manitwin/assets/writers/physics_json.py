@@ -6,7 +6,8 @@ from typing import Any
 
 from manitwin.assets.writers.content import TwinContent
 from manitwin.assets.writers.inertial import inertial_of
-from manitwin.assets.writers.licenses import license_of, one_line
+from manitwin.assets.writers.licenses import license_of
+from manitwin.formats.markdown import one_line
 from manitwin.twin.store import canonical_json
 
 PHYSICS_FILE = "physics.json"

@@ -13,10 +13,11 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets.writers.content import TwinContent
 from manitwin.assets.writers.exporter import Exported
 from manitwin.assets.writers.inertial import Inertial, inertial_of
-from manitwin.assets.writers.licenses import UNKNOWN, license_of, one_line, provenance_lines
+from manitwin.assets.writers.licenses import UNKNOWN, license_of, provenance_lines
 from manitwin.assets.writers.mesh_files import hull_files, lost_maps, visual_parts
 from manitwin.assets.writers.physics_json import PHYSICS_FILE, physics_file
-from manitwin.assets.writers.xml_document import add, document, numbers
+from manitwin.formats.markdown import one_line
+from manitwin.formats.xml_file import add, document, new_element, number_text
 
 VERSION = "1.9"
 MESHES = "meshes"
@@ -28,7 +29,7 @@ FRICTION = {"ode": ("mu", "mu2"), "bullet": ("friction", "friction2")}  # DART t
 def export(twin: TwinContent) -> Exported:
     """Write a twin as a Gazebo model. Raises ExportError for mass properties that no rigid body has."""
     parts, hulls = visual_parts(twin, MESHES), hull_files(twin, MESHES)
-    root = etree.Element("sdf", version=VERSION)
+    root = new_element("sdf", version=VERSION)
     model = add(root, "model", name=twin.name)
     link = add(model, "link", name=twin.name)
     _add_inertial(link, inertial_of(twin))
@@ -37,7 +38,7 @@ def export(twin: TwinContent) -> Exported:
         if part.texture is None:
             material = add(visual, "material")
             for tag in ("ambient", "diffuse"):
-                add(material, tag, numbers(*part.rgba))
+                add(material, tag, number_text(*part.rgba))
     for hull in hulls:
         _add_surface(_add_shape(link, "collision", hull), twin)
     files = {
@@ -61,12 +62,12 @@ def export(twin: TwinContent) -> Exported:
 
 def _add_inertial(link: etree._Element, inertial: Inertial) -> None:
     element = add(link, "inertial")
-    add(element, "pose", f"{numbers(*inertial.center_of_mass_m)} 0 0 0")
-    add(element, "mass", numbers(inertial.mass_kg))
+    add(element, "pose", f"{number_text(*inertial.center_of_mass_m)} 0 0 0")
+    add(element, "mass", number_text(inertial.mass_kg))
     tensor = add(element, "inertia")
     for i in range(3):
         for j in range(i, 3):
-            add(tensor, f"i{'xyz'[i]}{'xyz'[j]}", numbers(inertial.inertia_kg_m2[i, j]))
+            add(tensor, f"i{'xyz'[i]}{'xyz'[j]}", number_text(inertial.inertia_kg_m2[i, j]))
 
 
 def _add_shape(link: etree._Element, tag: str, mesh: str) -> etree._Element:
@@ -83,16 +84,16 @@ def _add_surface(collision: etree._Element, twin: TwinContent) -> None:
     for engine, tags in FRICTION.items():
         element = add(engines, engine)
         for tag in tags:
-            add(element, tag, numbers(friction))
+            add(element, tag, number_text(friction))
     bounce = add(surface, "bounce")
-    add(bounce, "restitution_coefficient", numbers(twin.physical.restitution.value))
-    add(bounce, "threshold", numbers(BOUNCE_THRESHOLD_M_S))
+    add(bounce, "restitution_coefficient", number_text(twin.physical.restitution.value))
+    add(bounce, "threshold", number_text(BOUNCE_THRESHOLD_M_S))
 
 
 def _model_config(twin: TwinContent) -> bytes:
     record = twin.record
     words = record.language.caption if record.language is not None else record.name or twin.name
-    root = etree.Element("model")
+    root = new_element("model")
     add(root, "name", twin.name)
     add(root, "version", "1.0")
     add(root, "sdf", "model.sdf", version=VERSION)

@@ -16,7 +16,7 @@ from manitwin.assets.writers.inertial import Inertial, inertial_of
 from manitwin.assets.writers.licenses import provenance_lines
 from manitwin.assets.writers.mesh_files import hull_files, lost_maps, visual_parts
 from manitwin.assets.writers.physics_json import PHYSICS_FILE, physics_file
-from manitwin.assets.writers.xml_document import add, document, numbers
+from manitwin.formats.xml_file import add, document, new_element, number_text
 
 MESHES = "meshes"
 
@@ -24,7 +24,7 @@ MESHES = "meshes"
 def export(twin: TwinContent) -> Exported:
     """Write a twin as URDF with meshes beside it. Raises ExportError for mass properties that no rigid body has."""
     parts, hulls = visual_parts(twin, MESHES), hull_files(twin, MESHES)
-    root = etree.Element("robot", name=twin.name)
+    root = new_element("robot", name=twin.name)
     link = add(root, "link", name=twin.name)
     _add_inertial(link, inertial_of(twin))
     for part in parts:
@@ -32,12 +32,12 @@ def export(twin: TwinContent) -> Exported:
         if (
             part.texture is None
         ):  # where there is a texture in the mesh's own material, SAPIEN would drop it for this one
-            add(add(visual, "material", name=part.name), "color", rgba=numbers(*part.rgba))
+            add(add(visual, "material", name=part.name), "color", rgba=number_text(*part.rgba))
     for hull in hulls:
         _add_shape(link, "collision", hull)
     contact = add(link, "contact")
-    add(contact, "lateral_friction", value=numbers(twin.physical.friction_static.value))
-    add(contact, "restitution", value=numbers(twin.physical.restitution.value))
+    add(contact, "lateral_friction", value=number_text(twin.physical.friction_static.value))
+    add(contact, "restitution", value=number_text(twin.physical.restitution.value))
     files = {f"{twin.name}.urdf": document(root, provenance_lines(twin.record)), PHYSICS_FILE: physics_file(twin)}
     for part in parts:
         files |= part.files
@@ -57,9 +57,9 @@ def export(twin: TwinContent) -> Exported:
 def _add_inertial(link: etree._Element, inertial: Inertial) -> None:
     tensor = inertial.inertia_kg_m2
     element = add(link, "inertial")
-    add(element, "origin", xyz=numbers(*inertial.center_of_mass_m), rpy="0 0 0")
-    add(element, "mass", value=numbers(inertial.mass_kg))
-    moments = {f"i{'xyz'[i]}{'xyz'[j]}": numbers(tensor[i, j]) for i in range(3) for j in range(i, 3)}
+    add(element, "origin", xyz=number_text(*inertial.center_of_mass_m), rpy="0 0 0")
+    add(element, "mass", value=number_text(inertial.mass_kg))
+    moments = {f"i{'xyz'[i]}{'xyz'[j]}": number_text(tensor[i, j]) for i in range(3) for j in range(i, 3)}
     add(element, "inertia", **moments)
 
 

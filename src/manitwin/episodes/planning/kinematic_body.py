@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.episodes.planning.convex_shapes import convex_hull, corners_of
 from manitwin.episodes.planning.libraries import coal, pin
+from manitwin.formats.xml_file import add
 from manitwin.robots.robot import Robot
+from manitwin.robots.urdf import UrdfTree
 
 TURN_RAD = 2 * np.pi
 
@@ -84,16 +85,16 @@ def broad_phase(model: Any, geometry: Any, data: Any) -> Any:
 
 def _without_continuous_joints(urdf: str) -> str:
     """Give joints without limits one turn to either side, so that each has one coordinate."""
-    root = etree.fromstring(urdf.encode(), etree.XMLParser(remove_comments=True))
-    for joint in root.iter("joint"):
+    tree = UrdfTree.of_text(urdf)
+    for joint in tree.joints.values():
         if joint.get("type") == "continuous":
             joint.set("type", "revolute")
             limit = joint.find("limit")
             if limit is None:
-                limit = etree.SubElement(joint, "limit", effort="1000", velocity="10")
+                limit = add(joint, "limit", effort="1000", velocity="10")
             limit.set("lower", str(-TURN_RAD))
             limit.set("upper", str(TURN_RAD))
-    return etree.tostring(root, encoding="unicode")
+    return tree.text()
 
 
 def _convex_shapes(geometry: Any, model: Any, finger_links: tuple[str, str]) -> list[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from functools import partial
 from typing import Any
 
 import collada
@@ -12,9 +13,11 @@ from lxml import etree  # type: ignore[import-untyped]
 from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
+from manitwin.errors import InputError
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, decode_texture, make_part, pbr_material
 from manitwin.formats.meshes.vertex_colors import color_by_corner
+from manitwin.formats.xml_file import parse_xml
 
 _REMEDY = "export it again, or as glTF 2.0"
 _MAX_PARTS = 20_000
@@ -39,16 +42,9 @@ def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, s
 
 
 def _inspect(data: bytes, source: MeshSource) -> tuple[float | None, str | None, bool]:
-    """Return unit, up axis and whether it is skinned; refuse XML with a document type, which can expand without end."""
-    try:
-        parser = etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=True)
-        root = etree.fromstring(data, parser)
-    except etree.XMLSyntaxError as error:
-        raise source.unreadable(f"its XML is broken ({str(error)[:80]})", _REMEDY) from error
-    if root.getroottree().docinfo.internalDTD is not None:
-        raise source.unreadable("its XML declares a document type, which is not read", _REMEDY)
-    if etree.QName(root).localname != "COLLADA":
-        raise source.unreadable("its XML is no COLLADA document", _REMEDY)
+    """Return unit, up axis and whether it is skinned; raises InputError ``unreadable``."""
+    refusal = partial(InputError, "unreadable")
+    root = parse_xml(data, "COLLADA", source.path.name, refusal=refusal, comments=False, max_bytes=None)
     unit_m, up = None, None
     for element in root.iterfind("./{*}asset/{*}unit"):
         try:

@@ -7,7 +7,7 @@ import sapien
 from sapien import physx
 
 from manitwin.physics.convex_shape import convex_shape
-from manitwin.robots.grippers.urdf import Link, LinkShape
+from manitwin.robots.links import Link, LinkShape
 
 LEAST_MASS_KG, LEAST_MOMENT_KG_M2 = 0.01, 1e-6
 """Of URDF's links without mass, which PhysX refuses."""

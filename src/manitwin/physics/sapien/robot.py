@@ -13,8 +13,7 @@ from sapien import physx
 from manitwin.physics.sapien.hand import HAND_COLLISION_GROUPS, MAX_DRIVE_FORCE, MIN_PATCH_RADIUS_M, PATCH_RADIUS_M
 from manitwin.physics.sapien.links import link_shape, set_joint_and_mass
 from manitwin.physics.sapien.robot_visuals import add_visuals
-from manitwin.robots.grippers.urdf import Link
-from manitwin.robots.links import bodies_of_urdf
+from manitwin.robots.links import Link, bodies_of_urdf
 from manitwin.robots.robot import Robot
 
 # Tracks its trajectories within 0.003 rad, with velocity feed-forward; 50 solver iterations and 50 N held 298 of 304 objects

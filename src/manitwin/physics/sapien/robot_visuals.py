@@ -10,7 +10,7 @@ import sapien
 from lxml import etree  # type: ignore[import-untyped]
 from sapien import physx
 
-from manitwin.robots.joints import origin_of
+from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of
 
 _GREY = (0.7, 0.7, 0.7, 1.0)
 Visual = tuple[str, np.ndarray, str, tuple[Any, ...], tuple[float, ...] | None]
@@ -58,17 +58,17 @@ def _shape(kind: str, numbers: tuple[Any, ...], rgba: tuple[float, ...] | None) 
 
 @lru_cache(maxsize=16)
 def _visuals(urdf: str) -> tuple[Visual, ...]:
-    robot = etree.fromstring(urdf.encode(), etree.XMLParser(remove_comments=True, resolve_entities=False))
-    named = {one.get("name"): _color(one) for one in robot.findall("material")}
+    tree = UrdfTree.of_text(urdf)
+    named = {one.get("name"): _color(one) for one in tree.element.findall("material")}
     found = []
-    for link in robot.findall("link"):
+    for name, link in tree.links.items():
         for visual in link.findall("visual"):
-            material, geometry = visual.find("material"), visual.find("geometry")[0]
+            material, geometry = visual.find("material"), geometry_of(visual)
             rgba = None if material is None else (_color(material) or named.get(material.get("name")))
             pose, numbers = origin_of(visual), _numbers(geometry)
             if geometry.tag == "cylinder":  # URDF's lies along Z, SAPIEN's along X
                 pose = pose @ _X_TO_Z
-            found.append((link.get("name"), pose, geometry.tag, numbers, rgba))
+            found.append((name, pose, geometry.tag, numbers, rgba))
     return tuple(found)
 
 

@@ -12,14 +12,16 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import BaseModel, TypeAdapter
 
-from manitwin.errors import UsageError
+from manitwin.errors import ConfigError, UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.robots.grippers.box import Box, PlacedBox
 from manitwin.robots.grippers.fields import STRICT
-from manitwin.robots.grippers.urdf import Link, link_poses, read_urdf
+from manitwin.robots.links import Link, link_poses, links_of
+from manitwin.robots.urdf import HAND, read_urdf
 
 BALL_AS_CUBE = (4 * np.pi / 3) ** (1 / 3) / 2  # half the side of the cube of a ball's volume, in radii
 SYMBOL_HALF_WIDTH_M = 0.004
+PACKAGE = "package://"
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,7 @@ def load_multi_finger(data: dict[str, Any], folder: Path) -> MultiFingerGripper:
     """Make a hand of its file's content; raises UsageError where the URDF is missing, unreadable or has other joints."""
     file = TypeAdapter(_File).validate_python(data)
     path, root = _urdf_path(file.name, file.urdf, folder)
-    links = read_urdf(path, root)
+    links = links_of(read_urdf(path, HAND), lambda mesh: _mesh_path(path, root, mesh))
     _check(file, links)
     rotation = rotation_from_quaternion_wxyz(np.array(file.root_to_gripper.quaternion_wxyz))
     described = {field.name: getattr(file, field.name) for field in fields(_Described)}
@@ -187,6 +189,20 @@ def _urdf_path(name: str, urdf: _UrdfField, folder: Path) -> tuple[Path, Path]:
     if not path.is_file():
         raise UsageError(f"gripper {name}: {urdf.distribution} {files.version} has no {urdf.file}: {remedy}")
     return path, path.parent.parent
+
+
+def _mesh_path(path: Path, root: Path, name: str) -> Path:
+    """Return where a mesh is: beside the URDF, or for ``package://`` below the nearest folder above it that has it."""
+    relative = name.removeprefix(PACKAGE).removeprefix("file://")
+    folders = [path.parent, *path.parent.parents] if name.startswith(PACKAGE) else [path.parent]
+    for folder in folders:
+        try:
+            found = (folder / relative).resolve()
+            if found.is_relative_to(root.resolve()) and found.is_file():
+                return found
+        except (OSError, ValueError):  # a name that no file system can hold
+            continue
+    raise ConfigError(f"{path}: mesh {name[:120]!r} is not below {root}; put it there")
 
 
 def _check(file: _File, links: tuple[Link, ...]) -> None:

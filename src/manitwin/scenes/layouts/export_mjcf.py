@@ -12,7 +12,7 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets.writers import mjcf
 from manitwin.assets.writers.content import TwinContent
 from manitwin.assets.writers.exporter import Exported
-from manitwin.assets.writers.xml_document import add, document, numbers
+from manitwin.formats.xml_file import add, document, new_element, number_text
 from manitwin.physics.mujoco.body import ROLLING_FRICTION_M, TORSIONAL_FRICTION_M
 from manitwin.scenes.layouts.looks import camera_axes
 from manitwin.scenes.loaded_scene import Scene
@@ -29,8 +29,8 @@ def export_mjcf(scene: Scene) -> Exported:
     Raises ExportError for a twin that MJCF cannot take.
     """
     record = scene.record
-    root = etree.Element("mujoco", model=record.scene_id)
-    add(root, "option", timestep=numbers(TIMESTEP_S), integrator="implicitfast", cone="elliptic")
+    root = new_element("mujoco", model=record.scene_id)
+    add(root, "option", timestep=number_text(TIMESTEP_S), integrator="implicitfast", cone="elliptic")
     asset, world = add(root, "asset"), add(root, "worldbody")
     files: dict[str, bytes] = {}
     lines: list[str] = []
@@ -46,7 +46,7 @@ def export_mjcf(scene: Scene) -> Exported:
             models[placed.twin_id] = content.name
     _add_surroundings(asset, world, scene)
     for placed in record.objects:
-        frame = add(world, "frame", pos=numbers(*placed.position_m), quat=numbers(*placed.quaternion_wxyz))
+        frame = add(world, "frame", pos=number_text(*placed.position_m), quat=number_text(*placed.quaternion_wxyz))
         name = models[placed.twin_id]
         add(frame, "attach", model=name, body=name, prefix=f"{placed.name}/")
     files[MAIN] = document(
@@ -59,22 +59,22 @@ def _add_surroundings(asset: etree._Element, world: etree._Element, scene: Scene
     """Add furniture, lights and cameras."""
     record = scene.record
     for material in sorted({box.material for box in record.furniture.boxes}):
-        add(asset, "material", name=material, rgba=numbers(*PLAIN_COLORS[material], 1.0))
+        add(asset, "material", name=material, rgba=number_text(*PLAIN_COLORS[material], 1.0))
     for number, light in enumerate(record.lights):
         add(
-            world, "light", name=f"light_{number}", type="directional", pos="0 0 3", dir=numbers(*light.direction),
-            diffuse=numbers(*(min(1.0, c / 2) for c in light.color)), castshadow=str(light.casts_shadow).lower(),
+            world, "light", name=f"light_{number}", type="directional", pos="0 0 3", dir=number_text(*light.direction),
+            diffuse=number_text(*(min(1.0, c / 2) for c in light.color)), castshadow=str(light.casts_shadow).lower(),
         )  # fmt: skip
     for camera in record.cameras:
         # MuJoCo's cameras look along -Z, +Y up
         right, up = camera_axes(camera.position_m, camera.target_m)
         add(
-            world, "camera", name=camera.name, pos=numbers(*camera.position_m), xyaxes=numbers(*right, *up),
-            fovy=numbers(math.degrees(camera.fov_y_rad)),
+            world, "camera", name=camera.name, pos=number_text(*camera.position_m), xyaxes=number_text(*right, *up),
+            fovy=number_text(math.degrees(camera.fov_y_rad)),
         )  # fmt: skip
-    friction = numbers(FURNITURE_FRICTION, TORSIONAL_FRICTION_M, ROLLING_FRICTION_M)
+    friction = number_text(FURNITURE_FRICTION, TORSIONAL_FRICTION_M, ROLLING_FRICTION_M)
     for box in record.furniture.boxes:
         add(
-            world, "geom", name=box.name, type="box", pos=numbers(*box.center_m), size=numbers(*box.half_extents_m),
+            world, "geom", name=box.name, type="box", pos=number_text(*box.center_m), size=number_text(*box.half_extents_m),
             material=box.material, friction=friction, condim=mjcf.CONDIM,
         )  # fmt: skip
