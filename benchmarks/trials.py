@@ -24,7 +24,7 @@ import numpy as np
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics import trial_phases
 from manitwin.physics.jitter import jittered
-from manitwin.physics.sapien import scene as sapien_scene
+from manitwin.physics.sapien import hand_scene
 from manitwin.physics.sapien import trial as sapien_trial
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.physics.trial import TrialSettings
@@ -113,22 +113,22 @@ def _cpu_of_trials(trial: SapienTrial, body: RigidBody, poses: np.ndarray, setti
 @contextmanager
 def _timed_steps() -> Iterator[list[float]]:
     """Yield a list of the CPU seconds inside the physics steps, and their number."""
-    spent, plain = [0.0, 0.0], sapien_scene.HandScene.advance
+    spent, plain = [0.0, 0.0], hand_scene.HandScene.advance
 
-    def advance(self: sapien_scene.HandScene, loads_m_s2: np.ndarray) -> None:
-        targets = (loads_m_s2 / sapien_scene.LOAD_RATE_PER_S).astype(np.float32)
+    def advance(self: hand_scene.HandScene, loads_m_s2: np.ndarray) -> None:
+        targets = (loads_m_s2 / hand_scene.LOAD_RATE_PER_S).astype(np.float32)
         for target in targets:
-            self.load.set_drive_velocity_target(target, sapien_scene.NO_SPIN)
+            self.load.set_drive_velocity_target(target, hand_scene.NO_SPIN)
             started = time.process_time()
             self.system.step()
             spent[0] += time.process_time() - started
             spent[1] += 1
 
-    sapien_scene.HandScene.advance = advance  # type: ignore[method-assign]
+    hand_scene.HandScene.advance = advance  # type: ignore[method-assign]
     try:
         yield spent
     finally:
-        sapien_scene.HandScene.advance = plain  # type: ignore[method-assign]
+        hand_scene.HandScene.advance = plain  # type: ignore[method-assign]
 
 
 @contextmanager

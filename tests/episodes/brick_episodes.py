@@ -15,7 +15,6 @@ from manitwin.episodes.recording import Recording
 from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.sapien.shape_pool import ShapePool
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.app_config import EpisodeSettings
@@ -25,7 +24,6 @@ BRICK_M = [0.04, 0.06, 0.1]
 TABLE = StaticBox("table", np.array([0.6, 1.0, 0.05]), transform(None, np.array([0.35, 0, -0.05])))
 START, GOAL = (transform(None, np.array([x, y, 0.05])) for x, y in ((0.45, -0.15), (0.5, 0.2)))
 GRASPS = tuple(Grasp(f"g{i}", above([0, 0.005 * i, 0.03]), 0.04) for i in range(3))
-POOL = ShapePool()
 
 
 @cache
@@ -58,7 +56,7 @@ def run(
 ) -> tuple[EpisodeFacts, Recording | None]:
     """Run an episode with the Panda."""
     robot, own = panda()
-    return run_episode(asked, planner or own, robot, settings or EpisodeSettings(), POOL)
+    return run_episode(asked, planner or own, robot, settings or EpisodeSettings())
 
 
 def digest(recording: Recording) -> str:

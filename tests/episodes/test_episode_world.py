@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from brick_episodes import POOL, START, panda, problem, standing
+from brick_episodes import START, panda, problem, standing
 
-from manitwin.episodes.execution import Execution
+from manitwin.episodes.episode import world_of
+from manitwin.episodes.execution import IN_HAND, Execution
 from manitwin.episodes.planning.problem import Phase, PickPlaceProblem
-from manitwin.episodes.world import EpisodeWorld
 from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import transform
+from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 from manitwin.scenes.app_config import EpisodeSettings
 from rigid_boxes import box
@@ -21,8 +22,8 @@ from rigid_boxes import box
 PALM_M, FINGER_END_M = 0.066, 0.1125  # where palm and fingers end, along the approach
 
 
-def made(asked: PickPlaceProblem) -> EpisodeWorld:
-    return EpisodeWorld(panda()[0], asked, EpisodeSettings(), POOL, 50.0)
+def made(asked: PickPlaceProblem) -> RobotWorld:
+    return world_of(asked, panda()[0], EpisodeSettings(), 50.0)
 
 
 def before_the_hand(depth_m: float) -> np.ndarray:
@@ -31,34 +32,32 @@ def before_the_hand(depth_m: float) -> np.ndarray:
 
 
 @pytest.fixture
-def world() -> Iterator[EpisodeWorld]:
+def world() -> Iterator[RobotWorld]:
     others = (standing("object_02", [0.05, 0.05, 0.1], 0.6, 0.2), standing("object_00", [0.04, 0.04, 0.04], 0.6, -0.3))
     with made(problem(obstacles=others)) as world:
         yield world
 
 
-def test_objects_are_in_the_order_of_their_names_where_they_were_put(world: EpisodeWorld) -> None:
+def test_objects_are_in_the_order_of_their_names_where_they_were_put(world: RobotWorld) -> None:
     assert [placed.name for placed in world.placed] == ["object_00", "object_01", "object_02"]
     assert world.target == 1
     for number, placed in enumerate(world.placed):
         assert world.object_to_world(number) == pytest.approx(placed.object_to_world, abs=1e-6)
 
 
-def test_what_stands_comes_to_rest_borne_by_the_table_and_touched_by_nobody(world: EpisodeWorld) -> None:
-    world.step(60)
+def test_what_stands_comes_to_rest_borne_by_the_table_and_touched_by_nobody(world: RobotWorld) -> None:
+    assert world.settle(0.5).at_rest.all()
     touches = world.contacts.touches(world.contacts.read())
-    assert world.is_still()
     assert touches.on_support
     assert touches.finger_forces_n == (0.0, 0.0)
-    assert world.contacts.unplanned(world.contacts.read(), Phase.REACH) == set()
+    assert world.contacts.unplanned(world.contacts.read(), in_hand=False) == set()
 
 
 def test_what_stands_on_a_tray_on_the_table_is_borne_by_it() -> None:
     tray = StaticBox("tray", np.array([0.15, 0.15, 0.01]), transform(None, np.array([START[0, 3], START[1, 3], 0.01])))
     on_tray = problem(start=transform(None, START[:3, 3] + [0, 0, 0.02]))
     with made(replace(on_tray, static_boxes=(*on_tray.static_boxes, tray))) as world:
-        world.step(60)
-        assert world.is_still()
+        assert world.settle(0.5).at_rest.all()
         assert world.contacts.touches(world.contacts.read()).on_support
         assert world.object_to_world(0)[2, 3] == pytest.approx(START[2, 3] + 0.02, abs=3e-4)
 
@@ -66,8 +65,7 @@ def test_what_stands_on_a_tray_on_the_table_is_borne_by_it() -> None:
 def test_what_falls_is_not_still_and_falls_as_it_should() -> None:
     steps = 24
     with made(problem(start=transform(None, START[:3, 3] + [0, 0, 0.4]))) as world:
-        world.step(steps)
-        assert not world.is_still()
+        assert not world.settle(steps / 120).at_rest.any()
         assert not world.contacts.touches(world.contacts.read()).on_support
         fallen_m = START[2, 3] + 0.4 - world.object_to_world(0)[2, 3]
     assert fallen_m == pytest.approx(9.81 / 120**2 * steps * (steps + 1) / 2, rel=1e-3)  # semi-implicit Euler
@@ -91,7 +89,7 @@ def hits(asked: PickPlaceProblem, number: int, phase: Phase) -> set[tuple[str, s
         world.bodies[number].set_linear_velocity(np.array([0, 0, 1.0], np.float32))
         for _ in range(8):
             world.step()
-            found.update(world.contacts.unplanned(world.contacts.read(), phase))
+            found.update(world.contacts.unplanned(world.contacts.read(), in_hand=phase in IN_HAND))
     return found
 
 
@@ -111,7 +109,7 @@ def test_robot_may_never_touch_another_object(phase: Phase) -> None:
     }  # fmt: skip
 
 
-def test_fingers_press_on_the_target_with_equal_forces_that_are_their_drives(world: EpisodeWorld) -> None:
+def test_fingers_press_on_the_target_with_equal_forces_that_are_their_drives(world: RobotWorld) -> None:
     in_the_fingers = before_the_hand(panda()[0].gripper.tip_depth_m)
     with made(problem(start=in_the_fingers, target=box([0.04, 0.06, 0.06], 0.1))) as world:
         opening_m = 0.04
@@ -125,12 +123,14 @@ def test_fingers_press_on_the_target_with_equal_forces_that_are_their_drives(wor
 
 @pytest.mark.parametrize("phase", [Phase.REACH, Phase.CARRY, Phase.LOWER])
 def test_touch_of_one_step_between_two_rows_is_not_missed(
-    world: EpisodeWorld, monkeypatch: pytest.MonkeyPatch, phase: Phase
+    world: RobotWorld, monkeypatch: pytest.MonkeyPatch, phase: Phase
 ) -> None:
     robot, planner = panda()
     execution = Execution(world, robot, TrialSettings(50.0, 1.0, timestep_s=1 / 120), planner.tip_pose)
     pair = ("panda_link7", "board")
-    monkeypatch.setattr(world.contacts, "unplanned", lambda contacts, asked: {pair} if execution.steps == 10 else set())
+    monkeypatch.setattr(
+        world.contacts, "unplanned", lambda contacts, in_hand: {pair} if execution.steps == 10 else set()
+    )
     execution.wait(phase, 18)
     assert execution.unplanned == {pair}
     assert execution.recording().unplanned_contact.tolist() == [False, False, True, False]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from manitwin.physics.kept_for_hulls import KeptForHulls
+from manitwin.physics.trial import KeptForHulls
 
 
 def test_made_once_for_the_same_hulls_and_anew_for_others() -> None:

@@ -12,9 +12,8 @@ from scipy.spatial.transform import Rotation
 from manitwin.physics import trial_phases
 from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.sapien.trial import SapienTrial
-from manitwin.physics.shared_target import SharedTarget
 from manitwin.physics.trial import GraspTrial
-from manitwin.physics.trial_phases import HandContacts, run_phases
+from manitwin.physics.trial_phases import HandContacts, SharedTarget, run_phases
 from rigid_boxes import SETTINGS, SLIDE_PEAK_M_S2, above, box, try_one
 
 GRAVITY = np.array([0, 0, -9.81])

@@ -21,14 +21,12 @@ from manitwin.episodes.outcome import (
 )
 from manitwin.episodes.planning.problem import Grasp, Motion, PickPlacePlan, PickPlaceProblem, PlanFailure, PlanReport
 from manitwin.episodes.recording import Recording
-from manitwin.episodes.world import EpisodeWorld
 from manitwin.geometry.poses import inverse, transform_points
-from manitwin.physics.sapien.shape_pool import ShapePool
+from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 from manitwin.robots.robot import Robot
 from manitwin.scenes.app_config import EpisodeSettings
 
-SETTLE_S = 0.05  # between looks at whether a start has come to rest
 SMALL_SLIP_M, SMALL_SLIP_RAD = 0.004, np.radians(2.0)  # a fifth of what a placement may be off: no reason to give up
 LEAST_LIFT_SHARE = 0.5  # of what the hand rose: less, and the object was left behind
 
@@ -85,27 +83,42 @@ class _Ended(Exception):
 
 
 def run_episode(
-    problem: PickPlaceProblem, planner: Planner, robot: Robot, settings: EpisodeSettings, pool: ShapePool
+    problem: PickPlaceProblem, planner: Planner, robot: Robot, settings: EpisodeSettings
 ) -> tuple[EpisodeFacts, Recording | None]:
     """Run one episode and return what became of it, and its recording where it was executed.
 
     The objects settle first, and the plan is made from where they came to rest. The same arguments give the same bytes.
     """
-    return _Episode(problem, planner, robot, settings, pool).run()
+    return _Episode(problem, planner, robot, settings).run()
+
+
+def world_of(problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings, closing_force_n: float) -> RobotWorld:
+    """Put a problem into physics."""
+    return RobotWorld(
+        robot,
+        problem.target,
+        problem.obstacles,
+        problem.static_boxes,
+        closing_force_n=closing_force_n,
+        timestep_s=settings.timestep_s,
+        contact_offset_m=settings.contact_offset_m,
+        solver_iterations=settings.solver_iterations,
+        solver_iterations_held=settings.solver_iterations_held,
+        max_contact_force_n=settings.max_contact_force_n,
+        furniture_friction=settings.furniture_friction,
+    )
 
 
 class _Episode:
-    def __init__(
-        self, problem: PickPlaceProblem, planner: Planner, robot: Robot, settings: EpisodeSettings, pool: ShapePool
-    ):
-        self.problem, self.planner, self.robot, self.settings, self.pool = problem, planner, robot, settings, pool
+    def __init__(self, problem: PickPlaceProblem, planner: Planner, robot: Robot, settings: EpisodeSettings):
+        self.problem, self.planner, self.robot, self.settings = problem, planner, robot, settings
         self.goal_object_to_world = problem.goal_object_to_world
         self.facts = EpisodeFacts()
 
     def run(self) -> tuple[EpisodeFacts, Recording | None]:
         start = time.process_time()
         recording, closing = None, self._closing()
-        with EpisodeWorld(self.robot, self.problem, self.settings, self.pool, closing.force_n) as world:
+        with world_of(self.problem, self.robot, self.settings, closing.force_n) as world:
             if not self._settle(world):
                 self.facts.outcome = "unsettled"
             elif plan := self._plan(world):
@@ -122,14 +135,10 @@ class _Episode:
         self.facts.simulation_s = time.process_time() - start - self.facts.planning_s
         return self.facts, recording
 
-    def _settle(self, world: EpisodeWorld) -> bool:
+    def _settle(self, world: RobotWorld) -> bool:
         """Let the objects come to rest and make the problem that of where they are; False where one does not stand."""
-        settings, looks = self.settings, 0
-        for _ in range(round(settings.max_settle_s / SETTLE_S)):
-            world.step(round(SETTLE_S / settings.timestep_s))
-            looks = looks + 1 if world.is_still() else 0
-            if looks >= 2:
-                break
+        settings = self.settings
+        world.settle(settings.max_settle_s)
         rested = [
             replace(placed, object_to_world=world.object_to_world(number)) for number, placed in enumerate(world.placed)
         ]
@@ -147,7 +156,7 @@ class _Episode:
         self.rested = rested
         return True
 
-    def _plan(self, world: EpisodeWorld) -> PickPlacePlan | None:
+    def _plan(self, world: RobotWorld) -> PickPlacePlan | None:
         start = time.process_time()
         report = self.planner.plan(self.problem)
         self.facts.planning_s += time.process_time() - start
@@ -229,7 +238,7 @@ class _Episode:
         self.facts.slip_m = moved_m(planned, measured, self.problem.target.body.center_of_mass_m)
         self.facts.turned_in_hand_rad = turned_rad(planned, measured)
 
-    def _judge(self, world: EpisodeWorld, execution: Execution) -> None:
+    def _judge(self, world: RobotWorld, execution: Execution) -> None:
         settings, body = self.settings, self.problem.target.body
         last = execution.rest(round(settings.max_rest_s / settings.timestep_s))
         errors = placement_errors(execution.target_to_world(), self.goal_object_to_world, body.center_of_mass_m)

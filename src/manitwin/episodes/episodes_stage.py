@@ -25,7 +25,6 @@ from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode, recorded_robot
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
 from manitwin.episodes.tasks import Placeable, Room, Task, free_goal, sample_task
-from manitwin.physics.sapien.shape_pool import ShapePool
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.app_config import TrajectoriesConfig
@@ -82,10 +81,6 @@ class EpisodesStage:
     @cached_property
     def _planner(self) -> PickPlacePlanner:
         return PickPlacePlanner(self._robot, timestep_s=self.settings.episode.timestep_s)
-
-    @cached_property
-    def _shapes(self) -> ShapePool:
-        return ShapePool()
 
     @cached_property
     def _source(self) -> TwinSource:
@@ -192,7 +187,7 @@ class EpisodesStage:
             static_boxes=tuple(furniture_boxes(setting.furniture)),
             seed=seed,
         )
-        facts, recording = run_episode(problem, self._planner, self._robot, self.settings.episode, self._shapes)
+        facts, recording = run_episode(problem, self._planner, self._robot, self.settings.episode)
         spoken = episode_instructions(
             twin.record.language,
             target.object_to_world[:3, 3],

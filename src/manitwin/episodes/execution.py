@@ -11,12 +11,13 @@ from sapien import physx
 from manitwin.episodes.planning.problem import Motion, Phase
 from manitwin.episodes.recorder import Recorder
 from manitwin.episodes.recording import RATE_HZ, Recording
-from manitwin.episodes.world import EpisodeWorld
 from manitwin.geometry.poses import inverse
-from manitwin.physics.shared_target import SharedTarget
+from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
+from manitwin.physics.trial_phases import SharedTarget
 from manitwin.robots.robot import Robot
 
+IN_HAND = frozenset({Phase.CLOSE, Phase.LIFT, Phase.CARRY, Phase.LOWER, Phase.OPEN})
 STILL_ROWS, REST_ROWS = 5, 10  # 0.25 s and 0.5 s
 FRAME_S = 1 / 60  # between two looks at how hard the hand presses
 STEADY_FRAMES = 6  # the hand presses for so long before it moves on
@@ -31,7 +32,7 @@ class Execution:
     """Moves the robot of a world and records what happens; ``tip_pose`` is the forward kinematics of commanded joints."""
 
     def __init__(
-        self, world: EpisodeWorld, robot: Robot, closing: TrialSettings, tip_pose: Callable[[np.ndarray], np.ndarray]
+        self, world: RobotWorld, robot: Robot, closing: TrialSettings, tip_pose: Callable[[np.ndarray], np.ndarray]
     ):
         """Record the first state. Raises ValueError where the timestep does not fit the rate of recording."""
         self._world, self._robot, self._closing, self._tip_pose = world, robot, closing, tip_pose
@@ -108,12 +109,15 @@ class Execution:
 
     def rest(self, max_steps: int) -> list[np.ndarray]:
         """Stay until nothing has moved for a quarter of a second; returns the target's poses ``(4, 4)`` at the last rows."""
-        looks, poses = 0, deque([self.target_to_world()], maxlen=REST_ROWS)
+        watch, poses = (
+            self._world.rest_watch(STILL_ROWS),
+            deque([self.target_to_world()], maxlen=REST_ROWS),
+        )
         for _ in range(max_steps // self._steps_per_row):
             self.wait(Phase.REST, self._steps_per_row - self.steps % self._steps_per_row)
             poses.append(self.target_to_world())
-            looks = looks + 1 if self._world.is_still() else 0
-            if looks >= STILL_ROWS:
+            watch.look()
+            if watch.all_rest:
                 break
         return list(poses)
 
@@ -142,7 +146,7 @@ class Execution:
                 self._record(phase, before, contacts)
 
     def _watch(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
-        unplanned = self._world.contacts.unplanned(contacts, phase)
+        unplanned = self._world.contacts.unplanned(contacts, in_hand=phase in IN_HAND)
         self.unplanned.update(unplanned)
         self._unplanned_since_row = self._unplanned_since_row or bool(unplanned)
 

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from manitwin.episodes.contacts import Touches
 from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.recording import Recording
-from manitwin.episodes.world import EpisodeWorld
 from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.world import RobotWorld
 
 
 class _State(NamedTuple):
@@ -34,7 +34,7 @@ class _Action(NamedTuple):
 class Recorder:
     """Takes a first state, then an action and the state that it led to at a time."""
 
-    def __init__(self, world: EpisodeWorld, touches: Touches):
+    def __init__(self, world: RobotWorld, touches: Touches):
         """Take the first state."""
         self._world = world
         self._states: list[_State] = [self._state(np.zeros(len(world.robot.robot.arm_joints)))]

@@ -8,6 +8,9 @@ import numpy as np
 
 from manitwin.geometry.rigid_body import RigidBody
 
+FURNITURE_FRICTION = 0.5
+"""Static and dynamic, of every piece of furniture."""
+
 
 @dataclass(frozen=True)
 class PlacedObject:

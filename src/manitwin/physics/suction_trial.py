@@ -13,10 +13,9 @@ from manitwin.geometry.poses import inverse
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.hull_surface import union_surface
-from manitwin.physics.kept_for_hulls import KeptForHulls
 from manitwin.physics.suction_load import lip_load
 from manitwin.physics.suction_seal import seal
-from manitwin.physics.trial import TrialResult, TrialSettings
+from manitwin.physics.trial import KeptForHulls, TrialResult, TrialSettings
 from manitwin.physics.trial_phases import HandContacts, run_phases
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.hand_collision import HandCollision

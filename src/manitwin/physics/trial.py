@@ -6,8 +6,9 @@ that the paper leaves open (force, friction, distances, solver) are settings, be
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.record import Outcome
 
 GRAVITY_M_S2 = 9.81
+
+Made = TypeVar("Made")
+Hulls = tuple[np.ndarray, ...]
 
 
 @dataclass(frozen=True)
@@ -93,3 +97,17 @@ class GraspTrial(Protocol):
         ``joints_rad (N, 2, J)`` are given for hands with more joints: those before closing and those to close to.
         """
         ...
+
+
+class KeptForHulls(Generic[Made]):
+    """Makes something of hulls, each ``(V, 3)`` m, and keeps it until other hulls come: trials often are of one object."""
+
+    def __init__(self, make: Callable[[Hulls], Made]):
+        self._make = make
+        self._last: tuple[Hulls, Made] | None = None
+
+    def __call__(self, hulls: Hulls) -> Made:
+        """Return what was made of this very tuple of hulls."""
+        if self._last is None or self._last[0] is not hulls:
+            self._last = hulls, self._make(hulls)
+        return self._last[1]

@@ -24,6 +24,7 @@ SLIDE_DIRECTIONS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1
 # once, and the other three repeat them. Of 1,735 grasps (25 objects) that had moved less than a fifth of the limit by
 # then, one failed in the repetition, so such a grasp is not asked again: 0.62 of the steps.
 ALL_LOADED_AFTER, SURE_SHARE = 3, 0.2
+MET_M = 1e-6  # pads this close have met
 
 
 @dataclass(frozen=True)
@@ -181,3 +182,30 @@ class _Phases:
 
 def _chunks(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:
     return (rows[start : start + size] for start in range(0, len(rows), size))
+
+
+class SharedTarget:
+    """The one position target of both fingers of a closing parallel hand; it never presses with more than the closing force.
+
+    The mechanical coupling of the real hand does the same; two independently saturated fingers have no lateral stiffness
+    and drift by centimetres.
+
+    Coordinates are the distances (m) of the pads from the plane between them. Pads that meet (``met_m`` and less) have
+    nothing between them, whatever they overlap: the target goes back to where it was, as a gripper opens again that
+    reports an empty hand. Without this, fingers that have tunnelled into a thin and light object hold it.
+    """
+
+    def __init__(self, opening_m: float, settings: TrialSettings, met_m: float = MET_M):
+        self.value_m = self._open_m = opening_m / 2
+        self._met_m, self._met = met_m, False
+        self._press_m = settings.force_n / settings.finger_stiffness_n_m
+        self._ramp_m = settings.close_speed_m_s * settings.frame_s
+
+    def move_on(self, mean_position_m: float) -> float:
+        """Move on by one frame and return the target; ``mean_position_m`` is that of the two fingers."""
+        self._met = self._met or mean_position_m <= self._met_m
+        if self._met:
+            self.value_m = self._open_m
+            return self.value_m
+        self.value_m = max(self.value_m - self._ramp_m, mean_position_m - self._press_m)
+        return self.value_m

@@ -8,6 +8,7 @@ from typing import Any, Literal, TypeVar
 from pydantic import Field, model_validator
 
 from manitwin.config import RunConfig, Section, read_toml, validated
+from manitwin.geometry.placed_object import FURNITURE_FRICTION
 
 Application = TypeVar("Application", bound=Section)
 
@@ -31,7 +32,7 @@ class EpisodeSettings(Section):
     solver_iterations: int = Field(default=10, ge=1)
     solver_iterations_held: int = Field(default=24, ge=1)
     contact_offset_m: float = Field(default=0.001, gt=0)
-    furniture_friction: float = Field(default=0.5, ge=0)
+    furniture_friction: float = Field(default=FURNITURE_FRICTION, ge=0)
     closing_force_n: float | None = Field(default=None, gt=0)
     release_height_m: float = Field(default=0.001, ge=0, le=0.02)
     max_settle_s: float = Field(default=1.0, ge=0)

@@ -11,12 +11,11 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
-from manitwin.geometry.poses import quaternion_wxyz, transform, transform_points
+from manitwin.geometry.poses import quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.mujoco.body import OBJECT, SOFT_SOLREF, add_object, contact_parameters
+from manitwin.physics.mujoco.body import OBJECT, SOFT_SOLREF, TIMESTEP_S, add_object, contact_parameters, new_spec
 from manitwin.physics.sapien.settle import Settled
 
-TIMESTEP_S = 0.002
 PLANE_HALF_SIZE_M = 10.0
 STILL_M_S, STILL_RAD_S = 1e-3, 1e-2
 
@@ -32,10 +31,7 @@ def settle_on_plane_in_mujoco(
 
 
 def _model(body: RigidBody) -> mujoco.MjModel:
-    spec = mujoco.MjSpec()
-    spec.option.timestep, spec.option.integrator = TIMESTEP_S, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    contact = contact_parameters(body.friction_static, SOFT_SOLREF)
+    spec, contact = new_spec(TIMESTEP_S), contact_parameters(body.friction_static, SOFT_SOLREF)
     size = [PLANE_HALF_SIZE_M, PLANE_HALF_SIZE_M, 0.1]
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=size, contype=1, conaffinity=2, **contact)
     add_object(spec, body, contact)
@@ -50,9 +46,6 @@ def _settle(model: mujoco.MjModel, body: RigidBody, pose: np.ndarray, drop_m: fl
     mujoco.mj_step(model, data, round(seconds / TIMESTEP_S))
     number = model.body(OBJECT).id
     end = transform(data.xmat[number].reshape(3, 3), data.xpos[number])
-    before, after = (transform_points(p, body.center_of_mass_m[None])[0] for p in (pose, end))
-    cosine = (np.trace(end[:3, :3] @ pose[:3, :3].T) - 1) / 2
     speed = data.qvel[model.joint(OBJECT).dofadr[0] :][:6]
     still = np.linalg.norm(speed[:3]) < STILL_M_S and np.linalg.norm(speed[3:]) < STILL_RAD_S
-    turned = float(np.arccos(np.clip(cosine, -1, 1)))
-    return Settled(end, float(np.linalg.norm(after - before)), turned, bool(still))
+    return Settled.of(body, pose, end, bool(still))

@@ -15,14 +15,21 @@ import numpy as np
 
 from manitwin.geometry.poses import inverse, quaternion_wxyz
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.mujoco.body import OBJECT, STIFF_SOLREF, add_object, contact_parameters
-from manitwin.physics.shared_target import SharedTarget
+from manitwin.physics.mujoco.body import (
+    OBJECT,
+    STIFF_SOLREF,
+    TIMESTEP_S,
+    add_box,
+    add_object,
+    contact_parameters,
+    new_spec,
+)
 from manitwin.physics.trial import TrialResult, TrialSettings
-from manitwin.physics.trial_phases import HandContacts, run_phases
+from manitwin.physics.trial_phases import HandContacts, SharedTarget, run_phases
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-TIMESTEP_S, STEPS_PER_FRAME = 0.002, 8
+STEPS_PER_FRAME = 8
 IMPEDANCE_RATIO, NO_SLIP_ITERATIONS = 10.0, 5
 FINGER_MASS_KG = 0.1
 MET_M = -0.001  # contacts and finger stops are soft: of 50 N they give half a millimetre on each side
@@ -120,11 +127,8 @@ class _Scene:
 
 def _model(body: RigidBody, gripper: ParallelGripper, settings: TrialSettings) -> mujoco.MjModel:
     """Compile hand and object once; contacts take the mean friction, as in SAPIEN (MuJoCo's own rule is the maximum)."""
-    spec = mujoco.MjSpec()
-    option = spec.option
-    option.timestep, option.integrator = settings.timestep_s, mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    option.cone, option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, IMPEDANCE_RATIO
-    option.noslip_iterations = NO_SLIP_ITERATIONS
+    spec = new_spec(settings.timestep_s)
+    spec.option.impratio, spec.option.noslip_iterations = IMPEDANCE_RATIO, NO_SLIP_ITERATIONS
     contact = contact_parameters((settings.finger_friction + body.friction_static) / 2, STIFF_SOLREF)
     _add_hand(spec, gripper, settings, contact)
     add_object(spec, body, contact)
@@ -151,12 +155,4 @@ def _add_hand(
         drive.forcerange, drive.forcelimited = [-limit_n, limit_n], True
     for holder, some in bodies:
         for box_to_gripper, half_extents_m in some:
-            holder.add_geom(
-                type=mujoco.mjtGeom.mjGEOM_BOX,
-                pos=box_to_gripper[:3, 3],
-                quat=quaternion_wxyz(box_to_gripper[:3, :3]),
-                size=half_extents_m,
-                contype=1,
-                conaffinity=2,
-                **contact,
-            )
+            add_box(holder, box_to_gripper, half_extents_m, contact, contact_types=(1, 2))

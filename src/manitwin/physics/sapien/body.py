@@ -1,4 +1,4 @@
-"""A rigid body in SAPIEN: its hulls, its own mass properties and friction, and its textured mesh."""
+"""Rigid bodies in SAPIEN: twins with their own mass properties and friction, boxes of furniture, and the ground."""
 
 from __future__ import annotations
 
@@ -9,30 +9,34 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.geometry.poses import GLTF_TO_OBJECT
+from manitwin.geometry.placed_object import FURNITURE_FRICTION, StaticBox
+from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.convex_shape import convex_shape
+from manitwin.physics.sapien.shapes import HullShapes, hull_shapes, set_contact
 
+CONTACT_OFFSET_M = 0.002
+"""At SAPIEN's own 10 mm a step costs 1.6 times as much for the same answer, and PhysX may take two thin things 14 mm apart for
+deep in each other, and throws them across the room: 1 of 250 layouts of real twins."""
 
-def hull_shapes(hulls: tuple[np.ndarray, ...]) -> list[physx.PhysxCollisionShapeConvexMesh]:
-    """Cook hulls, each ``(V, 3)`` m, at 0.2 ms a hull; the component that takes them gives them its material.
+SOLVER_ITERATIONS = 20
+"""At PhysX's own 4 to 10, stacks of hulls creep."""
 
-    A shape belongs to one component at a time, and is free again when that is gone.
-    """
-    return [convex_shape(hull, physx.get_default_material()) for hull in hulls]
+_PLANE_TO_WORLD = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])  # PhysX's planes face +X
 
 
 def dynamic_component(
     body: RigidBody,
-    shapes: list[physx.PhysxCollisionShapeConvexMesh],
+    shapes: HullShapes,
     *,
     contact_offset_m: float | None = None,
     restitution: float = 0.0,
+    soft_pad: bool = False,
 ) -> physx.PhysxRigidDynamicComponent:
     """Return the body as a component; SAPIEN would take the mass properties from the shapes, so they are set first.
 
-    ``shapes`` are those of its hulls, or of the ones that matter. Without ``contact_offset_m`` the scene's own applies.
-    Raises RuntimeError where a shape belongs to another component.
+    ``shapes`` are those of its hulls, or of the ones that matter. Without ``contact_offset_m`` the scene's own applies;
+    ``soft_pad`` is for what a hand holds (``shapes.set_contact``). Raises RuntimeError where a shape belongs to another
+    component.
     """
     material = physx.PhysxMaterial(body.friction_static, body.friction_dynamic, restitution)
     component = physx.PhysxRigidDynamicComponent()
@@ -43,8 +47,7 @@ def dynamic_component(
     for shape in shapes:
         shape.local_pose = sapien.Pose()  # refused while attached elsewhere; attaching would fail without a word
         shape.physical_material = material
-        if contact_offset_m is not None:
-            shape.contact_offset = contact_offset_m
+        set_contact(shape, contact_offset_m=contact_offset_m, soft_pad=soft_pad)
         component.attach(shape)
     return component
 
@@ -55,6 +58,7 @@ def add_body(
     *,
     restitution: float,
     pose: Any = None,
+    contact_offset_m: float | None = None,
     visual_glb: Path | None = None,
     name: str = "",
 ) -> Any:
@@ -64,16 +68,46 @@ def add_body(
     """
     entity = sapien.Entity()
     entity.name = name
-    entity.add_component(dynamic_component(body, hull_shapes(body.hulls), restitution=restitution))
+    shapes = hull_shapes(body.hulls)
+    entity.add_component(dynamic_component(body, shapes, contact_offset_m=contact_offset_m, restitution=restitution))
     if visual_glb is not None:
-        from sapien import render
+        from manitwin.physics.sapien.visuals import glb_visual
 
-        shape = render.RenderShapeTriangleMesh(str(visual_glb))
-        shape.local_pose = sapien.Pose(GLTF_TO_OBJECT)
-        component = render.RenderBodyComponent()
-        component.attach(shape)
-        entity.add_component(component)
+        entity.add_component(glb_visual(visual_glb))
     if pose is not None:
         entity.set_pose(pose)
     scene.add_entity(entity)
+    return entity
+
+
+def static_box(box: StaticBox, *, contact_offset_m: float, friction: float = FURNITURE_FRICTION) -> sapien.Entity:
+    """Return a box of furniture as an entity that no scene has yet; ``friction`` is static and dynamic."""
+    shape = physx.PhysxCollisionShapeBox(box.half_extents_m, physx.PhysxMaterial(friction, friction, 0.0))
+    pose = sapien.Pose(box.box_to_world[:3, 3], quaternion_wxyz(box.box_to_world[:3, :3]))
+    return _static(shape, pose, contact_offset_m, box.name)
+
+
+def static_plane(
+    friction_static: float, friction_dynamic: float, *, contact_offset_m: float | None = None, name: str = "ground"
+) -> sapien.Entity:
+    """Return the plane z = 0, solid below, as an entity that no scene has yet."""
+    shape = physx.PhysxCollisionShapePlane(physx.PhysxMaterial(friction_static, friction_dynamic, 0.0))
+    return _static(shape, sapien.Pose(_PLANE_TO_WORLD), contact_offset_m, name)
+
+
+def _static(
+    shape: physx.PhysxCollisionShape, pose: sapien.Pose, contact_offset_m: float | None, name: str
+) -> sapien.Entity:
+    set_contact(shape, contact_offset_m=contact_offset_m)
+    component = physx.PhysxRigidStaticComponent()
+    component.attach(shape)
+    return entity_at(component, pose, name)
+
+
+def entity_at(component: sapien.Component, pose: sapien.Pose, name: str = "") -> sapien.Entity:
+    """Return an entity of one component at a pose, which no scene has yet."""
+    entity = sapien.Entity()
+    entity.name = name
+    entity.add_component(component)
+    entity.pose = pose
     return entity

@@ -2,7 +2,7 @@
 
 Each finger closes along its own straight line of joints and stops where a joint presses; from then on its targets stay:
 the drives' stiffness then resists what pulls at the object. (Fingers that are driven with constant torques have no
-lateral stiffness, see ``shared_target``.)
+lateral stiffness, see ``trial_phases.SharedTarget``.)
 """
 
 from __future__ import annotations
@@ -13,11 +13,9 @@ from sapien import physx
 
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.kept_for_hulls import KeptForHulls
-from manitwin.physics.sapien.body import hull_shapes
-from manitwin.physics.sapien.hand import MIN_PATCH_RADIUS_M, PATCH_RADIUS_M
-from manitwin.physics.sapien.links import link_shape, set_joint_and_mass
-from manitwin.physics.sapien.scene import HandScene
+from manitwin.physics.sapien.articulation import LinkContact, build_articulation, drive_joints
+from manitwin.physics.sapien.hand_scene import HandScene
+from manitwin.physics.sapien.shapes import COOKED, HullShapes
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import run_phases
 from manitwin.robots.grippers.gripper import Gripper, of_kind
@@ -34,9 +32,6 @@ class ArticulatedTrial:
 
     name = "sapien"
 
-    def __init__(self) -> None:
-        self._shapes = KeptForHulls(hull_shapes)
-
     def run(
         self,
         body: RigidBody,
@@ -52,16 +47,16 @@ class ArticulatedTrial:
         hand = of_kind(gripper, MultiFingerGripper)
         if joints_rad is None:
             raise ValueError(f"a grasp of {hand.name} needs its joints before closing and those to close to")
-        shapes = self._shapes(body.hulls)
-        return [
-            _try_one(body, shapes, hand, pose, joints, settings)
-            for pose, joints in zip(gripper_to_object, joints_rad, strict=True)
-        ]
+        with COOKED.lent([body.hulls]) as (shapes,):
+            return [
+                _try_one(body, shapes, hand, pose, joints, settings)
+                for pose, joints in zip(gripper_to_object, joints_rad, strict=True)
+            ]
 
 
 def _try_one(
     body: RigidBody,
-    shapes: list[physx.PhysxCollisionShapeConvexMesh],
+    shapes: HullShapes,
     hand: MultiFingerGripper,
     gripper_to_object: np.ndarray,
     joints_rad: np.ndarray,
@@ -84,25 +79,34 @@ class FingeredHand:
         drive = gripper.drive
         strength = settings.force_n / gripper.force_n
         self._press_nm, self._stiffness = strength * drive.press_nm, drive.stiffness_nm_rad
-        self._finger_of_link = gripper.finger_of_link
-        self._links = _articulation(scene, gripper, settings)
-        self.articulation = self._links[0].articulation
+        material = physx.PhysxMaterial(settings.finger_friction, settings.finger_friction, 0.0)
+        finger_of = {link.name: finger for link, finger in zip(gripper.links, gripper.finger_of_link, strict=True)}
+        self._links = build_articulation(
+            scene,
+            gripper.links,
+            lambda link: LinkContact(material, soft_pad=True, collision_groups=_collision_groups(finger_of[link.name])),
+            contact_offset_m=settings.contact_offset_m,
+            root_to_scene=gripper.root_to_gripper,
+        )
+        self.articulation = next(iter(self._links.values())).articulation
         self.articulation.set_solver_position_iterations(settings.solver_iterations)
         self.articulation.set_solver_velocity_iterations(1)
         self._joints = self.articulation.active_joints
-        for joint in self._joints:
-            joint.set_drive_properties(self._stiffness, drive.damping_nm_s_rad, strength * drive.torque_limit_nm)
-            joint.set_armature(np.full(1, drive.armature_kg_m2, np.float32))
+        drive_joints(
+            self._joints,
+            stiffness=self._stiffness,
+            damping=drive.damping_nm_s_rad,
+            limit=strength * drive.torque_limit_nm,
+            armature=drive.armature_kg_m2,
+        )
         order = [gripper.joints.index(joint.name) for joint in self._joints]
         self._open, self._closed = joints_rad[:, order]
-        of_joint = {link.joint: owner for link, owner in zip(gripper.links, self._finger_of_link, strict=True)}
+        of_joint = {link.joint: finger_of[link.name] for link in gripper.links}
         self._finger_of_joint = np.array([of_joint[joint.name] for joint in self._joints])
         self._step, self._come = self._steps(len(gripper.fingers), drive.speed_rad_s * settings.frame_s)
         self.articulation.set_qpos(self._open.astype(np.float32))
         self._drive_to(self._open)
-        self._owner = {
-            link.entity.per_scene_id: finger for link, finger in zip(self._links, self._finger_of_link, strict=True)
-        }
+        self._owner = {link.entity.per_scene_id: finger_of[name] for name, link in self._links.items()}
 
     def _steps(self, fingers: int, step_rad: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the share of its way that each finger goes in a frame, and that it has come: none."""
@@ -131,29 +135,5 @@ class FingeredHand:
             joint.set_drive_target(float(target))
 
 
-def _articulation(
-    scene: sapien.Scene, gripper: MultiFingerGripper, settings: TrialSettings
-) -> list[physx.PhysxArticulationLinkComponent]:
-    """Build the hand, its root fixed at its place in the grasp frame; returns its links in the gripper's order."""
-    material = physx.PhysxMaterial(settings.finger_friction, settings.finger_friction, 0.0)
-    built: list[physx.PhysxArticulationLinkComponent] = []
-    entities = []
-    for link, finger in zip(gripper.links, gripper.finger_of_link, strict=True):
-        component = physx.PhysxArticulationLinkComponent(built[link.parent] if link.parent >= 0 else None)
-        bits = PALM_BITS if finger < 0 else THUMB_BITS if finger == THUMB else FINGER_BITS
-        for shape in link.shapes:
-            part = link_shape(shape, material)
-            part.local_pose = sapien.Pose(shape.shape_to_link)
-            part.contact_offset = settings.contact_offset_m
-            part.patch_radius, part.min_patch_radius = PATCH_RADIUS_M, MIN_PATCH_RADIUS_M
-            part.set_collision_groups([1, 1, bits, 0])
-            component.attach(part)
-        set_joint_and_mass(component, link)
-        component.disable_gravity = True
-        built.append(component)
-        entities.append(sapien.Entity())
-        entities[-1].add_component(component)
-    entities[0].pose = sapien.Pose(gripper.root_to_gripper)
-    for entity in entities:
-        scene.add_entity(entity)
-    return built
+def _collision_groups(finger: int) -> tuple[int, ...]:
+    return (1, 1, PALM_BITS if finger < 0 else THUMB_BITS if finger == THUMB else FINGER_BITS, 0)

@@ -11,8 +11,10 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.physics.shared_target import SharedTarget
+from manitwin.physics.sapien.body import entity_at
+from manitwin.physics.sapien.shapes import HAND_COLLISION_GROUPS, set_contact
 from manitwin.physics.trial import TrialSettings
+from manitwin.physics.trial_phases import SharedTarget
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 # PhysX stops a locked axis after every substep but solves contacts with the finger's mass along it too: friction of
@@ -23,10 +25,7 @@ FINGER_MASS_KG = 0.5
 LOCKED_INERTIA_KG_M2 = 1e9  # as good as infinite: the fingers do not turn
 LOCKED_AXES = [False, True, True, True, True, True]  # translations x, y, z, then rotations
 LIMIT_SLACK_M = 1e-4  # keeps the open finger off its limit
-PATCH_RADIUS_M, MIN_PATCH_RADIUS_M = 0.01, 0.005  # of PhysX's torsional friction: that of a soft pad
 MAX_DRIVE_FORCE = 4.0  # the drive's limit, as a multiple of the closing force: it never cuts the closing force itself
-# SAPIEN's shapes with a common bit in the third word do not collide: so palm and fingers with one another.
-HAND_COLLISION_GROUPS = [1, 1, 2, 0]
 
 # Rotations wxyz that turn the X axis, along which the fingers' drives work, into +X and -X.
 _ALONG_X, _ALONG_MINUS_X = (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)
@@ -77,9 +76,12 @@ class FixedHand:
         for box_to_gripper, half_extents_m in boxes:
             shape = physx.PhysxCollisionShapeBox(half_extents_m.astype(np.float32), self._material)
             shape.local_pose = sapien.Pose(box_to_gripper)
-            shape.contact_offset = self._contact_offset_m
-            shape.patch_radius, shape.min_patch_radius = PATCH_RADIUS_M, MIN_PATCH_RADIUS_M
-            shape.set_collision_groups(HAND_COLLISION_GROUPS)
+            set_contact(
+                shape,
+                contact_offset_m=self._contact_offset_m,
+                soft_pad=True,
+                collision_groups=HAND_COLLISION_GROUPS,
+            )
             component.attach(shape)
 
     def squeeze(self) -> None:
@@ -116,8 +118,7 @@ def _lock_to_x(finger: physx.PhysxRigidDynamicComponent, tip_depth_m: float) -> 
 
 
 def _place(scene: sapien.Scene, body: sapien.Component, x_m: float, *others: sapien.Component) -> None:
-    entity = sapien.Entity()
-    for component in (body, *others):
+    entity = entity_at(body, sapien.Pose([x_m, 0, 0]))
+    for component in others:
         entity.add_component(component)
-    entity.pose = sapien.Pose([x_m, 0, 0])
     scene.add_entity(entity)

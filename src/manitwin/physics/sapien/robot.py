@@ -1,8 +1,4 @@
-"""A robot in a SAPIEN scene: an articulation whose arm follows joint targets, and whose two fingers share one target.
-
-It is built from the links, not by SAPIEN's URDF loader, which follows mimic joints, looks for meshes by itself and cooks
-them anew each time. Gravity does not act on the robot: its controllers compensate it.
-"""
+"""A robot in a SAPIEN scene: an articulation whose arm follows joint targets, and whose two fingers share one target."""
 
 from __future__ import annotations
 
@@ -10,10 +6,11 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.physics.sapien.hand import HAND_COLLISION_GROUPS, MAX_DRIVE_FORCE, MIN_PATCH_RADIUS_M, PATCH_RADIUS_M
-from manitwin.physics.sapien.links import link_shape, set_joint_and_mass
-from manitwin.physics.sapien.robot_visuals import add_visuals
-from manitwin.robots.links import Link, bodies_of_urdf
+from manitwin.physics.sapien.articulation import LinkContact, build_articulation, drive_joints
+from manitwin.physics.sapien.body import CONTACT_OFFSET_M
+from manitwin.physics.sapien.hand import MAX_DRIVE_FORCE
+from manitwin.physics.sapien.visuals import add_robot_visuals
+from manitwin.robots.links import bodies_of_urdf
 from manitwin.robots.robot import Robot
 
 # Tracks its trajectories within 0.003 rad, with velocity feed-forward; 50 solver iterations and 50 N held 298 of 304 objects
@@ -25,7 +22,6 @@ FINGER_STIFFNESS_N_M, FINGER_DAMPING_N_S_M = 1e4, 100.0
 # contacts with fingers of 15 g are soft: 50 N press them 0.7 mm into a brick at 1/120 s and 32 iterations, with it 0.1 mm.
 ARM_ARMATURE_KG_M2, FINGER_ARMATURE_KG = 0.1, 0.1
 SOLVER_ITERATIONS = 50
-CONTACT_OFFSET_M = 0.002
 
 
 class SapienRobot:
@@ -53,7 +49,14 @@ class SapienRobot:
         self._scene = scene  # kept: bodies go with their scene
         friction = robot.gripper.finger_friction if finger_friction is None else finger_friction
         bodies, part_of = bodies_of_urdf(robot.urdf, robot.hand_links[0])
-        self.links = _articulation(scene, robot, bodies, friction, contact_offset_m)
+        arm_contact = LinkContact(physx.get_default_material())
+        pad_contact = LinkContact(physx.PhysxMaterial(friction, friction, 0.0), soft_pad=True)
+        self.links = build_articulation(
+            scene,
+            bodies,
+            lambda link: pad_contact if link.name in robot.finger_links else arm_contact,
+            contact_offset_m=contact_offset_m,
+        )
         tip_body, tip_to_body = part_of[robot.tip_link]
         self._tip, self._tip_in_body = self.links[tip_body], sapien.Pose(tip_to_body)
         self._gripper_in_body = sapien.Pose(tip_to_body @ robot.gripper_to_tip)
@@ -69,14 +72,22 @@ class SapienRobot:
         # bound once: they are called at every step
         self._arm_setters = [(joint.set_drive_target, joint.set_drive_velocity_target) for joint in arm]
         self._finger_setters = [joint.set_drive_target for joint in fingers]
-        for joint in arm:
-            joint.set_drive_properties(ARM_STIFFNESS_NM_RAD, ARM_DAMPING_NM_S_RAD, ARM_TORQUE_LIMIT_NM)
-            joint.set_armature(np.full(1, ARM_ARMATURE_KG_M2, np.float32))
-        for joint in fingers:
-            joint.set_drive_properties(FINGER_STIFFNESS_N_M, FINGER_DAMPING_N_S_M, MAX_DRIVE_FORCE * finger_force_n)
-            joint.set_armature(np.full(1, FINGER_ARMATURE_KG, np.float32))
+        drive_joints(
+            arm,
+            stiffness=ARM_STIFFNESS_NM_RAD,
+            damping=ARM_DAMPING_NM_S_RAD,
+            limit=ARM_TORQUE_LIMIT_NM,
+            armature=ARM_ARMATURE_KG_M2,
+        )
+        drive_joints(
+            fingers,
+            stiffness=FINGER_STIFFNESS_N_M,
+            damping=FINGER_DAMPING_N_S_M,
+            limit=MAX_DRIVE_FORCE * finger_force_n,
+            armature=FINGER_ARMATURE_KG,
+        )
         if visual:
-            add_visuals(robot.urdf, self.links, part_of)
+            add_robot_visuals(robot.urdf, self.links, part_of)
         self.set_state(robot.home_rad, robot.gripper.opening_m)
 
     def set_state(self, positions_rad: np.ndarray, opening_m: float) -> None:
@@ -122,38 +133,3 @@ class SapienRobot:
     def gripper_pose(self) -> np.ndarray:
         """Return the pose ``(4, 4)`` of the grasp frame in the world."""
         return np.asarray((self._tip.entity_pose * self._gripper_in_body).to_transformation_matrix(), float)
-
-
-def _articulation(
-    scene: sapien.Scene,
-    robot: Robot,
-    links: tuple[Link, ...],
-    finger_friction: float,
-    contact_offset_m: float,
-) -> dict[str, physx.PhysxArticulationLinkComponent]:
-    """Build the robot, its root fixed at the world's origin; returns its links by name."""
-    arm_material = physx.get_default_material()
-    pad_material = physx.PhysxMaterial(finger_friction, finger_friction, 0.0)
-    built: list[physx.PhysxArticulationLinkComponent] = []
-    entities = []
-    for link in links:
-        component = physx.PhysxArticulationLinkComponent(built[link.parent] if link.parent >= 0 else None)
-        is_finger = link.name in robot.finger_links
-        for shape in link.shapes:
-            part = link_shape(shape, pad_material if is_finger else arm_material)
-            part.local_pose = sapien.Pose(shape.shape_to_link)
-            part.contact_offset = contact_offset_m
-            if is_finger:
-                part.patch_radius, part.min_patch_radius = PATCH_RADIUS_M, MIN_PATCH_RADIUS_M
-            part.set_collision_groups(HAND_COLLISION_GROUPS)
-            component.attach(part)
-        set_joint_and_mass(component, link)
-        component.disable_gravity = True
-        built.append(component)
-        entity = sapien.Entity()
-        entity.name = link.name
-        entity.add_component(component)
-        entities.append(entity)
-    for entity in entities:
-        scene.add_entity(entity)
-    return {link.name: component for link, component in zip(links, built, strict=True)}

@@ -1,4 +1,4 @@
-"""Let a body come to rest on a plane, and let a ball drop into a vessel, in SAPIEN."""
+"""Let bodies come to rest in SAPIEN: copies of one on a plane, a scene of many on furniture, and a ball in a vessel."""
 
 from __future__ import annotations
 
@@ -10,32 +10,130 @@ import sapien
 from sapien import physx
 
 from manitwin.geometry.cavity import Opening
+from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform_points
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.convex_shape import convex_shape
-from manitwin.physics.sapien.body import dynamic_component, hull_shapes
-from manitwin.physics.sapien.physx_system import scene_with_gravity
+from manitwin.physics.sapien.body import (
+    CONTACT_OFFSET_M,
+    SOLVER_ITERATIONS,
+    dynamic_component,
+    entity_at,
+    static_box,
+    static_plane,
+)
+from manitwin.physics.sapien.scene import scene_with_gravity
+from manitwin.physics.sapien.shapes import COOKED, HullShapes, convex_shape, set_contact
 
-_TIMESTEP_S = 1 / 240
-_SOLVER_ITERATIONS = 20  # at PhysX's own 4 to 10, stacks of hulls creep
-_CONTACT_OFFSET_M = 0.002  # 10 mm costs 1.6 times as much for the same answer
-_CHECK_EVERY = 12  # steps between looks at whether all is still
-_STILL_M_S = 1e-3
-_STILL_RAD_S = 1e-2
+TIMESTEP_S = 1 / 240
+TOUCHING_M = 5e-4  # solvers leave a gap of some tenths of a millimetre where there is weight on it
 _BALL_TIMESTEP_S = 1 / 480
 
 
 @dataclass(frozen=True)
+class RestLimits:
+    """When a body counts as at rest: slower than both speeds, for so many looks in a row.
+
+    Its speeds are those between two looks: at rest on many hulls, its velocity of one step is noise. ``by_velocity`` takes the
+    velocities of the last step all the same, which are the sooner to be small.
+    """
+
+    speed_m_s: float = 1e-3
+    turn_rad_s: float = 1e-2
+    between_s: float = 0.05
+    looks: int = 3  # one slow look can be a turning point
+    by_velocity: bool = False
+
+
+class RestWatch:
+    """Tells from look to look which bodies have come to rest."""
+
+    def __init__(self, bodies: Sequence[physx.PhysxRigidDynamicComponent], limits: RestLimits):
+        """Take the first look, from which motions are measured."""
+        self._bodies, self._limits = bodies, limits
+        self.start = self._before = poses_of(bodies)
+        self.looks = np.zeros(len(bodies), dtype=int)
+
+    @property
+    def all_rest(self) -> bool:
+        """Whether every body has been still for the looks that are asked for."""
+        return bool((self.looks >= self._limits.looks).all())
+
+    def look(self) -> np.ndarray:
+        """Look again, ``between_s`` after the look before; return the poses ``(N, 4, 4)``."""
+        now, limits = poses_of(self._bodies), self._limits
+        speed_m_s, turn_rad_s = self._last_speeds() if limits.by_velocity else self._mean_speeds(now)
+        still = (speed_m_s < limits.speed_m_s) & (turn_rad_s < limits.turn_rad_s)
+        self.looks, self._before = np.where(still, self.looks + 1, 0), now
+        return now
+
+    def _mean_speeds(self, now: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        moved_m = np.linalg.norm((now - self._before)[:, :3, 3], axis=1)
+        turned_rad = np.linalg.norm((now - self._before)[:, :3, :3], axis=(1, 2)) / np.sqrt(
+            2
+        )  # |R - I| for small angles
+        return moved_m / self._limits.between_s, turned_rad / self._limits.between_s
+
+    def _last_speeds(self) -> tuple[np.ndarray, np.ndarray]:
+        return (
+            np.array([np.linalg.norm(body.linear_velocity) for body in self._bodies]),
+            np.array([np.linalg.norm(body.angular_velocity) for body in self._bodies]),
+        )
+
+
+@dataclass(frozen=True)
+class Rest:
+    """How settling ended: ``at_rest (N,)``, ``lost (N,)`` where a body went so far that the rest was not waited for."""
+
+    at_rest: np.ndarray
+    lost: np.ndarray
+    steps: int
+
+
+def settle(
+    system: physx.PhysxCpuSystem,
+    bodies: Sequence[physx.PhysxRigidDynamicComponent],
+    *,
+    timestep_s: float,
+    seconds: float,
+    at_least_s: float = 0.0,
+    limits: RestLimits = RestLimits(),
+    give_up_m: Sequence[float] | None = None,
+) -> Rest:
+    """Step until all bodies are at rest, not before ``at_least_s`` nor after ``seconds``.
+
+    ``give_up_m`` is how far the origin of each may move before the rest is not worth waiting for.
+    """
+    watch, lost = RestWatch(bodies, limits), np.zeros(len(bodies), dtype=bool)
+    limits_m = np.full(len(bodies), np.inf) if give_up_m is None else np.array(give_up_m, dtype=float)
+    least, most, between = (round(time_s / timestep_s) for time_s in (at_least_s, seconds, limits.between_s))
+    done = 0
+    while done < most:
+        system.step()
+        done += 1
+        if done % between == 0:
+            now = watch.look()
+            lost = np.linalg.norm((now - watch.start)[:, :3, 3], axis=1) > limits_m
+            if (done >= least and watch.all_rest) or lost.any():
+                break
+    return Rest(watch.looks > 0, lost, done)
+
+
+@dataclass(frozen=True)
 class Settled:
-    """Where a body came to: its pose, how far its centre of mass moved and it turned, and whether it had come to rest.
+    """A body after it was set down: its pose, how far its centre of mass moved, and whether it is at rest.
 
     The drop itself does not count as having moved.
     """
 
     object_to_plane: np.ndarray
     moved_m: float
-    turned_rad: float
     at_rest: bool
+
+    @staticmethod
+    def of(body: RigidBody, start: np.ndarray, end: np.ndarray, at_rest: bool) -> Settled:
+        """Return what lies between two poses ``(4, 4)`` of the object frame."""
+        before, after = (transform_points(p, body.center_of_mass_m[None])[0] for p in (start, end))
+        return Settled(end, float(np.linalg.norm(after - before)), at_rest)
 
 
 def settle_on_plane(
@@ -48,32 +146,116 @@ def settle_on_plane(
     """
     if not len(object_to_plane):
         return []
-    scene = scene_with_gravity(_TIMESTEP_S)
-    material = physx.PhysxMaterial(body.friction_static, body.friction_dynamic, 0.0)
-    _add_ground(scene, material)
+    scene = scene_with_gravity(TIMESTEP_S)
+    scene.add_entity(static_plane(body.friction_static, body.friction_dynamic))
     reach = max(float(np.linalg.norm(hull - body.center_of_mass_m, axis=1).max()) for hull in body.hulls)
     spacing = 8 * reach + 1.0
     offsets = [np.array([spacing * i, 0.0, drop_m]) for i in range(len(object_to_plane))]
-    bodies = []
-    for pose, offset in zip(object_to_plane, offsets, strict=True):
-        component = dynamic_component(body, hull_shapes(body.hulls), contact_offset_m=_CONTACT_OFFSET_M)
-        component.set_solver_position_iterations(_SOLVER_ITERATIONS)
-        component.set_angular_damping(0.0)
-        _add(scene, component, sapien.Pose(pose[:3, 3] + offset, quaternion_wxyz(pose[:3, :3])))
-        bodies.append(component)
-    still = [0] * len(bodies)
-    for step in range(round(seconds / _TIMESTEP_S)):
-        scene.step()
-        if (step + 1) % _CHECK_EVERY:
-            continue
-        still = [count + 1 if _is_still(component) else 0 for count, component in zip(still, bodies, strict=True)]
-        if min(still) >= 3:  # one slow look can be a turning point
-            break
-    drop = np.array([0, 0, drop_m])
+    with COOKED.lent([body.hulls] * len(offsets)) as shapes:
+        bodies = [
+            _release(scene, body, own, pose[:3, 3] + offset, pose[:3, :3], may_sleep=True)
+            for pose, offset, own in zip(object_to_plane, offsets, shapes, strict=True)
+        ]
+        rest = settle(scene.physx_system, bodies, timestep_s=TIMESTEP_S, seconds=seconds)
+        ends = poses_of(bodies)
+    ends[:, :2, 3] -= np.array(offsets)[:, :2]
     return [
-        _outcome(body, pose, component.entity.pose, offset - drop, drop, bool(count))
-        for pose, component, offset, count in zip(object_to_plane, bodies, offsets, still, strict=True)
+        Settled.of(body, pose, end, bool(at_rest))
+        for pose, end, at_rest in zip(object_to_plane, ends, rest.at_rest, strict=True)
     ]
+
+
+@dataclass(frozen=True)
+class SettledScene:
+    """A scene after its objects came to rest.
+
+    ``object_to_world (N, 4, 4)``, ``at_rest (N,)``; ``lost (N,)`` went so far that the rest was not waited for. ``touching``
+    are pairs of names (objects and boxes) that press on each other, the earlier added first, with the deepest overlap (m, 0
+    where none) that the solver has left between them.
+    """
+
+    object_to_world: np.ndarray
+    at_rest: np.ndarray
+    lost: np.ndarray
+    touching: dict[tuple[str, str], float]
+    steps: int
+
+    def neighbours(self, name: str) -> set[str]:
+        """Return what touches an object."""
+        return {other for pair in self.touching if name in pair for other in pair if other != name}
+
+
+def settle_scene(
+    objects: Sequence[PlacedObject],
+    boxes: Sequence[StaticBox],
+    *,
+    seconds: float,
+    at_least_s: float = 0.0,
+    give_up_m: Sequence[float] | None = None,
+) -> SettledScene:
+    """Release all objects at their poses at once, and see where they come to rest and what touches what.
+
+    ``seconds``, ``at_least_s`` and ``give_up_m`` are those of ``settle``.
+    """
+    scene = scene_with_gravity(TIMESTEP_S)
+    names: dict[int, str] = {}
+    for box in boxes:
+        entity = static_box(box, contact_offset_m=CONTACT_OFFSET_M)
+        scene.add_entity(entity)
+        names[entity.per_scene_id] = box.name
+    with COOKED.lent([placed.body.hulls for placed in objects]) as shapes:
+        bodies = []
+        for placed, own in zip(objects, shapes, strict=True):
+            pose = placed.object_to_world
+            # what sleeps reports no contacts
+            component = _release(scene, placed.body, own, pose[:3, 3], pose[:3, :3], may_sleep=False)
+            names[component.entity.per_scene_id] = placed.name
+            bodies.append(component)
+        rest = settle(
+            scene.physx_system,
+            bodies,
+            timestep_s=TIMESTEP_S,
+            seconds=seconds,
+            at_least_s=at_least_s,
+            give_up_m=give_up_m,
+        )
+        return SettledScene(poses_of(bodies), rest.at_rest, rest.lost, _touching(scene, names), rest.steps)
+
+
+def _release(
+    scene: sapien.Scene,
+    body: RigidBody,
+    shapes: HullShapes,
+    position_m: np.ndarray,
+    rotation: np.ndarray,
+    *,
+    may_sleep: bool,
+) -> physx.PhysxRigidDynamicComponent:
+    component = dynamic_component(body, shapes, contact_offset_m=CONTACT_OFFSET_M)
+    component.set_solver_position_iterations(SOLVER_ITERATIONS)
+    component.set_angular_damping(0.0)
+    if not may_sleep:
+        component.set_sleep_threshold(0.0)
+    scene.add_entity(entity_at(component, sapien.Pose(position_m, quaternion_wxyz(rotation))))
+    return component
+
+
+def poses_of(bodies: Sequence[physx.PhysxRigidDynamicComponent]) -> np.ndarray:
+    """Return the poses ``(N, 4, 4)`` of bodies."""
+    return np.array([body.entity_pose.to_transformation_matrix() for body in bodies], dtype=float).reshape(-1, 4, 4)
+
+
+def _touching(scene: sapien.Scene, names: dict[int, str]) -> dict[tuple[str, str], float]:
+    found: dict[tuple[str, str], float] = {}
+    for contact in scene.physx_system.get_contacts():
+        separation = min((point.separation for point in contact.points), default=np.inf)
+        pressed = any(np.linalg.norm(point.impulse) > 0 for point in contact.points)
+        if separation > TOUCHING_M and not pressed:
+            continue
+        first, second = sorted(body.entity.per_scene_id for body in contact.bodies)
+        pair = names[first], names[second]
+        found[pair] = max(found.get(pair, 0.0), -float(separation), 0.0)
+    return dict(sorted(found.items()))
 
 
 def ball_stays_inside(hulls: Sequence[np.ndarray], opening: Opening, *, seconds: float = 2.0) -> bool:
@@ -93,51 +275,22 @@ def ball_stays_inside(hulls: Sequence[np.ndarray], opening: Opening, *, seconds:
     vessel = physx.PhysxRigidStaticComponent()
     for hull in hulls:
         wall = convex_shape(hull, material)
-        wall.contact_offset = _CONTACT_OFFSET_M
+        set_contact(wall, contact_offset_m=CONTACT_OFFSET_M)
         vessel.attach(wall)
-    _add(scene, vessel, sapien.Pose([0, 0, 0], quaternion_wxyz(turn)))
+    scene.add_entity(entity_at(vessel, sapien.Pose([0, 0, 0], quaternion_wxyz(turn))))
     ball = physx.PhysxRigidDynamicComponent()
     shape = physx.PhysxCollisionShapeSphere(radius, material)
-    shape.contact_offset = min(_CONTACT_OFFSET_M, radius / 4)
+    set_contact(shape, contact_offset_m=min(CONTACT_OFFSET_M, radius / 4))
     ball.attach(shape)
     ball.set_mass(0.01)
     ball.set_inertia(np.full(3, 0.4 * 0.01 * radius**2, dtype=np.float32))
     ball.set_linear_damping(1.0)  # takes the bouncing out: only where it ends counts
     rim = turn @ opening.center_m
     start = rim + up * (max(along) - float(opening.center_m @ axis) + 1.5 * radius)
-    _add(scene, ball, sapien.Pose(start))
+    scene.add_entity(entity_at(ball, sapien.Pose(start)))
     for _ in range(round(seconds / _BALL_TIMESTEP_S)):
         scene.step()
     end = np.asarray(ball.entity.pose.p, dtype=float)
     widest = max(float(np.linalg.norm((hull @ turn.T - rim)[:, :2], axis=1).max()) for hull in hulls)
     below_brim = rim[2] - end[2]
     return bool(0 < below_brim <= opening.depth_m and np.linalg.norm((end - rim)[:2]) < widest)
-
-
-def _add(scene: sapien.Scene, component: physx.PhysxRigidBaseComponent, pose: sapien.Pose) -> None:
-    entity = sapien.Entity()
-    entity.add_component(component)
-    entity.pose = pose
-    scene.add_entity(entity)
-
-
-def _add_ground(scene: sapien.Scene, material: physx.PhysxMaterial) -> None:
-    ground = physx.PhysxRigidStaticComponent()
-    ground.attach(physx.PhysxCollisionShapePlane(material))
-    half = float(np.sqrt(0.5))
-    _add(scene, ground, sapien.Pose([0, 0, 0], [half, 0, -half, 0]))  # PhysX planes face +X
-
-
-def _is_still(component: physx.PhysxRigidDynamicComponent) -> bool:
-    linear, angular = np.linalg.norm(component.linear_velocity), np.linalg.norm(component.angular_velocity)
-    return bool(component.is_sleeping or (linear < _STILL_M_S and angular < _STILL_RAD_S))
-
-
-def _outcome(
-    body: RigidBody, start: np.ndarray, end: sapien.Pose, offset: np.ndarray, drop: np.ndarray, at_rest: bool
-) -> Settled:
-    pose = np.asarray(end.to_transformation_matrix(), dtype=float)
-    pose[:3, 3] -= offset
-    before, after = (transform_points(p, body.center_of_mass_m[None])[0] for p in (start, pose))
-    cosine = (np.trace(pose[:3, :3] @ start[:3, :3].T) - 1) / 2
-    return Settled(pose, float(np.linalg.norm(after - before)), float(np.arccos(np.clip(cosine, -1, 1))), at_rest)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from sapien import physx
 
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.kept_for_hulls import KeptForHulls
-from manitwin.physics.sapien.body import hull_shapes
 from manitwin.physics.sapien.hand import FixedHand
-from manitwin.physics.sapien.scene import HandScene
-from manitwin.physics.trial import TrialResult, TrialSettings
+from manitwin.physics.sapien.hand_scene import HandScene
+from manitwin.physics.sapien.shapes import COOKED, HullShapes
+from manitwin.physics.trial import KeptForHulls, TrialResult, TrialSettings
 from manitwin.physics.trial_phases import run_phases
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.hand_reach import HandReach
@@ -29,7 +27,7 @@ class SapienTrial:
     name = "sapien"
 
     def __init__(self) -> None:
-        self._shapes, self._reach = KeptForHulls(hull_shapes), KeptForHulls(HandReach)
+        self._reach = KeptForHulls(HandReach)
 
     def run(
         self,
@@ -41,13 +39,14 @@ class SapienTrial:
     ) -> list[TrialResult]:
         """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order."""
         hand = of_kind(gripper, ParallelGripper)
-        shapes, reach = self._shapes(body.hulls), self._reach(body.hulls)
-        return [_try_one(body, shapes, reach, hand, inverse(pose), settings) for pose in gripper_to_object]
+        reach = self._reach(body.hulls)
+        with COOKED.lent([body.hulls]) as (shapes,):
+            return [_try_one(body, shapes, reach, hand, inverse(pose), settings) for pose in gripper_to_object]
 
 
 def _try_one(
     body: RigidBody,
-    shapes: list[physx.PhysxCollisionShapeConvexMesh],
+    shapes: HullShapes,
     reach: HandReach,
     gripper: ParallelGripper,
     object_to_hand: np.ndarray,

@@ -1,8 +1,13 @@
-"""What a robot's links look like, for pictures."""
+"""Visuals of SAPIEN scenes: a twin's GLB file, plain boxes, and the visual shapes of a robot's URDF.
+
+SAPIEN reads the files itself here. The pictures of this package upload prepared arrays instead: ``manitwin.render.surfaces``.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,36 +15,64 @@ import sapien
 from lxml import etree  # type: ignore[import-untyped]
 from sapien import physx
 
+from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of
 
 _GREY = (0.7, 0.7, 0.7, 1.0)
 Visual = tuple[str, np.ndarray, str, tuple[Any, ...], tuple[float, ...] | None]
 
 
-def add_visuals(
+def glb_visual(path: Path) -> Any:
+    """Return a Y-up glTF file as a component in the object frame (+Z up)."""
+    from sapien import render
+
+    shape = render.RenderShapeTriangleMesh(str(path))
+    shape.local_pose = sapien.Pose(GLTF_TO_OBJECT)
+    return _component([shape])
+
+
+def box_visual(half_extents_m: np.ndarray, rgb: tuple[float, float, float]) -> Any:
+    """Return a box of one colour (linear RGB) as a component."""
+    from sapien import render
+
+    return _component([render.RenderShapeBox(half_extents_m, _plain_material((*rgb, 1.0), roughness=0.7))])
+
+
+def add_robot_visuals(
     urdf: str,
     bodies: dict[str, physx.PhysxArticulationLinkComponent],
     part_of: dict[str, tuple[str, np.ndarray]],
 ) -> None:
-    """Give the bodies in a scene the visuals of their links; ``part_of`` says which link is where in which body."""
-    from sapien import render
-
-    components: dict[str, Any] = {}
+    """Give the bodies in a scene the visuals of their links; ``part_of`` has each link's body and pose in it."""
+    shapes: dict[str, list[Any]] = {}
     for link, shape_to_link, kind, numbers, rgba in _visuals(urdf):
         body, link_to_body = part_of[link]
         shape = _shape(kind, numbers, rgba)
         shape.local_pose = sapien.Pose(link_to_body @ shape_to_link)
-        if body not in components:
-            components[body] = render.RenderBodyComponent()
-        components[body].attach(shape)
-    for name, component in components.items():
-        bodies[name].entity.add_component(component)
+        shapes.setdefault(body, []).append(shape)
+    for name, of_body in shapes.items():
+        bodies[name].entity.add_component(_component(of_body))
+
+
+def _component(shapes: Sequence[Any]) -> Any:
+    from sapien import render
+
+    component = render.RenderBodyComponent()
+    for shape in shapes:
+        component.attach(shape)
+    return component
+
+
+def _plain_material(rgba: tuple[float, ...], *, roughness: float) -> Any:
+    from sapien import render
+
+    return render.RenderMaterial(base_color=list(rgba), roughness=roughness, metallic=0.0)
 
 
 def _shape(kind: str, numbers: tuple[Any, ...], rgba: tuple[float, ...] | None) -> Any:
     from sapien import render
 
-    material = render.RenderMaterial(base_color=list(rgba or _GREY), roughness=0.6)
+    material = _plain_material(rgba or _GREY, roughness=0.6)
     if kind == "mesh":
         path, scale = numbers
         own = rgba is None and not path.lower().endswith(".stl")  # an STL has no colours of its own

@@ -1,4 +1,4 @@
-"""Who touches whom in an episode: the fingers the target, the target its support, and the robot what it should not."""
+"""Contacts of a robot's world: of the fingers with the target, the target with its support, the robot with what it should not."""
 
 from __future__ import annotations
 
@@ -9,13 +9,9 @@ from enum import IntEnum
 import numpy as np
 from sapien import physx
 
-from manitwin.episodes.planning.problem import Phase
-
-IN_HAND = frozenset({Phase.CLOSE, Phase.LIFT, Phase.CARRY, Phase.LOWER, Phase.OPEN})
-
 
 class Role(IntEnum):
-    """What a body is in an episode; the robot's parts come first."""
+    """The role of a body in a task; the robot's parts come first."""
 
     PLUS_FINGER = 0
     MINUS_FINGER = 1
@@ -28,7 +24,7 @@ class Role(IntEnum):
 
 @dataclass(frozen=True)
 class Touches:
-    """How hard each finger presses on the target, and whether something else carries it."""
+    """The force (N) of each finger on the target, and whether something else carries it."""
 
     finger_forces_n: tuple[float, float]
     on_support: bool
@@ -73,10 +69,13 @@ class ContactReader:
         plus_n, minus_n = (float(np.linalg.norm(impulse)) / self._system.timestep for impulse in impulses)
         return Touches((plus_n, minus_n), on_support)
 
-    def unplanned(self, contacts: Iterable[physx.PhysxContact], phase: Phase) -> set[tuple[str, str]]:
-        """Return the names of what touches with more than the allowed force and should not, the robot's part first."""
+    def unplanned(self, contacts: Iterable[physx.PhysxContact], *, in_hand: bool) -> set[tuple[str, str]]:
+        """Return the names of what touches with more than the allowed force and should not, the robot's part first.
+
+        While the target is ``in_hand``, the palm may touch it.
+        """
         impulses: dict[tuple[str, str], np.ndarray] = {}
-        forbidden = _FORBIDDEN_IN_HAND if phase in IN_HAND else _FORBIDDEN
+        forbidden = _FORBIDDEN_IN_HAND if in_hand else _FORBIDDEN
         for contact in contacts:
             first, second = contact.bodies
             if not forbidden[self._roles[first]][self._roles[second]]:
