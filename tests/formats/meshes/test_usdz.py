@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -9,6 +11,8 @@ from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 
 from manitwin.errors import InputError
+from manitwin.formats.isolated import run_isolated
+from manitwin.formats.meshes import read
 from manitwin.formats.meshes.read import read_mesh
 
 POINTS = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
@@ -63,13 +67,6 @@ def _package(path: Path, members: dict[str, bytes], compression: int = zipfile.Z
         for name, data in members.items():
             archive.writestr(name, data)
     return path
-
-
-@pytest.fixture(autouse=True)
-def _quick(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Leave out the rehearsal in a process of its own, which takes a second, where it is not what is tested."""
-    if "rehearsal" not in request.node.name and "crashes" not in request.node.name:
-        monkeypatch.setattr("manitwin.formats.meshes.usdz._rehearse", lambda source: None)
 
 
 @pytest.fixture
@@ -147,13 +144,21 @@ def test_cut_and_broken_packages_are_unreadable(usdz: Path) -> None:
 
 
 def test_layer_that_crashes_the_usd_library_is_only_unreadable(usdz: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    crashing = usdz.with_name("python")
-    crashing.write_text("#!/bin/sh\nkill -ABRT $$\n")
-    crashing.chmod(0o755)
-    monkeypatch.setattr("sys.executable", str(crashing))
+    monkeypatch.setattr(read, "run_isolated", lambda *_: run_isolated("os:abort"))
     with pytest.raises(InputError, match="crashes"):
         read_mesh(usdz)
-
-
-def test_rehearsal_in_a_process_of_its_own_lets_good_files_pass(usdz: Path) -> None:
+    monkeypatch.undo()
     assert len(read_mesh(usdz).parts) == 2
+
+
+def test_the_usd_library_is_not_loaded_into_the_process_that_reads(usdz: Path) -> None:
+    code = f"""
+import sys
+from pathlib import Path
+from manitwin.formats.isolated import run_isolated
+from manitwin.formats.meshes import read
+from manitwin.formats.meshes.read import read_mesh
+assert len(read_mesh(Path({str(usdz)!r})).parts) == 2
+assert not any(name.startswith("pxr") for name in sys.modules)
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)

@@ -16,10 +16,10 @@ from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.readers.usd_layers import LayerFiles
 from manitwin.assets.readers.usd_physics import declared_contact, declared_inertial
-from manitwin.assets.readers.usd_process import read_apart
 from manitwin.assets.readers.usd_shapes import StageShapes
 from manitwin.assets.readers.usd_textures import LayeredSurfaces
 from manitwin.errors import AssetError, InputError
+from manitwin.formats.isolated import MAX_MEMORY_BYTES, ProcessCrashed, run_isolated
 from manitwin.formats.meshes.source import MeshSource
 
 
@@ -29,7 +29,15 @@ def read(path: Path) -> Asset:
     Layers, references, payloads and textures are followed inside of the file's folder only. Raises AssetError naming what
     is broken, also where the USD library crashes on it.
     """
-    return read_apart(path)
+    try:
+        asset: Asset = run_isolated("manitwin.assets.readers.usd:read_here", path.absolute())
+    except ProcessCrashed as error:
+        raise AssetError(f"{path}: its USD is so broken that the USD library crashes on it; export it again") from error
+    except MemoryError as error:
+        raise AssetError(
+            f"{path}: it asks for more than {MAX_MEMORY_BYTES >> 30} GiB of memory; simplify it"
+        ) from error
+    return asset
 
 
 def read_here(path: Path) -> Asset:

@@ -10,6 +10,7 @@ import numpy as np
 import trimesh
 
 from manitwin.errors import InputError
+from manitwin.formats.isolated import ProcessCrashed, run_isolated
 from manitwin.formats.meshes.dae import read_dae
 from manitwin.formats.meshes.gltf import read_gltf
 from manitwin.formats.meshes.normals import with_creased_normals
@@ -18,7 +19,6 @@ from manitwin.formats.meshes.ply import read_ply
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.formats.meshes.stl import read_stl
 from manitwin.formats.meshes.textures import normals_of
-from manitwin.formats.meshes.usdz import read_usdz
 from manitwin.formats.sniff import sniff
 
 _SUFFIXES = {
@@ -93,9 +93,19 @@ def _read(format: str, source: MeshSource) -> tuple[list[trimesh.Trimesh], float
     if format == "dae":
         return read_dae(source)
     if format == "usdz":
-        return read_usdz(source)
+        return _read_usdz(source)
     readers = {"obj": read_obj, "ply": read_ply, "stl": read_stl}
     return readers[format](source), None, None
+
+
+def _read_usdz(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
+    try:
+        parts, unit_m, up, read = run_isolated("manitwin.formats.meshes.usdz:read_usdz", source)
+    except ProcessCrashed as error:
+        cause = "its USD is so broken that the USD library crashes on it"
+        raise source.unreadable(cause, "export it again") from error
+    source.findings[:], source.bytes_read = read.findings, read.bytes_read
+    return parts, unit_m, up
 
 
 def _checked(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.Trimesh]:

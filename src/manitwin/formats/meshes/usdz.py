@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import resource
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,9 +9,8 @@ import trimesh
 from pxr import Tf, Usd, UsdGeom, UsdShade
 from trimesh.visual.material import PBRMaterial
 
-from manitwin.errors import InputError
 from manitwin.formats.meshes.polygons import triangle_fans
-from manitwin.formats.meshes.source import MeshLimits, MeshSource
+from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, make_part
 from manitwin.formats.meshes.usdz_archive import UsdzArchive
 from manitwin.formats.meshes.usdz_materials import PreviewSurfaces
@@ -24,36 +19,20 @@ from manitwin.formats.meshes.vertex_colors import color_by_corner
 _MAX_PARTS = 20_000
 _UV_NAMES = ("st", "st0", "st_0", "UVMap", "uv", "map1", "Texture_uv")
 
-MAX_MEMORY_BYTES = 8 << 30
-OUT_OF_MEMORY = 3
-"""The exit status of a rehearsal that wanted more."""
 
-
-def read_usdz(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
+def read_usdz(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None, MeshSource]:
     """Read all visible meshes of a USDZ package: parts with transforms baked, unit in metres, up axis 'y' | 'z'.
 
-    A stage that does not say its unit is in centimetres (USD's fallback), which is told as None. Raises InputError
-    ``unreadable``, ``animated`` (skinned meshes, value clips).
+    To be run in a process of its own; the source comes back with what was found. A stage that does not say its unit is in
+    centimetres (USD's fallback), which is told as None. Raises InputError ``unreadable``, ``animated`` (skinned meshes,
+    value clips).
     """
     archive = UsdzArchive(source)
     if archive.root is None:
         raise source.unreadable("its first member is no USD layer", "pack it with usdzip")
-    _rehearse(source)
-    return _composed(archive, source)
-
-
-def _rehearse(source: MeshSource) -> None:
-    """Read the file in a process of its own first: USD aborts the whole process on some broken layers."""
-    command = [sys.executable, "-P", "-m", "manitwin.formats.meshes.usdz", str(source.path)]
-    rehearsal = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
-    if rehearsal.returncode < 0 or rehearsal.returncode == OUT_OF_MEMORY:
-        raise source.unreadable("its USD is so broken that the USD library crashes on it", "export it again")
-
-
-def _composed(archive: UsdzArchive, source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
     archive.check_layers()
     try:
-        return _read(Usd.Stage.Open(str(source.path)), archive, source)
+        return *_read(Usd.Stage.Open(str(source.path)), archive, source), source
     except Tf.ErrorException as error:
         raise source.unreadable("its USD is broken", "export it again") from error
 
@@ -195,15 +174,3 @@ def _display_colors(mesh: UsdGeom.Mesh, indices: np.ndarray, sizes: np.ndarray) 
 
 def _value(attribute: Usd.Attribute) -> Any:
     return attribute.Get(Usd.TimeCode.EarliestTime())
-
-
-if __name__ == "__main__":
-    # a broken file of a kilobyte can ask for tens of gigabytes
-    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
-    rehearsed = MeshSource(Path(sys.argv[1]), MeshLimits())
-    try:
-        _composed(UsdzArchive(rehearsed), rehearsed)
-    except InputError as refusal:
-        print(refusal)
-    except MemoryError:
-        sys.exit(OUT_OF_MEMORY)
