@@ -23,9 +23,9 @@ import pyarrow as pa
 import pyarrow.compute
 
 from manitwin.dataset.index.dataset import Dataset
-from manitwin.dataset.index.merge import PART_ROWS, write_rows
 from manitwin.dataset.index.near_duplicates import near_duplicates
 from manitwin.dataset.index.part_list import PartList
+from manitwin.dataset.index.parts import PART_ROWS, write_rows
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.index.tables import TABLES, joined
 from manitwin.geometry.shape_descriptor import LENGTH

@@ -22,7 +22,7 @@ import trimesh
 
 from manitwin.geometry.distance import distance_to_surface
 from manitwin.geometry.repair.cascade import RepairResult, repair
-from manitwin.geometry.repair.open_sheets import fibonacci_sphere
+from manitwin.geometry.repair.thickening import fibonacci_sphere
 from manitwin.geometry.repair.welding import weld_equal
 from manitwin.geometry.sampling import sample_surface
 

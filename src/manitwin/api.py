@@ -442,7 +442,7 @@ def statistics_connection(dataset: str | Path) -> duckdb.DuckDBPyConnection:
 
     Raises UsageError where there is no index.
     """
-    from manitwin.dataset.statistics.tables import ReportTables
+    from manitwin.dataset.statistics.query import ReportTables
     from manitwin.twin.dataset_root import DatasetRoot
 
     return ReportTables.of_index(DatasetRoot(dataset)).connection

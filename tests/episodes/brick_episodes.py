@@ -12,9 +12,8 @@ from manitwin.episodes.episode import EpisodeFacts, run_episode
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, Motion, PickPlacePlan, PickPlaceProblem, PlanReport
 from manitwin.episodes.recording import Recording
-from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import transform
-from manitwin.geometry.rigid_body import RigidBody
+from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.app_config import EpisodeSettings

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.geometry.ray_caster import RayCaster
+from handmade import cup
+from manitwin.geometry.ray_caster import RayCaster, local_thickness
 
 
 def test_first_hit_is_the_near_face_of_a_box() -> None:
@@ -28,3 +29,21 @@ def test_ray_beside_the_box_hits_nothing() -> None:
 def test_no_rays_give_no_hits() -> None:
     distance, face = RayCaster(trimesh.creation.box()).first_hits(np.zeros((0, 3)), np.zeros((0, 3)))
     assert len(distance) == len(face) == 0
+
+
+def test_a_box_is_as_thick_as_its_sides() -> None:
+    box = trimesh.creation.box([0.1, 0.06, 0.02])
+    normals = np.array([[1.0, 0, 0], [0, -1, 0], [0, 0, 1]])
+    points = normals * np.array([0.05, 0.03, 0.01])
+    assert local_thickness(box, points, normals) == pytest.approx([0.1, 0.06, 0.02], abs=1e-6)
+
+
+def test_a_cup_is_as_thick_as_its_wall_from_both_sides() -> None:
+    points = np.array([[0.04, 0, 0.05], [0.037, 0, 0.05], [0.0, 0, 0.0]])
+    normals = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 0, -1]])
+    assert local_thickness(cup(), points, normals) == pytest.approx([0.003, 0.003, 0.003], abs=1e-4)
+
+
+def test_normals_need_not_be_of_unit_length() -> None:
+    box = trimesh.creation.box([0.1, 0.06, 0.02])
+    assert local_thickness(box, np.array([[0, 0, 0.01]]), np.array([[0, 0, 7.0]])) == pytest.approx([0.02], abs=1e-6)

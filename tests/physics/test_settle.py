@@ -6,9 +6,8 @@ from scipy.spatial.transform import Rotation
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.hulls.decomposition import convex_decomposition
 from manitwin.geometry.mass_properties import solid_mass_properties
-from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import transform
-from manitwin.geometry.rigid_body import RigidBody
+from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
 from manitwin.physics.sapien.settle import ball_stays_inside, settle_on_plane, settle_scene
 from real_meshes import VESSELS, cup, load_real_mesh
 from scene_twins import bowl, can, slab, standing_at

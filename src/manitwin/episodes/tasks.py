@@ -8,10 +8,9 @@ from functools import cached_property
 
 import numpy as np
 
-from manitwin.geometry.footprints import footprint, separation_m
-from manitwin.geometry.placed_object import PlacedObject
+from manitwin.geometry.boxes import footprint, separation_m
 from manitwin.geometry.poses import inverse, transform, transform_points
-from manitwin.geometry.rigid_body import RigidBody
+from manitwin.geometry.rigid_body import PlacedObject, RigidBody
 from manitwin.robots.robot import Workspace
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.scene import SupportRegion

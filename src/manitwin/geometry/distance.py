@@ -45,11 +45,6 @@ def signed_distance(points: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
     return np.where(outside, distance, -distance)
 
 
-def contains(points: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
-    """Tell which points ``(N, 3)`` lie inside a watertight welded mesh, ``(N,) bool``."""
-    return signed_distance(points, mesh) < 0
-
-
 def closest_points_on_triangles(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the closest point ``(N, 3)`` of each triangle ``(N, 3, 3)`` to its point, and its barycentric weights.
 

@@ -1,4 +1,4 @@
-"""How different grasps are, and far-apart subsets of them.
+"""Distances between grasps, and far-apart subsets of them.
 
 A parallel gripper turned by half a turn about its approach direction is the same gripper: such twins have distance
 zero.

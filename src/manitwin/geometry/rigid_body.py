@@ -1,4 +1,4 @@
-"""The rigid body that simulations move: convex hulls with mass properties and friction of their own."""
+"""Rigid bodies of simulations: convex hulls with mass properties and friction, at a pose; and boxes that do not move."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ import numpy as np
 
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.geometry.ray_caster import RayCaster
+
+FURNITURE_FRICTION = 0.5
+"""Static and dynamic, of every piece of furniture."""
 
 
 @dataclass(frozen=True)
@@ -40,3 +43,22 @@ def principal_frame(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if np.linalg.det(axes) < 0:
         axes[:, 0] *= -1
     return moments, axes
+
+
+@dataclass(frozen=True)
+class PlacedObject:
+    """A twin's body at a pose ``object_to_world (4, 4)``; ``name`` is its own in the scene (``object_00``)."""
+
+    name: str
+    twin_id: str
+    body: RigidBody
+    object_to_world: np.ndarray
+
+
+@dataclass(frozen=True)
+class StaticBox:
+    """A box that does not move: a table's top, a shelf's board, a tray's rim. ``half_extents_m (3,)``, metres, world frame."""
+
+    name: str
+    half_extents_m: np.ndarray
+    box_to_world: np.ndarray

@@ -16,9 +16,7 @@ from manitwin.formats.meshes.read import MeshFile, read_mesh
 from manitwin.formats.meshes.repaired import repaired_parts
 from manitwin.formats.meshes.source import MeshLimits
 from manitwin.formats.meshes.textures import bake_transform
-from manitwin.geometry.canonical.frame import object_frame
-from manitwin.geometry.canonical.units import LengthUnit, decide_unit
-from manitwin.geometry.canonical.up import UpChoice, choose_up
+from manitwin.geometry.canonical_frame import LengthUnit, UpChoice, choose_up, decide_unit, object_frame
 from manitwin.geometry.repair.cascade import RepairResult, repair
 from manitwin.geometry.repair.components import connected_parts
 from manitwin.models.annotators.priors import Prior, lookup

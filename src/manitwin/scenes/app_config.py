@@ -8,7 +8,7 @@ from typing import Any, Literal, TypeVar
 from pydantic import Field, model_validator
 
 from manitwin.config import RunConfig, Section, read_toml, validated
-from manitwin.geometry.placed_object import FURNITURE_FRICTION
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION
 
 Application = TypeVar("Application", bound=Section)
 

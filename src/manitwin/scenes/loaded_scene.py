@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
-from manitwin.geometry.rigid_body import RigidBody
+from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
 from manitwin.scenes.scene import Furniture, SceneObject, SceneRecord
 from manitwin.scenes.scene_file import read_scene
 from manitwin.twin.loaded_twin import Twin

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mujoco
 
-from manitwin.geometry.placed_object import FURNITURE_FRICTION
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION
 from manitwin.physics.mujoco.body import (
     SOFT_SOLREF,
     TIMESTEP_S,

@@ -8,7 +8,7 @@ import fsspec
 import pyarrow as pa
 import pytest
 
-from manitwin.dataset.index import merge, parts
+from manitwin.dataset.index import parts
 from manitwin.dataset.index.part_list import PARTS, read_part_list
 from manitwin.dataset.index.parts import compact, indexed_twins, write_part
 from manitwin.dataset.index.query import Index
@@ -144,8 +144,7 @@ def test_large_index_is_cut_into_parts_that_do_not_overlap(
 ) -> None:
     root, ids = written
     before = contents(root)
-    for module in (merge, parts):
-        monkeypatch.setattr(module, "PART_ROWS", 20)
+    monkeypatch.setattr(parts, "PART_ROWS", 20)
     found = compact(root)  # 63 grasps
     assert len(found) == 4 and sum(part.twins for part in found) == len(ids)
     assert all(one.last < other.first for one, other in itertools.pairwise(found))

@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from manitwin.dataset.publish.hub_license import hub_license
-from manitwin.dataset.publish.licences import licenses_page, select, without_attribution
+from manitwin.dataset.publish.licences import hub_license, licenses_page, select, without_attribution
 from manitwin.dataset.publish.publish import publish_dataset
 from manitwin.errors import UsageError
 

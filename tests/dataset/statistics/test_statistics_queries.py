@@ -12,9 +12,8 @@ import pytest
 from scipy.stats import binomtest
 from synthetic_index import identities, synthetic_tables
 
-from manitwin.dataset.statistics import cost_queries, grasp_queries, object_queries, stage_queries
-from manitwin.dataset.statistics.query import Query, Row
-from manitwin.dataset.statistics.tables import ReportTables
+from manitwin.dataset.statistics import grasp_queries, object_queries, stage_queries
+from manitwin.dataset.statistics.query import Query, ReportTables, Row
 from manitwin.models.annotators.priors import load_priors
 from manitwin.twin.record import REJECTION_REASONS
 
@@ -191,14 +190,14 @@ def test_share_inside_the_prior_is_that_of_the_package(tables: ReportTables, row
 
 
 def test_cost_by_stage_adds_up_to_the_total(tables: ReportTables, rows: dict[str, Rows]) -> None:
-    stages = by(tables, cost_queries.COST_BY_STAGE, "stage")
-    total = by(tables, cost_queries.COST, "quantity")
+    stages = by(tables, stage_queries.COST_BY_STAGE, "stage")
+    total = by(tables, stage_queries.COST, "quantity")
     cpu = sum(row["cpu_seconds"] for row in rows["stages"])
     assert (
         total["CPU s"]["total"] == pytest.approx(cpu) == pytest.approx(sum(r["cpu_seconds"] for r in stages.values()))
     )
     assert total["CPU s"]["per_accepted"] == pytest.approx(cpu / len(rows["twins"]))
-    assert list(stages) == [stage for stage in cost_queries.STAGE_ORDER if stage in stages], "in the pipeline's order"
+    assert list(stages) == [stage for stage in stage_queries.STAGE_ORDER if stage in stages], "in the pipeline's order"
 
 
 def test_same_source_lists_accepted_and_rejected_together() -> None:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
-from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import transform
-from manitwin.geometry.rigid_body import RigidBody
+from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
 
 TABLE = StaticBox("table", np.array([0.6, 1.0, 0.05]), transform(translation=np.array([0.35, 0, -0.05])))
 FROM_ABOVE = np.diag([1.0, -1.0, -1.0])  # closes along the object's x

@@ -11,8 +11,8 @@ from manitwin.episodes.planning.kinematic_body import floating_hand_of
 from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.planning.problem_world import ProblemWorld
 from manitwin.episodes.planning.settings import PlannerSettings
-from manitwin.geometry.placed_object import PlacedObject
 from manitwin.geometry.poses import inverse
+from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.load import load_robot
 
 SETTINGS = PlannerSettings()

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.geometry.repair.boundary_loops import boundary_loops, loop_lengths
 from manitwin.geometry.repair.halfedges import group_edges, is_closed_and_consistent, twins_of_manifold_edges
-from manitwin.geometry.repair.hole_filling import fill_loops
+from manitwin.geometry.repair.hole_filling import boundary_loops, fill_loops, loop_lengths
 from manitwin.geometry.repair.orientation import wind_consistently
 from manitwin.geometry.repair.surface import Surface
 

@@ -13,7 +13,7 @@ from pydantic import ValidationError
 from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset
 from manitwin.assets.importers.rests import settled_rests
 from manitwin.errors import AssetError
-from manitwin.geometry.canonical.frame import object_frame
+from manitwin.geometry.canonical_frame import object_frame
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.twin.import_record import GivenGrasps, GivenPoint, ImportRecord
 

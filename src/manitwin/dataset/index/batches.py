@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from manitwin.dataset.index.query import Index, grasps_of, sql_texts
 from manitwin.dataset.index.rows import VISUAL, surface
-from manitwin.dataset.index.twin_files import local_files
+from manitwin.dataset.index.twins import local_files
 from manitwin.errors import UsageError, choose_from
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.geometry.sampling import sample_surface

@@ -11,8 +11,7 @@ import pyarrow as pa
 
 from manitwin.dataset.index.part_list import PartList
 from manitwin.dataset.index.query import Index, grasps_of
-from manitwin.dataset.index.twin_files import local_files
-from manitwin.dataset.index.twins import Twins
+from manitwin.dataset.index.twins import Twins, local_files
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record import TwinRecord
@@ -51,7 +50,7 @@ class Dataset(Sequence["Twin"]):
 
     @property
     def root(self) -> DatasetRoot:
-        """Where it lives."""
+        """The folder or URL that it lives at."""
         return self._index.root
 
     def __repr__(self) -> str:

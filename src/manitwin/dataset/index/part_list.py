@@ -1,4 +1,4 @@
-"""Which files make up an index: ``index/parts.json``, replaced whole, so that an index changes at one moment."""
+"""The list of the files that make up an index: ``index/parts.json``, replaced whole, so that an index changes at one moment."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class IndexPart:
 
     @property
     def twins(self) -> int:
-        """How many twins it has, accepted and rejected."""
+        """The number of its twins, accepted and rejected."""
         return self.rows["twins"] + self.rows["rejections"]
 
 

@@ -1,16 +1,16 @@
-"""Ask an index: DuckDB over the Parquet files of its parts, read-only and locked."""
+"""Ask an index: DuckDB over the Parquet files of its parts, read-only and locked, with conditions that are checked first."""
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import duckdb
 import pyarrow as pa
 
-from manitwin.dataset.index.condition import check_condition
 from manitwin.dataset.index.part_list import PartList, read_part_list
 from manitwin.dataset.index.tables import ORDER, TABLES
 from manitwin.errors import UsageError, choose_from
@@ -166,3 +166,73 @@ def _explained(error: duckdb.Error, table: str) -> str:
 
 def _first_line(error: Exception) -> str:
     return " ".join(str(error).split("\n")[0].split())
+
+
+EXAMPLE = "\"category = 'mug' and mass_kg < 0.4\""
+_ALONE: dict[str, Any] = {
+    **dict.fromkeys(("where_clause", "having", "qualify", "sample")),
+    **{name: [] for name in ("modifiers", "group_expressions", "group_sets")},
+    "aggregate_handling": "STANDARD_HANDLING",
+}
+"""What DuckDB's parser says of a SELECT that has no more than its list of expressions."""
+_REFUSED = {
+    "TABLE_FUNCTION": "functions that make tables",
+    "SHOW_REF": "DESCRIBE and SHOW",
+    "PIVOT": "PIVOT",
+    "PARAMETER": "parameters",
+}
+
+
+def check_condition(connection: duckdb.DuckDBPyConnection, condition: str) -> None:
+    """Raise UsageError for what is not exactly one SQL expression, or reads anything but the tables of the index.
+
+    DuckDB's own parser says what it is (``json_serialize_sql``). Subqueries may read the six tables. This is one of two
+    bolts: the connection is locked too.
+    """
+    statement = f"SELECT\n{condition}\n"
+    try:
+        [(parsed,)] = connection.execute("SELECT json_serialize_sql(?)", [statement]).fetchall()
+        _check_tree(json.loads(parsed), condition)
+    except RecursionError as error:
+        raise UsageError(f"condition {_short(condition)}: nested too deeply; write it flatter") from error
+
+
+def _check_tree(tree: dict[str, Any], condition: str) -> None:
+    if tree.get("error", True):
+        message = " ".join(str(tree.get("error_message", "cannot be parsed")).split())
+        raise UsageError(f"condition {_short(condition)}: {message}; give one SQL condition such as {EXAMPLE}")
+    node = tree["statements"][0]["node"] if len(tree["statements"]) == 1 else {}
+    alone = (
+        node.get("type") == "SELECT_NODE"
+        and len(node["select_list"]) == 1
+        and not node["select_list"][0]["alias"]
+        and node["from_table"]["type"] == "EMPTY"
+        and not node["cte_map"]["map"]
+        and all(node.get(key) == value for key, value in _ALONE.items())
+    )
+    if not alone:
+        raise UsageError(f"condition {_short(condition)}: not one condition; give one such as {EXAMPLE}")
+    _check_nodes(node["select_list"], condition)
+
+
+def _check_nodes(node: Any, condition: str) -> None:
+    if isinstance(node, list):
+        for each in node:
+            _check_nodes(each, condition)
+    elif isinstance(node, dict):
+        refused = _REFUSED.get(str(node.get("type")), _REFUSED.get(str(node.get("class"))))
+        if refused:
+            raise UsageError(
+                f"condition {_short(condition)}: {refused} may not be used; it may read the tables {', '.join(TABLES)}"
+            )
+        if node.get("type") == "BASE_TABLE":
+            path = [node[part] for part in ("catalog_name", "schema_name", "table_name") if node[part]]
+            if len(path) != 1 or path[0].lower() not in TABLES:
+                raise UsageError(f"condition {_short(condition)}: {choose_from('table', '.'.join(path), TABLES)}")
+        for value in node.values():
+            _check_nodes(value, condition)
+
+
+def _short(condition: str) -> str:
+    line = " ".join(condition.split())
+    return f"{line!r}" if len(line) <= 80 else f"{line[:77]!r}..."

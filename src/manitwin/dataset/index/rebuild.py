@@ -10,9 +10,8 @@ from pathlib import Path, PurePosixPath
 from pebble import ProcessExpired, ProcessPool
 from pyarrow.fs import LocalFileSystem
 
-from manitwin.dataset.index.merge import merged, write_rows
 from manitwin.dataset.index.part_list import INDEX, IndexPart, PartList, in_order_of_twins, sweep
-from manitwin.dataset.index.parts import rows_of_twins
+from manitwin.dataset.index.parts import merged, rows_of_twins, write_rows
 from manitwin.dataset.index.tables import TABLES, joined, parquet
 from manitwin.engine.main_module import WorkerContext, hidden_main_module
 from manitwin.errors import TwinError
@@ -36,7 +35,7 @@ class Rebuilt:
 
 @dataclass(frozen=True)
 class _Read:
-    """What became of a task: its rows are in files."""
+    """The answer of a task, whose rows are in files."""
 
     twins: int
     grasps: int

@@ -6,13 +6,14 @@ import operator
 import shutil
 import tempfile
 import weakref
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 
-if TYPE_CHECKING:  # SAPIEN and meshes are imported when a twin is loaded
+if TYPE_CHECKING:
     from manitwin.twin.loaded_twin import Twin
 
 _SHOWN = 3
@@ -93,3 +94,19 @@ def load_twin(root: DatasetRoot, twin_id: str) -> Twin:
         raise
     weakref.finalize(twin, shutil.rmtree, copy.parent, ignore_errors=True)
     return twin
+
+
+@contextmanager
+def local_files(root: DatasetRoot, twin_id: str, files: Iterable[str]) -> Iterator[Path]:
+    """Give a folder with those of a twin's files that are there: its own, or for a URL a copy that ends with the context."""
+    name = twin_name(twin_id)
+    if root.local is not None:
+        yield root.local / name
+        return
+    with tempfile.TemporaryDirectory(prefix="manitwin-") as scratch:
+        folder = Path(scratch) / twin_id
+        folder.mkdir()
+        for file in files:
+            if root.exists(f"{name}/{file}"):  # who reads the folder says what is missing
+                root.fetch_file(f"{name}/{file}", folder / file)
+        yield folder

@@ -1,4 +1,4 @@
-"""What must not leave the house: folders of this machine, and the names of the people in them."""
+"""Check that nothing published names folders of this machine, or the people in them."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ _INCOMING, _SCRATCH = "incoming-", "scratch-"
 
 @dataclass(frozen=True)
 class Kind:
-    """What is published: the ``folders`` that it owns besides ``.publish/``, and the ``sign`` that a finished one has."""
+    """A kind of publication: the ``folders`` that it owns besides ``.publish/``, and the ``sign`` that a finished one has."""
 
     name: str
     folders: tuple[str, ...]

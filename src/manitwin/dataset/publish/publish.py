@@ -13,10 +13,9 @@ from manitwin.dataset.index.tables import parquet
 from manitwin.dataset.publish.card import CardFacts, dataset_card
 from manitwin.dataset.publish.card_statistics import COLUMNS
 from manitwin.dataset.publish.licences import LICENSES_MD, Selection, licenses_page, select, without_attribution
-from manitwin.dataset.publish.listing import tar_bytes_of_twins
 from manitwin.dataset.publish.privacy import places_of
 from manitwin.dataset.publish.publication import Publication
-from manitwin.dataset.publish.shard_plan import HUB_FILE_BYTES, Shard, ShardTwin, plan_shards
+from manitwin.dataset.publish.shard_plan import HUB_FILE_BYTES, Shard, ShardTwin, plan_shards, tar_bytes_of_twins
 from manitwin.dataset.publish.shards import write_shard
 from manitwin.dataset.publish.tables import (
     INDEX,
@@ -51,7 +50,7 @@ class ShardDone:
 
 @dataclass(frozen=True)
 class Published:
-    """What went out and what did not.
+    """The counts of a publication: what went out, and what was left out.
 
     ``left_out`` counts accepted twins by licence; ``without_attribution`` those published whose licence asks for it,
     ``rehearsals`` those left out because a rehearsal server had a part in them.

@@ -1,4 +1,4 @@
-"""Which twin goes into which shard: by category, in order of ids, within a size and within the hub's limits."""
+"""Plan shards: twins by category, in order of ids, within a size and the hub's limits; their sizes are those of a listing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from hashlib import sha256
 from pathlib import PurePosixPath
 
 from manitwin.errors import UsageError
-from manitwin.twin.store import sha256_of_json
+from manitwin.twin.dataset_root import TWINS, DatasetRoot
+from manitwin.twin.store import RECORD, sha256_of_json
 
 HUB_FILES = 100_000
 HUB_FOLDER_ENTRIES = 10_000
@@ -21,6 +22,7 @@ HUB_FILE_BYTES = 20 * 10**9
 CATEGORY_FOLDERS = 5_000
 """Categories that get a folder of their own, the largest ones; half of what the hub lets one folder hold."""
 
+VIEWS = "views"
 SHARED_FOLDER = "various"
 DATA = "data"
 SHARD_FORMAT = 1
@@ -143,3 +145,37 @@ def check_hub_limits(sizes: dict[str, int]) -> None:
             f"{largest}: {sizes[largest]:,} bytes, the hub takes files below {HUB_FILE_BYTES:,}; "
             "give a smaller --shard-size-mb"
         )
+
+
+_END_OF_ZIP = 22  # bytes of the end-of-central-directory record (APPNOTE.TXT 4.3.16)
+
+
+def tar_bytes_of_twins(root: DatasetRoot) -> dict[str, int]:
+    """Return what each finished twin takes in a tar at most, by its id.
+
+    An entry of an archive takes less than the tar header that is counted for it. Raises UsageError where there are no twins.
+    """
+    root.fs.invalidate_cache()
+    top = root.full(TWINS)
+    if not root.fs.isdir(top):
+        raise UsageError(f"{root.url}: no {TWINS}/ below it; give a data set that manitwin run made")
+    sizes: dict[str, int] = {}
+    for prefix in sorted(root.fs.ls(top, detail=False)):
+        sizes |= _sizes_below(root, str(prefix))
+    return sizes
+
+
+def _sizes_below(root: DatasetRoot, prefix: str) -> dict[str, int]:
+    sizes: dict[str, int] = {}
+    archives: set[tuple[str, str]] = set()
+    finished: set[str] = set()
+    for path, info in root.fs.find(prefix, detail=True).items():
+        twin_id, *file = PurePosixPath(str(path).removeprefix(prefix.rstrip("/") + "/")).parts
+        sizes[twin_id] = sizes.get(twin_id, 0) + member_bytes(info["size"])
+        if file == [RECORD]:
+            finished.add(twin_id)
+        if len(file) > 1 and file[0] != VIEWS:
+            archives.add((twin_id, file[0]))
+    for twin_id, _ in archives:
+        sizes[twin_id] += member_bytes(_END_OF_ZIP)
+    return {twin_id: size for twin_id, size in sizes.items() if twin_id in finished}

@@ -7,8 +7,8 @@ from typing import Any
 
 import pyarrow as pa
 
-from manitwin.dataset.index.merge import file_system, files_of, merged, read_rows
 from manitwin.dataset.index.part_list import PartList, read_part_list
+from manitwin.dataset.index.parts import file_system, files_of, merged, read_rows
 from manitwin.dataset.index.tables import TABLES, parquet
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from manitwin.dataset.publish.members import KEY, parts_of, unpack
+from manitwin.dataset.publish.shards import KEY, parts_of, unpack
 from manitwin.errors import TwinError, UsageError
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import RECORD, RUN, read_record, replace_folder

@@ -1,10 +1,19 @@
-"""A table of the report: the SQL that gives it, and how its columns are read."""
+"""Queries of a report: the SQL of each, how its columns are read, and the DuckDB connection that answers them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
+
+import duckdb
+import pyarrow as pa
+from fsspec import AbstractFileSystem
+
+from manitwin.dataset.index.query import Index
+from manitwin.dataset.index.tables import TABLES
+from manitwin.errors import ManiTwinError, UsageError
+from manitwin.twin.dataset_root import DatasetRoot
 
 Kind = Literal["text", "count", "number", "given", "share", "signed", "usd"]
 Row = dict[str, Any]
@@ -78,3 +87,76 @@ def summary_columns(heading: str, *, total: bool = True) -> tuple[Column, ...]:
     shown = tuple(Column(name, name, "number") for name in numbers)
     last = (Column("total", "total", "number"),) if total else ()
     return (Column("quantity", heading, "text"), Column("objects", "objects"), *shown, *last)
+
+
+PRELUDE = """-- Wilson's 95 % interval of a share k of n (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927); z = 1.96, z^2 = 3.84
+CREATE OR REPLACE TEMP MACRO wilson_centre(k, n) AS (k + 3.841458820694124 / 2) / (n + 3.841458820694124);
+CREATE OR REPLACE TEMP MACRO wilson_half(k, n) AS
+  1.959963984540054 * sqrt(k * (n - k) / n + 3.841458820694124 / 4) / (n + 3.841458820694124);
+CREATE OR REPLACE TEMP MACRO wilson_low(k, n) AS
+  CASE WHEN n > 0 THEN greatest(wilson_centre(k, n) - wilson_half(k, n), 0) END;
+CREATE OR REPLACE TEMP MACRO wilson_high(k, n) AS
+  CASE WHEN n > 0 THEN least(wilson_centre(k, n) + wilson_half(k, n), 1) END;
+-- rows of grasps.parquet by what they are: the twin's own, the unfiltered sample, the jittered controls
+CREATE OR REPLACE TEMP MACRO unfiltered(proposer) AS suffix(proposer, ':unfiltered');
+CREATE OR REPLACE TEMP MACRO jittered(proposer) AS suffix(proposer, ':jittered');
+CREATE OR REPLACE TEMP MACRO own(proposer) AS NOT unfiltered(proposer) AND NOT jittered(proposer);
+"""
+
+
+class ReportTables:
+    """Answer the report's queries from the tables of an index."""
+
+    def __init__(self, tables: Mapping[str, pa.Table | str], file_system: AbstractFileSystem | None = None):
+        """Take for every table of the index a pyarrow table, or SQL that yields it: ``read_parquet('...')``.
+
+        ``file_system`` is what reads files that are not local. One thread: sums of floats then do not depend on which one
+        came first, and memory stays flat. Raises ManiTwinError where a table is missing.
+        """
+        missing = [name for name in TABLES if name not in tables]
+        if missing:
+            raise ManiTwinError(f"the index lacks the tables {', '.join(missing)}; write it again with manitwin index")
+        self.connection = duckdb.connect()
+        self.connection.execute("SET threads = 1; SET preserve_insertion_order = false")
+        if file_system is not None:
+            self.connection.register_filesystem(file_system)
+        for name in TABLES:
+            table = tables[name]
+            if isinstance(table, str):
+                self.connection.execute(f"CREATE TEMP VIEW {name} AS SELECT * FROM {table}")
+            else:
+                self.connection.register(name, table)
+        self.connection.execute(PRELUDE)
+
+    @classmethod
+    def of_index(cls, root: DatasetRoot) -> ReportTables:
+        """Open a data set's index; raises UsageError where it has none."""
+        parts = Index(root).parts.parts
+        tables: dict[str, pa.Table | str] = {}
+        for name, schema in TABLES.items():
+            files = [_location(root, part.file(name)) for part in parts if part.rows[name]]
+            tables[name] = f"read_parquet([{', '.join(map(text, files))}])" if files else schema.empty_table()
+        return cls(tables, None if root.local is not None else root.fs)
+
+    def result(self, query: Query) -> Result:
+        """Run a query; floats come with 12 digits, which do not depend on how rows are spread over files.
+
+        Raises UsageError where a file has gone meanwhile.
+        """
+        try:
+            cursor = self.connection.execute(query.sql)
+            names = [column[0] for column in cursor.description]
+            rows = cursor.fetchall()
+        except (duckdb.IOException, FileNotFoundError) as error:
+            line = str(error).split("\n")[0]
+            raise UsageError(f"the index changed while it was read ({line}); run the same command again") from error
+        return Result(query, [dict(zip(names, map(_rounded, row), strict=True)) for row in rows])
+
+
+def _rounded(value: Any) -> Any:
+    return float(f"{value:.12g}") if isinstance(value, float) else value
+
+
+def _location(root: DatasetRoot, name: str) -> str:
+    full = root.full(name)
+    return full if root.local is not None else str(root.fs.unstrip_protocol(full))

@@ -9,15 +9,13 @@ from typing import Any
 
 from manitwin.dataset.index.near_duplicates import MAX_SHAPE_DISTANCE, MAX_SIZE_RATIO, NearDuplicates, near_duplicates
 from manitwin.dataset.index.query import Index
-from manitwin.dataset.statistics import cost_queries as costs
 from manitwin.dataset.statistics import grasp_queries as grasps
 from manitwin.dataset.statistics import object_queries as objects
 from manitwin.dataset.statistics import stage_queries as stages
 from manitwin.dataset.statistics.figures import bars, histograms, masses, words
 from manitwin.dataset.statistics.page import NearPairs, Page, ReportSection, SectionPart
-from manitwin.dataset.statistics.query import Query, Result
+from manitwin.dataset.statistics.query import PRELUDE, Query, ReportTables, Result
 from manitwin.dataset.statistics.style import Figure, drawing
-from manitwin.dataset.statistics.tables import PRELUDE, ReportTables
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, write_bytes_atomically
 
@@ -28,14 +26,14 @@ MOST_PAIRS = 1000
 NO_TWIN = "There is no accepted twin."
 
 QUERIES: tuple[Query, ...] = (
-    *(stages.TOTALS, stages.SUCCESS_BY_STAGE, stages.REJECTIONS_BY_REASON, costs.BESIDE_THE_PAPER),
+    *(stages.TOTALS, stages.SUCCESS_BY_STAGE, stages.REJECTIONS_BY_REASON, stages.BESIDE_THE_PAPER),
     *(grasps.GRASPS_PER_OBJECT, grasps.VERIFICATION_RATE, grasps.BY_GRIPPER, grasps.OUTCOMES, grasps.BY_GRASP_TYPE),
     *(grasps.ROBUST, grasps.SECOND_ENGINE, grasps.SIMULATED_HISTOGRAM, grasps.VERIFIED_HISTOGRAM),
     *(grasps.RATE_HISTOGRAM, grasps.ROBUSTNESS_HISTOGRAM),
     *(objects.POINTS_PER_OBJECT, objects.FUNCTIONAL_LABELS, objects.PLACEMENTS, *objects.COUNT_HISTOGRAMS),
     *(objects.DIMENSIONS, objects.SIZE_HISTOGRAM, objects.MASS_HISTOGRAM, objects.MASS_SOURCES, objects.MASS_AND_SIZE),
     *(objects.CATEGORIES, *objects.WORDS),
-    *(costs.COST, costs.COST_BY_STAGE, costs.BACKENDS),
+    *(stages.COST, stages.COST_BY_STAGE, stages.BACKENDS),
     *(stages.SOURCES, stages.LICENCES, stages.SAME_SOURCE, stages.FINDINGS, stages.CONFIGURATIONS),
 )
 """All queries but ``mass_in_prior``, whose priors are those of the categories found."""

@@ -1,4 +1,4 @@
-"""How figures look: one palette, one type size, and SVG that is the same bytes every time."""
+"""The look of figures: one palette, one type size, and SVG that is the same bytes every time."""
 
 from __future__ import annotations
 

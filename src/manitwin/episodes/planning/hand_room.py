@@ -7,8 +7,8 @@ from scipy.spatial import ConvexHull
 
 from manitwin.episodes.planning.convex_shapes import corners_of
 from manitwin.episodes.planning.kinematic_body import KinematicBody
-from manitwin.geometry.placed_object import StaticBox
 from manitwin.geometry.poses import inverse
+from manitwin.geometry.rigid_body import StaticBox
 
 
 class HandRoom:

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from manitwin.geometry.placed_object import PlacedObject, StaticBox
+from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 
 
 class Phase(IntEnum):

@@ -9,8 +9,7 @@ from typing import Any
 
 from manitwin.dataset.publish.card import size_category
 from manitwin.dataset.publish.card_statistics import licence_lines
-from manitwin.dataset.publish.hub_license import hub_license
-from manitwin.dataset.publish.licences import LICENSES_MD, without_attribution
+from manitwin.dataset.publish.licences import LICENSES_MD, hub_license, without_attribution
 from manitwin.episodes.publication.choose import TwinInEpisodes
 from manitwin.episodes.publication.success import Success, Tally
 from manitwin.formats.markdown import markdown_escaped, table

@@ -1,4 +1,4 @@
-"""How well a set of convex hulls stands for a mesh."""
+"""The error of a set of convex hulls as a model of a mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the parts of a thing are, told from its shape: scores of surface points for places such as rim, handle or tip.
+"""Find the parts of an object by its shape: scores of surface points for places such as rim, handle or tip.
 
 Every score is in [0, 1]; a place that the shape does not have has no score (None). Object frame: +Z up, metres.
 """

@@ -1,4 +1,4 @@
-"""What a thing looks like as a whole, in one word, from its proportions and how round or box-like it is."""
+"""Name the overall shape of an object in one word, from its proportions and how round or box-like it is."""
 
 from __future__ import annotations
 

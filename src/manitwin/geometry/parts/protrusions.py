@@ -1,4 +1,4 @@
-"""What sticks out sideways from an upright round body: handles and spouts."""
+"""Find what sticks out sideways from an upright round body: handles and spouts."""
 
 from __future__ import annotations
 

@@ -1,17 +1,17 @@
-"""What is measured of a thing once, so that its parts can be found: box, long axis, upright body, opening, handle."""
+"""Measure an object once for all of its parts: box, long axis and its ends, upright body, opening, handle."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 import trimesh
 
 from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.cavity import Opening, find_opening
-from manitwin.geometry.parts.elongation import HeadEnd, LongAxis, long_axis
-from manitwin.geometry.parts.local_thickness import local_thickness
 from manitwin.geometry.parts.protrusions import Protrusion, RoundBody, round_body
+from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
 
 _SAMPLES = 6000
@@ -21,7 +21,7 @@ _ELONGATED, _ELONGATED_LYING = 1.6, 1.15  # length by width from which a thing h
 
 @dataclass(frozen=True)
 class Shape:
-    """What was measured of a mesh, once for all features."""
+    """The measurements of a mesh, made once for all features."""
 
     surface_m: np.ndarray
     bounds_m: np.ndarray
@@ -48,7 +48,7 @@ class Shape:
 
     @property
     def has_ends(self) -> bool:
-        """Whether it is long, or lies and so is held along its axis."""
+        """True where it is long, or lies and so is held along its axis."""
         return self.axis.ratio >= (_ELONGATED if self.upright else _ELONGATED_LYING)
 
 
@@ -94,3 +94,110 @@ def measure_shape(
 def surface_points(mesh: trimesh.Trimesh, positions_m: np.ndarray, normals: np.ndarray) -> SurfacePoints:
     """Measure the thickness behind points of the surface."""
     return SurfacePoints(positions_m, normals, local_thickness(mesh, positions_m, normals))
+
+
+HeadEnd = Literal["wide", "narrow", "thin", "thick", "heavy", "up"]
+"""What tells the working end: its width, its thickness, the side of the centre of mass, or being the upper one."""
+
+_SLICES = 32
+_END_SHARE = 0.3  # of the length: what is compared to tell the two ends apart
+_DEFAULT_HEAD_SHARE = 0.25  # where the outline shows no step between head and handle
+_STEP_CONTRAST = 1.25  # wider over narrower end: a step that can be located
+
+
+@dataclass(frozen=True)
+class LongAxis:
+    """The oriented box's longest axis, from the head (0) to the far end (1).
+
+    ``origin_m (3,)`` is its point at the head, ``direction (3,)`` leads away from it, ``across (2, 3)`` are the box's
+    other axes, the wider first. ``width_m`` and ``thickness_m`` ``(32,)`` are the outline along it. ``ratio`` is length
+    by width of the box, ``head_share`` where the head ends, ``center_of_mass_share`` where the centre of mass is.
+    """
+
+    origin_m: np.ndarray
+    direction: np.ndarray
+    across: np.ndarray
+    length_m: float
+    ratio: float
+    width_m: np.ndarray
+    thickness_m: np.ndarray
+    head_share: float
+    center_of_mass_share: float
+
+    def along(self, points_m: np.ndarray) -> np.ndarray:
+        """Return where points ``(N, 3)`` are on the axis: 0 at the head, 1 at the far end."""
+        return (points_m - self.origin_m) @ self.direction / self.length_m
+
+    def off_axis_m(self, points_m: np.ndarray) -> np.ndarray:
+        """Return the distance (m) of points ``(N, 3)`` from the axis."""
+        return np.linalg.norm((points_m - self.origin_m) @ self.across.T, axis=1)
+
+
+def long_axis(
+    surface_m: np.ndarray,
+    obb_extents_m: np.ndarray,
+    obb_to_object: np.ndarray,
+    center_of_mass_m: np.ndarray,
+    head_end: HeadEnd,
+) -> LongAxis:
+    """Measure the long axis on surface samples ``(N, 3)``; the head, told by ``head_end``, comes first."""
+    order = np.argsort(-obb_extents_m, kind="stable")
+    axes = obb_to_object[:3, :3].T[order]
+    length = float(obb_extents_m[order[0]])
+    local = (surface_m - obb_to_object[:3, 3]) @ axes.T
+    share = local[:, 0] / length + 0.5
+    width, thickness = _outline(share, local[:, 1:])
+    center_share = float((center_of_mass_m - obb_to_object[:3, 3]) @ axes[0] / length + 0.5)
+    if _head_is_last(head_end, width, thickness, center_share, axes[0]):
+        axes[0], width, thickness, center_share = -axes[0], width[::-1], thickness[::-1], 1 - center_share
+    return LongAxis(
+        origin_m=obb_to_object[:3, 3] - axes[0] * length / 2,
+        direction=axes[0],
+        across=axes[1:],
+        length_m=length,
+        ratio=length / max(float(obb_extents_m[order[1]]), 1e-9),
+        width_m=width,
+        thickness_m=thickness,
+        head_share=_head_share(width),
+        center_of_mass_share=center_share,
+    )
+
+
+def _outline(share: np.ndarray, across_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the extents ``(32,)`` along both cross axes in slices of the long axis; empty ones repeat the nearest."""
+    index = np.clip((share * _SLICES).astype(int), 0, _SLICES - 1)
+    extents = np.full((_SLICES, 2), np.nan)
+    for i in range(_SLICES):
+        inside = across_m[index == i]
+        if len(inside):
+            extents[i] = np.ptp(inside, axis=0)
+    filled = np.flatnonzero(np.isfinite(extents[:, 0]))
+    nearest = filled[np.abs(np.arange(_SLICES)[:, None] - filled[None]).argmin(1)]
+    return extents[nearest, 0], extents[nearest, 1]
+
+
+def _head_is_last(
+    rule: HeadEnd, width: np.ndarray, thickness: np.ndarray, center_share: float, axis: np.ndarray
+) -> bool:
+    count = round(_END_SHARE * _SLICES)
+    if rule == "up":
+        return bool(axis[2] > 0)
+    if rule == "heavy":
+        return center_share > 0.5
+    profile = width if rule in ("wide", "narrow") else thickness
+    first, last = float(np.mean(profile[:count])), float(np.mean(profile[-count:]))
+    return last > first if rule in ("wide", "thick") else last < first
+
+
+def _head_share(width: np.ndarray) -> float:
+    """Return where the width crosses the middle between its values at the two ends, coming from the head."""
+    count = round(_END_SHARE * _SLICES)
+    head, handle = float(width[:count].max()), float(np.median(width[-count:]))
+    if max(head, handle) < _STEP_CONTRAST * min(head, handle):
+        return _DEFAULT_HEAD_SHARE
+    halfway = (head + handle) / 2
+    beyond = width < halfway if head > handle else width > halfway
+    start = int(width[:count].argmax()) if head > handle else 0
+    crossing = np.flatnonzero(beyond[start:])
+    share = (start + int(crossing[0])) / _SLICES if len(crossing) else _DEFAULT_HEAD_SHARE
+    return float(np.clip(share, 0.08, 0.6))

@@ -12,12 +12,11 @@ import numpy as np
 import trimesh
 
 from manitwin.errors import ManiTwinError
-from manitwin.geometry.repair import halfedges, nonmanifold, open_sheets, welding
-from manitwin.geometry.repair.boundary_loops import boundary_loops, loop_lengths
-from manitwin.geometry.repair.hole_filling import fill_loops
+from manitwin.geometry.repair import halfedges, nonmanifold, welding
+from manitwin.geometry.repair.hole_filling import boundary_loops, fill_loops, loop_lengths
 from manitwin.geometry.repair.orientation import face_outward, wind_consistently
 from manitwin.geometry.repair.surface import Surface, signed_volumes
-from manitwin.geometry.repair.thickening import thicken
+from manitwin.geometry.repair.thickening import lids_of_openings, thicken
 
 _STRAY_AREA_SHARE = 2e-3  # open pieces below this share of the area are debris
 _HANGING_AREA_SHARE = 0.05  # the same for open pieces that hang on by an edge with more than two faces
@@ -183,7 +182,7 @@ def _closed_surface(
     lengths = loop_lengths(surface, loops)
     filled = fill_loops(surface, loops)
     outward = face_outward(filled.surface)
-    lids = open_sheets.lids(outward, filled.loop_of_face, lengths, lid_length_m, lid_area_share)
+    lids = lids_of_openings(outward, filled.loop_of_face, lengths, lid_length_m, lid_area_share)
     is_lid = np.isin(filled.loop_of_face, lids)
     holes = np.array([i for i in range(len(loops)) if i not in set(lids.tolist())], dtype=np.int64)
     if len(holes):

@@ -1,4 +1,4 @@
-"""Which parts of a mesh are one thing, and which are several things side by side."""
+"""Tell the parts of one object from several objects side by side."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Part:
 
 @dataclass(frozen=True)
 class SeparateObjects:
-    """How many things stand apart from each other, and how many parts are too small to be one."""
+    """The number of objects that stand apart from each other, and of parts that are too small to be one."""
 
     count: int
     specks: int

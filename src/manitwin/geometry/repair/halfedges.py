@@ -45,7 +45,7 @@ class EdgeGroups:
 
     @property
     def uses(self) -> np.ndarray:
-        """How many faces use the edge of each half-edge ``(3F,)``."""
+        """The number of faces that use the edge of each half-edge ``(3F,)``."""
         return self.counts[self.group_of]
 
     def members(self, group: int) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 
 from manitwin.geometry.boxes import oriented_bounding_box
-from manitwin.geometry.parts.local_thickness import local_thickness
+from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.annotators.priors import Interval, Prior, unknown_prior
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject

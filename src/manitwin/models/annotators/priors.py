@@ -17,8 +17,8 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from manitwin.errors import ManiTwinError, choose_from
-from manitwin.geometry.parts.elongation import HeadEnd
 from manitwin.geometry.parts.features import Feature
+from manitwin.geometry.parts.shape import HeadEnd
 from manitwin.twin.record import Estimate, Finite, GraspType, Record
 
 TABLES = resources.files("manitwin.models.annotators") / "prior_tables"

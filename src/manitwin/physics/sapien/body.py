@@ -9,9 +9,8 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.geometry.placed_object import FURNITURE_FRICTION, StaticBox
 from manitwin.geometry.poses import quaternion_wxyz
-from manitwin.geometry.rigid_body import RigidBody
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION, RigidBody, StaticBox
 from manitwin.physics.sapien.shapes import HullShapes, hull_shapes, set_contact
 
 CONTACT_OFFSET_M = 0.002

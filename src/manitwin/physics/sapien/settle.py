@@ -10,9 +10,8 @@ import sapien
 from sapien import physx
 
 from manitwin.geometry.cavity import Opening
-from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform_points
-from manitwin.geometry.rigid_body import RigidBody
+from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
 from manitwin.physics.sapien.body import (
     CONTACT_OFFSET_M,
     SOLVER_ITERATIONS,

@@ -14,7 +14,7 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.geometry.placed_object import FURNITURE_FRICTION, PlacedObject, StaticBox
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, StaticBox
 from manitwin.physics.sapien.body import dynamic_component, entity_at, static_box, static_plane
 from manitwin.physics.sapien.contacts import ContactReader, Role
 from manitwin.physics.sapien.hand_scene import MAX_DEPENETRATION_M_S

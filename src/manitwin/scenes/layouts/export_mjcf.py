@@ -13,7 +13,7 @@ from manitwin.assets.writers import mjcf
 from manitwin.assets.writers.content import TwinContent
 from manitwin.assets.writers.exporter import Exported
 from manitwin.formats.xml_file import add, document, new_element, number_text
-from manitwin.geometry.placed_object import FURNITURE_FRICTION
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION
 from manitwin.physics.mujoco.body import ROLLING_FRICTION_M, TIMESTEP_S, TORSIONAL_FRICTION_M
 from manitwin.scenes.layouts.looks import camera_axes
 from manitwin.scenes.loaded_scene import Scene

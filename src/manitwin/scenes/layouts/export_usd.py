@@ -12,8 +12,8 @@ from manitwin.assets.writers import usd
 from manitwin.assets.writers.content import TwinContent
 from manitwin.assets.writers.exporter import Exported
 from manitwin.assets.writers.usd_stage import CANNOT_SAY
-from manitwin.geometry.placed_object import FURNITURE_FRICTION
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION
 from manitwin.scenes.layouts.looks import camera_axes
 from manitwin.scenes.loaded_scene import Scene
 from manitwin.scenes.sapien_scene import PLAIN_COLORS

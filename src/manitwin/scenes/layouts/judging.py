@@ -9,8 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from manitwin.geometry.hull_distance import ConvexParts, PlacedParts, least_distance, overlap_depth
-from manitwin.geometry.placed_object import PlacedObject, StaticBox
 from manitwin.geometry.poses import rotation_angle_rad, transform_points
+from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 from manitwin.physics.sapien.settle import SettledScene, settle_scene
 from manitwin.scenes.app_config import LayoutSettings
 from manitwin.scenes.layouts.pool import Pool

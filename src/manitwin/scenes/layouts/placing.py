@@ -8,8 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.hull_distance import ConvexParts, PlacedParts, is_clear_of
-from manitwin.geometry.placed_object import StaticBox
 from manitwin.geometry.poses import transform
+from manitwin.geometry.rigid_body import StaticBox
 from manitwin.scenes.layouts.clutter import Patch
 from manitwin.scenes.layouts.pool import PoolBody, StandingPose
 from manitwin.scenes.layouts.slots import Put

@@ -8,7 +8,7 @@ import trimesh
 
 from handmade import hammer, screwdriver
 from manitwin.geometry.boxes import oriented_bounding_box
-from manitwin.geometry.parts.elongation import HeadEnd, LongAxis, long_axis
+from manitwin.geometry.parts.shape import HeadEnd, LongAxis, long_axis
 from manitwin.geometry.sampling import sample_surface
 
 ANYWAY = trimesh.transformations.rotation_matrix(0.7, [0.3, -0.5, 0.8], [0.1, 0, 0])

@@ -5,9 +5,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from manitwin.geometry.canonical.frame import object_frame
-from manitwin.geometry.canonical.units import decide_unit
-from manitwin.geometry.canonical.up import UpChoice, choose_up
+from manitwin.geometry.canonical_frame import UpChoice, choose_up, decide_unit, object_frame
 from manitwin.geometry.poses import transform_points
 
 
