@@ -15,7 +15,7 @@ from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.hull_surface import union_surface
 from manitwin.physics.suction_load import lip_load
 from manitwin.physics.suction_seal import seal
-from manitwin.physics.trial import KeptForHulls, TrialResult, TrialSettings
+from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import HandContacts, run_phases
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.hand_collision import HandCollision
@@ -28,7 +28,7 @@ class SuctionTrial:
     name = "statics"
 
     def __init__(self) -> None:
-        self._collision = KeptForHulls(HandCollision)
+        self._last: tuple[tuple[np.ndarray, ...], HandCollision] | None = None
 
     def run(
         self,
@@ -63,6 +63,12 @@ class SuctionTrial:
             )
             results.append(run_phases(scene, object_to_hand[:3, :3], settings))
         return results
+
+    def _collision(self, hulls: tuple[np.ndarray, ...]) -> HandCollision:
+        """Prepare hulls, or return what was made of this very tuple: trials often are of one object."""
+        if self._last is None or self._last[0] is not hulls:
+            self._last = hulls, HandCollision(hulls)
+        return self._last[1]
 
 
 class _Scene:

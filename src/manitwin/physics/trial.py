@@ -1,4 +1,4 @@
-"""What a grasp trial is: the body, the settings, the answer, and the protocol that an engine fulfils.
+"""The grasp trial: its settings, its result, and the protocol that an engine fulfils.
 
 The trial is the paper's ("Verification"): close, lift, wait for stable frames, slide along six directions. The numbers
 that the paper leaves open (force, friction, distances, solver) are settings, because the success rate depends on them.
@@ -6,20 +6,19 @@ that the paper leaves open (force, friction, distances, solver) are settings, be
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 
+from manitwin.config import VerifyConfig
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.record import Outcome
 
 GRAVITY_M_S2 = 9.81
 
-Made = TypeVar("Made")
-Hulls = tuple[np.ndarray, ...]
+_CONFIGURED = VerifyConfig()  # the defaults of what a user may set
 
 
 @dataclass(frozen=True)
@@ -33,10 +32,10 @@ class TrialSettings:
 
     force_n: float
     finger_friction: float
-    timestep_s: float = 1 / 240
-    solver_iterations: int = 20
+    timestep_s: float = _CONFIGURED.timestep_s
+    solver_iterations: int = _CONFIGURED.solver_iterations
     contact_offset_m: float = 0.002
-    max_steps: int = 2000
+    max_steps: int = _CONFIGURED.max_steps
     steps_per_frame: int = 4
     close_time_s: float = 0.8
     close_speed_m_s: float = 0.1
@@ -48,12 +47,12 @@ class TrialSettings:
     lift_m: float = 0.2
     lift_time_s: float = 0.8
     max_lift_displacement_m: float = 0.02
-    stable_frames: int = 3
+    stable_frames: int = _CONFIGURED.stable_frames
     stable_speed_m_s: float = 0.01
     stable_time_s: float = 1.0
-    slide_m: float = 0.1
+    slide_m: float = _CONFIGURED.slide_distance_m
     slide_time_s: float = 0.4
-    max_displacement_m: float = 0.01
+    max_displacement_m: float = _CONFIGURED.max_displacement_m
 
     @property
     def frame_s(self) -> float:
@@ -63,7 +62,7 @@ class TrialSettings:
 
 @dataclass(frozen=True)
 class TrialResult:
-    """What became of one grasp.
+    """The outcome of one grasp.
 
     ``displacement_m`` is the largest distance that the centre of mass moved in the hand during the phase that decided:
     the slides of a held grasp, else the phase of its failure. ``rotation_rad`` is how far the object turned in the hand
@@ -97,17 +96,3 @@ class GraspTrial(Protocol):
         ``joints_rad (N, 2, J)`` are given for hands with more joints: those before closing and those to close to.
         """
         ...
-
-
-class KeptForHulls(Generic[Made]):
-    """Makes something of hulls, each ``(V, 3)`` m, and keeps it until other hulls come: trials often are of one object."""
-
-    def __init__(self, make: Callable[[Hulls], Made]):
-        self._make = make
-        self._last: tuple[Hulls, Made] | None = None
-
-    def __call__(self, hulls: Hulls) -> Made:
-        """Return what was made of this very tuple of hulls."""
-        if self._last is None or self._last[0] is not hulls:
-            self._last = hulls, self._make(hulls)
-        return self._last[1]

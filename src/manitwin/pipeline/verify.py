@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -63,29 +64,20 @@ def trial_settings(settings: VerifyConfig, gripper: Gripper) -> TrialSettings:
     return TrialSettings(
         force_n=gripper.force_n if settings.force_n is None else settings.force_n,
         finger_friction=gripper.finger_friction,
-        timestep_s=settings.timestep_s,
-        solver_iterations=settings.solver_iterations,
-        max_steps=settings.max_steps,
-        stable_frames=settings.stable_frames,
-        max_displacement_m=settings.max_displacement_m,
         slide_m=settings.slide_distance_m,
+        **settings.model_dump(exclude={"force_n", "slide_distance_m"}),
     )
 
 
 def describe(trial: GraspTrial, settings: TrialSettings, object_friction: float) -> Trial:
-    """Return what a twin says of the trial that its grasps went through."""
+    """Return what a twin says of the trial that its grasps went through: the settings that a user may set, and frictions."""
+    numbers = {name: value for name, value in asdict(settings).items() if name in Trial.model_fields}
     return Trial(
         engine=trial.name,
-        finger_friction=settings.finger_friction,
         object_friction=object_friction,
         combine="average",
-        force_n=settings.force_n,
-        timestep_s=settings.timestep_s,
-        solver_iterations=settings.solver_iterations,
-        max_steps=settings.max_steps,
-        stable_frames=settings.stable_frames,
-        max_displacement_m=settings.max_displacement_m,
         slide_distance_m=settings.slide_m,
+        **numbers,
     )
 
 

@@ -10,8 +10,7 @@ from contextlib import contextmanager
 import numpy as np
 from sapien import physx
 
-from manitwin.physics.trial import Hulls
-
+Hulls = tuple[np.ndarray, ...]
 HullShapes = list[physx.PhysxCollisionShapeConvexMesh]
 
 COOKING_SCALE = 100.0

@@ -9,7 +9,7 @@ from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.sapien.hand import FixedHand
 from manitwin.physics.sapien.hand_scene import HandScene
 from manitwin.physics.sapien.shapes import COOKED, HullShapes
-from manitwin.physics.trial import KeptForHulls, TrialResult, TrialSettings
+from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import run_phases
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.hand_reach import HandReach
@@ -26,9 +26,6 @@ class SapienTrial:
 
     name = "sapien"
 
-    def __init__(self) -> None:
-        self._reach = KeptForHulls(HandReach)
-
     def run(
         self,
         body: RigidBody,
@@ -38,8 +35,7 @@ class SapienTrial:
         joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
         """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order."""
-        hand = of_kind(gripper, ParallelGripper)
-        reach = self._reach(body.hulls)
+        hand, reach = of_kind(gripper, ParallelGripper), HandReach(body.hulls)
         with COOKED.lent([body.hulls]) as (shapes,):
             return [_try_one(body, shapes, reach, hand, inverse(pose), settings) for pose in gripper_to_object]
 
