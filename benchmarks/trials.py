@@ -23,7 +23,7 @@ import numpy as np
 
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics import trial_phases
-from manitwin.physics.jitter import jittered
+from manitwin.physics.robustness import jittered
 from manitwin.physics.sapien import hand_scene
 from manitwin.physics.sapien import trial as sapien_trial
 from manitwin.physics.sapien.trial import SapienTrial

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.grasp_diversity import approach_octants
 from manitwin.geometry.poses import transform
-from manitwin.physics.grasp_filters import GraspFilter, select_grasps, torque_ratio
-from manitwin.physics.pad_contact import PadContacts
+from manitwin.physics.grasp_filters import GraspFilter, PadContacts, pad_merits, torque_ratio
+from manitwin.physics.grasp_selection import select_likely
 from manitwin.robots.grippers.gripper import load_gripper
 
 PANDA = load_gripper("panda")
@@ -54,7 +54,7 @@ def test_selection_prefers_short_levers_and_large_contacts() -> None:
     rng = np.random.default_rng(4)
     lever, cells = np.tile([0.01, 0.2], 200), np.repeat([6, 2], 200)
     poses = cloud(400, rng.normal(size=(50, 3)), rng)
-    chosen = select_grasps(poses, np.full(400, 0.1), contacts(lever, cells), lever / 0.2, 50)
+    chosen = select_likely(poses, np.full(400, 0.1), pad_merits(contacts(lever, cells), lever / 0.2), 50)
     assert len(np.unique(chosen)) == 50
     assert (lever[chosen] < 0.05).all()
     assert (cells[chosen] >= 3).all()
@@ -65,7 +65,7 @@ def test_selection_fills_up_with_the_next_best_where_few_are_good() -> None:
     lever = np.concatenate([np.full(10, 0.01), np.linspace(0.1, 0.3, 90)])
     poses = cloud(100, rng.normal(size=(50, 3)), rng)
     ratio = np.where(lever < 0.05, 0.1, 2.0)
-    chosen = select_grasps(poses, np.full(100, 0.1), contacts(lever, np.full(100, 6)), ratio, 30)
+    chosen = select_likely(poses, np.full(100, 0.1), pad_merits(contacts(lever, np.full(100, 6)), ratio), 30)
     assert chosen.tolist() == list(range(30))
 
 
@@ -75,6 +75,6 @@ def test_selection_points_into_four_octants_where_there_are_four() -> None:
     poses = cloud(400, directions, rng)
     octants = approach_octants(poses)
     lever = np.where(octants == octants[0], 0.01, 0.15)  # all the good ones in one octant
-    chosen = select_grasps(poses, np.full(400, 0.1), contacts(lever, np.full(400, 6)), lever / 0.1, 60)
+    chosen = select_likely(poses, np.full(400, 0.1), pad_merits(contacts(lever, np.full(400, 6)), lever / 0.1), 60)
     assert len(np.unique(octants[chosen])) == 4
     assert (octants[chosen] == octants[0]).sum() >= 30

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.grasp_diversity import fingertips
 from manitwin.geometry.poses import transform
-from manitwin.physics.jitter import jittered
+from manitwin.physics.robustness import jittered
 
 MANY = 20_000
 DEPTH_M = 0.1034

@@ -8,7 +8,7 @@ import trimesh
 
 from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.physics.pad_contact import ACROSS, ALONG, PadContacts, pad_contacts
+from manitwin.physics.grasp_filters import ACROSS, ALONG, PadContacts, pad_contacts
 from manitwin.robots.grippers.gripper import load_gripper
 
 PANDA = load_gripper("panda")

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
-from manitwin.physics.perturbation import Perturbation, Spread, draw_perturbations
+from manitwin.physics.robustness import Perturbation, Spread, draw_perturbations
 from rigid_boxes import PANDA, SETTINGS, above, box
 
 SPREAD = Spread(

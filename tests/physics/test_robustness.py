@@ -8,8 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from manitwin.physics.perturbation import Spread, draw_perturbations
-from manitwin.physics.robustness import Robustness, SequentialTest, try_until_clear
+from manitwin.physics.robustness import Robustness, SequentialTest, Spread, draw_perturbations, try_until_clear
 from manitwin.physics.sapien.trial import SapienTrial
 from rigid_boxes import FROM_ABOVE, SETTINGS, above, box, try_one
 

@@ -11,7 +11,7 @@ import trimesh
 from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.suction_load import lip_load
+from manitwin.physics.suction import lip_load
 from manitwin.physics.suction_trial import SuctionTrial
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.robots.grippers.gripper import load_gripper

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from manitwin.geometry.poses import rotation_between, transform, transform_points
-from manitwin.physics.support_clearance import CLEARANCE_M, lowest_points_m, raised
+from manitwin.physics.grasp_filters import SUPPORT_CLEARANCE_M, lowest_points_m, raised
 from manitwin.robots.grippers.gripper import load_gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
@@ -38,11 +38,11 @@ def test_a_low_hand_is_drawn_back_along_its_approach_until_it_is_clear() -> None
     poses = np.array([at_tip_height(0.004), at_tip_height(0.004, tilted), at_tip_height(0.05)])
     back, index = raised(PANDA, poses, np.eye(4))
     assert index.tolist() == [0, 1]
-    assert (lowest_points_m(PANDA, back, np.eye(4)) >= CLEARANCE_M - 1e-9).all()
+    assert (lowest_points_m(PANDA, back, np.eye(4)) >= SUPPORT_CLEARANCE_M - 1e-9).all()
     moves = back[:, :3, 3] - poses[index, :3, 3]
     assert np.allclose(np.cross(moves, back[:, :3, 2]), 0)
     tips = [transform_points(pose, np.array([[0, 0, PANDA.tip_depth_m]]))[0, 2] for pose in back]
-    assert tips[0] == pytest.approx(CLEARANCE_M + REACH_M - PANDA.tip_depth_m)
+    assert tips[0] == pytest.approx(SUPPORT_CLEARANCE_M + REACH_M - PANDA.tip_depth_m)
 
 
 def test_what_would_leave_nothing_between_the_pads_or_comes_from_the_side_is_left_out() -> None:

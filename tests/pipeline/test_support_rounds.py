@@ -9,8 +9,8 @@ import numpy as np
 from grasp_drafts import PANDA, box_draft, run_all
 from manitwin.config import GraspConfig, VerifyConfig
 from manitwin.models.graspers.antipodal import AntipodalGrasper
+from manitwin.physics.grasp_filters import lowest_points_m
 from manitwin.physics.sapien.trial import SapienTrial
-from manitwin.physics.support_clearance import lowest_points_m
 from manitwin.pipeline.grasps import GraspsStage, picked_from
 from manitwin.pipeline.verify import VERDICTS, VerifyStage
 from manitwin.robots.grippers.parallel import ParallelGripper

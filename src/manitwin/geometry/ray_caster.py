@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +18,15 @@ class RayCaster:
 
     def __init__(self, mesh: trimesh.Trimesh):
         self._mesh = mesh
+
+    @classmethod
+    def of_hulls(cls, hulls: Sequence[np.ndarray]) -> RayCaster:
+        """Return that of the faces of convex hulls, each ``(V, 3)`` m; those inside other hulls are among them."""
+        surfaces = [trimesh.convex.convex_hull(vertices) for vertices in hulls]
+        offsets = np.cumsum([0] + [len(surface.vertices) for surface in surfaces[:-1]])
+        faces = [surface.faces + offset for surface, offset in zip(surfaces, offsets, strict=True)]
+        vertices = np.concatenate([surface.vertices for surface in surfaces])
+        return cls(trimesh.Trimesh(vertices, np.concatenate(faces), process=False))
 
     @cached_property
     def face_normals(self) -> np.ndarray:

@@ -1,18 +1,24 @@
-"""What is dropped before the simulation, and what the simulation is likely to hold."""
+"""Filters of proposed grasps: the contact of the pads, the clearance of the open hand, and that from a supporting plane.
+
+Contact is found by a grid of rays from each open pad, inwards. A grasp that is proven in the air may have its fingertips
+below the plane that the object will be picked from: of the fork, the plate and the scissors of the test set every one had.
+The last millimetres of the pads hold flat things as well, so such a grasp is raised.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.physics.grasp_selection import Merits, select_likely
-from manitwin.physics.hull_surface import union_surface
-from manitwin.physics.pad_contact import PadContacts, pad_contacts
+from manitwin.physics.grasp_selection import Merits
 from manitwin.robots.grippers.hand_collision import HandCollision
 from manitwin.robots.grippers.parallel import ParallelGripper
 
+ACROSS, ALONG = 3, 5  # cells of a pad
+INSET = 0.87  # the outermost rays lie inside the pad's edge
+SAME_CONTACT_M = 0.0015  # cells this close behind the first one touch too, as soft pads do
 # The pad filter: two cells of fifteen, contact centres at most 6 mm apart, normals inside the narrowed friction cone.
 MIN_CELLS, MAX_OFFSET_M, CONE_SAFETY = 2, 0.006, 1.5
 CLEARANCE_M = 0.0005
@@ -22,10 +28,78 @@ GOOD_CELLS, GOOD_LEVER_M, GOOD_TORQUE_RATIO = 3, 0.05, 0.5
 PAD_ARM_M = 0.007  # the arm of the friction torque that a pad can hold: about two thirds of its half width
 PEAK_SLIDE_ACCELERATION_M_S2 = 3.6  # of a quintic path of 0.1 m in 0.4 s: 5.77 d / t^2
 
+SUPPORT_CLEARANCE_M = 0.002
+"""Between the open hand and the plane."""
+MIN_DESCENT = 0.5
+"""The least cosine between the approach and straight down at which a hand is raised along it."""
+CORNERS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], float)
+
+
+@dataclass(frozen=True)
+class PadContacts:
+    """The contacts of both pads of N grasps with an object.
+
+    ``width_m`` distance of the two contacts along the closing axis (inf where a pad meets nothing), ``cells`` the
+    smaller number of touching cells of the two pads, ``offset_m`` the distance of the two contacts' centres across the
+    closing axis, ``alignment`` the smaller mean cosine of surface normal and closing axis, ``lever_m`` the distance of
+    the centre of mass from the line through the contacts.
+    """
+
+    width_m: np.ndarray
+    cells: np.ndarray
+    offset_m: np.ndarray
+    alignment: np.ndarray
+    lever_m: np.ndarray
+
+    def take(self, index: np.ndarray) -> PadContacts:
+        """Return the contacts at ``index``."""
+        return PadContacts(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+    @staticmethod
+    def joined(parts: list[PadContacts]) -> PadContacts:
+        """Return the contacts of all parts, one after the other."""
+        return PadContacts(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(PadContacts)})
+
+
+def pad_contacts(
+    gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: RayCaster, center_of_mass_m: np.ndarray
+) -> PadContacts:
+    """Cast rays from both open pads of grasps ``(N, 4, 4)`` against the union of the hulls."""
+    half_y, half_z = gripper.pad_half_extents_m
+    y, z = np.meshgrid(
+        np.linspace(-INSET * half_y, INSET * half_y, ACROSS),
+        np.linspace(-INSET * half_z, INSET * half_z, ALONG) + gripper.tip_depth_m,
+        indexing="ij",
+    )
+    grid = np.stack([y.ravel(), z.ravel()], axis=1)
+    rotation, origin = gripper_to_object[:, :3, :3], gripper_to_object[:, :3, 3]
+    depth, facing = [], []
+    for side in (1, -1):
+        pads = np.column_stack([np.full(len(grid), side * gripper.opening_m / 2), grid])
+        starts = np.einsum("nij,kj->nki", rotation, pads) + origin[:, None]
+        inwards = np.repeat(-side * rotation[:, None, :, 0], len(grid), axis=1)
+        distance, face = hulls.first_hits(starts.reshape(-1, 3), inwards.reshape(-1, 3))
+        cosine = np.where(face >= 0, -(hulls.face_normals[face] * inwards.reshape(-1, 3)).sum(1), 0.0)
+        depth.append(distance.reshape(-1, len(grid)))
+        facing.append(cosine.reshape(-1, len(grid)))
+    first = [d.min(1) for d in depth]
+    touching = [(d <= f[:, None] + SAME_CONTACT_M) & np.isfinite(d) for d, f in zip(depth, first, strict=True)]
+    count = [t.sum(1) for t in touching]
+    centers = [t @ grid / np.maximum(c, 1)[:, None] for t, c in zip(touching, count, strict=True)]
+    alignment = [(t * f).sum(1) / np.maximum(c, 1) for t, f, c in zip(touching, facing, count, strict=True)]
+    line = np.einsum("nij,nj->ni", rotation[:, :, 1:], (centers[0] + centers[1]) / 2) + origin
+    return PadContacts(
+        width_m=np.where(np.isfinite(first[0] + first[1]), gripper.opening_m - first[0] - first[1], np.inf),
+        cells=np.minimum(*count),
+        offset_m=np.linalg.norm(centers[0] - centers[1], axis=1),
+        alignment=np.minimum(*alignment),
+        lever_m=np.linalg.norm(np.cross(center_of_mass_m - line, rotation[:, :, 0]), axis=1),
+    )
+
 
 @dataclass(frozen=True)
 class FilteredGrasps:
-    """Which of N grasps are left and what their pads meet, and how many were left after the pads alone."""
+    """The indices of the grasps that are left with their contacts, and how many were left after the pads alone."""
 
     index: np.ndarray
     contacts: PadContacts
@@ -40,7 +114,7 @@ class GraspFilter:
     ):
         """Prepare the convex hulls (each ``(V, 3)`` m); ``friction`` is that between finger and object."""
         self._gripper, self._center_of_mass_m = gripper, center_of_mass_m
-        self._caster = RayCaster(union_surface(hulls))
+        self._caster = RayCaster.of_hulls(hulls)
         self._collision = HandCollision(hulls)
         self._min_alignment = 1 / np.hypot(1, friction / CONE_SAFETY)
 
@@ -69,8 +143,32 @@ def pad_merits(contacts: PadContacts, torque_ratio: np.ndarray) -> Merits:
     return Merits(~weak & (torque_ratio <= GOOD_TORQUE_RATIO), weak, contacts.lever_m, GOOD_LEVER_M)
 
 
-def select_grasps(
-    gripper_to_object: np.ndarray, depth_m: np.ndarray, contacts: PadContacts, torque_ratio: np.ndarray, count: int
-) -> np.ndarray:
-    """Choose ``count`` diverse grasps among those that are likely to hold: indices into the N grasps."""
-    return select_likely(gripper_to_object, depth_m, pad_merits(contacts, torque_ratio), count)
+def lowest_points_m(gripper: ParallelGripper, gripper_to_object: np.ndarray, object_to_plane: np.ndarray) -> np.ndarray:
+    """Return the least height ``(N,)`` of the wide open hand above the plane z = 0, for each pose ``(N, 4, 4)``."""
+    corners = np.concatenate(
+        [
+            (CORNERS * half_extents_m) @ box_to_gripper[:3, :3].T + box_to_gripper[:3, 3]
+            for box_to_gripper, half_extents_m in gripper.boxes(gripper.opening_m)
+        ]
+    )
+    upwards = object_to_plane[2, :3]
+    along = np.einsum("i,nij->nj", upwards, gripper_to_object[:, :3, :3])
+    origins = gripper_to_object[:, :3, 3] @ upwards + object_to_plane[2, 3]
+    return origins + (along @ corners.T).min(1)
+
+
+def raised(
+    gripper: ParallelGripper, gripper_to_object: np.ndarray, object_to_plane: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the grasps from above whose hand is below the plane, drawn back along their approach until it is clear.
+
+    ``(N, 4, 4)`` to ``(M, 4, 4)``, with the index ``(M,)`` of each in the second value. Not drawn back farther than the pads
+    are high: then nothing would be left between them.
+    """
+    missing_m = SUPPORT_CLEARANCE_M - lowest_points_m(gripper, gripper_to_object, object_to_plane)
+    descent = -(gripper_to_object[:, :3, 2] @ object_to_plane[2, :3])
+    back_m = missing_m / np.maximum(descent, MIN_DESCENT)
+    index = np.flatnonzero((missing_m > 0) & (descent >= MIN_DESCENT) & (back_m < 2 * gripper.pad_half_extents_m[1]))
+    poses = gripper_to_object[index].copy()
+    poses[:, :3, 3] -= back_m[index, None] * poses[:, :3, 2]
+    return poses, index

@@ -1,4 +1,4 @@
-"""Which of many grasps are tried: those that are likely to hold, and different from each other."""
+"""The choice of grasps to try: those that are likely to hold, and different from each other."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ MIN_OCTANTS = 4
 
 @dataclass(frozen=True)
 class Merits:
-    """What is known of N grasps before the trial.
+    """The prospects of N grasps before the trial.
 
     A grasp is likely to hold where it is ``fit`` and its ``cost`` at most ``good_cost``. Of the others those that are not
     ``weak`` come first, then those that cost less.

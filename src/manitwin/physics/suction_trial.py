@@ -12,9 +12,7 @@ import numpy as np
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.hull_surface import union_surface
-from manitwin.physics.suction_load import lip_load
-from manitwin.physics.suction_seal import seal
+from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import HandContacts, run_phases
 from manitwin.robots.grippers.gripper import Gripper, of_kind
@@ -42,7 +40,7 @@ class SuctionTrial:
 
         The cup seals on the body's ``surface``, and on its hulls where it has none.
         """
-        surface = RayCaster(union_surface(body.hulls)) if body.surface is None else body.surface
+        surface = RayCaster.of_hulls(body.hulls) if body.surface is None else body.surface
         cup = of_kind(gripper, SuctionGripper)
         found = seal(cup, gripper_to_object, surface)
         pressed_on = gripper_to_object.copy()

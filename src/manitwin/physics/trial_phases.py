@@ -29,7 +29,7 @@ MET_M = 1e-6  # pads this close have met
 
 @dataclass(frozen=True)
 class HandContacts:
-    """How hard each finger presses inwards on the object (N), and the deepest overlap (m) of hand and object."""
+    """The inward force (N) of each finger on the object, and the deepest overlap (m) of hand and object."""
 
     forces_n: tuple[float, ...]
     penetration_m: float

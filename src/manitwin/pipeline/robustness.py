@@ -9,8 +9,7 @@ import numpy as np
 
 from manitwin.config import Resource, RobustnessConfig, VerifyConfig
 from manitwin.engine.stage import Draft
-from manitwin.physics.perturbation import Spread, draw_perturbations
-from manitwin.physics.robustness import Robustness, SequentialTest, try_until_clear
+from manitwin.physics.robustness import Robustness, SequentialTest, Spread, draw_perturbations, try_until_clear
 from manitwin.physics.trial import GraspTrial
 from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
 from manitwin.pipeline.object_arrays import joints_of, load_body

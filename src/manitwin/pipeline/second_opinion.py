@@ -9,8 +9,7 @@ import numpy as np
 
 from manitwin.config import Resource, SecondOpinionConfig, VerifyConfig
 from manitwin.engine.stage import Draft
-from manitwin.physics.agreement import cohens_kappa
-from manitwin.physics.jitter import jittered
+from manitwin.physics.robustness import jittered
 from manitwin.physics.trial import GraspTrial, TrialResult
 from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
 from manitwin.pipeline.object_arrays import joints_of, load_body
@@ -116,3 +115,16 @@ def _agreement(
         jittered_agree=int((controls == second).sum()),
         kappa=cohens_kappa(controls, second),
     )
+
+
+def cohens_kappa(first: np.ndarray, second: np.ndarray) -> float | None:
+    """Return Cohen's kappa of two boolean verdicts ``(N,)``; None where it is not defined: no rows, or chance alone agrees.
+
+    kappa = (p_o - p_e) / (1 - p_e) with p_e from the two marginals (Cohen 1960, "A coefficient of agreement for nominal
+    scales").
+    """
+    if not len(first):
+        return None
+    p, q = float(np.mean(first)), float(np.mean(second))
+    observed, by_chance = float(np.mean(first == second)), p * q + (1 - p) * (1 - q)
+    return None if by_chance == 1 else (observed - by_chance) / (1 - by_chance)

@@ -8,8 +8,8 @@ import numpy as np
 
 from manitwin.config import GraspConfig
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest, Screen
+from manitwin.physics.grasp_filters import lowest_points_m, raised
 from manitwin.physics.grasp_selection import Merits
-from manitwin.physics.support_clearance import lowest_points_m, raised
 from manitwin.pipeline.association import distances_to_grasps
 from manitwin.pipeline.proposal_rounds import Kept
 from manitwin.robots.grippers.parallel import ParallelGripper

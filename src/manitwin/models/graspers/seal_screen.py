@@ -9,8 +9,7 @@ from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screened
 from manitwin.physics.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2
 from manitwin.physics.grasp_selection import Merits
-from manitwin.physics.suction_load import lip_load
-from manitwin.physics.suction_seal import seal
+from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.physics.trial_phases import SLIDE_DIRECTIONS
 from manitwin.robots.grippers.gripper import of_kind

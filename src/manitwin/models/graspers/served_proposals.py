@@ -12,7 +12,7 @@ from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.base_link_frames import gripper_poses
 from manitwin.models.graspers.grasp_server import GraspServer, ServerError
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
-from manitwin.physics.pad_contact import pad_contacts
+from manitwin.physics.grasp_filters import pad_contacts
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 ASKED_FOR = 4000  # paper, implementation details

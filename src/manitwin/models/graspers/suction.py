@@ -9,7 +9,7 @@ from manitwin.geometry.antipodal import tangents
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.starting_points import starting_points
-from manitwin.physics.suction_seal import seal
+from manitwin.physics.suction import seal
 from manitwin.robots.grippers.gripper import of_kind
 from manitwin.robots.grippers.suction import SuctionGripper
 

@@ -1,8 +1,19 @@
-"""Does a suction cup seal on the surface under it?
+"""A suction cup on a surface: whether it seals, and what a sealed lip can carry.
 
 The lip's ring is projected onto the surface along the approach, and how far the cup must deform to follow it is bounded:
 the idea of Dex-Net 3.0's quasi-static spring model (Mahler et al., ICRA 2018, section IV-A), with bounds in the units of
 a cup's data sheet (tilt of the bellows, bending of the lip, angle) instead of one strain for all springs.
+
+The sealed lip presses on the surface with N = V - T: the vacuum's force V less the pull T along its axis. It holds where
+
+* friction carries shear and twist: hypot(S, M_n / r) <= mu N, the limit surface of Howe and Cutkosky (1996) as an ellipsoid,
+  whose twist mu N r is exact for a thin ring;
+* the lip stays pressed on all around: M_t <= N r / 2, where the pressure of a thin elastic ring, N / (2 pi r) (1 + a cos)
+  with M_t = a N r / 2, becomes zero at one edge.
+
+The first is that of Dex-Net 3.0 (section IV-B) without its linearisation; in place of its elastic moment limit, a constant of
+the cup's material, stands the second. Both are linear in the load: each is carried where ``(S / mu + T) / V <= 1`` and
+``(2 M_t / r + T) / V <= 1``.
 """
 
 from __future__ import annotations
@@ -20,7 +31,7 @@ INNER_RINGS = ((1, 0.0), (8, 1 / 3), (12, 2 / 3))  # number of points, share of 
 
 @dataclass(frozen=True)
 class Seal:
-    """What N cups meet: whether they seal, and the centre (m) and the normal into the object of the plane of the lip.
+    """The seals of N cups: whether they hold, and the centre (m) and the normal into the object of the plane of the lip.
 
     Centre and normal are in the object frame, and those of the lip at rest where it does not seal. ``advance_m`` is how
     much farther than planned the cup is pushed along its approach to meet the surface.
@@ -84,3 +95,27 @@ def _project(
     distance_m, face = surface.first_hits(starts.reshape(-1, 3), along.reshape(-1, 3))
     normals = np.where(face[:, None] >= 0, surface.face_normals[face], 0.0)
     return (distance_m - behind_m).reshape(along.shape[:2]), normals.reshape(along.shape)
+
+
+def lip_load(
+    force_n: np.ndarray,
+    arm_m: np.ndarray,
+    inward: np.ndarray,
+    *,
+    vacuum_force_n: float,
+    friction: float,
+    lip_radius_m: float,
+) -> np.ndarray:
+    """Return the share ``(...)`` of its limits that a lip carries; it lets go beyond 1.
+
+    ``force_n (..., 3)`` acts on the object at ``arm_m (..., 3)`` from the lip's centre; ``inward (..., 3)`` is the unit
+    normal of the lip's plane into the object.
+    """
+    pull = (force_n * inward).sum(-1)
+    moment = np.cross(arm_m, force_n)
+    twist = (moment * inward).sum(-1)
+    shear = np.linalg.norm(force_n - pull[..., None] * inward, axis=-1)
+    tilt = np.linalg.norm(moment - twist[..., None] * inward, axis=-1)
+    sliding = np.hypot(shear, twist / lip_radius_m) / friction
+    peeling = 2 * tilt / lip_radius_m
+    return np.asarray((np.maximum(sliding, peeling) + pull) / vacuum_force_n)

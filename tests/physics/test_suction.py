@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.poses import transform
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.physics.suction_seal import seal
+from manitwin.physics.suction import seal
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.suction import SuctionGripper
 

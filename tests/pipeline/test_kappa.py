@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manitwin.physics.agreement import cohens_kappa
+from manitwin.pipeline.second_opinion import cohens_kappa
 
 
 def verdicts(both: int, first_only: int, second_only: int, neither: int) -> tuple[np.ndarray, np.ndarray]:
