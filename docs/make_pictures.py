@@ -24,7 +24,7 @@ from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.poses import OBJECT_TO_GLTF, rotation_between, transform, transform_points
 from manitwin.models.vlm.protocol import Picture as ChatPicture
 from manitwin.render.cameras import Camera, framing_camera, project
-from manitwin.render.gripper_fork import gripper_body
+from manitwin.render.card_panels import gripper_body
 from manitwin.render.raycast import merged
 from manitwin.render.renderer import shared_renderer
 from manitwin.render.surfaces import plain_part

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manitwin.render.gripper_fork import gripper_body, gripper_fork
+from manitwin.render.card_panels import gripper_body, gripper_fork
 from manitwin.robots.grippers.gripper import load_gripper
 
 

@@ -15,12 +15,11 @@ from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera, look_at, pixel_rays, project
 from manitwin.render.drawable import drawable
-from manitwin.render.procedural_textures import ProceduralTexture
+from manitwin.render.procedural_textures import ProceduralTexture, textured_box
 from manitwin.render.raycast import cast_camera
 from manitwin.render.scene_lighting import WHITE_PAPER, DirectionalLight, Lighting
-from manitwin.render.scene_renderer import Room, SceneRenderer
+from manitwin.render.scene_renderer import SceneRenderer, Surroundings
 from manitwin.render.surfaces import plain_part
-from manitwin.render.textured_box import textured_box
 
 SIZE = 160
 DIRECTION = np.array([0.6, 0.0, -0.8])
@@ -61,7 +60,7 @@ def filled(renderer: SceneRenderer, tolerance_m: float = 0.0) -> SceneRenderer:
 
 @pytest.fixture(scope="module")
 def renderer() -> Iterator[SceneRenderer]:
-    with SceneRenderer(room=None) as made:
+    with SceneRenderer(surroundings=None) as made:
         yield filled(made)
 
 
@@ -109,7 +108,7 @@ def test_moved_things_are_drawn_where_they_are(renderer: SceneRenderer) -> None:
 def test_same_scene_gives_the_same_bytes_and_several_cameras_do_not_disturb_each_other(renderer: SceneRenderer) -> None:
     both = renderer.render(CAMERAS, geometry=True)
     alone = [renderer.render([view], geometry=True)[0] for view in CAMERAS]
-    with SceneRenderer(room=None) as other:
+    with SceneRenderer(surroundings=None) as other:
         fresh = filled(other).render(CAMERAS, geometry=True)
     for a, b, c in zip(both, alone, fresh, strict=True):
         for name in ("rgb", "depth_m", "normals", "ids"):
@@ -124,7 +123,7 @@ def test_geometry_is_left_out_where_it_is_not_asked_for(renderer: SceneRenderer)
 
 def test_nothing_shows_the_backdrop_and_has_no_depth() -> None:
     up = camera([0, 0, 0.5], [1.0, 0, 1.5])
-    with SceneRenderer(room=Room(backdrop=(10, 120, 240))) as made:
+    with SceneRenderer(surroundings=Surroundings(backdrop=(10, 120, 240))) as made:
         frame = made.render([up], geometry=True)[0]
     assert (frame.rgb == (10, 120, 240)).all()
     assert frame.depth_m is not None and (frame.depth_m == 0).all()
@@ -132,7 +131,7 @@ def test_nothing_shows_the_backdrop_and_has_no_depth() -> None:
 
 def test_floor_has_depth_and_the_id_of_nothing() -> None:
     down = camera([0, 0, 1.0], [0, 0, 0])
-    with SceneRenderer(room=Room(floor_z_m=-0.5)) as made:
+    with SceneRenderer(surroundings=Surroundings(floor_z_m=-0.5)) as made:
         frame = made.render([down], geometry=True)[0]
     assert frame.depth_m is not None and frame.ids is not None
     np.testing.assert_allclose(frame.depth_m, 1.5, atol=1e-5)
@@ -144,7 +143,7 @@ def lit_table(
 ) -> np.ndarray:
     """The linear picture, straight from above, of a white table with things on it."""
     view = camera([0.0, 0.0, 1.5], [0, 0, 0], size=256, fov=0.8)
-    with SceneRenderer(lighting, room=None) as made:
+    with SceneRenderer(lighting, surroundings=None) as made:
         made.add("table", [plain_part(slab(), (255, 255, 255), roughness=1.0)])
         for index, (mesh, pose) in enumerate(things):
             made.add(str(index), drawable([plain_part(mesh, (255, 255, 255))], **kind), pose)
@@ -223,7 +222,7 @@ def test_texture_lies_the_right_way_up_on_a_box() -> None:
     texture = ProceduralTexture(color, np.full((64, 64), 255, np.uint8), 0.0, 0.4)
     part = textured_box(np.array([0.2, 0.2, 0.02]), texture, offset_m=(0.2, 0.2))
     view = camera([0, 0, 1.0], [0, 0, 0], size=64, fov=0.45)
-    with SceneRenderer(room=None) as made:
+    with SceneRenderer(surroundings=None) as made:
         made.add("box", [part])
         rgb = made.render([view])[0].rgb.astype(int)
     upper_left, upper_right, lower_left, lower_right = rgb[20, 20], rgb[20, 44], rgb[44, 20], rgb[44, 44]

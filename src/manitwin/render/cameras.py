@@ -72,6 +72,12 @@ class Camera:
         return cls(pose, value["fov_y_rad"], value["width_px"], value["height_px"])
 
 
+def sapien_axes(camera: Camera) -> np.ndarray:
+    """Return the rotation ``(3, 3)`` of SAPIEN's camera frame (x forward, y left, z up) to the object frame."""
+    right, up, backward = camera.camera_to_object[:3, :3].T
+    return np.stack([-backward, -right, up], 1)
+
+
 def look_at(eye: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Return ``camera_to_object (4, 4)`` of a camera at ``eye`` that looks at ``target``, +Z up in its picture.
 

@@ -44,7 +44,7 @@ RED = (200, 24, 32)
 
 @dataclass(frozen=True)
 class CardText:
-    """What is written on a card: a title, a sentence, facts as (name, value) from left to right, and a footer.
+    """The text of a card: a title, a sentence, facts as (name, value) from left to right, and a footer.
 
     ``stamp`` is a word across all pictures but the input.
     """

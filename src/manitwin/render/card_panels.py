@@ -1,4 +1,4 @@
-"""The pictures on a twin's card: what went in, how it looks, what it is made of, and how to hold it."""
+"""The pictures on a twin's card: what went in, the object as it looks, its collision hulls, and grasps drawn as slim forks."""
 
 from __future__ import annotations
 
@@ -13,13 +13,11 @@ from manitwin.geometry.hulls.reduction import convex_corners, hull_mesh
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.render.cameras import Camera, framing_camera, project, silhouette_area_px
-from manitwin.render.gripper_fork import Boxes, gripper_fork
-from manitwin.render.ground_shadow import ground_shadow
 from manitwin.render.markers import draw_markers
+from manitwin.render.overlays import ground_shadow, visible_edges
 from manitwin.render.raycast import cast_camera, merged, visible_points
 from manitwin.render.renderer import BACKDROP, shared_renderer
 from manitwin.render.surfaces import plain_part
-from manitwin.render.wireframe import visible_edges
 
 CLAY = (214, 210, 203)
 WIRE = np.array([40, 46, 58], dtype=np.float32)
@@ -31,6 +29,15 @@ HULL_COLORS = (
     (252, 205, 229), (255, 237, 111), (188, 128, 189), (204, 235, 197), (217, 217, 217), (255, 255, 179),
 )  # fmt: skip
 DRAWN_GRASPS = 12
+
+Boxes = Sequence[tuple[np.ndarray, np.ndarray]]
+"""``(box_to_gripper (4, 4), half_extents_m (3,))`` of each box of palm and fingers, grasp frame: +Z approach, X
+closing."""
+
+_unit_box = trimesh.creation.box(bounds=[[0, 0, 0], [1, 1, 1]])
+_UNIT_BOX = np.asarray(_unit_box.vertices), np.asarray(_unit_box.faces)  # made once: trimesh takes a millisecond for it
+
+STEM_SHARE = 0.5  # the stem's length, in that of the fingers
 
 
 @dataclass(frozen=True)
@@ -171,3 +178,48 @@ def _grounded(parts: list[trimesh.Trimesh], mesh: trimesh.Trimesh, camera: Camer
     shade = ground_shadow(mesh, camera)
     behind = (1 - frame.coverage)[..., None] * (1 - shade)[..., None]
     return np.rint(np.clip(frame.rgb - behind * np.array(BACKDROP), 0, 255)).astype(np.uint8)
+
+
+def gripper_fork(boxes: Boxes, rod_m: float) -> trimesh.Trimesh:
+    """Return rods of ``rod_m`` thickness in the grasp frame: one along each finger's inner face, a crossbar, a stem.
+
+    Fingers are the boxes beside the middle plane x = 0; they reach from the palm's front to their tips. A gripper without
+    any, a suction cup, is its boxes.
+    """
+    sides: dict[int, list[np.ndarray]] = {1: [], -1: []}
+    front = 0.0
+    for box_to_gripper, half in boxes:
+        corners = _corners(box_to_gripper, half)
+        if abs(box_to_gripper[0, 3]) < 1e-9:
+            front = max(front, float(corners[:, 2].max()))
+        else:
+            sides[1 if box_to_gripper[0, 3] > 0 else -1].append(corners)
+    if not all(sides.values()):
+        return gripper_body(boxes)
+    rods, tips = [], []
+    for corners_of_side in sides.values():
+        corners = np.concatenate(corners_of_side)
+        x = float(corners[np.abs(corners[:, 0]).argmin(), 0])
+        x += np.copysign(rod_m / 2, float(corners[:, 0].mean()))
+        tips.append(float(corners[:, 2].max()))
+        rods.append(_rod([x, 0, front], [x, 0, tips[-1]], rod_m))
+    reach = max(abs(float(rod.vertices[:, 0].mean())) for rod in rods)
+    rods.append(_rod([-reach, 0, front], [reach, 0, front], rod_m))
+    rods.append(_rod([0, 0, front - STEM_SHARE * (max(tips) - front)], [0, 0, front], rod_m))
+    return merged(rods)
+
+
+def gripper_body(boxes: Boxes) -> trimesh.Trimesh:
+    """Return the boxes themselves as one mesh in the grasp frame."""
+    return merged([trimesh.creation.box(2 * half, box_to_gripper) for box_to_gripper, half in boxes])
+
+
+def _rod(start: Sequence[float], end: Sequence[float], thickness: float) -> trimesh.Trimesh:
+    """Return a square rod along an axis of the frame, closed around both ends."""
+    low, high = np.minimum(start, end) - thickness / 2, np.maximum(start, end) + thickness / 2
+    return trimesh.Trimesh(low + _UNIT_BOX[0] * (high - low), _UNIT_BOX[1], process=False)
+
+
+def _corners(box_to_gripper: np.ndarray, half: np.ndarray) -> np.ndarray:
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+    return (signs * half) @ box_to_gripper[:3, :3].T + box_to_gripper[:3, 3]

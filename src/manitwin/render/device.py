@@ -1,4 +1,4 @@
-"""Which Vulkan device SAPIEN renders with: a GPU where one works, otherwise the CPU through Mesa's lavapipe.
+"""The Vulkan device that SAPIEN renders with: a GPU where one works, otherwise the CPU through Mesa's lavapipe.
 
 SAPIEN asks the Vulkan loader for a device at its first RenderSystem; the loader reads its environment variables then.
 So ``require_renderer`` must be called before. Each way is tried in a process of its own: a driver that crashes or hangs
@@ -14,7 +14,10 @@ import os
 import platform
 import subprocess
 import sys
+import warnings
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import Any
 
 from manitwin.errors import ManiTwinError, RendererMissing, UsageError
 from manitwin.twin.loggers import RUN
@@ -65,6 +68,19 @@ class RenderDevice:
     def on_cpu(self) -> bool:
         """Tell a software renderer from a GPU."""
         return "llvmpipe" in self.name or "SwiftShader" in self.name
+
+
+def render_scene(picture_formats: Mapping[str, str]) -> tuple[Any, Any]:
+    """Return SAPIEN's module and an empty scene of it that renders, its pictures in these formats; raises RendererMissing."""
+    require_renderer()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # SAPIEN warns of drivers that it looks for and does not need
+        import sapien
+        import sapien.render
+    sapien.render.set_log_level("error")
+    for picture, pixel_format in picture_formats.items():
+        sapien.render.set_picture_format(picture, pixel_format)
+    return sapien, sapien.Scene([sapien.render.RenderSystem()])
 
 
 def require_renderer() -> RenderDevice:

@@ -1,26 +1,28 @@
-"""A thing made ready to be drawn: its surfaces, and what throws its shadow."""
+"""A thing made ready to be drawn: its surfaces, from both sides where they are seen from behind, and what throws its shadow."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
-import cv2
 import numpy as np
 import trimesh
 
 from manitwin.formats.meshes.normals import with_creased_normals
 from manitwin.formats.meshes.textures import make_part, material_of
+from manitwin.geometry.poses import rotation_between
+from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.repair.welding import weld_equal
-from manitwin.render.back_faces import shows_back_faces
 from manitwin.render.raycast import merged
-from manitwin.render.sapien_shape import front_faces
 from manitwin.render.simplification import simplified
-from manitwin.render.surfaces import Surface, surface
+from manitwin.render.surfaces import RenderSurface, front_faces, render_surface, shrunk
 
 SMALL_TEXTURE_PX = 1024  # of simplified things; the 2048 of a twin's take four times the memory and time to upload
 SHADOW_TOLERANCE_M = 0.001
 """How far what throws the shadow may be from what is seen: less than the bias of ``shaders/scene``."""
+_RAYS = 40  # each way, from each side
+_SEEN_FROM_BEHIND = 2e-4  # share of the hits: what grazing rays find between two triangles of a closed solid is less
 
 
 @dataclass(frozen=True)
@@ -31,8 +33,8 @@ class Drawable:
     would say nothing of heights.
     """
 
-    surfaces: tuple[Surface, ...]
-    shadow: Surface
+    surfaces: tuple[RenderSurface, ...]
+    shadow: RenderSurface
 
 
 def drawable(parts: Sequence[trimesh.Trimesh], *, tolerance_m: float = 0.0) -> Drawable:
@@ -44,7 +46,7 @@ def drawable(parts: Sequence[trimesh.Trimesh], *, tolerance_m: float = 0.0) -> D
     both_sides = shows_back_faces(parts)
     if tolerance_m > 0:
         parts = [_welded(part) for part in parts]
-    surfaces = [surface(part) if both_sides else front_faces(surface(part)) for part in parts]
+    surfaces = [render_surface(part) if both_sides else front_faces(render_surface(part)) for part in parts]
     if tolerance_m > 0:
         surfaces = [_simplified(each, tolerance_m) for each in surfaces]
     return Drawable(tuple(surfaces), _shadow_caster(parts, both_sides, tolerance_m))
@@ -59,7 +61,7 @@ def _welded(part: trimesh.Trimesh) -> trimesh.Trimesh:
     return with_creased_normals(make_part(vertices, faces, material=material, name=part.metadata["name"]))
 
 
-def _simplified(s: Surface, tolerance_m: float) -> Surface:
+def _simplified(s: RenderSurface, tolerance_m: float) -> RenderSurface:
     """Return a surface with fewer vertices and texels; vertices of seams and creases, where they come twice, stay."""
     faces = simplified(s.vertices, s.faces, tolerance_m)
     used, faces = np.unique(faces, return_inverse=True)
@@ -69,21 +71,17 @@ def _simplified(s: Surface, tolerance_m: float) -> Surface:
         normals=s.normals[used],
         uv=s.uv[used],
         faces=faces.reshape(-1, 3).astype(np.uint32),
-        color_map=_shrunk(s.color_map),
-        roughness_map=_shrunk(s.roughness_map),
-        metallic_map=_shrunk(s.metallic_map),
+        color_map=_small(s.color_map),
+        roughness_map=_small(s.roughness_map),
+        metallic_map=_small(s.metallic_map),
     )
 
 
-def _shrunk(image: np.ndarray | None) -> np.ndarray | None:
-    if image is None or max(image.shape[:2]) <= SMALL_TEXTURE_PX:
-        return image
-    scale = SMALL_TEXTURE_PX / max(image.shape[:2])
-    size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+def _small(image: np.ndarray | None) -> np.ndarray | None:
+    return None if image is None else shrunk(image, SMALL_TEXTURE_PX)
 
 
-def _shadow_caster(parts: Sequence[trimesh.Trimesh], both_sides: bool, tolerance_m: float) -> Surface:
+def _shadow_caster(parts: Sequence[trimesh.Trimesh], both_sides: bool, tolerance_m: float) -> RenderSurface:
     whole = merged(list(parts))
     vertices, faces = weld_equal(np.asarray(whole.vertices), np.asarray(whole.faces))
     if tolerance_m > 0:
@@ -92,10 +90,10 @@ def _shadow_caster(parts: Sequence[trimesh.Trimesh], both_sides: bool, tolerance
     return _bare_surface(vertices, np.concatenate([turned, faces]) if both_sides else turned)
 
 
-def _bare_surface(vertices: np.ndarray, faces: np.ndarray) -> Surface:
+def _bare_surface(vertices: np.ndarray, faces: np.ndarray) -> RenderSurface:
     """Return a bare mesh, ``(V, 3)`` and ``(F, 3)``, as a grey surface without shading normals."""
     used, faces = np.unique(faces, return_inverse=True)
-    return Surface(
+    return RenderSurface(
         vertices=vertices[used].astype(np.float32),
         faces=faces.reshape(-1, 3).astype(np.uint32),
         normals=np.tile(np.array([0, 0, 1], np.float32), (len(used), 1)),
@@ -107,3 +105,29 @@ def _bare_surface(vertices: np.ndarray, faces: np.ndarray) -> Surface:
         roughness=1.0,
         roughness_map=None,
     )
+
+
+def shows_back_faces(parts: Sequence[trimesh.Trimesh]) -> bool:
+    """Tell whether faces of the parts, as one thing, are seen from behind from outside: open sheets, or a wrong winding.
+
+    Asked of parallel rays from the 26 directions of a cube's faces, edges and corners. Drawing both sides costs twice the
+    time.
+    """
+    mesh = merged(list(parts))
+    if not len(mesh.faces):
+        return False
+    caster = RayCaster(mesh)
+    center, radius = mesh.bounds.mean(0), float(np.linalg.norm(np.ptp(mesh.bounds, axis=0))) / 2
+    side = (np.arange(_RAYS) + 0.5) / _RAYS * 2 - 1
+    plane = np.stack([*np.meshgrid(side, side), np.ones((_RAYS, _RAYS))], -1).reshape(-1, 3) * radius
+    hits = behind = 0
+    for direction in product((-1, 0, 1), repeat=3):
+        if direction == (0, 0, 0):
+            continue
+        toward = np.array(direction) / np.linalg.norm(direction)
+        origins = center + plane @ rotation_between(np.array([0.0, 0, 1]), toward).T
+        _, face = caster.first_hits(origins, np.broadcast_to(-toward, origins.shape))
+        normals = caster.face_normals[face[face >= 0]]
+        hits += len(normals)
+        behind += int((normals @ toward < -1e-3).sum())
+    return behind > _SEEN_FROM_BEHIND * hits

@@ -1,4 +1,4 @@
-"""Wood, metal, marble and cloth as images: seamless, of a seed, for furniture that a scene stands on.
+"""Wood, metal, marble and cloth as images: seamless, of a seed, and boxes of furniture that have them, true to scale.
 
 All noise is made in the frequency domain, so a texture continues across its edges without a seam.
 """
@@ -13,12 +13,13 @@ from itertools import pairwise
 import cv2
 import numpy as np
 import scipy.fft
+import trimesh
+from PIL import Image
 
 from manitwin.errors import UsageError, choose_from
+from manitwin.formats.meshes.textures import make_part, pbr_material
 
 TEXTURE_PX = 1024
-
-Image = np.ndarray
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def procedural_texture(material: str, seed: int, *, size_px: int = TEXTURE_PX) -
 
 def periodic_noise(
     rng: np.random.Generator, size_px: int, *, wavelengths: tuple[float, float], slope: float = 1.0
-) -> Image:
+) -> np.ndarray:
     """Return noise ``(size, size)`` of mean 0 and deviation 1 that repeats; amplitudes fall with frequency to the ``slope``.
 
     ``wavelengths`` are the longest ones along u and v, as shares of the square: unequal ones stretch the noise.
@@ -136,17 +137,17 @@ def _cloth(rng: np.random.Generator, size: int) -> ProceduralTexture:
     return _texture(color * _tint(rng, 0.08), 0.92 - 0.06 * height, 0.0, 0.5)
 
 
-def _mixed(zero: Image, one: Image, share: Image) -> Image:
+def _mixed(zero: np.ndarray, one: np.ndarray, share: np.ndarray) -> np.ndarray:
     return zero + (one - zero) * share[..., None]
 
 
-def _tint(rng: np.random.Generator, spread: float) -> Image:
+def _tint(rng: np.random.Generator, spread: float) -> np.ndarray:
     """Return factors ``(3,)`` that shift hue and lightness a little."""
     return np.exp(rng.normal(0, spread) + rng.normal(0, spread / 2, 3))
 
 
-def _texture(color: Image, roughness: Image, metallic: float, size_m: float) -> ProceduralTexture:
-    def to_bytes(image: Image) -> Image:
+def _texture(color: np.ndarray, roughness: np.ndarray, metallic: float, size_m: float) -> ProceduralTexture:
+    def to_bytes(image: np.ndarray) -> np.ndarray:
         pixels = np.rint(np.clip(image, 0, 1) * 255).astype(np.uint8)
         pixels.flags.writeable = False  # it is kept and given again
         return pixels
@@ -154,7 +155,7 @@ def _texture(color: Image, roughness: Image, metallic: float, size_m: float) -> 
     return ProceduralTexture(to_bytes(color), to_bytes(roughness), metallic, size_m)
 
 
-def _srgb(*hexes: str) -> tuple[Image, ...]:
+def _srgb(*hexes: str) -> tuple[np.ndarray, ...]:
     return tuple(np.array([int(code[i : i + 2], 16) for i in (0, 2, 4)]) / 255 for code in hexes)
 
 
@@ -181,3 +182,48 @@ _MAKERS: dict[str, Callable[[np.random.Generator, int], ProceduralTexture]] = {
     "metal": _metal,
     "wood": _wood,
 }
+
+
+# Corners of the faces as seen from outside, from the lower left one counterclockwise, in half extents; the face's
+# horizontal and vertical axis in the picture. On top +X runs to the right and +Y up.
+_FACES = (
+    (((1, -1, -1), (1, 1, -1), (1, 1, 1), (1, -1, 1)), 1, 2),
+    (((-1, 1, -1), (-1, -1, -1), (-1, -1, 1), (-1, 1, 1)), 1, 2),
+    (((1, 1, -1), (-1, 1, -1), (-1, 1, 1), (1, 1, 1)), 0, 2),
+    (((-1, -1, -1), (1, -1, -1), (1, -1, 1), (-1, -1, 1)), 0, 2),
+    (((-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)), 0, 1),
+    (((-1, 1, -1), (1, 1, -1), (1, -1, -1), (-1, -1, -1)), 0, 1),
+)
+
+
+def textured_box(
+    half_extents_m: np.ndarray, texture: ProceduralTexture, *, offset_m: tuple[float, float] = (0.0, 0.0)
+) -> trimesh.Trimesh:
+    """Return a box about its origin as a visual part; its grain runs along the longest side.
+
+    ``offset_m`` shifts the texture, so that boards of one wood differ.
+    """
+    half = np.asarray(half_extents_m, float)
+    grain = int(half.argmax())
+    vertices, uv, normals = [], [], []
+    for corners, right, up in _FACES:
+        points = np.array(corners) * half
+        axes = (right, up) if right == grain or up != grain else (up, right)
+        vertices.append(points)
+        uv.append((points[:, axes] + offset_m) / texture.size_m)
+        normals.append(np.cross(points[1] - points[0], points[3] - points[0]))
+    quads = np.arange(24).reshape(6, 4)
+    faces = np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+    normal = np.repeat(np.array(normals) / np.linalg.norm(normals, axis=1)[:, None], 4, axis=0)
+    # glTF 2.0, section 3.9.2: roughness is green, metallic is blue
+    metal = np.full_like(texture.roughness, round(texture.metallic * 255))
+    material = pbr_material(
+        "furniture",
+        metallic=1.0,
+        roughness=1.0,
+        base_color_texture=Image.fromarray(texture.color),
+        metallic_roughness_texture=Image.fromarray(np.stack([metal * 0, texture.roughness, metal], -1)),
+    )
+    return make_part(
+        np.concatenate(vertices), faces, material=material, name="box", uv=np.concatenate(uv), normals=normal
+    )

@@ -1,4 +1,4 @@
-"""What a camera sees, by rays: exact depth, normals and faces, and whether a point is hidden."""
+"""Pictures by rays: exact depth, normals and faces, and whether a point is hidden."""
 
 from __future__ import annotations
 

@@ -9,7 +9,6 @@ pixels' centres, and no mean of two things.
 from __future__ import annotations
 
 import atexit
-import warnings
 import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,12 +21,11 @@ import trimesh
 
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform
-from manitwin.render.cameras import Camera
-from manitwin.render.device import require_renderer
+from manitwin.render.cameras import Camera, sapien_axes
+from manitwin.render.device import render_scene
 from manitwin.render.drawable import Drawable, drawable
-from manitwin.render.sapien_shape import triangle_mesh_shape
 from manitwin.render.scene_lighting import STUDIO, Lighting
-from manitwin.render.surfaces import Surface, plain_part, surface
+from manitwin.render.surfaces import RenderSurface, plain_part, render_surface, triangle_mesh_shape
 
 SHADERS = Path(__file__).parent / "shaders"
 SUPERSAMPLE = 2  # the shader spreads its shadow samples over blocks of 2 x 2
@@ -46,8 +44,8 @@ NOTHING = 0
 
 
 @dataclass(frozen=True)
-class Room:
-    """What is behind a scene: a level floor that fades into an even backdrop. sRGB; ``floor_z_m`` in the world frame."""
+class Surroundings:
+    """A level floor below a scene that fades into an even backdrop. sRGB; ``floor_z_m`` in the world frame."""
 
     floor_z_m: float = -0.75
     floor: tuple[int, int, int] = (172, 170, 166)
@@ -84,25 +82,20 @@ class SceneRenderer:
     """
 
     def __init__(
-        self, lighting: Lighting = STUDIO, *, room: Room | None = Room(), shadows: ShadowRegion = ShadowRegion()
+        self,
+        lighting: Lighting = STUDIO,
+        *,
+        surroundings: Surroundings | None = Surroundings(),
+        shadows: ShadowRegion = ShadowRegion(),
     ) -> None:
-        require_renderer()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # SAPIEN warns of drivers that it looks for and does not need
-            import sapien
-            import sapien.render
-        self._sapien: Any = sapien
-        sapien.render.set_log_level("error")
-        for picture, pixel_format in PICTURE_FORMATS.items():
-            sapien.render.set_picture_format(picture, pixel_format)
-        self._scene: Any = sapien.Scene([sapien.render.RenderSystem()])
+        self._sapien, self._scene = render_scene(PICTURE_FORMATS)
         self._entities: dict[str, tuple[int, Any]] = {}
         self._casters: dict[str, Any] = {}
         self._cameras: dict[tuple[str, int, int, int], tuple[Any, Any]] = {}
-        self._backdrop = np.zeros(3) if room is None else np.array(room.backdrop, float)
+        self._backdrop = np.zeros(3) if surroundings is None else np.array(surroundings.backdrop, float)
         self._add_lights(lighting, shadows)
-        if room is not None:
-            self._add_floor(room)
+        if surroundings is not None:
+            self._add_floor(surroundings)
         _open_renderers.add(self)
 
     def __enter__(self) -> SceneRenderer:
@@ -145,7 +138,7 @@ class SceneRenderer:
         self._casters[name] = self._shadow_caster(thing.shadow, entity.pose)
         return number
 
-    def _shadow_caster(self, shape: Surface, pose: Any) -> Any:
+    def _shadow_caster(self, shape: RenderSurface, pose: Any) -> Any:
         """Add something that is not seen but throws a shadow."""
         body = self._sapien.render.RenderBodyComponent()
         body.attach(triangle_mesh_shape(self._sapien.render, shape, mipmaps=False))
@@ -200,8 +193,7 @@ class SceneRenderer:
         component, entity = self._cameras[key]
         component.set_fovy(camera.fov_y_rad, True)
         component.near, component.far = NEAR_M, FAR_M
-        right, up, backward = camera.camera_to_object[:3, :3].T
-        entity.set_pose(self._sapien.Pose(transform(np.stack([-backward, -right, up], 1), camera.position)))
+        entity.set_pose(self._sapien.Pose(transform(sapien_axes(camera), camera.position)))
         return component
 
     def _placed(self, component: Any, pose: np.ndarray) -> Any:
@@ -238,10 +230,16 @@ class SceneRenderer:
             shadow_map_size=map_px,
         )
 
-    def _add_floor(self, room: Room) -> None:
-        corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [12, 12, 1] + [0, 0, room.floor_z_m]
-        floor = plain_part(trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False), room.floor, roughness=0.9)
-        shape = triangle_mesh_shape(self._sapien.render, surface(floor), mipmaps=False)
+    def _add_floor(self, surroundings: Surroundings) -> None:
+        corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [12, 12, 1] + [
+            0,
+            0,
+            surroundings.floor_z_m,
+        ]
+        floor = plain_part(
+            trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False), surroundings.floor, roughness=0.9
+        )
+        shape = triangle_mesh_shape(self._sapien.render, render_surface(floor), mipmaps=False)
         shape.material.set_emission([0.0, 0.0, 0.0, 1.0])  # tells the shader to fade it
         body = self._sapien.render.RenderBodyComponent()
         body.attach(shape)

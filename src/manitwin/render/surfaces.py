@@ -1,12 +1,13 @@
-"""Visual parts as arrays that a rasteriser takes: normals, V-down texture coordinates, metallic-roughness maps.
+"""Visual parts as arrays that a rasteriser takes, and their upload into SAPIEN.
 
-The model is glTF 2.0's (section 3.9.2). Colour textures are sRGB, colour factors linear. Normal maps are left out:
-SAPIEN takes no tangents with arrays.
+The model is glTF 2.0's (section 3.9.2). Colour textures are sRGB, colour factors linear; texture coordinates are V-down.
+Normal maps are left out: SAPIEN takes no tangents with arrays.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,10 +17,11 @@ from manitwin.formats.meshes.normals import with_creased_normals
 from manitwin.formats.meshes.textures import make_part, material_of, pbr_material, uv_of
 
 MAX_TEXTURE_PX = 2048  # twice the largest picture made here; more only costs time and aliases
+SPECULAR = 0.5  # reflectance of a dielectric at 0.5 * 0.08 = 4 %, the default of glTF 2.0 (index of refraction 1.5)
 
 
 @dataclass(frozen=True)
-class Surface:
+class RenderSurface:
     """One mesh with one material, ready for upload.
 
     ``vertices``, ``normals (V, 3) float32``, ``faces (F, 3) uint32``, ``uv (V, 2) float32`` V-down. ``color_map`` is
@@ -39,8 +41,8 @@ class Surface:
     roughness_map: np.ndarray | None
 
 
-def surface(part: trimesh.Trimesh) -> Surface:
-    """Read a visual part as ``files.glb.read_glb`` gives it; raises TypeError for a mesh without a PBRMaterial.
+def render_surface(part: trimesh.Trimesh) -> RenderSurface:
+    """Read a visual part as ``formats.glb.read_glb`` gives it; raises TypeError for a mesh without a PBRMaterial.
 
     Every face comes twice, from either side: SAPIEN culls back faces, and open sheets would vanish from behind.
     """
@@ -48,13 +50,13 @@ def surface(part: trimesh.Trimesh) -> Surface:
     factor = np.asarray(material.baseColorFactor)[:3] / 255
     color_map = mask = None
     if uv is not None and material.baseColorTexture is not None:
-        color_map = _tinted(_shrunk(np.asarray(material.baseColorTexture.convert("RGB"))), factor)
+        color_map = _tinted(shrunk(np.asarray(material.baseColorTexture.convert("RGB")), MAX_TEXTURE_PX), factor)
     if uv is not None and material.metallicRoughnessTexture is not None:
-        mask = _shrunk(np.asarray(material.metallicRoughnessTexture.convert("RGB")))
+        mask = shrunk(np.asarray(material.metallicRoughnessTexture.convert("RGB")), MAX_TEXTURE_PX)
     metallic, roughness = float(material.metallicFactor), float(material.roughnessFactor)
     vertices, faces, normals = np.asarray(part.vertices), np.asarray(part.faces), np.asarray(part.vertex_normals)
     uv_down = np.zeros((len(vertices), 2)) if uv is None else uv * [1, -1] + [0, 1]
-    return Surface(
+    return RenderSurface(
         vertices=np.concatenate([vertices, vertices]).astype(np.float32),
         faces=np.concatenate([faces, faces[:, ::-1] + len(vertices)]).astype(np.uint32),
         normals=np.concatenate([normals, -normals]).astype(np.float32),
@@ -74,6 +76,15 @@ def plain_part(mesh: trimesh.Trimesh, color: tuple[int, int, int], *, roughness:
     return with_creased_normals(make_part(mesh.vertices, mesh.faces, material=material, name="plain"))
 
 
+def shrunk(image: np.ndarray, most_px: int) -> np.ndarray:
+    """Return an image of at most ``most_px`` a side, by averaging."""
+    scale = most_px / max(image.shape[:2])
+    if scale >= 1:
+        return image
+    size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+
+
 def srgb_to_linear(value: np.ndarray) -> np.ndarray:
     """Decode sRGB in [0, 1] (IEC 61966-2-1)."""
     return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
@@ -84,18 +95,50 @@ def linear_to_srgb(value: np.ndarray) -> np.ndarray:
     return np.where(value <= 0.0031308, value * 12.92, 1.055 * np.maximum(value, 0.0031308) ** (1 / 2.4) - 0.055)
 
 
-def _shrunk(image: np.ndarray) -> np.ndarray:
-    """Shrink an image to the largest texture size by averaging."""
-    scale = MAX_TEXTURE_PX / max(image.shape[:2])
-    if scale >= 1:
-        return image
-    size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
-    return cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-
-
 def _tinted(image: np.ndarray, factor: np.ndarray) -> np.ndarray:
     """Multiply an sRGB image ``(H, W, 3) uint8`` by a linear factor; returns ``(H, W, 4) uint8`` sRGB, opaque."""
     if not np.allclose(factor, 1.0, rtol=0, atol=1 / 512):
         table = np.rint(linear_to_srgb(srgb_to_linear(np.linspace(0, 1, 256))[:, None] * factor) * 255).astype(np.uint8)
         image = np.asarray(cv2.LUT(image, table[None]))
     return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2RGBA))
+
+
+def triangle_mesh_shape(render: Any, s: RenderSurface, *, mipmaps: bool) -> Any:
+    """Return a surface as a shape of the module ``sapien.render``.
+
+    ``mipmaps`` are for scenes, where textures are much finer than the pixels; the driver averages them in sRGB, which
+    darkens what is both fine and rich in contrast a little.
+    """
+    material = render.RenderMaterial()
+    material.base_color = [*s.color, 1.0]
+    material.specular = SPECULAR
+    roughness, material.roughness = _map_or_value(s.roughness_map, s.roughness)
+    metallic, material.metallic = _map_or_value(s.metallic_map, s.metallic)
+    if s.color_map is not None:
+        material.base_color_texture = _texture(render, s.color_map, "R8G8B8A8Unorm", srgb=True, mipmaps=mipmaps)
+    if roughness is not None:
+        material.roughness_texture = _texture(render, roughness, "R8Unorm", srgb=False, mipmaps=mipmaps)
+    if metallic is not None:
+        material.metallic_texture = _texture(render, metallic, "R8Unorm", srgb=False, mipmaps=mipmaps)
+    return render.RenderShapeTriangleMesh(s.vertices, s.faces, s.normals, s.uv, material)
+
+
+def front_faces(s: RenderSurface) -> RenderSurface:
+    """Return a surface without the copies of its faces that are seen from behind (``render_surface``)."""
+    vertices, faces = len(s.vertices) // 2, len(s.faces) // 2
+    return replace(
+        s, vertices=s.vertices[:vertices], normals=s.normals[:vertices], uv=s.uv[:vertices], faces=s.faces[:faces]
+    )
+
+
+def _map_or_value(image: np.ndarray | None, value: float) -> tuple[np.ndarray | None, float]:
+    """Return an even map as its value: many are, and looking them up for every pixel costs."""
+    if image is not None and image.min() == image.max():
+        return None, float(image.flat[0]) / 255
+    return image, value
+
+
+def _texture(render: Any, image: np.ndarray, pixel_format: str, *, srgb: bool, mipmaps: bool) -> Any:
+    array = np.ascontiguousarray(image if image.ndim == 3 else image[..., None])
+    levels = min(image.shape[:2]).bit_length() if mipmaps else 1
+    return render.RenderTexture2D(array=array, format=pixel_format, mipmap_levels=levels, srgb=srgb)

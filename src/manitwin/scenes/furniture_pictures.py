@@ -11,10 +11,9 @@ import trimesh
 
 from manitwin.formats.meshes.textures import bake_transform
 from manitwin.geometry.poses import transform
-from manitwin.render.procedural_textures import ProceduralTexture, procedural_texture
+from manitwin.render.procedural_textures import ProceduralTexture, procedural_texture, textured_box
 from manitwin.render.scene_lighting import DirectionalLight, Lighting
-from manitwin.render.scene_renderer import Room, SceneRenderer
-from manitwin.render.textured_box import textured_box
+from manitwin.render.scene_renderer import SceneRenderer, Surroundings
 from manitwin.scenes.scene import Furniture, Light, SurfaceBox
 
 TEXTURE_VARIANTS = 8
@@ -43,7 +42,7 @@ def add_furniture(renderer: SceneRenderer, furniture: Furniture, *, seed: int) -
 def _legs(table: SurfaceBox, texture: ProceduralTexture) -> list[trimesh.Trimesh]:
     """Return four legs down to the room's floor, in the table's frame: they are of its looks only."""
     x, y, z = table.half_extents_m
-    half_m = np.array([LEG_HALF_M, LEG_HALF_M, (table.center_m[2] - z - Room().floor_z_m) / 2])
+    half_m = np.array([LEG_HALF_M, LEG_HALF_M, (table.center_m[2] - z - Surroundings().floor_z_m) / 2])
     if half_m[2] <= 0:
         return []
     legs = []

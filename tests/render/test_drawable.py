@@ -5,8 +5,7 @@ from __future__ import annotations
 import trimesh
 
 from handmade import mug
-from manitwin.render.back_faces import shows_back_faces
-from manitwin.render.drawable import drawable
+from manitwin.render.drawable import drawable, shows_back_faces
 from manitwin.render.surfaces import plain_part
 
 

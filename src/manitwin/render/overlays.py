@@ -1,0 +1,75 @@
+"""Layers over and under a picture: the edges of a mesh that its camera sees, and the soft shade on the ground below it."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import trimesh
+
+from manitwin.geometry.sampling import sample_surface
+from manitwin.render.cameras import Camera, pixel_rays, project
+
+_FINE = 3  # lines are put down on a raster this many times finer each way, one fine pixel wide
+_DEPTH_SLACK = 0.012  # of the mesh's diagonal: the depth picture is coarser than the lines
+_GRID = 192
+_SAMPLES = 20_000
+_STRENGTH, _MOST = 0.38, 0.6
+
+
+def visible_edges(mesh: trimesh.Trimesh, camera: Camera, depth: np.ndarray) -> np.ndarray:
+    """Return how much of each pixel the mesh's visible edges cover, ``(H, W) float32``.
+
+    ``depth (H, W)`` is the mesh's own, 0 where nothing is. An edge is drawn where one of its faces turns to the camera
+    and it lies no deeper than the depth picture says.
+    """
+    facing = ((mesh.triangles_center - camera.position) * mesh.face_normals).sum(1) < 0
+    edges = np.unique(np.sort(mesh.faces[facing][:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    pixels, z = project(np.asarray(mesh.vertices), camera)
+    length = np.linalg.norm(pixels[edges[:, 0]] - pixels[edges[:, 1]], axis=1)
+    count = np.ceil(length * _FINE).astype(int) + 1
+    edge = np.repeat(np.arange(len(edges)), count)
+    step = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+    along = (step / count[edge])[:, None]
+    a, b = edges[edge].T
+    point = pixels[a] * (1 - along) + pixels[b] * along
+    point_depth = 1 / ((1 - along[:, 0]) / z[a] + along[:, 0] / z[b])  # 1/depth is linear along a picture's line
+    height, width = depth.shape
+    inside = ((point >= 0) & (point < [width, height])).all(1)
+    point, point_depth = point[inside], point_depth[inside]
+    x, y = point.astype(int).T
+    slack = _DEPTH_SLACK * float(np.linalg.norm(mesh.extents))
+    seen = (depth[y, x] == 0) | (point_depth < depth[y, x] + slack)
+    fine = np.zeros((height * _FINE, width * _FINE), dtype=np.float32)
+    fx, fy = (point[seen] * _FINE).astype(int).T
+    fine[fy, fx] = 1
+    return fine.reshape(height, _FINE, width, _FINE).mean((1, 3))
+
+
+def ground_shadow(mesh: trimesh.Trimesh, camera: Camera) -> np.ndarray:
+    """Return a factor ``(H, W) float32`` for the picture of the plane z = 0 under a mesh, lit by a wide sky.
+
+    The nearer a surface is to the ground, the sharper and darker its shade; 1 where the camera does not see the ground.
+    """
+    points, _, _ = sample_surface(mesh, _SAMPLES, np.random.default_rng(0))
+    low, high = mesh.bounds
+    size, middle = 2.2 * float((high - low).max()), (low + high)[:2] / 2
+    cells = ((points[:, :2] - middle) / size + 0.5) * _GRID
+    x, y = np.clip(cells.astype(int), 0, _GRID - 1).T
+    height = np.clip((points[:, 2] - low[2]) / float((high - low).max()), 0, 1)
+    touching = height < 0.06
+    shade = 0.6 * _blurred_footprint(x[touching], y[touching], 2.0) + 0.75 * _blurred_footprint(x, y, 9.0)
+    origins, directions = pixel_rays(camera)
+    down = directions[:, 2] < -1e-6
+    reach = np.where(down, (low[2] - origins[:, 2]) / np.where(down, directions[:, 2], -1.0), 0.0)
+    ground = ((origins + directions * reach[:, None])[:, :2] - middle) / size + 0.5
+    at = (ground * _GRID - 0.5).astype(np.float32).reshape(camera.height_px, camera.width_px, 2)
+    seen = cv2.remap(shade, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=0)
+    return (1 - np.where(down.reshape(seen.shape), np.minimum(_STRENGTH * seen, _MOST), 0)).astype(np.float32)
+
+
+def _blurred_footprint(x: np.ndarray, y: np.ndarray, blur: float) -> np.ndarray:
+    """Return the grid's cells that hold points, small gaps closed, blurred."""
+    layer = np.zeros((_GRID, _GRID), dtype=np.float32)
+    layer[y, x] = 1
+    layer = np.asarray(cv2.morphologyEx(layer, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)))
+    return np.asarray(cv2.GaussianBlur(layer, (0, 0), blur))
