@@ -27,8 +27,7 @@ from manitwin.dataset.index.near_duplicates import near_duplicates
 from manitwin.dataset.index.part_list import PartList
 from manitwin.dataset.index.parts import PART_ROWS, write_rows
 from manitwin.dataset.index.query import Index
-from manitwin.dataset.index.tables import TABLES, joined
-from manitwin.geometry.shape_descriptor import LENGTH
+from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH, TABLES, joined
 from manitwin.twin.dataset_root import DatasetRoot
 
 CATEGORIES = (
@@ -80,9 +79,9 @@ def filled(name: str, count: int, rng: np.random.Generator, **known: pa.Array) -
 
 def descriptors(count: int, rng: np.random.Generator) -> pa.Array:
     """Return descriptors that differ in four independent ways and lie as far apart as those of real objects (about 0.1)."""
-    modes = np.random.default_rng(1).normal(size=(4, LENGTH)) / np.sqrt(LENGTH)
+    modes = np.random.default_rng(1).normal(size=(4, DESCRIPTOR_LENGTH)) / np.sqrt(DESCRIPTOR_LENGTH)
     values = (0.5 + 0.08 * rng.normal(size=(count, 4)) @ modes).astype(np.float32)
-    return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), LENGTH)
+    return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), DESCRIPTOR_LENGTH)
 
 
 def rows(ids: np.ndarray, per_twin: int, rng: np.random.Generator) -> dict[str, pa.Table]:

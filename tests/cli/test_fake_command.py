@@ -13,7 +13,7 @@ from manitwin.cli.commands import fake as fake_command
 from manitwin.cli.commands.fake import fake
 from manitwin.config import ServicesConfig
 from manitwin.errors import UsageError
-from manitwin.models.fakes.faults import FAULTS
+from manitwin.models.fakes.faults import Faults
 from manitwin.models.graspers.grasp_server import GraspServer
 
 RUN = "import typer; from manitwin.cli.commands.fake import fake; typer.run(fake)"
@@ -72,9 +72,12 @@ def test_it_says_the_key_to_set() -> None:
         process.communicate()
 
 
-def test_faults_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_fault_that_is_listed_can_be_asked_for_and_says_what_it_does(capsys: pytest.CaptureFixture[str]) -> None:
     fake(list_faults=True)
-    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(FAULTS)
+    listed = dict(line.split(maxsplit=1) for line in capsys.readouterr().out.splitlines())
+    assert len(listed) > 10 and all(len(meaning.split()) > 1 for meaning in listed.values())
+    faults = Faults.parse([f"{word}=1" for word in listed])
+    assert [faults.strike(word) for word in listed for _ in range(2)] == [True, False] * len(listed)
 
 
 @pytest.mark.parametrize(

@@ -136,11 +136,6 @@ def test_without_a_terminal_a_plain_line_with_the_time_is_printed_again_and_agai
     assert lines[-1].endswith("1 of 5 items; 1 accepted")
 
 
-def test_line_every_thirty_seconds_is_what_users_get() -> None:
-    shown = ShownProgress(RunProgress(), Console(file=io.StringIO()), Console(file=io.StringIO()))
-    assert shown._every_s == 30.0
-
-
 def test_on_a_terminal_one_line_is_kept_up_to_date_and_taken_away_at_the_end() -> None:
     stream, progress = io.StringIO(), RunProgress("items")
     err = Console(file=stream, force_terminal=True, width=100, _environ={"TERM": "xterm"})

@@ -27,10 +27,6 @@ def test_attempts_come_back_as_they_were_with_equal_bytes(tmp_path: Path) -> Non
     assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "b.parquet").read_bytes()
 
 
-def test_columns_are_the_fields_of_an_attempt() -> None:
-    assert table.SCHEMA.names == list(Attempt.__dataclass_fields__)
-
-
 def test_merging_keeps_order_and_numbers_the_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table, "_ROW_GROUP", 16)
     given = some(50)

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from manitwin.config import CollisionConfig
-from manitwin.engine.stage import Draft, Stage
+from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.pipeline.collision import CollisionStage
 from manitwin.pipeline.item import Item
@@ -22,7 +22,6 @@ def _draft(folder: Path, mesh: trimesh.Trimesh) -> Draft:
 
 def test_cup_gets_hulls_that_keep_it_open(tmp_path: Path) -> None:
     stage = CollisionStage(CollisionConfig())
-    assert isinstance(stage, Stage)
     field = stage.run(_draft(tmp_path, cup()), tmp_path)["collision"]
     hulls = load_hulls(tmp_path / "hulls.npz")
     assert len(hulls) == field["count"] <= 32

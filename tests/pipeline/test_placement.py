@@ -8,7 +8,7 @@ import trimesh
 from scipy.optimize import minimize
 
 from manitwin.config import CollisionConfig, PlacementConfig
-from manitwin.engine.stage import Draft, Stage
+from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.geometry.mass_properties import solid_mass_properties
@@ -81,7 +81,6 @@ def _set_down_in_mujoco(draft: Draft, placement: dict[str, Any]) -> tuple[float,
 def test_box_rests_on_its_six_sides_upright_among_them(tmp_path: Path) -> None:
     box = trimesh.creation.box((0.10, 0.08, 0.06)).apply_translation((0, 0, 0.03))
     draft = _draft(tmp_path, box, 0.3, [np.asarray(box.vertices)])
-    assert isinstance(PlacementStage(PlacementConfig()), Stage)
     found = _placements(draft, tmp_path)
     assert len(found) == 6 and all(p["settled"] for p in found)
     assert sum(p["probability"] for p in found) == pytest.approx(1.0)

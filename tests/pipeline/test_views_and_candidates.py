@@ -10,7 +10,7 @@ import trimesh
 from PIL import Image
 
 from manitwin.config import CandidatesConfig, ViewsConfig
-from manitwin.engine.stage import Draft, Stage
+from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.distance import distance_to_surface
@@ -47,11 +47,6 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Draft]:
     draft.fields |= ViewsStage(ViewsConfig(), 256).run(draft, folder)
     draft.fields |= CandidatesStage(CandidatesConfig()).run(draft, folder)
     return folder, draft
-
-
-def test_stages_keep_the_protocol() -> None:
-    assert isinstance(ViewsStage(ViewsConfig(), 512), Stage)
-    assert isinstance(CandidatesStage(CandidatesConfig()), Stage)
 
 
 def test_eight_views_show_the_whole_cup(made: tuple[Path, Draft]) -> None:

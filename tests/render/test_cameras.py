@@ -9,7 +9,6 @@ import pytest
 import trimesh
 
 from manitwin.render.cameras import (
-    FILL,
     Camera,
     framing_camera,
     hero_camera,
@@ -44,7 +43,7 @@ def test_framing_fills_the_picture_and_cuts_nothing() -> None:
     points = trimesh.creation.torus(0.1, 0.03).vertices + np.array([3.0, -2.0, 5.0])
     pixels, _ = project(points, framing_camera(points, azimuth_deg=20, elevation_deg=35, **FRAMING))
     reach = np.abs(pixels - [200, 150]).max(0) / [200, 150]
-    assert reach.max() == pytest.approx(FILL, abs=1e-9)
+    assert 0.8 < reach.max() < 0.95  # of the way from the middle to the nearer edge
     assert (pixels.min(0) + pixels.max(0)) / 2 == pytest.approx([200, 150], abs=8)
 
 

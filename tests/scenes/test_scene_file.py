@@ -16,8 +16,10 @@ from scene_twins import pool_of_things
 def test_scene_comes_back_as_it_was(tmp_path: Path) -> None:
     record = sample_layout(pool_of_things(), LayoutSettings(objects=(2, 2)), 3, 1)
     path = write_scene(record, tmp_path / "new" / "scene")
-    assert path.name == SCENE
     assert read_scene(path) == read_scene(path.parent) == record
+    said = json.loads((tmp_path / "new" / "scene" / "scene.json").read_bytes())
+    assert [each["position_m"] for each in said["objects"]] == [list(each.position_m) for each in record.objects]
+    assert [each["twin_id"] for each in said["objects"]] == [each.twin_id for each in record.objects]
     assert scene_bytes(read_scene(path)) == path.read_bytes()
     assert list(path.parent.iterdir()) == [path]
 

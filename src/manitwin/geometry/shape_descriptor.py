@@ -10,7 +10,6 @@ import trimesh
 from manitwin.geometry.sampling import sample_surface
 
 QUANTILES = 32
-LENGTH = 2 * QUANTILES + 2
 _PAIRS = 1 << 15  # two draws are 0.005 apart, at most 0.011, over 25 real objects; different ones 0.047 or more
 _LEVELS = (np.arange(QUANTILES) + 0.5) / QUANTILES
 

@@ -8,10 +8,10 @@ import pytest
 
 from manitwin.config import BuildConfig
 from manitwin.dataset.index.rows import rows_of
-from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH, TABLES
+from manitwin.dataset.index.tables import TABLES
 from manitwin.engine.stage_order import STAGE_ORDER
 from manitwin.errors import TwinError
-from manitwin.geometry.shape_descriptor import LENGTH, shape_descriptor
+from manitwin.geometry.shape_descriptor import shape_descriptor
 from manitwin.pipeline.recipe import stages_for
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.grasp_table import SCHEMA
@@ -23,12 +23,6 @@ def test_every_table_has_exactly_the_columns_of_its_schema(tmp_path: Path) -> No
     for write in (write_accepted, write_rejected):
         rows = rows_of(tmp_path / twin_name(write(tmp_path, 1)))
         assert {name: table.schema for name, table in rows.items()} == TABLES
-
-
-def test_grasp_columns_are_those_of_a_twin() -> None:
-    assert TABLES["grasps"].names[:3] == ["twin_id", "category", "number"]
-    assert list(TABLES["grasps"])[3:] == list(SCHEMA)
-    assert DESCRIPTOR_LENGTH == LENGTH
 
 
 def test_page_names_every_column() -> None:

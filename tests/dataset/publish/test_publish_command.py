@@ -49,11 +49,13 @@ def test_rehearsals_are_left_out_with_their_count_unless_asked_for(tmp_path: Pat
 def test_wrong_licence_is_a_usage_error(tmp_path: Path) -> None:
     make_dataset(tmp_path / "set")
     done = CliRunner().invoke(app, [str(tmp_path / "set"), "-o", str(tmp_path / "out"), "--license-allow", "MIT"])
-    assert isinstance(done.exception, UsageError)
+    assert isinstance(done.exception, UsageError) and "CC0-1.0 (1)" in str(done.exception)
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("option", ["--shard-size-mb", "--twins-per-shard"])
 def test_bounds_are_checked(tmp_path: Path, option: str) -> None:
     make_dataset(tmp_path / "set")
     done = CliRunner().invoke(app, [str(tmp_path / "set"), "-o", str(tmp_path / "out"), option, "0"])
-    assert isinstance(done.exception, UsageError)
+    assert isinstance(done.exception, UsageError) and f"{option} is 0; give 1" in str(done.exception)
+    assert not (tmp_path / "out").exists()

@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 
 from manitwin.config import BuildConfig, ServicesConfig
-from manitwin.errors import UsageError
+from manitwin.errors import AccessDenied, UsageError
 from manitwin.models.fakes.catalog import REHEARSALS, serving
-from manitwin.models.fakes.faults import Faults
 from manitwin.models.registry import create
 
 KINDS = {"--vlm": "annotator", "--generator": "generator", "--grasper": "grasper"}
@@ -22,13 +21,6 @@ def test_its_client_finds_a_working_service(name: str, monkeypatch: pytest.Monke
         assert backend.probe()
 
 
-@pytest.mark.parametrize("name", REHEARSALS)
-def test_faults_can_be_asked_for(name: str) -> None:
-    with serving(name, faults=Faults({"server_error": 1})) as server:
-        assert "127.0.0.1" in server.url
-        assert server.url in server.spec
-
-
 def test_unknown_names_list_the_valid_ones() -> None:
     with pytest.raises(UsageError, match=r"unknown server 'rodan'; did you mean 'rodin'.*graspgen"), serving("rodan"):
         pass
@@ -40,9 +32,14 @@ def test_what_a_server_does_not_have_cannot_be_chosen(given: dict[str, int | str
         pass
 
 
-def test_a_key_can_be_chosen() -> None:
+def test_a_chosen_key_is_the_one_that_opens(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = BuildConfig(services=ServicesConfig(cache=False))
     with serving("meshy", key="msy_mine", polls=0) as server:
-        assert server.key == "msy_mine"
+        monkeypatch.setenv("MESHY_API_KEY", "msy_mine")
+        assert create("generator", server.spec, config).probe()
+        monkeypatch.setenv("MESHY_API_KEY", "msy_other")
+        with pytest.raises(AccessDenied):
+            create("generator", server.spec, config).probe()
 
 
 @pytest.mark.parametrize("name", ["meshy", "graspgen"])
