@@ -1,4 +1,4 @@
-"""One pick-and-place episode: plan, execute in physics, re-plan from what is measured, judge (``reference/planning.md`` 6)."""
+"""One pick-and-place episode: plan, execute in physics, re-plan from what is measured, judge (docs/trajectories.md)."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from manitwin.pipeline.subject import findings_of, read_subject
 from manitwin.twin.record import Estimate, OrientedBox, Physical
 
 CONFIRMED = ("measured", "user")
-"""Sources that a plausibility check does not overrule (design: rejected where implausible and not confirmed)."""
+"""Sources that a plausibility check does not overrule (docs/imports.md: an implausible mass of another source is rejected)."""
 
 NOMINAL_WALL_M = 0.002
 """The wall of an ordinary bottle or housing: what the centre of mass is compared with where no wall is known."""

@@ -1,4 +1,4 @@
-"""``grasps.parquet``: one row a grasp that reached verification, held or failed (design of the twin folder)."""
+"""``grasps.parquet``: one row a grasp that reached verification, held or failed (docs/twin.md)."""
 
 from __future__ import annotations
 
