@@ -9,7 +9,7 @@ from manitwin.engine.stage import Draft
 from manitwin.twin.record import Check
 
 UNCOVERED_LIMIT_M = 0.002
-"""Of the surface that no collision hull covers: more would let fingers sink in (reference study of hulls)."""
+"""Of the surface that no collision hull covers: more would let fingers sink in (measured on real meshes: docs/measured.md)."""
 
 CAVITY_LIMIT = 0.8
 """Of the open cavity that the hulls keep: less, and a container holds visibly less than it shows."""

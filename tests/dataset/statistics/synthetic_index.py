@@ -7,8 +7,7 @@ import hashlib
 import numpy as np
 import pyarrow as pa
 
-from manitwin.dataset.index.tables import TABLES, joined
-from manitwin.geometry.shape_descriptor import LENGTH
+from manitwin.dataset.index.tables import DESCRIPTOR_LENGTH, TABLES, joined
 from manitwin.twin.record import REJECTION_REASONS
 
 CATEGORIES = ("mug", "bottle", "hammer", "spoon", "box", "banana", "stapler", "toy", "bowl", "screwdriver")
@@ -96,7 +95,9 @@ def twins_table(count: int, rng: np.random.Generator, category_names: tuple[str,
         "seed": np.zeros(count, int),
         "config_sha256": ["c0ffee" * 10] * count,
         "radius_of_gyration_m": longest / 3,
-        "shape_descriptor": pa.FixedSizeListArray.from_arrays(rng.random(count * LENGTH, np.float32), LENGTH),
+        "shape_descriptor": pa.FixedSizeListArray.from_arrays(
+            rng.random(count * DESCRIPTOR_LENGTH, np.float32), DESCRIPTOR_LENGTH
+        ),
     }
     return pa.table(columns)
 

@@ -11,7 +11,7 @@ class PlannerSettings:
 
     ``margin_m`` is kept in free motion, and lowered step by step to ``clearance_m`` where start or goal are nearer;
     ``clearance_m`` is kept on straight lines. Defaults: 10 mm of margin, so that no thin part passes between two
-    checks of a path (every 0.02 rad); 10 cm approach, 12 cm lift (docs/trajectories.md).
+    checks of a path (every 0.02 rad); 10 cm approach, 12 cm lift.
     """
 
     approach_m: float = 0.10

@@ -20,7 +20,7 @@ from manitwin.twin.record import FunctionalPoint, GraspPoint
 MOST_FUNCTIONAL, MOST_GRASPS, LEAST = 4, 3, 2  # the paper: 2-4 functional and 2-3 grasp points
 
 _WEAK = 0.2  # a place that no candidate reaches better than this is not there
-_LEVER_M = 0.08  # from the centre of mass: half as good; grasps held at 80 mm slip half of the time (reference study)
+_LEVER_M = 0.08  # from the centre of mass: half as good; grasps held at 80 mm slip half of the time, measured in SAPIEN
 _FINGER_CLEARANCE_M = 0.004  # of the opening: the pads need some play on both sides
 _UNSEEN = 0.3  # a candidate in no view can be chosen only where no seen one is near as good
 _TAKEN = 0.35  # a candidate that already stands for another part
