@@ -18,9 +18,8 @@ from collections import Counter
 from importlib import import_module
 from pathlib import Path
 
-from manitwin.assets.audit.run import audit_all, find_all
-from manitwin.assets.audit.select import select_rules
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.audit.run import audit_all, find_all, select_rules
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD
 

@@ -23,7 +23,7 @@ import sapien
 import trimesh
 from pxr import Usd, UsdGeom, UsdPhysics
 
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.write import export_twin
 from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, rotation_from_quaternion_wxyz, transform

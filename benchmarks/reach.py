@@ -22,8 +22,7 @@ from manitwin.robots.load import load_robot, shipped_robots
 from manitwin.scenes.layouts.furniture import make_furniture
 from manitwin.scenes.layouts.pool import Pool, pool_of
 from manitwin.scenes.loaded_scene import furniture_boxes
-from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import Twin, TwinSource
 
 
 def shares(robot_name: str, source: TwinSource, pool: Pool, starts: int) -> tuple[int, list[float], list[str], float]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from manitwin.twin.version import installed_version
+from manitwin.formats.installation import installed_version
 
 sys.path.insert(0, str(Path(__file__).parent))  # the extension reference_directives
 

@@ -32,7 +32,7 @@ from manitwin.scenes.layouts.run import make_layouts
 from manitwin.scenes.scene import Furniture, Light
 from manitwin.scenes.scene_file import read_scene
 from manitwin.scenes.scene_folders import scene_name
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 
 DOCS = Path(__file__).resolve().parent
 TILE_PX, ANIMATION_PX = 300, 360

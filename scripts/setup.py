@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "src"))  # nothing is installed yet
 
-from manitwin.formats.shared_libraries import missing_libraries, package_by_contents, package_by_policy  # noqa: E402
+from manitwin.formats.installation import missing_libraries, package_by_contents, package_by_policy  # noqa: E402
 
 VENV = ROOT / ".venv"
 STAMP = VENV / "manitwin-setup.sha256"

@@ -13,7 +13,7 @@ import pytest
 import sapien
 from lxml import etree
 
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 
 BULLET_MARGIN_M = 0.001  # gUrdfDefaultCollisionMargin: around every convex mesh

@@ -13,7 +13,7 @@ import trimesh
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.hulls.reduction import hull_to_obj

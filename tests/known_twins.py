@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from handmade import visual
-from manitwin.assets.writers.content import TwinContent, export_name
+from manitwin.assets.writers.exporter import TwinContent, export_name
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.geometry.rigid_body import RigidBody

@@ -6,6 +6,7 @@ in ``manitwin.backends``. Other modules may change from one version to the next.
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -117,6 +118,8 @@ __all__ = [
     "write_statistics",
 ]
 
+logging.getLogger("manitwin").addHandler(logging.NullHandler())  # else Python prints warnings where nobody listens
+
 _DEFINED_IN = {
     "manitwin.api": (
         "BuildReport",
@@ -197,7 +200,7 @@ _DEFINED_IN = {
 def __getattr__(name: str) -> Any:
     """Import the public names when they are first used, so that `manitwin --help` answers at once."""
     if name == "__version__":
-        from manitwin.twin.version import installed_version
+        from manitwin.formats.installation import installed_version
 
         return installed_version()
     if name not in __all__:

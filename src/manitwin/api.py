@@ -226,7 +226,7 @@ def export_twin(
 
     Raises UsageError for an unknown format, ExportError for a licence that is not allowed or a twin that a format cannot take.
     """
-    from manitwin.assets.writers.content import TwinContent
+    from manitwin.assets.writers.exporter import TwinContent
     from manitwin.assets.writers.registry import chosen_formats
     from manitwin.assets.writers.write import export_twin as write
     from manitwin.twin.loaded_twin import Twin

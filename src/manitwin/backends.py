@@ -4,8 +4,7 @@ Raise ``BackendError`` or one of its kinds where the backend fails (the item sta
 is at fault.
 """
 
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported, Exporter, FormatNotes
+from manitwin.assets.writers.exporter import Exported, Exporter, FormatNotes, TwinContent
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import (
     AccessDenied,

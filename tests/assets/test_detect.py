@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from manitwin.assets.detect import detect
-from manitwin.assets.read import find_assets, read_asset
+from manitwin.assets.read import detect, find_assets, read_asset
 from manitwin.errors import AssetError
 
 URDF = '<robot name="r"><link name="l"><visual><geometry><box size="1 1 1"/></geometry></visual></link></robot>'

@@ -11,7 +11,7 @@ from exported_twins import content
 from manitwin.assets.audit.run import audit_assets
 from manitwin.assets.importers.importer import import_assets
 from manitwin.assets.read import read_asset
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.registry import exporter
 from manitwin.assets.writers.write import export_twin as write_export
 from manitwin.pipeline.manifest import collect_items

@@ -14,7 +14,7 @@ from handmade import visual
 from known_twins import TWINS, brick, hammer
 from manitwin.assets.readers.robotwin import read
 from manitwin.assets.writers import robotwin
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.grasp_rows import grasp_rows
 from manitwin.errors import AssetError
 from manitwin.formats.glb import write_glb
@@ -193,8 +193,8 @@ def test_variant_by_its_file_and_the_lowest_by_the_folder(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("data", "complaint"),
     [
-        ("{", "broken JSON"),
-        ("[1]", "no JSON object"),
+        ("{", "JSON is broken"),
+        ("[1]", "holds a JSON list, not an object"),
         ({"scale": [1, 2]}, "scale is neither"),
         ({"scale": "big"}, "scale is not made of numbers"),
         ('{"scale": [1e300, 1, 1]}', "scale holds a number"),

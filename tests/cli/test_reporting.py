@@ -19,8 +19,8 @@ from manitwin.cli.main import app
 from manitwin.cli.run_log import RunLog, WithoutSecrets, begin_log, end_log
 from manitwin.pipeline.dataset_run import local_log
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.loggers import PACKAGE
 
+PACKAGE = logging.getLogger("manitwin")
 MAKING = ("build", "run", "layout", "trajectories", "render", "export", "import", "publish", "stats", "index")
 TIME = r"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d\.\d{3}Z"
 

@@ -18,8 +18,8 @@ from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode
 from manitwin.episodes.video import EpisodesVideo
 from manitwin.scenes.app_config import TrajectoriesConfig
 from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import RECORD, seal
-from manitwin.twin.twin_source import TwinSource
 from twin_folders import twin_id, write_accepted
 
 LICENCES = {0: "CC-BY-4.0", 1: "CC0-1.0", 2: "CC-BY-NC-4.0", 3: "unknown"}

@@ -14,8 +14,8 @@ from manitwin.episodes.target_grasps import usable_grasps
 from manitwin.robots.grippers.gripper import load_gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import read_record
-from manitwin.twin.twin_source import TwinSource
 
 KEPT = replace(attempt(0), outcome="kept", twin_id="t", grasp_id="g", transferred=False)
 

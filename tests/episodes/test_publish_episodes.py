@@ -29,8 +29,8 @@ from manitwin.episodes.lerobot.read import read_lerobot
 from manitwin.episodes.pictures_recipe import batch_name
 from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
 from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import RECORD, digests_below, seal
-from manitwin.twin.twin_source import TwinSource
 
 
 def files_below(root: Path) -> Iterator[Path]:

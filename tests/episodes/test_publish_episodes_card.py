@@ -9,7 +9,7 @@ from publishable_run import LICENCES, PLAIN
 
 from manitwin.episodes.lerobot.read import read_lerobot
 from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
-from manitwin.twin.version import installed_version
+from manitwin.formats.installation import installed_version
 
 
 def test_card_says_what_is_there_and_its_front_matter_is_yaml(published: tuple[Path, PublishedEpisodes]) -> None:

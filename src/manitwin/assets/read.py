@@ -1,18 +1,119 @@
-"""Read an asset of any tool."""
+"""Which tool's asset lies at a path: by what is there, not by what it is called."""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import Literal
 
 from manitwin.assets.asset import Asset, Format
-from manitwin.assets.detect import detect, file_format, folder_format, robotwin_data
 from manitwin.errors import AssetError, choose_from
 
+USD_SUFFIXES = frozenset({".usd", ".usda", ".usdc", ".usdz"})
+SCAN_METADATA = "metadata.pbtxt"
+"""Which Google Scanned Objects have, and other models of Gazebo have not."""
+_HEAD_BYTES = 1 << 16
+_FIRST_TAG = re.compile(rb"<([A-Za-z][\w.:-]*)[\s/>]")
+_MARKS = re.compile(rb"<extra_info[\s/>]|<custom_data[\s/>]")
+_ROBOTWIN_DATA = re.compile(r"model_data\d*\.json")
+
+VALID_ASSETS = (
+    "valid are twin folders, RoboTwin, ManiTwin-100K, EmbodiedGen and Google Scanned Objects folders, .urdf, .sdf, MJCF"
+    " .xml and USD files; a plain mesh goes to `manitwin build`"
+)
+"""What a person is told who gave something else."""
 FORMATS: tuple[Format, ...] = ("twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
+
+
+def detect(path: Path) -> Format:
+    """Return the format of the asset in a file or folder.
+
+    Raises AssetError where there is none, or a folder holds more than one.
+    """
+    if not path.exists():
+        raise AssetError(f"{path}: no such file or folder")
+    found = folder_format(path) if path.is_dir() else file_format(path)
+    if found is not None:
+        return found
+    if path.is_dir():
+        return detect(only_file(path))
+    raise AssetError(f"{path.name}: no asset of a known format; {VALID_ASSETS}")
+
+
+def folder_format(folder: Path) -> Format | None:
+    """Return the format of a folder that is one asset as a whole, None where it is none."""
+    names = {entry.name for entry in folder.iterdir()}
+    if "twin.json" in names:
+        return "twin"
+    if "manipulation_annotations.json" in names or names & {"base_rescaled.glb", "base_rescaled.usdz"}:
+        return "manitwin100k"
+    if any(_ROBOTWIN_DATA.fullmatch(name) for name in names):
+        return "robotwin"
+    if {"model.config", "model.sdf"} <= names:
+        return "gso" if SCAN_METADATA in names else "sdf"
+    return None
+
+
+def file_format(file: Path) -> Format | None:
+    """Return the format of a file that is the main file of an asset, None where it is none."""
+    suffix = file.suffix.lower()
+    if file.name == "twin.json":
+        return "twin"
+    if _ROBOTWIN_DATA.fullmatch(file.name):
+        return "robotwin"
+    if suffix in USD_SUFFIXES:
+        return "usd"
+    if suffix in (".urdf", ".xml", ".mjcf", ".sdf"):
+        return _xml_format(file)
+    return None
+
+
+def only_file(folder: Path) -> Path:
+    """Return the one main file in a folder or the folders directly in it; raises AssetError where there is not one.
+
+    Where a folder holds the same asset in several formats, URDF is taken before MJCF, SDF and USD.
+    """
+    for depth in ("*", "*/*"):
+        files = [file for file in sorted(folder.glob(depth)) if file.is_file() and not _hidden(file, folder)]
+        found = [(file, form) for file in files if (form := file_format(file)) is not None]
+        for wanted in (("urdf", "embodiedgen"), ("mjcf",), ("sdf", "gso"), ("usd",)):
+            named = [file for file, form in found if form in wanted]
+            if len(named) == 1:
+                return named[0]
+            if named:
+                listed = ", ".join(file.name for file in named[:4])
+                raise AssetError(f"{folder}: holds {len(named)} assets ({listed}); name one of them")
+    raise AssetError(f"{folder}: holds no asset of a known format; {VALID_ASSETS}")
+
+
+def robotwin_data(folder: Path) -> list[Path]:
+    """Return a RoboTwin folder's model_data files, one a variant, in the order of their numbers."""
+    found = [file for file in folder.iterdir() if _ROBOTWIN_DATA.fullmatch(file.name)]
+    return sorted(found, key=lambda file: (int("".join(filter(str.isdigit, file.stem)) or -1), file.name))
+
+
+def _hidden(file: Path, folder: Path) -> bool:
+    return any(part.startswith(".") for part in file.relative_to(folder).parts)
+
+
+def _xml_format(file: Path) -> Format | None:
+    try:
+        with file.open("rb") as stream:
+            head = stream.read(_HEAD_BYTES)
+    except OSError as error:
+        raise AssetError(f"{file.name}: {error.strerror or error}; check the path") from error
+    first = _FIRST_TAG.search(re.sub(rb"<!--.*?-->", b"", head, flags=re.DOTALL))
+    tag = first.group(1) if first else None
+    if tag == b"mujoco":
+        return "mjcf"
+    if tag == b"sdf":
+        return "gso" if file.name == "model.sdf" and (file.parent / SCAN_METADATA).is_file() else "sdf"
+    if tag == b"robot":
+        return "embodiedgen" if _MARKS.search(head) else "urdf"
+    return None
 
 
 def read_asset(path: Path, format: Format | Literal["auto"] = "auto") -> Asset:

@@ -10,7 +10,8 @@ from typing import Any
 
 from rich.console import Console
 
-from manitwin.twin.loggers import PACKAGE
+PACKAGE = logging.getLogger("manitwin")
+
 
 SAID = logging.getLogger("manitwin.said")
 """What was printed; the log of a run has it, and ``--verbose`` does not print it again."""

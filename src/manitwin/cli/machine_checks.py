@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from manitwin.errors import ManiTwinError
-from manitwin.formats.shared_libraries import missing_libraries, package_by_policy
+from manitwin.formats.installation import missing_libraries, package_by_policy
 
 PACKAGES = (
     "sapien",

@@ -40,8 +40,7 @@ from manitwin.cli.json_output import CommandLineError, Json, asked_for_json, pri
 from manitwin.cli.reporting import LOG, Quiet, Verbose, reported, say_as_told
 from manitwin.cli.run_log import end_log
 from manitwin.errors import BackendError, ManiTwinError, Unavailable
-from manitwin.formats.shared_libraries import import_remedy, names_shared_library
-from manitwin.twin.version import installed_version
+from manitwin.formats.installation import import_remedy, installed_version, names_shared_library
 
 TYPER_INTERRUPTED = 130
 """What typer returns where it caught a KeyboardInterrupt by itself."""

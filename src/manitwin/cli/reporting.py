@@ -15,7 +15,7 @@ import typer
 from manitwin.cli.console import be_quiet, be_verbose
 from manitwin.cli.run_log import begin_log
 from manitwin.errors import UsageError
-from manitwin.twin.version import installed_version
+from manitwin.formats.installation import installed_version
 
 Verbose = Annotated[
     bool, typer.Option("--verbose", "-v", help="Say more: stages and their seconds, what was chosen and why.")

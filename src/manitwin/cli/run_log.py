@@ -9,8 +9,8 @@ import time
 from pathlib import Path
 
 from manitwin.errors import UsageError
-from manitwin.twin.loggers import PACKAGE
 
+PACKAGE = logging.getLogger("manitwin")
 SECRET_NAMES = re.compile(r"KEY|TOKEN|SECRET|PASSWORD|CREDENTIAL", re.IGNORECASE)
 SHORTEST_SECRET = 6
 CREDENTIALS_IN_URL = re.compile(r"(?<=://)[^/@\s]+@")

@@ -6,6 +6,7 @@ under way. What is lost by a crash is at most what was running: results that are
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -27,8 +28,8 @@ from manitwin.engine.stage_order import ASSEMBLE, INPUT
 from manitwin.engine.stage_runner import StageRun
 from manitwin.engine.table_writer import TableWriter
 from manitwin.engine.task import Task
-from manitwin.twin.loggers import RUN
 
+RUN = logging.getLogger("manitwin.run")
 RESOURCES: tuple[Resource, ...] = get_args(Resource)
 LONGEST_WAIT_S = 0.5
 FAILED_AS = {"died": "crashed", "timeout": "timeout"}

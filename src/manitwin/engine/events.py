@@ -10,8 +10,8 @@ from typing import Literal
 from manitwin.engine.ledger.ledger import ItemState
 from manitwin.engine.stage_parts import StagePart
 from manitwin.engine.task import Task
-from manitwin.twin.loggers import RUN
 
+RUN = logging.getLogger("manitwin.run")
 StageState = Literal["done", "there already", "rejected", "waiting", "failed"]
 
 

@@ -34,8 +34,7 @@ from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
 from manitwin.scenes.scene import Furniture, Light
 from manitwin.scenes.scene_folders import scene_name
-from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import Twin, TwinSource
 
 EPISODES = "episodes.h5"
 KEPT_TWINS = 256

@@ -34,8 +34,8 @@ from manitwin.robots.robot import Robot
 from manitwin.scenes.app_config import PicturesConfig
 from manitwin.scenes.furniture_pictures import lighting_of
 from manitwin.scenes.scene import Furniture, Light
+from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import digests_below, sha256_of_json
-from manitwin.twin.twin_source import TwinSource
 
 PICTURES_RECORD = "pictures.json"
 FILMS = "films/"

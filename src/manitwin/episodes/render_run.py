@@ -18,7 +18,7 @@ from manitwin.pipeline.dataset_run import CONFIG, ExecutorName, RunReport, drive
 from manitwin.robots.load import load_robot
 from manitwin.scenes.app_config import PicturesConfig
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 
 PICTURES = "pictures"
 

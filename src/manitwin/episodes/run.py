@@ -22,7 +22,7 @@ from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.scene_file import read_scene
 from manitwin.scenes.scene_folders import SCENES, scene_ids, scene_name
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 
 KIND = "trajectories"
 DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "run", "batch", "retire_failed_share"))

@@ -11,8 +11,7 @@ import numpy as np
 from PIL import Image, ImageCms, ImageOps
 
 from manitwin.errors import InputError, choose_from
-from manitwin.formats.not_read import HEIC_NOT_READ
-from manitwin.formats.sniff import sniff
+from manitwin.formats.sniff import HEIC_NOT_READ, sniff
 
 MAX_PIXELS = 250_000_000
 MIN_SIDE_PX = 32

@@ -34,7 +34,7 @@ BACKENDS: dict[str, dict[str, str]] = {
         "urdf": "manitwin.assets.writers.urdf:export",
         "sdf": "manitwin.assets.writers.sdf:export",
         "usd": "manitwin.assets.writers.usd:export",
-        "usdz": "manitwin.assets.writers.usdz:export",
+        "usdz": "manitwin.assets.writers.usd:export_usdz",
         "glb": "manitwin.assets.writers.glb:export",
         "robotwin": "manitwin.assets.writers.robotwin:export",
         "maniskill": "manitwin.assets.writers.maniskill:export",

@@ -13,13 +13,13 @@ import numpy as np
 from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import Rejected
+from manitwin.formats.installation import installed_version
 from manitwin.formats.source_files import pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.quality import rehearsal_checks
 from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
 from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
-from manitwin.twin.version import installed_version
 
 
 def assemble(

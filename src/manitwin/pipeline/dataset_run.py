@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 import sqlite3
 import tempfile
@@ -31,9 +32,9 @@ from manitwin.formats.output_folder import require_writable_folder
 from manitwin.pipeline.folder_listing import FolderListing
 from manitwin.pipeline.manifest import Notes, iterate_items
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.loggers import RUN
 from manitwin.twin.store import canonical_json
 
+RUN = logging.getLogger("manitwin.run")
 CONFIG = "config.json"
 RUN_LOG = "run.log"
 COPY_EVERY_S = 60.0

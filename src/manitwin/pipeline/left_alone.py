@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path, PurePosixPath
 
-from manitwin.formats.not_read import HEIC_NOT_READ, NOT_READ
-from manitwin.formats.sniff import image_format
+from manitwin.formats.sniff import HEIC_NOT_READ, NOT_READ, image_format
 
 _BY_SUFFIX = {
     **NOT_READ,

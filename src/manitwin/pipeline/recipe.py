@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -42,10 +43,10 @@ from manitwin.pipeline.verify import VerifyStage
 from manitwin.pipeline.views import ViewsStage
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
 from manitwin.twin.dataset_root import twin_name
-from manitwin.twin.loggers import RUN
 from manitwin.twin.record import StageProvenance, TwinRecord
 from manitwin.twin.store import RECORD, parse_record, sha256_of_json
 
+RUN = logging.getLogger("manitwin.run")
 Kind = Literal["image", "text", "mesh"]
 KINDS_OF_INPUT: tuple[Kind, ...] = ("image", "text", "mesh")
 

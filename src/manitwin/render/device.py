@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import glob
 import json
+import logging
 import os
 import platform
 import subprocess
@@ -20,8 +21,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from manitwin.errors import ManiTwinError, RendererMissing, UsageError
-from manitwin.twin.loggers import RUN
 
+RUN = logging.getLogger("manitwin.run")
 SWITCH = "MANITWIN_RENDER_DEVICE"
 """Set to ``cpu`` to leave GPUs alone (some hang: vla-evaluation-harness#112); ``auto`` otherwise."""
 

@@ -9,8 +9,8 @@ from itertools import product
 import numpy as np
 import trimesh
 
-from manitwin.formats.meshes.normals import with_creased_normals
 from manitwin.formats.meshes.textures import make_part, material_of
+from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.poses import rotation_between
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.repair.welding import weld_equal

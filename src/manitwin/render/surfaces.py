@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 import trimesh
 
-from manitwin.formats.meshes.normals import with_creased_normals
 from manitwin.formats.meshes.textures import make_part, material_of, pbr_material, uv_of
+from manitwin.formats.meshes.triangles import with_creased_normals
 
 MAX_TEXTURE_PX = 2048  # twice the largest picture made here; more only costs time and aliases
 SPECULAR = 0.5  # reflectance of a dielectric at 0.5 * 0.08 = 4 %, the default of glTF 2.0 (index of refraction 1.5)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from manitwin.errors import ConfigError, Unavailable
-from manitwin.formats.shared_libraries import import_remedy
+from manitwin.formats.installation import import_remedy
 from manitwin.formats.xml_file import read_xml
 from manitwin.robots.definition import RobotDefinition
 from manitwin.robots.links import LinkShape, links_of_urdf

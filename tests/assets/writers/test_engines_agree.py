@@ -13,7 +13,7 @@ import pytest
 import exported_twins as made
 from export_engines import PHYSX_TOLERANCE_M, assert_same, body_of, in_mujoco, in_pybullet, in_sapien, sdf_text
 from manitwin.api import build
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.write import export_twin
 from manitwin.formats.meshes.textures import make_part, material_of
 from manitwin.twin.loaded_twin import Twin

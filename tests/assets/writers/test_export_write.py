@@ -14,10 +14,9 @@ import trimesh
 from lxml import etree
 
 import exported_twins as made
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.format_notes import NOTES, QUANTITIES
-from manitwin.assets.writers.obj_file import obj_file
+from manitwin.assets.writers.mesh_files import obj_file
 from manitwin.assets.writers.registry import chosen_formats, exporter, formats
 from manitwin.assets.writers.write import export_twin, safe_name, write_exported
 from manitwin.errors import ExportError, UsageError

@@ -12,7 +12,7 @@ import trimesh
 
 from known_twins import TWINS, brick, tray
 from manitwin.assets.writers import graspgen
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.grasp_rows import grasp_rows
 from manitwin.errors import ExportError
 from manitwin.geometry.distance import distance_to_surface

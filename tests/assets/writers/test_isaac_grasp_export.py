@@ -10,7 +10,7 @@ import yaml
 
 from known_twins import TWINS, brick, tray
 from manitwin.assets.writers import isaac_grasp
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.grasp_rows import grasp_rows
 from manitwin.errors import ExportError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz

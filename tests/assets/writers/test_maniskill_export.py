@@ -15,7 +15,7 @@ from sapien import physx
 
 from known_twins import TWINS, brick, tray
 from manitwin.assets.writers import maniskill
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.formats.meshes.gltf import read_gltf
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from manitwin.assets.writers.phrases import noun_phrases, seen_and_unseen
+from manitwin.assets.writers.robotwin import noun_phrases, seen_and_unseen
 from manitwin.errors import ExportError
 from manitwin.twin.record import Language
 

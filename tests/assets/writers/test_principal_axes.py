@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from manitwin.assets.writers.principal_axes import principal_axes
+from manitwin.assets.writers.mass_properties import principal_axes
 
 
 def rebuilt(moments: np.ndarray, wxyz: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from sapien import physx
 
 from known_twins import FROM_PLUS_Y, TWINS, brick, hammer, made_twin, tray
 from manitwin.assets.writers import robotwin
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.geometry.distance import distance_to_surface
 from rigid_boxes import FROM_ABOVE, above
 

@@ -10,7 +10,7 @@ import pytest
 
 from known_twins import TWINS, body_of
 from manitwin.assets.writers import robotwin
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.sapien.trial import SapienTrial
 from rigid_boxes import PANDA, SETTINGS

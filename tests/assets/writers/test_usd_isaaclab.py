@@ -13,7 +13,7 @@ from pxr import Usd, UsdPhysics
 
 from exported_twins import MASS_KG, NAME, content
 from manitwin.assets.writers import isaaclab
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers.exporter import TwinContent
 
 
 @pytest.fixture(scope="module")

@@ -24,10 +24,9 @@ from exported_twins import (
     hulls,
     visual_parts,
 )
-from manitwin.assets.writers import usd, usdz
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
-from manitwin.assets.writers.glb_images import GlbImages
+from manitwin.assets.writers import usd
+from manitwin.assets.writers.exporter import Exported, TwinContent
+from manitwin.assets.writers.usd_materials import GlbImages
 
 
 @pytest.fixture(scope="module")
@@ -35,11 +34,11 @@ def twin(tmp_path_factory: pytest.TempPathFactory) -> TwinContent:
     return content(tmp_path_factory.mktemp("usd") / "twin")
 
 
-@pytest.fixture(scope="module", params=[usd, usdz], ids=["usd", "usdz"])
+@pytest.fixture(scope="module", params=[usd.export, usd.export_usdz], ids=["usd", "usdz"])
 def main(request: pytest.FixtureRequest, twin: TwinContent, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The exported stage's file."""
     folder = tmp_path_factory.mktemp("exported")
-    exported = request.param.export(twin)
+    exported = request.param(twin)
     write(exported, folder)
     return folder / exported.main
 

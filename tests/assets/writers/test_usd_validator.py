@@ -13,7 +13,7 @@ from pxr import Usd, UsdGeom, UsdPhysics
 
 import known_twins
 from exported_twins import content
-from manitwin.assets.writers import usd, usdz
+from manitwin.assets.writers import usd
 
 PYTHON = Path(__file__).resolve().parents[3] / ".venv-usd-validate" / "bin" / "python"
 ASK = """
@@ -56,7 +56,7 @@ def verdicts(files: list[Path]) -> dict[str, Any]:
 def test_validator_finds_nothing_in_exports_and_much_in_a_spoilt_one(tmp_path: Path) -> None:
     files = []
     for twin in (content(tmp_path / "twin"), known_twins.brick()):
-        for exported in (usd.export(twin), usdz.export(twin)):
+        for exported in (usd.export(twin), usd.export_usdz(twin)):
             for name, data in exported.files.items():
                 file = tmp_path / "exported" / twin.name / name
                 file.parent.mkdir(parents=True, exist_ok=True)

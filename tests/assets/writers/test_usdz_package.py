@@ -14,17 +14,17 @@ from pathlib import Path
 import pytest
 
 from exported_twins import NAME, content, write_twin
-from manitwin.assets.writers import isaaclab, usd, usdz
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers import isaaclab, usd
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.twin.loaded_twin import Twin
 
 DIGESTS = """
 import hashlib, json, sys
-from manitwin.assets.writers import isaaclab, usd, usdz
-from manitwin.assets.writers.content import TwinContent
+from manitwin.assets.writers import isaaclab, usd
+from manitwin.assets.writers.exporter import TwinContent
 from manitwin.twin.loaded_twin import Twin
 twin = TwinContent.of(Twin(sys.argv[1]))
-files = [each.export(twin).files for each in (isaaclab, usd, usdz)]
+files = [export(twin).files for export in (isaaclab.export, usd.export, usd.export_usdz)]
 print(json.dumps([{name: hashlib.sha256(data).hexdigest() for name, data in each.items()} for each in files]))
 """
 
@@ -35,7 +35,7 @@ def twin(tmp_path_factory: pytest.TempPathFactory) -> TwinContent:
 
 
 def test_members_start_on_64_bytes_uncompressed_the_stage_first(twin: TwinContent) -> None:
-    exported = usdz.export(twin)
+    exported = usd.export_usdz(twin)
     data = exported.files[exported.main]
     assert list(exported.files) == [f"{NAME}.usdz"] == [exported.main]
     with zipfile.ZipFile(io.BytesIO(data)) as package:
@@ -57,7 +57,7 @@ def test_members_start_on_64_bytes_uncompressed_the_stage_first(twin: TwinConten
 
 @pytest.mark.parametrize("length", range(1, 70, 7))
 def test_padding_is_right_whatever_the_length_of_names(twin: TwinContent, length: int) -> None:
-    exported = usdz.export(replace(twin, name="n" * length))
+    exported = usd.export_usdz(replace(twin, name="n" * length))
     data = exported.files[exported.main]
     with zipfile.ZipFile(io.BytesIO(data)) as package:
         for entry in package.infolist():
@@ -81,7 +81,7 @@ def test_another_process_writes_the_same_bytes(tmp_path: Path) -> None:
     ]
     twin = TwinContent.of(Twin(folder))
     mine = [
-        {name: hashlib.sha256(data).hexdigest() for name, data in each.export(twin).files.items()}
-        for each in (isaaclab, usd, usdz)
+        {name: hashlib.sha256(data).hexdigest() for name, data in export(twin).files.items()}
+        for export in (isaaclab.export, usd.export, usd.export_usdz)
     ]
     assert answers[0] == answers[1] == mine

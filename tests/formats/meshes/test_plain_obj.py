@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.formats.meshes.obj import read_obj
-from manitwin.formats.meshes.plain_obj import plain_triangles
+from manitwin.formats.meshes.obj import plain_triangles, read_obj
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.geometry.hulls.reduction import hull_to_obj
 

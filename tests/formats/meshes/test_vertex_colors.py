@@ -5,9 +5,8 @@ import pytest
 import trimesh
 from PIL import Image
 
-from manitwin.formats.meshes.normals import with_creased_normals
-from manitwin.formats.meshes.textures import bake_transform, make_part, pbr_material
-from manitwin.formats.meshes.vertex_colors import color_by_corner
+from manitwin.formats.meshes.textures import bake_transform, color_by_corner, make_part, pbr_material
+from manitwin.formats.meshes.triangles import with_creased_normals
 
 
 def _part(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -41,7 +40,7 @@ def test_painted_texture_blends_the_corner_colours_across_every_face() -> None:
 
 
 def test_more_faces_than_an_atlas_holds_get_their_mean(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("manitwin.formats.meshes.vertex_colors._MAX_ATLAS", 16)
+    monkeypatch.setattr("manitwin.formats.meshes.textures._MAX_ATLAS", 16)
     part = _part(trimesh.creation.icosphere(subdivisions=2))
     painted = color_by_corner(part, np.full((len(part.faces), 3, 3), 255, np.uint8))
     assert painted.visual.material.baseColorTexture is None

@@ -15,7 +15,7 @@ from manitwin.scenes.layouts.export_usd import export_usd
 from manitwin.scenes.layouts.pool import read_pool
 from manitwin.scenes.layouts.sample import sample_layout
 from manitwin.scenes.loaded_scene import Scene
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 from scene_twins import slab, write_things
 
 

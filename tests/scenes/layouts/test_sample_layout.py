@@ -18,7 +18,7 @@ from manitwin.scenes.layouts.sample import LAYOUT_REASONS, sample_layout
 from manitwin.scenes.loaded_scene import Scene
 from manitwin.scenes.scene import SceneRecord
 from manitwin.scenes.scene_file import scene_bytes
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 from scene_twins import BOWL_HEIGHT_M, BOWL_RADIUS_M, distances_in_mujoco, pool_of_things, slab, write_things
 
 TOUCHES_M = 0.001

@@ -1,15 +1,16 @@
-"""What a rule is, and what it finds."""
+"""Rules of the audit, and what they find."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from manitwin.assets.asset import Asset
-from manitwin.assets.audit.complaint import Complaint
-from manitwin.assets.audit.measured import MeasuredAsset
+
+if TYPE_CHECKING:
+    from manitwin.assets.audit.measured import MeasuredAsset
 
 Severity = Literal["error", "warning", "note"]
 
@@ -42,3 +43,12 @@ class Rule:
     remedy: str
     check: Callable[[MeasuredAsset], Iterator[Complaint]]
     fix: Callable[[Asset], str] | None = None
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """The message, where, and the numbers behind it."""
+
+    message: str
+    file: Path | None = None
+    values: dict[str, Any] | None = None

@@ -13,7 +13,7 @@ import numpy as np
 
 from manitwin.assets.asset import Asset
 from manitwin.assets.audit.convex_shapes import ConvexShapes
-from manitwin.assets.detect import only_file, robotwin_data
+from manitwin.assets.read import only_file, robotwin_data
 from manitwin.assets.readers.robotwin_data import FRAME_KEYS, read_json
 from manitwin.formats.xml_file import add, edited_document, new_element, read_xml
 from manitwin.twin.store import write_bytes_atomically

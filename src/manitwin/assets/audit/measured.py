@@ -13,8 +13,8 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from manitwin.assets.asset import Asset
-from manitwin.assets.audit.complaint import Complaint
 from manitwin.assets.audit.convex_shapes import ConvexShapes, UniformSolid, inertia_of_second_moment
+from manitwin.assets.audit.finding import Complaint
 from manitwin.assets.audit.open_air import OpenAir, open_air
 from manitwin.geometry.distance import closest_points_on_triangles, distance_to_surface
 from manitwin.geometry.sampling import sample_surface
@@ -35,7 +35,7 @@ CLOSED = 1e-3
 
 
 @dataclass(frozen=True)
-class Surface:
+class SurfaceIntegrals:
     """Exact integrals over a surface: area, enclosed volume (None: not closed), a thin even shell of one kilogram."""
 
     area_m2: float
@@ -120,7 +120,7 @@ class MeasuredAsset:
         return ConvexShapes.of([np.asarray(shape.vertices, float) for shape in self.asset.collision])
 
     @cached_property
-    def surface(self) -> Surface | None:
+    def surface(self) -> SurfaceIntegrals | None:
         """Integrals over the surface of the body; None without one."""
         return None if self.body is None else _integrate(self.body)
 
@@ -198,7 +198,7 @@ class MeasuredAsset:
         return read_record(path if path.is_dir() else path.parent)
 
 
-def _integrate(mesh: trimesh.Trimesh) -> Surface:
+def _integrate(mesh: trimesh.Trimesh) -> SurfaceIntegrals:
     """Integrate over triangles exactly (as geometry.mass_properties does), without asking that vertices are shared."""
     origin = mesh.bounds.mean(0)
     corners = (np.asarray(mesh.vertices, float) - origin)[mesh.faces]
@@ -211,10 +211,10 @@ def _integrate(mesh: trimesh.Trimesh) -> Surface:
     volumes = np.einsum("ij,ij->i", corners[:, 0], normals) / 3
     volume = float(volumes.sum())
     if np.linalg.norm(normals.sum(0)) > CLOSED * area or volume <= 0:
-        return Surface(area, None, shell, None)
+        return SurfaceIntegrals(area, None, shell, None)
     mean = volumes @ total / (4 * volume)
     second = _second_moment(volumes / (20 * volume), corners, total) - np.outer(mean, mean)
-    return Surface(area, volume, shell, inertia_of_second_moment(second))
+    return SurfaceIntegrals(area, volume, shell, inertia_of_second_moment(second))
 
 
 def _second_moment(weights: np.ndarray, corners: np.ndarray, total: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 from manitwin.assets.audit.finding import Finding, Rule
 from manitwin.assets.audit.run import Audited
-from manitwin.twin.version import installed_version
+from manitwin.formats.installation import installed_version
 
 ReportFormat = Literal["text", "json", "sarif"]
 PAGE = "docs/audit.md"

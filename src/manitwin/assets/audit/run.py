@@ -7,17 +7,16 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from pebble import ProcessExpired, ProcessPool
 
 from manitwin.assets.asset import Asset
-from manitwin.assets.audit.complaint import Complaint
-from manitwin.assets.audit.finding import Finding, Rule
+from manitwin.assets.audit.finding import Complaint, Finding, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
-from manitwin.assets.audit.rules import RULES_BY_CODE
-from manitwin.assets.audit.select import select_rules
+from manitwin.assets.audit.rules import RULES, RULES_BY_CODE
 from manitwin.assets.read import find_assets, read_asset
 from manitwin.engine.main_module import WorkerContext, hidden_main_module
 from manitwin.errors import AssetError, TwinError, UsageError
@@ -30,6 +29,8 @@ ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 
 STOPS = ("FIL005", "FIL006")
 """Where one of these holds there is nothing to measure."""
+ALWAYS = frozenset({"FIL001", "FIL005", "FIL006"})
+"""What cannot be read or measured was not audited at all: only --ignore leaves that out."""
 
 
 @dataclass(frozen=True)
@@ -172,3 +173,44 @@ def audit_assets(
     """Audit every asset at or below paths and return what was found of each; raises UsageError for a wrong path or code."""
     rules = select_rules(select, ignore)
     return list(audit_all(find_all(Path(path) for path in paths), rules, jobs=jobs, fix=fix))
+
+
+def select_rules(select: Iterable[str] = (), ignore: Iterable[str] = ()) -> tuple[Rule, ...]:
+    """Return the rules that are selected and not ignored; all are selected where nothing is.
+
+    Codes are taken in any case. The longer beginning wins: ``select=["INE001"], ignore=["INE"]`` leaves INE001 in; equally
+    long, ``ignore`` does. Raises UsageError for what no code begins with, naming the nearest.
+    """
+    chosen, dropped = _prefixes(select), _prefixes(ignore)
+    return tuple(rule for rule in RULES if _is_selected(rule.code, chosen, dropped))
+
+
+def rule_of(code: str) -> Rule:
+    """Return the rule of a whole code; raises UsageError naming the nearest."""
+    for rule in RULES:
+        if rule.code == code.strip().upper():
+            return rule
+    raise UsageError(_unknown(code.strip().upper()))
+
+
+def _is_selected(code: str, chosen: Sequence[str], dropped: Sequence[str]) -> bool:
+    default = 0 if not chosen or code in ALWAYS else -1
+    longest_chosen = max((len(prefix) for prefix in chosen if code.startswith(prefix)), default=default)
+    longest_dropped = max((len(prefix) for prefix in dropped if code.startswith(prefix)), default=-1)
+    return longest_chosen > longest_dropped
+
+
+def _prefixes(words: Iterable[str]) -> list[str]:
+    prefixes = [word.strip().upper() for word in words if word.strip()]
+    for prefix in prefixes:
+        if not any(rule.code.startswith(prefix) for rule in RULES):
+            raise UsageError(_unknown(prefix))
+    return prefixes
+
+
+def _unknown(code: str) -> str:
+    codes = [rule.code for rule in RULES]
+    families = list(dict.fromkeys(code[:3] for code in codes))
+    near = get_close_matches(code, [*codes, *families], n=1, cutoff=0.5)
+    hint = f"did you mean {near[0]}? " if near else ""
+    return f"no rule's code is or begins with {code!r}; {hint}Valid beginnings: {', '.join(families)}"

@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Literal
 
 from manitwin.assets.asset import Asset, Format
-from manitwin.assets.detect import robotwin_data
 from manitwin.assets.importers.record import asset_to_object, import_record, shown_parts
-from manitwin.assets.read import find_assets, read_asset
+from manitwin.assets.read import find_assets, read_asset, robotwin_data
 from manitwin.errors import AssetError, UsageError
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import bake_transform

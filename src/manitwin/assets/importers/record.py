@@ -11,10 +11,9 @@ import trimesh
 from pydantic import ValidationError
 
 from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset
-from manitwin.assets.importers.rests import settled_rests
 from manitwin.errors import AssetError
 from manitwin.geometry.canonical_frame import object_frame
-from manitwin.geometry.poses import GLTF_TO_OBJECT
+from manitwin.geometry.poses import GLTF_TO_OBJECT, inverse, transform_points
 from manitwin.twin.import_record import GivenGrasps, GivenPoint, ImportRecord
 
 MAX_FRICTION = 10.0
@@ -22,6 +21,7 @@ MAX_FRICTION = 10.0
 
 _UP_TO_Z = {"z": np.eye(3), "y": GLTF_TO_OBJECT[:3, :3]}
 _MAX_TEXTS, _MAX_LETTERS, _MAX_POINTS = 64, 500, 64
+_OFF_M = 1e-3  # a millimetre above the table an object falls, below it a simulator throws it out
 
 
 def shown_parts(asset: Asset) -> tuple[trimesh.Trimesh, ...]:
@@ -184,3 +184,27 @@ def _why(asset: Asset) -> str:
     lines: Iterator[str] = iter([*(f"{name} is missing" for name in asset.missing_files), *asset.remarks])
     first = next(lines, None)
     return f" ({first})" if first else ""
+
+
+def settled_rests(asset: Asset, asset_to_object: np.ndarray) -> tuple[list[np.ndarray], list[str]]:
+    """Return the resting poses, object frame to plane ``(4, 4)``, each with the lowest point on z = 0; and remarks.
+
+    Published annotations are off the true lowest point, so that their users lift objects by hand; the turn is kept, the
+    height is that of the mesh.
+    """
+    points = [part.vertices[np.unique(part.faces)] for part in asset.visual if len(part.faces)]
+    if not points or not asset.rests:
+        return [], []
+    vertices = np.concatenate(points)
+    rests, remarks = [], []
+    for number, declared in enumerate(asset.rests):
+        lowest_m = float(transform_points(declared, vertices)[:, 2].min())
+        rest = declared.copy()
+        rest[2, 3] -= lowest_m
+        rests.append(rest @ inverse(asset_to_object))
+        if abs(lowest_m) > _OFF_M:
+            where = "above" if lowest_m > 0 else "below"
+            remarks.append(
+                f"place {number} puts the lowest point {abs(lowest_m) * 1000:.1f} mm {where} the plane; it was set down on it"
+            )
+    return rests, remarks

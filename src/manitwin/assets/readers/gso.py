@@ -11,7 +11,7 @@ import trimesh
 
 from manitwin.assets.asset import Asset
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
-from manitwin.assets.detect import SCAN_METADATA
+from manitwin.assets.read import SCAN_METADATA
 from manitwin.assets.readers.sdf import asset_of, open_sdf
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import decode_texture, make_part, material_of, normals_of, uv_of

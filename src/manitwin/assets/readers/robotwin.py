@@ -14,7 +14,7 @@ import trimesh
 
 from manitwin.assets.asset import Asset, CollisionShape, Contact, Inertial
 from manitwin.assets.asset_files import AssetFiles
-from manitwin.assets.detect import robotwin_data
+from manitwin.assets.read import robotwin_data
 from manitwin.assets.readers.robotwin_data import RobotwinData, read_json
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.textures import bake_transform

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,8 +10,8 @@ import numpy as np
 
 from manitwin.assets.asset import AnnotatedFrame, FrameKind
 from manitwin.errors import AssetError
+from manitwin.formats.json_file import parse_json
 
-MAX_BYTES = 16 << 20
 MAX_FRAMES = 10_000
 LARGEST = 1e6  # metres, or scale: what is beyond is no object
 FRAME_KEYS: dict[FrameKind, tuple[str, ...]] = {
@@ -151,19 +150,7 @@ class RobotwinData:
 
 def read_json(file: Path) -> dict[str, Any]:
     """Read a JSON object from a file, empty where the file is not there; raises AssetError for anything else."""
-    if not file.is_file():
-        return {}
-    if file.stat().st_size > MAX_BYTES:
-        raise AssetError(f"{file.name}: more than {MAX_BYTES} bytes; it is no annotation")
-    try:
-        content = json.loads(file.read_text(encoding="utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise AssetError(
-            f"{file.name}: broken JSON ({' '.join(str(error).split())[:100]}); correct it there"
-        ) from error
-    if not isinstance(content, dict):
-        raise AssetError(f"{file.name}: no JSON object; it is not RoboTwin's")
-    return content
+    return parse_json(file) if file.is_file() else {}
 
 
 def _unit(vector: np.ndarray | None) -> np.ndarray | None:

@@ -10,10 +10,9 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import AssetFiles
-from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence, stated_or_none
-from manitwin.assets.readers.sdf_poses import ModelFrames, pose_of
-from manitwin.assets.readers.sdf_shapes import SdfShapes
+from manitwin.assets.read import only_file
+from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
 from manitwin.errors import AssetError
 from manitwin.formats.xml_file import comments_before, number, read_xml, text_of
 

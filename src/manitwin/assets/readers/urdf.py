@@ -10,8 +10,8 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import AssetFiles
-from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence
+from manitwin.assets.read import only_file
 from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.errors import AssetError
 from manitwin.formats.xml_file import comments_before, number

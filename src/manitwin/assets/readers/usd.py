@@ -8,19 +8,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pxr import Tf, Usd, UsdGeom
+from pxr import Sdf, Tf, Usd, UsdGeom, UsdPhysics, UsdShade
 
-from manitwin.assets.asset import Asset
+from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import MESH_LIMITS
-from manitwin.assets.detect import only_file
 from manitwin.assets.licence_text import stated_licence
+from manitwin.assets.read import only_file
 from manitwin.assets.readers.usd_layers import LayerFiles
-from manitwin.assets.readers.usd_physics import declared_contact, declared_inertial
-from manitwin.assets.readers.usd_shapes import StageShapes
-from manitwin.assets.readers.usd_textures import LayeredSurfaces
+from manitwin.assets.readers.usd_shapes import LayeredSurfaces, StageShapes
 from manitwin.errors import AssetError, InputError
 from manitwin.formats.isolated import MAX_MEMORY_BYTES, ProcessCrashed, run_isolated
 from manitwin.formats.meshes.source import MeshSource
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 
 
 def read(path: Path) -> Asset:
@@ -106,3 +105,102 @@ def _texts(stage: Usd.Stage, root: Usd.Prim) -> Iterator[str]:
     yield from (layer.documentation, layer.comment)
     if root:
         yield root.GetDocumentation() or ""
+
+
+def declared_inertial(stage: Usd.Stage, shapes: StageShapes, unit_m: float, source: MeshSource) -> Inertial:
+    """Return the mass, the centre of mass and the inertia that MassAPI declares, in kg and m along the stage's axes.
+
+    A mass on a prim stands for all below it; several beside each other are taken as one body. Values that the schema
+    calls unspecified (no inertia, no centre) are None; a mass of 0 that somebody wrote is kept.
+    Source: UsdPhysics schema, MassAPI.
+    """
+    unit_kg = UsdPhysics.GetStageKilogramsPerUnit(stage)
+    if not (np.isfinite(unit_kg) and unit_kg > 0):
+        raise AssetError(f"{source.path}: its kilogramsPerUnit is {unit_kg}; mend it")
+    with_mass = [prim for prim in shapes.prims if prim.HasAPI(UsdPhysics.MassAPI)]
+    bodies: list[Inertial] = []
+    taken: set[Sdf.Path] = set()
+    for prim in with_mass:
+        if any(prim.GetPath().HasPrefix(path) for path in taken):
+            continue
+        body = _of_prim(prim, shapes.to_world(prim), unit_m, unit_kg, source)
+        if body.mass_kg is not None:
+            taken.add(prim.GetPath())
+            bodies.append(body)
+        elif body.inertia_kg_m2 is not None or body.center_of_mass_m is not None:
+            source.find(f"{prim.GetName()} has a centre of mass or an inertia and no mass")
+    _remark_bodies(shapes, with_mass, bodies, source)
+    return combined_inertial(bodies) if bodies else Inertial()
+
+
+def declared_contact(shapes: StageShapes, source: MeshSource) -> Contact:
+    """Return the friction and restitution of the material bound to the collision shapes; the first where they differ."""
+    found: dict[str, Contact] = {}
+    for prim in shapes.colliders():
+        material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial("physics")
+        bound = material.GetPrim() if material else None
+        if bound is None or not bound.HasAPI(UsdPhysics.MaterialAPI) or str(bound.GetPath()) in found:
+            continue
+        api = UsdPhysics.MaterialAPI(bound)
+        found[str(bound.GetPath())] = Contact(
+            _authored(api.GetStaticFrictionAttr(), source),
+            _authored(api.GetDynamicFrictionAttr(), source),
+            _authored(api.GetRestitutionAttr(), source),
+        )
+    contacts = list(found.values())
+    if any(contact != contacts[0] for contact in contacts):
+        source.find(f"{len(contacts)} physics materials are bound to its collision shapes; the first was taken")
+    if not contacts and any(prim.HasAPI(UsdPhysics.MaterialAPI) for prim in shapes.prims):
+        source.find("it has a physics material that is bound to no collision shape")
+    return contacts[0] if contacts else Contact()
+
+
+def _of_prim(prim: Usd.Prim, to_world: np.ndarray, unit_m: float, unit_kg: float, source: MeshSource) -> Inertial:
+    api = UsdPhysics.MassAPI(prim)
+    mass = _authored(api.GetMassAttr(), source)
+    density = _authored(api.GetDensityAttr(), source)
+    if density and not mass:
+        source.find(
+            f"{prim.GetName()} declares a density of {density * unit_kg / unit_m**3:g} kg/m3 in place of a mass"
+        )
+    center = api.GetCenterOfMassAttr().Get()
+    moments = np.array(api.GetDiagonalInertiaAttr().Get(), dtype=float)
+    turn = api.GetPrincipalAxesAttr().Get()
+    wxyz = np.array([turn.GetReal(), *turn.GetImaginary()], dtype=float)
+    declared = center is not None and not np.isneginf(np.array(center)).any()  # the fallback, -inf, is unspecified
+    if not np.isfinite(moments).all() or not np.isfinite(wxyz).all() or (declared and not np.isfinite(center).all()):
+        raise AssetError(f"{source.path}: the mass properties of {prim.GetPath()} are not finite; mend them")
+    left, stretch, right = np.linalg.svd(to_world[:3, :3] / unit_m)
+    if np.abs(stretch - 1).max() > 1e-5:
+        source.find(
+            f"{prim.GetName()} is scaled by {stretch.round(6).tolist()}, which its mass and inertia do not follow"
+        )
+    axes = rotation_from_quaternion_wxyz(wxyz) if np.linalg.norm(wxyz) > 0 else np.eye(3)
+    turned = left @ right @ axes
+    inertia = turned @ np.diag(moments * unit_kg * unit_m**2) @ turned.T if moments.any() else None
+    center_m = to_world[:3, :3] @ np.array(center) + to_world[:3, 3] if declared else None
+    return Inertial(None if mass is None else mass * unit_kg, center_m, inertia)
+
+
+def _remark_bodies(shapes: StageShapes, with_mass: list[Usd.Prim], found: list[Inertial], source: MeshSource) -> None:
+    rigid = [prim for prim in shapes.prims if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
+    if not rigid:
+        source.find("no prim of it is a rigid body")
+    if len(rigid) > 1:
+        source.find(f"its {len(rigid)} rigid bodies were taken as one")
+    if with_mass and not found:
+        source.find("it has a mass API and no mass")
+    if any(UsdPhysics.RigidBodyAPI(prim).GetKinematicEnabledAttr().Get() for prim in rigid):
+        source.find("its rigid body is kinematic: it moves only where it is moved")
+    if any(prim.HasAPI(UsdPhysics.ArticulationRootAPI) or prim.IsA(UsdPhysics.Joint) for prim in shapes.prims):
+        source.find("it has joints, which were left out")
+
+
+def _authored(attribute: Usd.Attribute, source: MeshSource) -> float | None:
+    """Return a number that somebody wrote, None for the schema's fallback."""
+    if not attribute or not attribute.HasAuthoredValue():
+        return None
+    value: Any = attribute.Get(Usd.TimeCode.EarliestTime())
+    if value is None or not np.isfinite(value):
+        raise AssetError(f"{source.path}: {attribute.GetPath()} is {value}; mend it")
+    return float(str(np.float32(value)))  # the number as it was meant: 0.45, not 0.44999998807907104

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
 import trimesh
-from pxr import Usd, UsdGeom, UsdPhysics
+from PIL import Image
+from pxr import Sdf, Usd, UsdGeom, UsdPhysics, UsdShade
 
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import MAX_SHAPES
-from manitwin.assets.readers.usd_textures import LayeredSurfaces
-from manitwin.assets.readers.usd_types import check_types
+from manitwin.assets.readers.usd_layers import LayerFiles
 from manitwin.errors import AssetError
-from manitwin.formats.meshes.polygons import triangle_fans
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import bake_transform, make_part, pbr_material
+from manitwin.formats.meshes.textures import bake_transform, decode_texture, make_part, pbr_material
+from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.meshes.usdz import mesh_parts
+from manitwin.formats.meshes.usdz_package import PreviewSurfaces
 
 _MAX_SIZE_M = 1e6  # what is larger is no object, and its products overflow single precision
 _ALONG = {
@@ -194,3 +196,45 @@ def _bare_mesh(mesh: UsdGeom.Mesh, source: MeshSource) -> trimesh.Trimesh:
 def _grey(mesh: trimesh.Trimesh, prim: Usd.Prim) -> trimesh.Trimesh:
     vertices, faces = np.asarray(mesh.vertices).reshape(-1, 3), np.asarray(mesh.faces).reshape(-1, 3)
     return make_part(vertices, faces, material=pbr_material(base_color=(0.8, 0.8, 0.8)), name=prim.GetName())
+
+
+class LayeredSurfaces(PreviewSurfaces):
+    """Materials whose textures lie beside the layers of a stage, or in their packages."""
+
+    def __init__(self, layers: LayerFiles, source: MeshSource):
+        self._layers, self._source = layers, source
+        self._materials = {}
+        self._images: dict[str, Image.Image | None] = {}
+
+    def _texture(self, reader: UsdShade.Shader, stage: Usd.Stage) -> Image.Image | None:
+        socket = reader.GetInput("file")
+        attributes = socket.GetValueProducingAttributes() if socket else []
+        asset = attributes[0].Get() if attributes else None
+        if asset is None or not asset.path:
+            return None
+        layer = attributes[0].GetPropertyStack(Usd.TimeCode.Default())[0].layer
+        key = f"{layer.identifier}:{asset.path}"
+        if key not in self._images:
+            data = self._layers.texture(layer, asset.path)
+            self._images[key] = None if data is None else decode_texture(data, asset.path, self._source)
+        return self._images[key]
+
+
+def check_types(prim: Usd.Prim, source: MeshSource) -> None:
+    """Raise AssetError where a value is not of the type that its schema gives it, precision apart."""
+    definition = prim.GetPrimDefinition()
+    for name in definition.GetPropertyNames():
+        attribute = prim.GetAttribute(name)
+        if not attribute or not attribute.HasAuthoredValue():
+            continue
+        wanted = _kind(definition.GetAttributeDefinition(name).GetTypeName())
+        for spec in attribute.GetPropertyStack(Usd.TimeCode.Default()):
+            written = spec.typeName if isinstance(spec, Sdf.AttributeSpec) else "relationship"
+            if written == "relationship" or _kind(written) != wanted:
+                raise AssetError(f"{source.path}: {attribute.GetPath()} is a {written}, not a {wanted}; mend it")
+
+
+def _kind(name: Sdf.ValueTypeName) -> str:
+    """Return a value type without its precision: ``float`` for ``double``, ``half`` and ``float``."""
+    bare = str(name.type.typeName).replace("pxr_half::", "").replace("TfToken", "string")
+    return re.sub(r"(GfVec\d|GfQuat|GfMatrix\d)[dfh]", r"\1", re.sub(r"\b(?:double|half)\b", "float", bare))

@@ -1,12 +1,63 @@
-"""What an exporter is."""
+"""What exporters are given of a twin: everything in memory, so that each is a pure function."""
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
-from manitwin.assets.writers.content import TwinContent
+import numpy as np
+import pyarrow.parquet
+import trimesh
+
 from manitwin.assets.writers.format_notes import FormatNotes
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.record import Physical, TwinRecord
+
+
+@dataclass(frozen=True)
+class TwinContent:
+    """A finished twin: object frame (Z up), metres.
+
+    ``name`` is a file and element name, unique to the twin. ``hulls`` are vertices ``(V, 3)`` and faces ``(F, 3)``;
+    ``grasps`` the rows of grasps.parquet as columns.
+    """
+
+    name: str
+    record: TwinRecord
+    visual_glb: bytes
+    visual: tuple[trimesh.Trimesh, ...]
+    hulls: tuple[tuple[np.ndarray, np.ndarray], ...]
+    grasps: dict[str, list[Any]]
+    source: bytes
+
+    @property
+    def physical(self) -> Physical:
+        """The physical properties; an accepted twin has them."""
+        assert self.record.physical is not None
+        return self.record.physical
+
+    @classmethod
+    def of(cls, twin: Twin) -> TwinContent:
+        """Read a twin's folder; raises TwinError for a rejected twin."""
+        record = twin.record
+        twin.physical  # noqa: B018  a rejected twin has nothing to export: say so
+        return cls(
+            name=export_name(record),
+            record=record,
+            visual_glb=(twin.folder / "visual.glb").read_bytes(),
+            visual=tuple(twin.visual),
+            hulls=tuple((np.asarray(hull.vertices), np.asarray(hull.faces)) for hull in twin.hulls),
+            grasps=pyarrow.parquet.read_table(twin.folder / "grasps.parquet").to_pydict(),
+            source=(twin.folder / record.source.file).read_bytes(),
+        )
+
+
+def export_name(record: TwinRecord) -> str:
+    """Return a name that every format takes: letters, digits and underscores, the category first, then the twin's id."""
+    category = record.language.category if record.language is not None else record.name or "object"
+    word = re.sub(r"[^a-z0-9]+", "_", category.lower()).strip("_")[:40] or "object"
+    return f"{'o_' if word[0].isdigit() else ''}{word}_{record.twin_id[:8]}"
 
 
 @dataclass(frozen=True)

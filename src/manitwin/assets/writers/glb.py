@@ -10,11 +10,10 @@ import json
 import struct
 from typing import Any
 
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.licenses import license_of
+from manitwin.assets.writers.mass_properties import physics_of
 from manitwin.assets.writers.mesh_files import hulls_of
-from manitwin.assets.writers.physics_json import physics_of
 from manitwin.formats.glb import write_glb
 from manitwin.formats.markdown import one_line
 from manitwin.formats.meshes.textures import make_part, pbr_material

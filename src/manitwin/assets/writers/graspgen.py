@@ -12,12 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
-from manitwin.assets.writers.grasp_rows import GraspRows, grasp_rows, parallel_grippers_of
-from manitwin.assets.writers.gripper_assets import ASSETS, parallel_gripper
+from manitwin.assets.writers.exporter import Exported, TwinContent
+from manitwin.assets.writers.grasp_rows import ASSETS, GraspRows, grasp_rows, parallel_gripper, parallel_grippers_of
 from manitwin.assets.writers.licenses import license_of, provenance_lines
-from manitwin.assets.writers.object_mesh import object_mesh
+from manitwin.assets.writers.mesh_files import object_mesh
 from manitwin.errors import ExportError
 from manitwin.twin.store import canonical_json
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import json
 
 from manitwin.assets.writers import usd
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
+from manitwin.assets.writers.exporter import Exported, TwinContent
 
 _MODULE = '''"""Isaac Lab configuration of one object: a dynamic rigid body in metres, +Z up, its origin at the bottom centre.
 

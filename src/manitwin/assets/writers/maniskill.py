@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
-from manitwin.assets.writers.inertial import inertial_of
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.licenses import license_of, provenance_lines
+from manitwin.assets.writers.mass_properties import inertial_of
 from manitwin.twin.store import canonical_json
 
 

@@ -10,12 +10,10 @@ from pathlib import PurePosixPath
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
-from manitwin.assets.writers.inertial import inertial_of
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.licenses import provenance_lines
+from manitwin.assets.writers.mass_properties import PHYSICS_FILE, inertial_of, physics_file
 from manitwin.assets.writers.mesh_files import VisualPart, hull_files, lost_maps, visual_parts
-from manitwin.assets.writers.physics_json import PHYSICS_FILE, physics_file
 from manitwin.formats.xml_file import add, document, new_element, number_text
 from manitwin.physics.mujoco.body import ROLLING_FRICTION_M, TORSIONAL_FRICTION_M
 

@@ -9,21 +9,23 @@ direction in which the fingers move).
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.grasp_rows import GraspRows, best_and_diverse, grasp_rows, parallel_grippers_of
 from manitwin.assets.writers.licenses import license_of, provenance_lines
-from manitwin.assets.writers.phrases import seen_and_unseen
-from manitwin.assets.writers.physics_json import physics_of
+from manitwin.assets.writers.mass_properties import physics_of
+from manitwin.errors import ExportError
 from manitwin.formats.glb import write_glb
+from manitwin.formats.markdown import one_line
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.grasp_diversity import fingertips
 from manitwin.geometry.poses import OBJECT_TO_GLTF, rotation_between, rotation_from_quaternion_wxyz, transform
-from manitwin.twin.record import FunctionalPoint, Placement
+from manitwin.twin.record import FunctionalPoint, Language, Placement
 from manitwin.twin.store import canonical_json
 
 MAX_GRASPS = (
@@ -33,6 +35,13 @@ SEEN, UNSEEN = 12, 3  # phrases of a description, as in RoboTwin's own
 STABLE_TILT_RAD = math.radians(3)  # RoboTwin's check_stable throws a scene away in which an object turned by more
 _FIRST_NUMBER, _NUMBERS = 200, 800  # below are RoboTwin's own objects
 FRANKA_GRIPPER_BIAS_M = 0.08  # of its franka-panda embodiment, by the manual's page on new embodiments
+_MAX_WORDS = 20
+_ARTICLE = re.compile(r"^(?:an?|the)\s+", re.IGNORECASE)
+_KNOWN_CLAUSE = re.compile(r"^(?:to|for|used)\s", re.IGNORECASE)
+# a caption with one of these is a sentence about the object and not a name for it
+_FINITE_VERB = re.compile(
+    r"\b(?:is|are|was|has|have|sits|stands|lies|can|features|shows|appears|looks)\b", re.IGNORECASE
+)
 
 
 def export(twin: TwinContent) -> Exported:
@@ -174,3 +183,76 @@ def _cannot_say(twin: TwinContent, grasps: GraspRows) -> tuple[str, ...]:
 def _depth_of(grasps: GraspRows) -> str:
     depths = sorted(set(grasps.depth_m.tolist()))
     return f": {depths[0]} m for {grasps.gripper}" if len(depths) == 1 else ""
+
+
+def noun_phrases(language: Language, count: int) -> list[str]:
+    """Return ``count`` different phrases without an article, those of the captions first.
+
+    They stand behind "the" in an instruction: captions that are whole sentences or commands are left out. Raises ExportError
+    where so many cannot be made.
+    """
+    captions = (phrase for text in (language.caption, *language.captions) if (phrase := _of_caption(text)))
+    phrases = _distinct([*captions, *_of_attributes(language)])
+    if len(phrases) < count:
+        raise ExportError(
+            f"only {len(phrases)} phrases for {language.category!r}, {count} are needed; give it captions"
+        )
+    return phrases[:count]
+
+
+def seen_and_unseen(language: Language, seen: int, unseen: int) -> tuple[list[str], list[str]]:
+    """Return phrases for training and disjoint ones to test with, the latter spread evenly over all kinds."""
+    phrases = noun_phrases(language, seen + unseen)
+    step = (seen + unseen) // unseen
+    held_out = phrases[step - 1 :: step][:unseen]
+    return [phrase for phrase in phrases if phrase not in held_out], held_out
+
+
+def _of_caption(text: str) -> str | None:
+    """Return a caption's noun phrase, None where it is no such thing."""
+    line = one_line(text).rstrip(".")
+    if not _ARTICLE.match(line) or ". " in line or _FINITE_VERB.search(line) or len(line.split()) > _MAX_WORDS:
+        return None
+    return _ARTICLE.sub("", line)
+
+
+def _of_attributes(language: Language) -> Iterator[str]:
+    noun, material, shape, size = (
+        one_line(text) for text in (language.category, language.material, language.shape, language.size)
+    )
+    function = one_line(language.function)
+    use = function if _KNOWN_CLAUSE.match(function) else f"for {function}"
+    color = one_line(language.color)
+    if not color.lower().startswith("unknown"):
+        yield from (
+            f"{color} {noun}",
+            f"{color} {material} {noun}",
+            f"{color} {noun} {use}",
+            f"{color} {noun}, {shape}",
+        )
+    yield from (
+        noun,
+        f"{material} {noun}",
+        f"{noun} made of {material}",
+        f"{noun} {use}",
+        f"{material} {noun} {use}",
+        f"{noun} made of {material}, {use}",
+        f"{noun}, {shape}",
+        f"{material} {noun}, {shape}",
+        f"{noun} of {size}",
+        f"{material} {noun} of {size}",
+        f"{noun} {use}, {size}",
+        f"{noun}, {shape}, {size}",
+        f"{noun} made of {material}, {shape}",
+        f"{noun} {use}, {shape}",
+        f"{material} {noun} {use}, {shape}",
+        f"{noun} made of {material}, {size}, {shape}",
+    )
+
+
+def _distinct(phrases: Iterable[str]) -> list[str]:
+    """Return each phrase once, whatever its capitals, where it comes first."""
+    distinct: dict[str, str] = {}
+    for phrase in phrases:
+        distinct.setdefault(phrase.lower(), phrase)
+    return list(distinct.values())

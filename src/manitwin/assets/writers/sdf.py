@@ -10,12 +10,10 @@ from pathlib import PurePosixPath
 
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
-from manitwin.assets.writers.inertial import Inertial, inertial_of
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.licenses import UNKNOWN, license_of, provenance_lines
+from manitwin.assets.writers.mass_properties import PHYSICS_FILE, MassProperties, inertial_of, physics_file
 from manitwin.assets.writers.mesh_files import hull_files, lost_maps, visual_parts
-from manitwin.assets.writers.physics_json import PHYSICS_FILE, physics_file
 from manitwin.formats.markdown import one_line
 from manitwin.formats.xml_file import add, document, new_element, number_text
 
@@ -60,7 +58,7 @@ def export(twin: TwinContent) -> Exported:
     )
 
 
-def _add_inertial(link: etree._Element, inertial: Inertial) -> None:
+def _add_inertial(link: etree._Element, inertial: MassProperties) -> None:
     element = add(link, "inertial")
     add(element, "pose", f"{number_text(*inertial.center_of_mass_m)} 0 0 0")
     add(element, "mass", number_text(inertial.mass_kg))

@@ -1,10 +1,18 @@
-"""USD: one stage in the binary form, with its textures beside it."""
+"""USD: one stage in the binary form with its textures beside it, or all in one USDZ package."""
 
 from __future__ import annotations
 
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
+import io
+import struct
+import zipfile
+
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.usd_stage import CANNOT_SAY, build_stage, crate
+
+_ALIGNMENT = 64  # USDZ specification, "Layout": file data starts on a multiple of 64 bytes
+_HEADER = 30  # ZIP APPNOTE 4.3.7: a local header without its name and extra field
+_PADDING_ID = 0x1986  # the extra field that Pixar's own writer pads with
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date that a ZIP entry has: equal twins give equal packages
 
 
 def export(twin: TwinContent) -> Exported:
@@ -12,3 +20,25 @@ def export(twin: TwinContent) -> Exported:
     stage, textures = build_stage(twin)
     main = f"{twin.name}.usdc"
     return Exported({main: crate(stage.GetRootLayer()), **textures}, main, CANNOT_SAY)
+
+
+def export_usdz(twin: TwinContent) -> Exported:
+    """Return the package: the stage in USD's binary form first, then the textures; no compression, no dates."""
+    stage, textures = build_stage(twin)
+    main = f"{twin.name}.usdz"
+    members = {f"{twin.name}.usdc": crate(stage.GetRootLayer()), **dict(sorted(textures.items()))}
+    return Exported({main: _packed(members)}, main, CANNOT_SAY)
+
+
+def _packed(members: dict[str, bytes]) -> bytes:
+    """Return members as a USDZ package in the order given."""
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_STORED) as archive:
+        for name, data in members.items():
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.create_system = 3  # the same on Windows
+            unpadded = stream.tell() + _HEADER + len(name.encode()) + 4
+            padding = -unpadded % _ALIGNMENT
+            entry.extra = struct.pack("<HH", _PADDING_ID, padding) + b"\0" * padding
+            archive.writestr(entry, data)
+    return stream.getvalue()

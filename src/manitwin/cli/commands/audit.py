@@ -44,9 +44,8 @@ def audit(
     if explain is None and not paths:
         raise UsageError("no PATH given: name assets or folders of them, or --explain CODE")
     from manitwin.assets.audit.report import explanation
-    from manitwin.assets.audit.run import audit_all, find_all
-    from manitwin.assets.audit.select import rule_of, select_rules
-    from manitwin.assets.detect import VALID_ASSETS
+    from manitwin.assets.audit.run import audit_all, find_all, rule_of, select_rules
+    from manitwin.assets.read import VALID_ASSETS
 
     if explain is not None:
         sys.stdout.write(explanation(rule_of(explain)) + "\n")

@@ -14,7 +14,7 @@ from manitwin.cli import choices
 from manitwin.cli.console import out_console, print_error
 
 if TYPE_CHECKING:
-    from manitwin.assets.writers.content import TwinContent
+    from manitwin.assets.writers.exporter import TwinContent
 
 
 def export(
@@ -121,7 +121,7 @@ def _export(
 
 
 def _content(folder: Path, allowed: frozenset[str] | None) -> TwinContent:
-    from manitwin.assets.writers.content import TwinContent
+    from manitwin.assets.writers.exporter import TwinContent
     from manitwin.assets.writers.licenses import check_license
     from manitwin.twin.loaded_twin import Twin
 

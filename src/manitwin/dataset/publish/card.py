@@ -11,8 +11,8 @@ from typing import Any
 from manitwin.dataset.publish.card_statistics import category_lines, licence_lines, total_lines
 from manitwin.dataset.publish.licences import LICENSES_MD, hub_license, without_attribution
 from manitwin.dataset.publish.tables import PUBLISHED, columns_of
+from manitwin.formats.installation import installed_version
 from manitwin.formats.markdown import markdown_escaped, table
-from manitwin.twin.version import installed_version
 
 TASK_CATEGORIES = ("robotics",)
 TAGS = ("robotics", "manipulation", "grasping", "simulation", "digital-twin", "3d", "webdataset")

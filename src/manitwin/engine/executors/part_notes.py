@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import time
 from collections.abc import Iterator
@@ -10,8 +11,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from manitwin.engine.stage_parts import StagePart, heard_by
-from manitwin.twin.loggers import RUN
 
+RUN = logging.getLogger("manitwin.run")
 NOTE = ".part"
 EVERY_S = 1.0
 

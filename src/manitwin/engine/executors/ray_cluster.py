@@ -19,8 +19,8 @@ from manitwin.engine.executors.ray_worker import RayWorker
 from manitwin.engine.jobs import Failure, Job, Reply, WorkerSetup
 from manitwin.engine.stage_parts import StagePart
 from manitwin.errors import UsageError
+from manitwin.formats.installation import installed_version
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.version import installed_version
 
 OVERDUE_EVERY_S = 1.0
 NODES_LOST = 3  # a job under which so many nodes died is taken for the cause

@@ -13,7 +13,7 @@ from manitwin.engine.executors.one_thread import one_thread_each
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
 from manitwin.errors import UsageError
-from manitwin.twin.version import installed_version
+from manitwin.formats.installation import installed_version
 
 STACK_LINES = 12
 STALE_S = 3600.0  # a stack that nobody asked for by then is of a worker whose run is over

@@ -8,7 +8,7 @@ from functools import cache
 from typing import Any
 
 from manitwin.errors import Unavailable
-from manitwin.formats.shared_libraries import import_remedy
+from manitwin.formats.installation import import_remedy
 
 REMEDY = "pip install 'manitwin[robots]'"
 

@@ -14,7 +14,7 @@ from manitwin.episodes.attempt import Attempt
 from manitwin.episodes.batch import read_batch
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 
 
 @dataclass(frozen=True)

@@ -31,10 +31,10 @@ from manitwin.episodes.publication.films import films_of
 from manitwin.episodes.publication.success import success_of
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.errors import EpisodesError, UsageError
+from manitwin.formats.installation import installed_version
 from manitwin.pipeline.dataset_run import CONFIG
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.twin_source import TwinSource
-from manitwin.twin.version import installed_version
+from manitwin.twin.loaded_twin import TwinSource
 
 README = "README.md"
 TWINS_SCHEMA = pa.schema(

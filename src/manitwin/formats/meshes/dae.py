@@ -15,8 +15,7 @@ from trimesh.visual.material import PBRMaterial
 
 from manitwin.errors import InputError
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import bake_transform, decode_texture, make_part, pbr_material
-from manitwin.formats.meshes.vertex_colors import color_by_corner
+from manitwin.formats.meshes.textures import bake_transform, color_by_corner, decode_texture, make_part, pbr_material
 from manitwin.formats.xml_file import parse_xml
 
 _REMEDY = "export it again, or as glTF 2.0"

@@ -10,11 +10,9 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from manitwin.formats.meshes.gltf_accessors import Accessors, split_glb
-from manitwin.formats.meshes.gltf_materials import GltfMaterials, transformed_uv
+from manitwin.formats.meshes.gltf_document import Accessors, GltfMaterials, split_glb, transformed_uv
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import bake_transform, linear_to_srgb, make_part
-from manitwin.formats.meshes.vertex_colors import color_by_corner
+from manitwin.formats.meshes.textures import bake_transform, color_by_corner, linear_to_srgb, make_part
 
 # required extensions that change nothing of the geometry, or that are understood here
 _KNOWN_REQUIRED = (

@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import trimesh
+from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
-from manitwin.formats.meshes.mtl import read_mtl
-from manitwin.formats.meshes.plain_obj import plain_triangles
-from manitwin.formats.meshes.polygons import triangle_fans
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import make_part, material_of, pbr_material
-from manitwin.formats.meshes.vertex_colors import color_by_corner
+from manitwin.formats.meshes.textures import color_by_corner, decode_texture, make_part, material_of, pbr_material
+from manitwin.formats.meshes.triangles import triangle_fans
+from manitwin.formats.source_files import map_file_name
 
 DEFAULT_COLOR = (0.8, 0.8, 0.8)
 
@@ -185,3 +184,87 @@ def _materials(document: _Document, source: MeshSource) -> dict[str, PBRMaterial
     if materials and missing:
         source.find(f"material {missing[0]!r} is in no material library; shown grey")
     return materials
+
+
+def plain_triangles(text: str) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return vertices ``(V, 3)`` and triangles ``(F, 3)`` of such a text, None for any other or a broken one.
+
+    All vertices are used by some triangle: the full reader leaves out others.
+    """
+    if "/" in text or "\\" in text:
+        return None
+    lines = [line for line in text.splitlines() if line and not line.startswith("#")]
+    places = [line[2:] for line in lines if line.startswith("v ")]
+    corners = [line[2:] for line in lines if line.startswith("f ")]
+    if not corners or len(places) + len(corners) != len(lines):
+        return None
+    try:
+        vertices = np.array(" ".join(places).split(), dtype=np.float64)
+        faces = np.array(" ".join(corners).split(), dtype=np.int64)
+    except (ValueError, OverflowError):
+        return None
+    # three of each in every line: a sum that fits by chance is told by the lines themselves
+    if len(vertices) != 3 * len(places) or len(faces) != 3 * len(corners) or not np.isfinite(vertices).all():
+        return None
+    if any(len(line.split()) != 3 for line in (*places, *corners)):
+        return None
+    if len(np.unique(faces)) != len(places) or faces.min() < 1 or faces.max() > len(places):
+        return None
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3) - 1
+
+
+def read_mtl(text: str, source: MeshSource) -> dict[str, PBRMaterial]:
+    """Return the materials of an MTL file by name.
+
+    Kd (unless there is a map_Kd), d, Ns, Pr, Pm, map_Kd and norm are used. ``Tr`` is not: MeshLab
+    writes 1 there for opaque.
+    """
+    materials: dict[str, PBRMaterial] = {}
+    entries: list[tuple[str, dict[str, str]]] = []
+    for line in text.splitlines():
+        keyword, _, rest = line.strip().replace("\t", " ").partition(" ")
+        if keyword.lower() == "newmtl":
+            entries.append((rest.strip(), {}))
+        elif entries and rest and not keyword.startswith("#"):
+            entries[-1][1].setdefault(keyword.lower(), rest.strip())
+    for name, values in entries:
+        materials.setdefault(name, _material(name, values, source))
+    return materials
+
+
+def _material(name: str, values: dict[str, str], source: MeshSource) -> PBRMaterial:
+    texture = _map(values.get("map_kd"), source)
+    color = _leading_numbers(values.get("kd")) or [0.8, 0.8, 0.8]
+    # exporters leave Kd black or grey beside a map and viewers ignore it there
+    base = [1.0, 1.0, 1.0] if texture is not None else (color * 3)[:3]
+    opacity = (_leading_numbers(values.get("d")) or [1.0])[0]
+    opacity = opacity if 0 < opacity < 1 else 1.0  # d 0 is an invisible object: a known mix-up with Tr
+    shininess = max((_leading_numbers(values.get("ns")) or [0.0])[0], 0.0)
+    roughness = (_leading_numbers(values.get("pr")) or [(2 / (shininess + 2)) ** 0.25])[0]
+    return pbr_material(
+        name,
+        base_color=(*base, opacity),
+        metallic=(_leading_numbers(values.get("pm")) or [0.0])[0],
+        roughness=roughness,
+        base_color_texture=texture,
+        normal_texture=_map(values.get("norm"), source),
+        alpha_mode="BLEND" if opacity < 1 else None,
+    )
+
+
+def _map(statement: str | None, source: MeshSource) -> Image.Image | None:
+    if statement is None:
+        return None
+    name = map_file_name(statement)
+    data = source.sibling(name, "texture")
+    return None if data is None else decode_texture(data, name, source)
+
+
+def _leading_numbers(text: str | None) -> list[float]:
+    numbers: list[float] = []
+    for word in (text or "").split():
+        try:
+            numbers.append(float(word))
+        except ValueError:
+            break
+    return numbers

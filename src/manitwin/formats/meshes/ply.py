@@ -9,10 +9,9 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from manitwin.formats.meshes.polygons import triangle_fans
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import decode_texture, make_part, pbr_material
-from manitwin.formats.meshes.vertex_colors import color_by_corner
+from manitwin.formats.meshes.textures import color_by_corner, decode_texture, make_part, pbr_material
+from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.source_files import ply_texture
 
 _REMEDY = "download or export it again"
@@ -21,6 +20,7 @@ _TYPES = {
     "u2", "int": "i4", "uint": "u4", "int32": "i4", "uint32": "u4", "float": "f4", "float32": "f4", "double": "f8",
     "float64": "f8",
 }  # fmt: skip
+_Columns = dict[str, "np.ndarray | _Lists"]
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,6 @@ class _Lists:
 
     sizes: np.ndarray
     values: np.ndarray
-
-
-_Columns = dict[str, "np.ndarray | _Lists"]
 
 
 def read_ply(source: MeshSource) -> list[trimesh.Trimesh]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import struct
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,13 +14,13 @@ from manitwin.errors import InputError
 from manitwin.formats.isolated import ProcessCrashed, run_isolated
 from manitwin.formats.meshes.dae import read_dae
 from manitwin.formats.meshes.gltf import read_gltf
-from manitwin.formats.meshes.normals import with_creased_normals
 from manitwin.formats.meshes.obj import read_obj
 from manitwin.formats.meshes.ply import read_ply
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
-from manitwin.formats.meshes.stl import read_stl
-from manitwin.formats.meshes.textures import normals_of
+from manitwin.formats.meshes.textures import make_part, normals_of, pbr_material
+from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.formats.sniff import sniff
+from manitwin.geometry.repair.welding import weld_equal
 
 _SUFFIXES = {
     "glb": (".glb",),
@@ -30,6 +31,9 @@ _SUFFIXES = {
     "dae": (".dae",),
     "usdz": (".usdz",),
 }
+_TRIANGLE = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
+_HEADER = 84
+_REMEDY = "download or export it again"
 
 
 @dataclass(frozen=True)
@@ -126,3 +130,36 @@ def _checked(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.T
             part.vertices[unused] = 0.0
             part.remove_unreferenced_vertices()
     return [part if normals_of(part) is not None else with_creased_normals(part) for part in parts]
+
+
+def read_stl(source: MeshSource) -> list[trimesh.Trimesh]:
+    """Read an STL into one grey part; equal corners are shared so that shading can be smooth.
+
+    Raises InputError ``unreadable`` where the file is cut short.
+    """
+    data = source.data()
+    count = int.from_bytes(data[80:84], "little") if len(data) >= _HEADER else 0
+    if len(data) >= _HEADER and len(data) == _HEADER + count * _TRIANGLE.itemsize:
+        source.check_faces(count)
+        corners = np.frombuffer(data, dtype=_TRIANGLE, offset=_HEADER)["vertices"].reshape(-1, 3).astype(np.float64)
+    elif re.match(rb"\s*solid\b", data, re.IGNORECASE):
+        corners = _ascii(data.decode("utf-8", errors="replace"), source)
+    else:
+        raise source.unreadable(
+            f"truncated: it says {count} triangles and has {len(data)} bytes",
+            _REMEDY,
+        )
+    vertices, faces = weld_equal(corners, np.arange(len(corners)).reshape(-1, 3))
+    return [make_part(vertices, faces, material=pbr_material(base_color=(0.8, 0.8, 0.8)), name="mesh")]
+
+
+def _ascii(text: str, source: MeshSource) -> np.ndarray:
+    rows = re.findall(r"^\s*vertex\s+(\S+)\s+(\S+)\s+(\S+)\s*$", text, re.IGNORECASE | re.MULTILINE)
+    source.check_faces(len(rows) // 3)
+    facets = len(re.findall(r"^\s*facet\b", text, re.IGNORECASE | re.MULTILINE))
+    if len(rows) != 3 * facets:
+        raise source.unreadable(f"truncated or broken: {facets} facets and {len(rows)} corners", _REMEDY)
+    try:
+        return np.array(rows, dtype=np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise source.unreadable("a vertex does not hold three numbers", _REMEDY) from error

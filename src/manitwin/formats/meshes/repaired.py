@@ -6,8 +6,15 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
-from manitwin.formats.meshes.textures import linear_to_srgb, make_part, material_of, normals_of, pbr_material, uv_of
-from manitwin.formats.meshes.vertex_colors import color_by_corner
+from manitwin.formats.meshes.textures import (
+    color_by_corner,
+    linear_to_srgb,
+    make_part,
+    material_of,
+    normals_of,
+    pbr_material,
+    uv_of,
+)
 from manitwin.geometry.repair.cascade import RepairResult
 
 

@@ -9,12 +9,10 @@ import trimesh
 from pxr import Tf, Usd, UsdGeom, UsdShade
 from trimesh.visual.material import PBRMaterial
 
-from manitwin.formats.meshes.polygons import triangle_fans
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import bake_transform, make_part
-from manitwin.formats.meshes.usdz_archive import UsdzArchive
-from manitwin.formats.meshes.usdz_materials import PreviewSurfaces
-from manitwin.formats.meshes.vertex_colors import color_by_corner
+from manitwin.formats.meshes.textures import bake_transform, color_by_corner, make_part
+from manitwin.formats.meshes.triangles import triangle_fans
+from manitwin.formats.meshes.usdz_package import PreviewSurfaces, UsdzArchive
 
 _MAX_PARTS = 20_000
 _UV_NAMES = ("st", "st0", "st_0", "UVMap", "uv", "map1", "Texture_uv")

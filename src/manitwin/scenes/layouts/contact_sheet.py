@@ -18,7 +18,7 @@ from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_file import parse_scene
 from manitwin.scenes.scene_folders import scene_name
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 
 SCENES_SHOWN = 48
 CAMERA = "oblique"

@@ -10,8 +10,7 @@ import math
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.writers import mjcf
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.formats.xml_file import add, document, new_element, number_text
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION
 from manitwin.physics.mujoco.body import ROLLING_FRICTION_M, TIMESTEP_S, TORSIONAL_FRICTION_M

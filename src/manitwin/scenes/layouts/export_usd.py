@@ -9,8 +9,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdPhysics, UsdShade
 
 from manitwin.assets.writers import usd
-from manitwin.assets.writers.content import TwinContent
-from manitwin.assets.writers.exporter import Exported
+from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.usd_stage import CANNOT_SAY
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION

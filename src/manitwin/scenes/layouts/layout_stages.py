@@ -17,7 +17,7 @@ from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.layouts.sample import sample_layout
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_file import read_scene, write_scene
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 
 PICTURES = "pictures/"
 

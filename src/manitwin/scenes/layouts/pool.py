@@ -16,7 +16,7 @@ from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.hull_distance import ConvexParts
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 
 KEPT_BODIES = 256
 

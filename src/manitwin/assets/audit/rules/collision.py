@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from manitwin.assets.asset import CollisionShape
-from manitwin.assets.audit.complaint import Complaint
-from manitwin.assets.audit.finding import Rule
+from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 
 BOX_SLACK_M, BOX_SLACK_SHARE = 0.003, 0.03

@@ -10,7 +10,7 @@ import pytest
 
 from manitwin.cli import machine_checks as doctor
 from manitwin.cli import main as cli
-from manitwin.formats.shared_libraries import import_remedy, missing_libraries, package_by_contents, package_by_policy
+from manitwin.formats.installation import import_remedy, missing_libraries, package_by_contents, package_by_policy
 
 EXTENSION = Path(msgpack._cmsgpack.__file__)
 

@@ -1,4 +1,4 @@
-"""Which shared libraries of the system the installed wheels want and lack, and which Debian packages have them.
+"""The installed package's version, and shared libraries that installed wheels lack with the Debian packages that have them.
 
 The loader itself is asked (``ldd``) for every shared object and program below a folder, so that no list is kept by hand. The
 set-up script imports this before anything is installed: it wants nothing but Python.
@@ -13,7 +13,18 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 ELF = b"\x7fELF"
+NO_METADATA = "0+unknown"
 AT_A_TIME = 100  # files a call of ldd: a command line has its limits
+
+
+def installed_version() -> str:
+    """Return manitwin's version; of a source tree that was never installed, ``0+unknown``."""
+    from importlib.metadata import PackageNotFoundError, version  # 20 ms that `import manitwin` does without
+
+    try:
+        return version("manitwin")
+    except PackageNotFoundError:
+        return NO_METADATA
 
 
 def missing_libraries(folder: Path) -> list[str]:

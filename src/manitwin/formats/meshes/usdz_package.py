@@ -1,18 +1,128 @@
-"""UsdPreviewSurface materials of USDZ packages."""
+"""The archive side of USDZ: members, and a check that no layer in it reaches outside of it."""
 
 from __future__ import annotations
 
 import posixpath
+import re
+import zipfile
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image
-from pxr import Usd, UsdShade
+from pxr import Sdf, Tf, Usd, UsdShade
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import decode_texture, linear_to_srgb, pbr_material
-from manitwin.formats.meshes.usdz_archive import UsdzArchive
+
+_LAYERS = (".usd", ".usda", ".usdc")
+_MAX_MEMBERS = 10_000
+
+
+class UsdzArchive:
+    """The members of a USDZ package by name, without ever unpacking them to disk."""
+
+    def __init__(self, source: MeshSource):
+        self._source = source
+        size = source.path.stat().st_size
+        if size > source.limits.max_bytes:
+            raise source.unreadable(
+                f"{size} bytes are more than the limit of {source.limits.max_bytes}", "simplify it, or raise the limit"
+            )
+        try:
+            self._zip = zipfile.ZipFile(source.path)
+            members = self._zip.infolist()
+        except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError) as error:
+            raise source.unreadable(
+                f"truncated or broken: its archive cannot be read ({str(error)[:60]})", "download it again"
+            ) from error
+        if len(members) > _MAX_MEMBERS:
+            raise source.unreadable(f"{len(members)} members in the archive", "pack fewer files")
+        for member in members:
+            # USDZ allows neither compression nor encryption, which leaves nothing for a ZIP bomb to do
+            if (
+                member.compress_type != zipfile.ZIP_STORED
+                or member.flag_bits & 1
+                or member.file_size != member.compress_size
+            ):
+                raise source.unreadable(
+                    f"member {member.filename[:80]!r} is compressed or encrypted, which USDZ forbids",
+                    "pack it with usdzip",
+                )
+            if not _is_inside(member.filename):
+                raise source.unreadable(
+                    f"member {member.filename[:80]!r} leads out of the archive", "pack it with usdzip"
+                )
+        if sum(member.file_size for member in members) > size:
+            raise source.unreadable("its members overlap", "pack it with usdzip")
+        self.names = [member.filename for member in members]
+        self.root = self.names[0] if self.names and self.names[0].lower().endswith(_LAYERS) else None
+
+    def read(self, name: str, what: str) -> bytes | None:
+        """Return a member's bytes, or None with a finding; nothing outside the archive is ever opened."""
+        clean = posixpath.normpath(name.replace("\\", "/"))
+        if not _is_inside(clean):
+            self._source.find(f"{what} {name[:80]!r} lies outside the archive and was not read")
+            return None
+        if clean not in self.names:
+            self._source.find(f"{what} {name[:80]!r} is not in the archive; carried on without it")
+            return None
+        try:
+            return self._zip.read(clean)
+        except (zipfile.BadZipFile, OSError, EOFError):
+            self._source.find(f"{what} {name[:80]!r} is broken; carried on without it")
+            return None
+
+    def check_layers(self) -> None:
+        """Refuse a package with a layer that names a layer outside of it; raises InputError ``unreadable``.
+
+        Every layer of the archive is looked at, used or not, before a stage is composed: composing would open what they
+        name.
+        """
+        for name in self.names:
+            if not name.lower().endswith(_LAYERS):
+                continue
+            try:
+                layer = Sdf.Layer.OpenAsAnonymous(package_path(self._source.path, name))
+                named_layers = [] if layer is None else layer.GetCompositionAssetDependencies()
+                clips = layer is not None and _has_clips(layer)
+            except Tf.ErrorException as error:
+                raise self._source.unreadable(f"layer {name[:80]!r} cannot be read", "export it again") from error
+            if layer is None:
+                raise self._source.unreadable(f"layer {name[:80]!r} cannot be read", "export it again")
+            for named in named_layers:
+                target = posixpath.normpath(posixpath.join(posixpath.dirname(name), named))
+                if (not _is_inside(named) and named) or not _is_inside(target) or target not in self.names:
+                    raise self._source.unreadable(
+                        f"layer {name[:60]!r} names {named[:80]!r}, which is not in the archive",
+                        "pack it with usdzip, all layers in one",
+                    )
+            if clips:
+                raise self._source.refused("animated", "it holds value clips", "export a still mesh")
+
+
+def package_path(path: Path, member: str) -> str:
+    """Return how USD names a member of a package."""
+    return f"{path}[{member}]"
+
+
+def _is_inside(name: str) -> bool:
+    # a backquote starts an expression, brackets a nested package, a colon a scheme or a drive
+    if not name or name.startswith(("/", "\\", "~")) or re.search(r"[:`\[\]\0]", name):
+        return False
+    return ".." not in name.replace("\\", "/").split("/") and posixpath.normpath(name) not in ("", ".")
+
+
+def _has_clips(layer: Sdf.Layer) -> bool:
+    found: list[bool] = []
+
+    def look(path: Sdf.Path) -> None:
+        if path.IsPrimPath() and layer.GetPrimAtPath(path) is not None and layer.GetPrimAtPath(path).HasInfo("clips"):
+            found.append(True)
+
+    layer.Traverse(Sdf.Path.absoluteRootPath, look)
+    return bool(found)
 
 
 class PreviewSurfaces:

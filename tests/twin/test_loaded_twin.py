@@ -7,7 +7,7 @@ import fsspec
 import pytest
 
 from manitwin.errors import UsageError
-from manitwin.twin.twin_source import TwinSource
+from manitwin.twin.loaded_twin import TwinSource
 from twin_folders import write_set
 
 

@@ -1,0 +1,130 @@
+"""The mass properties of a twin as every format takes them, refused where no rigid body can have them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from manitwin.assets.writers.exporter import TwinContent
+from manitwin.assets.writers.licenses import license_of
+from manitwin.errors import ExportError
+from manitwin.formats.markdown import one_line
+from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.twin.store import canonical_json
+
+TRIANGLE_TOLERANCE = 1e-9
+"""By how much, of the largest moment, the other two may fall short of it: rounding of thin plates, no more."""
+_SWEEPS = 30  # it converges quadratically: four or five are what any tensor needs
+PHYSICS_FILE = "physics.json"
+
+
+@dataclass(frozen=True)
+class MassProperties:
+    """Mass, ``center_of_mass_m (3,)`` and ``inertia_kg_m2 (3, 3)`` about it along the axes of the object frame.
+
+    The same tensor as ``principal_moments_kg_m2 (3,)`` along axes that ``principal_axes_wxyz`` turns into the object's.
+    """
+
+    mass_kg: float
+    center_of_mass_m: np.ndarray
+    inertia_kg_m2: np.ndarray
+    principal_moments_kg_m2: np.ndarray
+    principal_axes_wxyz: np.ndarray
+
+
+def inertial_of(twin: TwinContent) -> MassProperties:
+    """Return a twin's mass properties.
+
+    Raises ExportError for a mass that is not positive, and for a tensor that is not symmetric, not positive definite or
+    against the triangle inequality of moments, which engines refuse or change in silence.
+    """
+    physical = twin.physical
+    mass_kg, tensor = physical.mass_kg.value, np.array(physical.inertia_kg_m2)
+    if not mass_kg > 0:
+        raise ExportError(f"{twin.name}: its mass is {mass_kg} kg; build the twin again with a mass above zero")
+    if not np.allclose(tensor, tensor.T, rtol=0, atol=1e-9 * np.abs(tensor).max()):
+        raise ExportError(f"{twin.name}: its inertia tensor is not symmetric; build the twin again")
+    tensor = (tensor + tensor.T) / 2
+    moments, axes_wxyz = principal_axes(tensor)
+    least, middle, most = sorted(moments.tolist())
+    slack = least + middle - most
+    if not least > 0 or slack < -TRIANGLE_TOLERANCE * most:
+        raise ExportError(
+            f"{twin.name}: no rigid body has the principal moments {', '.join(f'{m:.3g}' for m in moments)} kg m^2 "
+            "(each is positive, and none exceeds the sum of the others); build the twin again"
+        )
+    if slack < TRIANGLE_TOLERANCE * most:  # MuJoCo allows for no rounding of A + B >= C
+        extra = TRIANGLE_TOLERANCE * most - slack
+        tensor, moments = tensor + extra * np.eye(3), moments + extra
+    return MassProperties(mass_kg, np.array(physical.center_of_mass_m), tensor, moments, axes_wxyz)
+
+
+def principal_axes(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the moments ``(3,)`` kg m^2 and the quaternion wxyz ``(4,)`` that turns principal axes into the object's.
+
+    ``inertia = R diag(moments) R^T`` with ``R`` the quaternion's rotation. A tensor that is diagonal keeps its axes, and
+    the result is the same on every machine: LAPACK's would turn freely where two moments are equal.
+    Source: cyclic Jacobi rotations (Golub and Van Loan, Matrix Computations, section 8.5.3).
+    """
+    tensor = np.array(inertia_kg_m2, dtype=np.float64)
+    axes = np.eye(3)
+    for _ in range(_SWEEPS):
+        rotated = [_zero_element(tensor, axes, p, q) for p, q in ((0, 1), (0, 2), (1, 2))]
+        if not any(rotated):
+            break
+    return np.diag(tensor).copy(), quaternion_wxyz(axes)
+
+
+def _zero_element(tensor: np.ndarray, axes: np.ndarray, p: int, q: int) -> bool:
+    """Rotate in the plane of axes p and q so that their product of inertia is zero; False where it is nothing already."""
+    off = float(tensor[p, q])
+    if abs(off) <= 1e-16 * math.sqrt(abs(float(tensor[p, p] * tensor[q, q]))):
+        tensor[p, q] = tensor[q, p] = 0.0
+        return False
+    ratio = float(tensor[q, q] - tensor[p, p]) / (2 * off)
+    tangent = math.copysign(1.0, ratio) / (abs(ratio) + math.hypot(ratio, 1.0))  # the smaller of both angles
+    cosine = 1 / math.hypot(tangent, 1.0)
+    turn = np.eye(3)
+    turn[p, p] = turn[q, q] = cosine
+    turn[p, q], turn[q, p] = cosine * tangent, -cosine * tangent
+    tensor[:] = turn.T @ tensor @ turn
+    axes[:] = axes @ turn
+    return True
+
+
+def physics_of(twin: TwinContent) -> dict[str, Any]:
+    """Return the physical properties as JSON values: SI units, object frame, each estimate with its interval and source.
+
+    Raises ExportError as ``inertial_of``.
+    """
+    physical, inertial = twin.physical, inertial_of(twin)
+    return {
+        "name": twin.name,
+        "twin_id": twin.record.twin_id,
+        "revision": twin.record.revision,
+        "license": license_of(twin.record),
+        "attribution": one_line(twin.record.source.attribution or "") or None,
+        "units": "metres, kilograms, seconds, radians",
+        "frame": "right-handed, +Z up, origin at the bottom centre; quaternions wxyz",
+        "material": physical.material,
+        **{
+            key: getattr(physical, key).model_dump(mode="json")
+            for key in ("mass_kg", "friction_static", "friction_dynamic", "restitution")
+        },
+        "density_kg_m3": physical.density_kg_m3,
+        "extents_m": list(physical.extents_m),
+        "center_of_mass_m": inertial.center_of_mass_m.tolist(),
+        "center_of_mass_uncertainty_m": physical.center_of_mass_uncertainty_m,
+        "inertia_kg_m2": inertial.inertia_kg_m2.tolist(),
+        "principal_moments_kg_m2": inertial.principal_moments_kg_m2.tolist(),
+        "principal_axes_quaternion_wxyz": inertial.principal_axes_wxyz.tolist(),
+        "mass_distribution": physical.mass_distribution,
+    }
+
+
+def physics_file(twin: TwinContent) -> bytes:
+    """Return physics.json. Raises ExportError as ``inertial_of``."""
+    return canonical_json(physics_of(twin)).encode()
