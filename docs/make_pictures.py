@@ -29,7 +29,7 @@ from manitwin.render.raycast import merged
 from manitwin.render.renderer import shared_renderer
 from manitwin.render.surfaces import plain_part
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
-from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 

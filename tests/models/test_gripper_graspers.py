@@ -14,7 +14,7 @@ from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.seal_screen import SealScreen
 from manitwin.models.graspers.suction import SuctionGrasper
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
-from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 

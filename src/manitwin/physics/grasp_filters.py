@@ -13,7 +13,7 @@ import numpy as np
 
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.physics.grasp_selection import Merits
-from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 ACROSS, ALONG = 3, 5  # cells of a pad

@@ -16,7 +16,7 @@ from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import HandContacts, run_phases
 from manitwin.robots.grippers.gripper import Gripper, of_kind
-from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.suction import SuctionGripper
 
 

@@ -39,8 +39,6 @@ PICTURE_FORMATS = {
     "WorldNormal": "R32G32B32A32Sfloat",
     "Distance": "R32Sfloat",
 }
-NOTHING = 0
-"""The id of what is no thing of the scene: the floor and the backdrop."""
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from pydantic import BaseModel, Field, ValidationError, field_validator
 
 from manitwin.errors import ConfigError, Unavailable, UsageError, choose_from
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
-from manitwin.robots.grippers.fields import STRICT
+from manitwin.robots.grippers.box import STRICT
 
 UNIT_TOLERANCE = 1e-6
 PACKAGE, FILE = "package://", "file://"

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.poses import transform
 from manitwin.robots.grippers.gripper import load_gripper
-from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.hand_clearance import HandCollision
 
 PANDA = load_gripper("panda")
 FROM_ABOVE = np.diag([1.0, -1.0, -1.0])

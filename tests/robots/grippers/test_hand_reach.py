@@ -14,7 +14,7 @@ from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.sapien import trial as sapien_trial
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.physics.trial import TrialSettings
-from manitwin.robots.grippers.hand_reach import HandReach
+from manitwin.robots.grippers.hand_clearance import HandReach
 from rigid_boxes import FROM_ABOVE, PANDA, SETTINGS, above, block, box, try_one
 
 MARGIN_M = 0.015

@@ -10,7 +10,7 @@ from manitwin.physics.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2
 from manitwin.physics.grasp_selection import Merits
 from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.robots.grippers.gripper import of_kind
-from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 
 CLEARANCE_M = 0.0005

@@ -13,7 +13,7 @@ from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.physics.trial_phases import SLIDE_DIRECTIONS
 from manitwin.robots.grippers.gripper import of_kind
-from manitwin.robots.grippers.hand_collision import HandCollision
+from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.suction import SuctionGripper
 
 CLEARANCE_M = 0.0005

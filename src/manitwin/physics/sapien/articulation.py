@@ -22,7 +22,7 @@ LEAST_MASS_KG, LEAST_MOMENT_KG_M2 = 0.01, 1e-6
 
 @dataclass(frozen=True)
 class LinkContact:
-    """How a link touches: its material, whether it is a soft pad, and SAPIEN's words of what it collides with."""
+    """The contact properties of a link: its material, whether it is a soft pad, and SAPIEN's collision groups."""
 
     material: physx.PhysxMaterial
     soft_pad: bool = False

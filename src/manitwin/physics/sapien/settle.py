@@ -30,7 +30,7 @@ _BALL_TIMESTEP_S = 1 / 480
 
 @dataclass(frozen=True)
 class RestLimits:
-    """When a body counts as at rest: slower than both speeds, for so many looks in a row.
+    """The limits of rest: slower than both speeds, for so many looks in a row.
 
     Its speeds are those between two looks: at rest on many hulls, its velocity of one step is noise. ``by_velocity`` takes the
     velocities of the last step all the same, which are the sooner to be small.
@@ -54,7 +54,7 @@ class RestWatch:
 
     @property
     def all_rest(self) -> bool:
-        """Whether every body has been still for the looks that are asked for."""
+        """True where every body has been still for the looks that are asked for."""
         return bool((self.looks >= self._limits.looks).all())
 
     def look(self) -> np.ndarray:
@@ -81,7 +81,7 @@ class RestWatch:
 
 @dataclass(frozen=True)
 class Rest:
-    """How settling ended: ``at_rest (N,)``, ``lost (N,)`` where a body went so far that the rest was not waited for."""
+    """The end of settling: ``at_rest (N,)``, ``lost (N,)`` where a body went so far that the rest was not waited for."""
 
     at_rest: np.ndarray
     lost: np.ndarray

@@ -12,7 +12,7 @@ from manitwin.physics.sapien.shapes import COOKED, HullShapes
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import run_phases
 from manitwin.robots.grippers.gripper import Gripper, of_kind
-from manitwin.robots.grippers.hand_reach import HandReach
+from manitwin.robots.grippers.hand_clearance import HandReach
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 REACH_MARGIN_M = 0.015  # hulls farther than this from the closing hand are left out

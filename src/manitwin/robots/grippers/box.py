@@ -1,10 +1,14 @@
-"""Boxes that a gripper is made of."""
+"""Fields of grippers' files: boxes, and how strictly all are read."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from pydantic import ConfigDict
+
+STRICT = ConfigDict(extra="forbid", allow_inf_nan=False)
+"""A key that means nothing is an error: it is a misspelt one."""
 
 PlacedBox = tuple[np.ndarray, np.ndarray]
 """``box_to_gripper (4, 4)`` and ``half_extents_m (3,)``."""

@@ -25,7 +25,7 @@ Kind = TypeVar("Kind")
 
 
 class Gripper(Protocol):
-    """What all kinds of grippers have in common.
+    """The common part of all kinds of grippers.
 
     ``tip_depth_m`` is the fingertips' centre along +Z, ``opening_m`` the widest thing that fits, ``force_n`` the force it
     holds with.
@@ -33,12 +33,12 @@ class Gripper(Protocol):
 
     @property
     def kind(self) -> str:
-        """Which of ``KINDS`` it is."""
+        """Its kind, one of ``KINDS``."""
         ...
 
     @property
     def name(self) -> str:
-        """What a row of ``grasps.parquet`` calls it."""
+        """Its name in the rows of ``grasps.parquet``."""
         ...
 
     @property
@@ -68,7 +68,7 @@ class Gripper(Protocol):
 
     @property
     def source(self) -> str:
-        """Where its numbers come from."""
+        """The source of its numbers."""
         ...
 
     def boxes(self, opening_m: float) -> list[PlacedBox]:

@@ -14,8 +14,7 @@ from pydantic import BaseModel, TypeAdapter
 
 from manitwin.errors import ConfigError, UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
-from manitwin.robots.grippers.box import Box, PlacedBox
-from manitwin.robots.grippers.fields import STRICT
+from manitwin.robots.grippers.box import STRICT, Box, PlacedBox
 from manitwin.robots.links import Link, link_poses, links_of
 from manitwin.robots.urdf import HAND, read_urdf
 
@@ -47,7 +46,7 @@ class Posture:
 
 @dataclass(frozen=True)
 class Drive:
-    """How each joint is driven: a spring and damper towards its target, of limited torque.
+    """The drive of each joint: a spring and damper towards its target, of limited torque.
 
     A finger's target runs towards the closed posture at ``speed_rad_s``, until a joint of it presses with ``press_nm``.
     """
@@ -62,7 +61,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class _Described:
-    """What the gripper's file says as it is."""
+    """The part of the gripper's file that is taken as it is."""
 
     name: str
     sha256: str
@@ -131,7 +130,7 @@ class MultiFingerGripper(_Described):
 
 
 class _UrdfField(BaseModel):
-    """Where the URDF is: beside the gripper's file, or in an installed distribution that an extra of this package brings."""
+    """The place of the URDF: beside the gripper's file, or in an installed distribution that an extra of this package brings."""
 
     model_config = STRICT
     file: str

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from manitwin.robots.grippers.box import Box, PlacedBox
-from manitwin.robots.grippers.fields import STRICT
+from manitwin.robots.grippers.box import STRICT, Box, PlacedBox
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""A suction cup: what it weighs on the surface with, how far its lip gives way, and what is around it."""
+"""A suction cup: its vacuum, how far its lip gives way, and the boxes around it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from manitwin.robots.grippers.box import Box, PlacedBox
-from manitwin.robots.grippers.fields import STRICT
+from manitwin.robots.grippers.box import STRICT, Box, PlacedBox
 
 SYMBOL_HALF_WIDTH_M = 0.002
 
@@ -48,7 +47,7 @@ class SuctionGripper:
 
     @property
     def opening_m(self) -> float:
-        """How thick a thing it can hold: any, so the size of the largest object there is (``GateConfig``)."""
+        """The thickest thing that it can hold: any, so the size of the largest object there is (``GateConfig``)."""
         return 1.0
 
     def boxes(self, opening_m: float) -> list[PlacedBox]:
