@@ -84,7 +84,7 @@ def _run(root: Path, arguments: argparse.Namespace) -> None:
 def _executor(setup: WorkerSetup, settings: RunConfig, ray: bool):  # type: ignore[no-untyped-def]
     if not ray:
         return LocalExecutor(setup, settings)
-    from manitwin.executors.ray_cluster import RayExecutor
+    from manitwin.engine.executors.ray_cluster import RayExecutor
 
     return RayExecutor(setup, settings, None)
 

@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
+from manitwin.episodes.pick_place_tasks import Placeable, PlacingArea, sample_task
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.target_grasps import usable_grasps
-from manitwin.episodes.tasks import Placeable, Room, sample_task
 from manitwin.robots.load import load_robot, shipped_robots
-from manitwin.scenes.layouts.furniture import make_furniture
 from manitwin.scenes.layouts.pool import Pool, pool_of
+from manitwin.scenes.layouts.surroundings import make_furniture
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.twin.loaded_twin import Twin, TwinSource
 
@@ -37,7 +37,9 @@ def shares(robot_name: str, source: TwinSource, pool: Pool, starts: int) -> tupl
         for start in range(starts):
             rng = np.random.default_rng([number, start])
             furniture = make_furniture("table", rng)
-            task = sample_task(Placeable.of(pool, twin), _nobody, 0, Room(robot.workspace, furniture.supports[0]), rng)
+            task = sample_task(
+                Placeable.of(pool, twin), _nobody, 0, PlacingArea(robot.workspace, furniture.supports[0]), rng
+            )
             if task is None or not grasps:
                 continue
             boxes = tuple(furniture_boxes(furniture))

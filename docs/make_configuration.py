@@ -15,7 +15,8 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from manitwin.config import BuildConfig
-from manitwin.scenes.app_config import LayoutsConfig, PicturesConfig, TrajectoriesConfig
+from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
+from manitwin.scenes.settings import LayoutsConfig
 
 PAGE = Path(__file__).parent / "configuration.md"
 APPLICATIONS: dict[str, type[BaseModel]] = {

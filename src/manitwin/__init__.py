@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from manitwin.episodes.hdf5_file import EpisodeFile
     from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
     from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
+    from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
     from manitwin.errors import (
         AssetError,
         BackendError,
@@ -54,8 +55,8 @@ if TYPE_CHECKING:
     from manitwin.physics.sapien.robot import SapienRobot
     from manitwin.robots.load import load_robot
     from manitwin.robots.robot import Robot
-    from manitwin.scenes.app_config import LayoutsConfig, PicturesConfig, TrajectoriesConfig
     from manitwin.scenes.loaded_scene import Scene
+    from manitwin.scenes.settings import LayoutsConfig
     from manitwin.twin.loaded_twin import Grasps, Twin
     from manitwin.twin.record import TwinRecord
 
@@ -169,6 +170,10 @@ _DEFINED_IN = {
         "PublishedEpisodes",
         "publish_episodes",
     ),
+    "manitwin.episodes.settings": (
+        "PicturesConfig",
+        "TrajectoriesConfig",
+    ),
     "manitwin.errors": (
         "AssetError",
         "BackendError",
@@ -183,11 +188,7 @@ _DEFINED_IN = {
     "manitwin.physics.sapien.robot": ("SapienRobot",),
     "manitwin.robots.load": ("load_robot",),
     "manitwin.robots.robot": ("Robot",),
-    "manitwin.scenes.app_config": (
-        "LayoutsConfig",
-        "PicturesConfig",
-        "TrajectoriesConfig",
-    ),
+    "manitwin.scenes.settings": ("LayoutsConfig",),
     "manitwin.scenes.loaded_scene": ("Scene",),
     "manitwin.twin.loaded_twin": (
         "Grasps",

@@ -21,13 +21,14 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.engine.events import OnStage
     from manitwin.episodes.collect import AttemptTotals
     from manitwin.episodes.retirement import Retirement
+    from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
     from manitwin.pipeline.build_item import ItemResult
     from manitwin.pipeline.dataset_run import ExecutorName, RunReport
     from manitwin.pipeline.folder_listing import FolderListing
     from manitwin.pipeline.item import Item
     from manitwin.pipeline.manifest import Notes
-    from manitwin.scenes.app_config import LayoutsConfig, PicturesConfig, TrajectoriesConfig
     from manitwin.scenes.loaded_scene import Scene
+    from manitwin.scenes.settings import LayoutsConfig
     from manitwin.twin.loaded_twin import Twin
     from manitwin.twin.record import TwinRecord
 
@@ -214,7 +215,7 @@ def load_scene(scene: str | Path, dataset: str | Path | None = None) -> Scene:
     Raises UsageError where the scene cannot be read, or does not lie in the folder that says whose twins it has.
     """
     from manitwin.scenes.loaded_scene import Scene
-    from manitwin.scenes.scene_folders import dataset_of
+    from manitwin.scenes.scene_files import dataset_of
 
     return Scene.read(scene, dataset_of(Path(scene)) if dataset is None else dataset)
 
@@ -285,8 +286,8 @@ def make_layouts(
     by default one a core. ``find_scenes`` lists the accepted ones. Raises UsageError for a data set without twins, categories
     that it has not, scenes of other settings at ``out``, or where another run is at work there.
     """
-    from manitwin.scenes.app_config import LayoutsConfig
-    from manitwin.scenes.layouts.run import make_layouts as make
+    from manitwin.scenes.layouts.layouts_run import make_layouts as make
+    from manitwin.scenes.settings import LayoutsConfig
 
     settings = _settings(LayoutsConfig, config, jobs)
     return make(dataset, out, count, settings, executor=executor, address=address)
@@ -297,7 +298,7 @@ def find_scenes(place: str | Path) -> list[Path]:
 
     Raises UsageError where there is none.
     """
-    from manitwin.scenes.scene_folders import scene_files
+    from manitwin.scenes.scene_files import scene_files
 
     found = scene_files(Path(place))
     if not found:
@@ -363,9 +364,9 @@ def make_episodes(
     or where another run is at work there.
     """
     from manitwin.episodes.collect import chosen_formats, collect
-    from manitwin.episodes.run import make_episodes as make_batches
-    from manitwin.episodes.run import retire_failing
-    from manitwin.scenes.app_config import TrajectoriesConfig
+    from manitwin.episodes.episodes_run import make_episodes as make_batches
+    from manitwin.episodes.episodes_run import retire_failing
+    from manitwin.episodes.settings import TrajectoriesConfig
 
     settings, wanted = _settings(TrajectoriesConfig, config, jobs), chosen_formats(",".join(formats))
     run = make_batches(source, out, count, settings, twins=twins, executor=executor, address=address)
@@ -390,10 +391,10 @@ def render_episodes(
     ``twins``: where their twins are now. What is drawn already stays. Raises EpisodesError where there are no episodes,
     UsageError for an unknown camera, RendererMissing, and Unavailable without an encoder.
     """
-    from manitwin.episodes.render_run import draw_episodes, write_with_pictures
+    from manitwin.episodes.episode_pictures import draw_episodes, write_with_pictures
+    from manitwin.episodes.settings import PicturesConfig
     from manitwin.episodes.video import require_encoder
     from manitwin.render.device import require_renderer
-    from manitwin.scenes.app_config import PicturesConfig
 
     settings = _settings(PicturesConfig, config, jobs)
     if executor != "ray":
@@ -425,7 +426,7 @@ def write_statistics(dataset: str | Path, out: str | Path | None = None) -> Writ
     ``out`` None: ``statistics/`` below it. Raises UsageError where a data set has no index.
     """
     from manitwin.dataset.statistics.report import WrittenReport, write_dataset_report
-    from manitwin.episodes.attempts_table import ATTEMPTS
+    from manitwin.episodes.attempts import ATTEMPTS
     from manitwin.twin.dataset_root import DatasetRoot
 
     root = DatasetRoot(dataset)

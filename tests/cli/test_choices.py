@@ -14,6 +14,7 @@ from manitwin.cli.commands.query import WRITERS
 from manitwin.dataset.index.tables import TABLES
 from manitwin.episodes import collect
 from manitwin.episodes.cameras import named_cameras
+from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
 from manitwin.errors import UsageError
 from manitwin.models.fakes.catalog import REHEARSALS
 from manitwin.models.registry import backends
@@ -21,7 +22,7 @@ from manitwin.pipeline.dataset_run import EXECUTORS
 from manitwin.pipeline.manifest import Units, Up
 from manitwin.robots.grippers.gripper import shipped_grippers
 from manitwin.robots.load import load_robot, shipped_robots
-from manitwin.scenes.app_config import LayoutSettings, PicturesConfig, TrajectoriesConfig
+from manitwin.scenes.settings import LayoutSettings
 
 
 def literal(section: type, name: str) -> set[str]:

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 
 from manitwin.cli.commands.layout import layout
 from manitwin.errors import UsageError
-from manitwin.scenes.layouts.run import CONTACT_SHEET
+from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET
 from manitwin.scenes.scene import SCENE
-from manitwin.scenes.scene_file import read_scene
+from manitwin.scenes.scene_files import read_scene
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import RECORD, seal
 from scene_twins import slab, write_thing

@@ -9,7 +9,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from manitwin.cli.main import app
-from manitwin.scenes.scene_file import read_scene
+from manitwin.scenes.scene_files import read_scene
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import RECORD
 from scene_twins import THINGS, write_things

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.episodes.recording import Recording
-from manitwin.episodes.robot_visuals import tip_pose
+from manitwin.episodes.replay_pictures import link_poses
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
@@ -93,3 +93,8 @@ def moving(robot: Robot, steps: int, objects: np.ndarray) -> Recording:
         action_tip_quaternion_wxyz=zeros(4)[1:],
         phase=np.zeros(steps, np.uint8),
     )
+
+
+def tip_pose(robot: Robot, joint_positions_rad: np.ndarray) -> np.ndarray:
+    """Return ``gripper_to_world (4, 4)`` of the grasp frame (+Z approach, X closing)."""
+    return link_poses(robot, joint_positions_rad, 0.0)[robot.tip_link] @ robot.gripper_to_tip

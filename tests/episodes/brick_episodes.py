@@ -12,11 +12,11 @@ from manitwin.episodes.episode import EpisodeFacts, run_episode
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, Motion, PickPlacePlan, PickPlaceProblem, PlanReport
 from manitwin.episodes.recording import Recording
+from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
-from manitwin.scenes.app_config import EpisodeSettings
 from rigid_boxes import above, box
 
 BRICK_M = [0.04, 0.06, 0.1]

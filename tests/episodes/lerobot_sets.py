@@ -10,7 +10,7 @@ import numpy as np
 from synthetic_episodes import episode
 
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
-from manitwin.episodes.lerobot.write import Written, write_lerobot
+from manitwin.episodes.lerobot.write import LeRobotSummary, write_lerobot
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.episodes.stored_episode import StoredEpisode
 
@@ -21,7 +21,7 @@ def episodes(count: int = 5) -> list[StoredEpisode]:
     return [episode(i) for i in range(count)]
 
 
-def written(place: Path, count: int = 5, *, size_mb: int = 100, videos: Sequence[CameraVideos] = ()) -> Written:
+def written(place: Path, count: int = 5, *, size_mb: int = 100, videos: Sequence[CameraVideos] = ()) -> LeRobotSummary:
     return write_lerobot(episodes(count), place, data_files_size_in_mb=size_mb, videos=videos)
 
 

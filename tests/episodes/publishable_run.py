@@ -9,14 +9,14 @@ from pathlib import Path
 from lerobot_sets import HEIGHT_PX, WIDTH_PX, picture
 from synthetic_episodes import attempt, episode
 
-from manitwin.episodes.attempts_table import ATTEMPTS, merge_attempts, write_attempts
+from manitwin.episodes.attempts import ATTEMPTS, merge_attempts, write_attempts
 from manitwin.episodes.batch import BATCH_RECORD, BatchRecord
+from manitwin.episodes.episode_pictures import PICTURES_RECORD, PicturesRecord, batch_name
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import write_episodes
-from manitwin.episodes.pictures_recipe import PICTURES_RECORD, PicturesRecord, batch_name
+from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode
 from manitwin.episodes.video import EpisodesVideo
-from manitwin.scenes.app_config import TrajectoriesConfig
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import RECORD, seal

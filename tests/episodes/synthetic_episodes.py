@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.attempt import Attempt
+from manitwin.episodes.attempts import Attempt
 from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.episodes.stored_episode import RecordedObject, RecordedRobot, StoredEpisode
 

@@ -14,8 +14,8 @@ from brick_episodes import BRICK_M, GOAL, START, Deceived, brick, digest, panda,
 from manitwin.episodes.episode import EpisodeFacts
 from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.recording import RATE_HZ, Recording
+from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
-from manitwin.scenes.app_config import EpisodeSettings
 
 TESTS = Path(__file__).resolve().parents[1]
 

@@ -12,18 +12,19 @@ import pytest
 
 from grasped_twins import write_brick
 from manitwin.engine.stage_parts import StagePart, heard_by
-from manitwin.episodes.attempts_table import ATTEMPTS, read_attempts
+from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
+from manitwin.episodes.episode_pictures import draw_episodes, write_with_pictures
+from manitwin.episodes.episodes_run import make_episodes
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.lerobot.read import read_lerobot
 from manitwin.episodes.planning.problem import Phase
-from manitwin.episodes.render_run import draw_episodes, write_with_pictures
-from manitwin.episodes.run import make_episodes
+from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
 from manitwin.episodes.statistics.report import episode_statistics
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
-from manitwin.scenes.app_config import LayoutsConfig, LayoutSettings, PicturesConfig, TrajectoriesConfig
-from manitwin.scenes.layouts.run import make_layouts
+from manitwin.scenes.layouts.layouts_run import make_layouts
+from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 
 CONFIG = TrajectoriesConfig(seed=5, batch=2)
 

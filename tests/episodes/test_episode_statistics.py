@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from synthetic_episodes import attempt, episode, robot
 
-from manitwin.episodes.attempt import OUTCOMES, Attempt
-from manitwin.episodes.attempts_table import ATTEMPTS, merge_attempts, write_attempts
+from manitwin.episodes.attempts import ATTEMPTS, OUTCOMES, Attempt, merge_attempts, write_attempts
 from manitwin.episodes.hdf5_file import write_episodes
 from manitwin.episodes.statistics.queries import PRELUDE
 from manitwin.episodes.statistics.report import EpisodeReport, episode_statistics

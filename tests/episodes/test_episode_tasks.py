@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manitwin.episodes.tasks import MIN_GAP_M, MIN_MOVE_M, Placeable, Room, free_goal, sample_task
+from manitwin.episodes.pick_place_tasks import MIN_GAP_M, MIN_MOVE_M, Placeable, PlacingArea, free_goal, sample_task
 from manitwin.geometry.poses import transform_points
 from manitwin.robots.robot import Workspace
-from manitwin.scenes.layouts.furniture import make_furniture
+from manitwin.scenes.layouts.surroundings import make_furniture
 from scene_twins import pool_of_things
 
 POOL = pool_of_things()
 PLACEABLES = [Placeable.of(POOL, twin) for twin in POOL.twins]
-ROOM = Room(Workspace(0.35, 0.68, 0.9), make_furniture("table", np.random.default_rng(0)).supports[0])
+ROOM = PlacingArea(Workspace(0.35, 0.68, 0.9), make_furniture("table", np.random.default_rng(0)).supports[0])
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -50,5 +50,5 @@ def test_a_goal_in_a_scene_keeps_the_way_the_object_stands() -> None:
 
 
 def test_no_room_is_none() -> None:
-    nowhere = Room(Workspace(5.0, 6.0, 0.1), ROOM.support)
+    nowhere = PlacingArea(Workspace(5.0, 6.0, 0.1), ROOM.support)
     assert sample_task(PLACEABLES[0], lambda: PLACEABLES[1], 1, nowhere, np.random.default_rng(0)) is None

@@ -12,11 +12,11 @@ from brick_episodes import START, panda, problem, standing
 from manitwin.episodes.episode import world_of
 from manitwin.episodes.execution import IN_HAND, Execution
 from manitwin.episodes.planning.problem import Phase, PickPlaceProblem
+from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
-from manitwin.scenes.app_config import EpisodeSettings
 from rigid_boxes import box
 
 PALM_M, FINGER_END_M = 0.066, 0.1125  # where palm and fingers end, along the approach

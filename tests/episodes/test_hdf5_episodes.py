@@ -14,10 +14,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from synthetic_episodes import episode, recording, robot
 
-from manitwin.episodes.action_deltas import joint_delta, tip_delta
 from manitwin.episodes.hdf5_file import EpisodeFile, write_episodes
 from manitwin.episodes.hdf5_merge import METADATA, TRAJECTORIES, merge_episodes
-from manitwin.episodes.recording import Recording
+from manitwin.episodes.recording import Recording, joint_delta, tip_delta
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.errors import EpisodesError
 

@@ -12,10 +12,10 @@ import pytest
 from lerobot_sets import HEIGHT_PX, WIDTH_PX, camera, color_rgb, episodes, written
 from synthetic_episodes import episode, robot
 
-from manitwin.episodes.action_deltas import joint_delta, tip_delta
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
 from manitwin.episodes.lerobot.write import write_lerobot
+from manitwin.episodes.recording import joint_delta, tip_delta
 from manitwin.errors import EpisodesError
 from manitwin.twin.store import digests_below
 

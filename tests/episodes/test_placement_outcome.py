@@ -13,8 +13,8 @@ from manitwin.episodes.outcome import (
     placement_errors,
     placement_outcome,
 )
+from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import transform
-from manitwin.scenes.app_config import EpisodeSettings
 
 SETTINGS = EpisodeSettings()
 CENTER_M = np.array([0.0, 0.0, 0.05])

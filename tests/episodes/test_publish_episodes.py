@@ -24,9 +24,9 @@ from publishable_run import (
 )
 from test_episode_video import decoded
 
-from manitwin.episodes.attempts_table import ATTEMPTS, read_attempts
+from manitwin.episodes.attempts import ATTEMPTS, read_attempts
+from manitwin.episodes.episode_pictures import batch_name
 from manitwin.episodes.lerobot.read import read_lerobot
-from manitwin.episodes.pictures_recipe import batch_name
 from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import TwinSource

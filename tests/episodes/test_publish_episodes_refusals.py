@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from manitwin.cli.commands.publish import publish
 from manitwin.dataset.publish.publication import EPISODES, Publication
 from manitwin.episodes.batch import BATCH_RECORD
-from manitwin.episodes.pictures_recipe import PICTURES_RECORD, batch_name
+from manitwin.episodes.episode_pictures import PICTURES_RECORD, batch_name
 from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
@@ -133,8 +133,6 @@ def test_a_batch_without_its_record_says_so(run: Path, tmp_path: Path) -> None:
     half = tmp_path / "half"
     shutil.copytree(run, half)
     (half / batch_name("11batch") / BATCH_RECORD).write_text("{}")
-    with pytest.raises(
-        EpisodesError, match=r"batch\.json: schema_version: Field required; run manitwin traj"
-    ) as raised:
+    with pytest.raises(EpisodesError, match=r"batch\.json: config_sha256: Field required; run manitwin traj") as raised:
         publish_episodes(half, tmp_path / "out", license_allow=["CC-BY-4.0", "CC0-1.0"])
     assert "\n" not in str(raised.value) and not (tmp_path / "out").exists()

@@ -14,8 +14,7 @@ from boxy_robot import boxy_robot, moving
 
 from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.recording import Recording
-from manitwin.episodes.replay_pictures import Replay
-from manitwin.episodes.robot_visuals import link_poses, link_visuals
+from manitwin.episodes.replay_pictures import EpisodeReplay, link_poses, link_visuals
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform, transform_points
 from manitwin.geometry.ray_caster import RayCaster
@@ -44,15 +43,17 @@ def recording(robot: Robot) -> Recording:
 
 
 @pytest.fixture(scope="module")
-def replay(robot: Robot) -> Iterator[Replay]:
-    with Replay(robot, cubes()) as made:
+def replay(robot: Robot) -> Iterator[EpisodeReplay]:
+    with EpisodeReplay(robot, cubes()) as made:
         yield made
 
 
 def world(robot: Robot, recording: Recording, state: int, ids: dict[str, int]) -> tuple[trimesh.Trimesh, np.ndarray]:
     """Everything but the furniture at a state as one mesh, and the id of each face's thing."""
     poses = link_poses(robot, recording.joint_positions_rad[state], float(recording.gripper_opening_m[state]))
-    things = [(ids[f"boxy/{link}"], part, poses[link]) for link, parts in link_visuals(robot).items() for part in parts]
+    things = [
+        (ids[f"boxy/{link}"], part, poses[link]) for link, parts in link_visuals(robot.urdf).items() for part in parts
+    ]
     for index, parts in enumerate(cubes()):
         things.append((ids[f"object_{index:02d}"], parts[0], transform(translation=OBJECTS[index])))
     table = trimesh.creation.box([1.3, 1.4, 0.04]).apply_translation([0.4, 0.0, -0.02])
@@ -64,7 +65,7 @@ def world(robot: Robot, recording: Recording, state: int, ids: dict[str, int]) -
 
 @pytest.mark.parametrize("camera", ["front", "side", "top", "wrist"])
 def test_ids_and_depth_are_those_of_rays_at_the_recorded_states(
-    robot: Robot, recording: Recording, replay: Replay, camera: str
+    robot: Robot, recording: Recording, replay: EpisodeReplay, camera: str
 ) -> None:
     named = named_cameras([camera], robot)
     frames = replay.frames(recording, named, width_px=SIZE, height_px=SIZE, every=4, geometry=True)
@@ -84,7 +85,7 @@ def test_ids_and_depth_are_those_of_rays_at_the_recorded_states(
         assert np.quantile(np.abs(frame.depth_m - depth)[same], 0.999) < 1e-4
 
 
-def test_fingertips_are_drawn_at_the_recorded_tip(robot: Robot, recording: Recording, replay: Replay) -> None:
+def test_fingertips_are_drawn_at_the_recorded_tip(robot: Robot, recording: Recording, replay: EpisodeReplay) -> None:
     """The pads' middle, half an opening to either side of the recorded tip, is seen as a finger from the front."""
     front = named_cameras(["front"], robot)
     fingers = {replay.ids[f"boxy/{link}"] for link in robot.finger_links}
@@ -117,7 +118,7 @@ def test_link_poses_are_pinocchios(name: str) -> None:
 
 
 def test_every_link_with_looks_has_its_own_colours() -> None:
-    visuals = link_visuals(load_robot("panda"))
+    visuals = link_visuals(load_robot("panda").urdf)
     assert set(visuals) >= {"panda_link0", "panda_link7", "panda_hand", "panda_leftfinger"}
     colors = {tuple(part.visual.material.baseColorFactor[:3]) for parts in visuals.values() for part in parts}
     assert len(colors) > 3
@@ -125,7 +126,7 @@ def test_every_link_with_looks_has_its_own_colours() -> None:
     np.testing.assert_allclose(np.ptp(extents, axis=0), [0.21, 0.19, 0.14], atol=0.04)  # metres, Z up
 
 
-def test_robot_of_boxes_is_blue_as_its_urdf_says(robot: Robot, recording: Recording, replay: Replay) -> None:
+def test_robot_of_boxes_is_blue_as_its_urdf_says(robot: Robot, recording: Recording, replay: EpisodeReplay) -> None:
     frame = next(
         replay.frames(recording, named_cameras(["side"], robot), width_px=SIZE, height_px=SIZE, geometry=True)
     )[0]
@@ -133,7 +134,7 @@ def test_robot_of_boxes_is_blue_as_its_urdf_says(robot: Robot, recording: Record
     assert seen[2] > 2 * seen[0]
 
 
-def test_objects_that_moved_are_drawn_elsewhere(robot: Robot, recording: Recording, replay: Replay) -> None:
+def test_objects_that_moved_are_drawn_elsewhere(robot: Robot, recording: Recording, replay: EpisodeReplay) -> None:
     positions = recording.object_positions_m.copy()
     positions[1:, 0] += [0.1, 0.0, 0.2]
     moved = replace(recording, object_positions_m=positions)
@@ -148,7 +149,7 @@ def test_objects_that_moved_are_drawn_elsewhere(robot: Robot, recording: Recordi
     assert other[0] == other[1] > 20
 
 
-def test_recording_of_other_objects_is_refused(robot: Robot, replay: Replay) -> None:
+def test_recording_of_other_objects_is_refused(robot: Robot, replay: EpisodeReplay) -> None:
     with pytest.raises(UsageError, match="has 1 objects, the replay 2"):
         next(replay.frames(moving(robot, 2, OBJECTS[:1]), named_cameras(["top"], robot), width_px=16, height_px=16))
 
@@ -156,7 +157,7 @@ def test_recording_of_other_objects_is_refused(robot: Robot, replay: Replay) -> 
 def test_pictures_are_the_same_when_they_are_drawn_again(robot: Robot, recording: Recording, tmp_path: Path) -> None:
     runs = []
     for _ in range(2):
-        with Replay(robot, cubes()) as made:
+        with EpisodeReplay(robot, cubes()) as made:
             drawn = made.frames(recording, named_cameras(["front"], robot), width_px=64, height_px=64, every=4)
             runs.append(b"".join(frame[0].rgb.tobytes() for frame in drawn))
     assert runs[0] == runs[1]

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from manitwin.episodes.planning.problem import Grasp
-from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps, without_retired
+from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
 from manitwin.geometry.poses import transform
 from manitwin.robots.grippers.gripper import load_gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
@@ -56,7 +56,6 @@ def test_only_verified_grasps_that_are_not_retired_are_used(tmp_path: Path) -> N
     assert not found[0].transferred
     assert found[0].grasp_type == "pinch"
     assert found[0].grasp.gripper_to_object == pytest.approx(above([0, 0, 0.05]))
-    assert ids(without_retired(found, frozenset({"panda-0000"}))) == ["panda-0005"]
 
 
 def test_grasp_that_held_in_more_perturbed_trials_is_worth_more_and_without_trials_the_score_counts(

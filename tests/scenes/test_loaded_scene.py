@@ -8,11 +8,11 @@ import pytest
 import sapien
 
 from manitwin.geometry.poses import rotation_angle_rad, transform
-from manitwin.scenes.app_config import LayoutSettings
 from manitwin.scenes.layouts.pool import read_pool
 from manitwin.scenes.layouts.sample import sample_layout
 from manitwin.scenes.loaded_scene import Scene, object_pose
-from manitwin.scenes.scene_file import write_scene
+from manitwin.scenes.scene_files import write_scene
+from manitwin.scenes.settings import LayoutSettings
 from scene_twins import write_things
 
 

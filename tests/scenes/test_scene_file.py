@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from manitwin.errors import UsageError
-from manitwin.scenes.app_config import LayoutSettings
 from manitwin.scenes.layouts.sample import sample_layout
 from manitwin.scenes.scene import SCENE
-from manitwin.scenes.scene_file import read_scene, scene_bytes, write_scene
+from manitwin.scenes.scene_files import read_scene, scene_bytes, write_scene
+from manitwin.scenes.settings import LayoutSettings
 from scene_twins import pool_of_things
 
 

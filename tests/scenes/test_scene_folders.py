@@ -12,9 +12,9 @@ import manitwin
 from manitwin.cli.main import app
 from manitwin.errors import UsageError
 from manitwin.pipeline.dataset_run import stored_config
-from manitwin.scenes.app_config import LayoutsConfig, LayoutSettings
-from manitwin.scenes.layouts.run import layout_totals, make_layouts
-from manitwin.scenes.scene_folders import scene_ids, scene_name
+from manitwin.scenes.layouts.layouts_run import layout_totals, make_layouts
+from manitwin.scenes.scene_files import scene_ids, scene_name
+from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 from manitwin.twin.dataset_root import DatasetRoot
 from scene_twins import write_things
 

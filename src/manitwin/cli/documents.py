@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from manitwin.pipeline.build_item import ItemResult
     from manitwin.pipeline.dataset_run import RunReport
     from manitwin.pipeline.folder_listing import FolderListing
-    from manitwin.scenes.layouts.run import LayoutTotals
+    from manitwin.scenes.layouts.layouts_run import LayoutTotals
     from manitwin.twin.loaded_twin import Twin
     from manitwin.twin.resting import RestingPose
 

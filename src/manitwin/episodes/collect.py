@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from manitwin.episodes.attempts_table import ATTEMPTS, merge_attempts, read_attempts
+from manitwin.episodes.attempts import ATTEMPTS, merge_attempts, read_attempts
 from manitwin.episodes.batch import BATCH_RECORD, BATCHES, REMEDY_OF_REPEATS
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -21,11 +20,11 @@ from manitwin.episodes.outcome import (
 )
 from manitwin.episodes.planning.problem import Grasp, Motion, PickPlacePlan, PickPlaceProblem, PlanFailure, PlanReport
 from manitwin.episodes.recording import Recording
+from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 from manitwin.robots.robot import Robot
-from manitwin.scenes.app_config import EpisodeSettings
 
 SMALL_SLIP_M, SMALL_SLIP_RAD = 0.004, np.radians(2.0)  # a fifth of what a placement may be off: no reason to give up
 LEAST_LIFT_SHARE = 0.5  # of what the hand rose: less, and the object was left behind
@@ -52,7 +51,7 @@ class Planner(Protocol):
 
 @dataclass
 class EpisodeFacts:
-    """What became of an episode: the part of an ``Attempt`` that the execution knows. Times are CPU seconds."""
+    """The result of an episode: the part of an ``Attempt`` that the execution knows."""
 
     outcome: str = "no_plan"
     grasp: Grasp | None = None
@@ -60,12 +59,9 @@ class EpisodeFacts:
     plan_failures: Counter[PlanFailure] = field(default_factory=Counter)
     errors: PlacementErrors | None = None
     slip_m: float | None = None
-    turned_in_hand_rad: float | None = None
     length_s: float | None = None
     unplanned: tuple[tuple[str, str], ...] = ()
     replans: Counter[str] = field(default_factory=Counter)
-    planning_s: float = 0.0
-    simulation_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -116,7 +112,6 @@ class _Episode:
         self.facts = EpisodeFacts()
 
     def run(self) -> tuple[EpisodeFacts, Recording | None]:
-        start = time.process_time()
         recording, closing = None, self._closing()
         with world_of(self.problem, self.robot, self.settings, closing.force_n) as world:
             if not self._settle(world):
@@ -132,7 +127,6 @@ class _Episode:
                 self.facts.unplanned = tuple(sorted(execution.unplanned))
                 recording = execution.recording()
                 del execution
-        self.facts.simulation_s = time.process_time() - start - self.facts.planning_s
         return self.facts, recording
 
     def _settle(self, world: RobotWorld) -> bool:
@@ -157,9 +151,7 @@ class _Episode:
         return True
 
     def _plan(self, world: RobotWorld) -> PickPlacePlan | None:
-        start = time.process_time()
         report = self.planner.plan(self.problem)
-        self.facts.planning_s += time.process_time() - start
         self.facts.grasps_tried, self.facts.plan_failures = report.tried, report.failures
         self.facts.grasp = report.plan.grasp if report.plan else None
         return report.plan
@@ -202,11 +194,10 @@ class _Episode:
 
     def _placed_anew(self, plan: PickPlacePlan, execution: Execution, *, with_carry: bool) -> _Placement | None:
         """Plan the placement from the pose in the hand."""
-        start, measured = time.process_time(), execution.gripper_to_object()
+        measured = execution.gripper_to_object()
         found = self.planner.plan_place(
             self.problem, plan, execution.commanded_rad, measured, self.problem.goal_object_to_world, with_carry
         )
-        self.facts.planning_s += time.process_time() - start
         return None if found is None else _Placement(measured, *found)
 
     def _placed_late(self, plan: PickPlacePlan, execution: Execution, before: _Placement) -> _Placement:
@@ -236,7 +227,6 @@ class _Episode:
     def _measure_slip(self, plan: PickPlacePlan, execution: Execution) -> None:
         planned, measured = inverse(plan.gripper_to_object), inverse(execution.gripper_to_object())
         self.facts.slip_m = moved_m(planned, measured, self.problem.target.body.center_of_mass_m)
-        self.facts.turned_in_hand_rad = turned_rad(planned, measured)
 
     def _judge(self, world: RobotWorld, execution: Execution) -> None:
         settings, body = self.settings, self.problem.target.body

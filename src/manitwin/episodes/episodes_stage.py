@@ -14,26 +14,24 @@ import numpy as np
 from manitwin.config import Resource
 from manitwin.engine.stage import Draft
 from manitwin.engine.stage_parts import tell_part
-from manitwin.episodes.attempt import Attempt
-from manitwin.episodes.attempts_table import ATTEMPTS, write_attempts
+from manitwin.episodes.attempts import ATTEMPTS, Attempt, write_attempts
 from manitwin.episodes.batch import Batch
 from manitwin.episodes.episode import EpisodeFacts, run_episode
 from manitwin.episodes.hdf5_file import write_episodes
 from manitwin.episodes.instructions import episode_instructions
+from manitwin.episodes.pick_place_tasks import PickPlaceTask, Placeable, PlacingArea, free_goal, sample_task
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
+from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode, recorded_robot
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
-from manitwin.episodes.tasks import Placeable, Room, Task, free_goal, sample_task
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
-from manitwin.scenes.app_config import TrajectoriesConfig
-from manitwin.scenes.layouts.furniture import make_furniture
-from manitwin.scenes.layouts.looks import make_lights
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
+from manitwin.scenes.layouts.surroundings import make_furniture, make_lights
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
 from manitwin.scenes.scene import Furniture, Light
-from manitwin.scenes.scene_folders import scene_name
+from manitwin.scenes.scene_files import scene_name
 from manitwin.twin.loaded_twin import Twin, TwinSource
 
 EPISODES = "episodes.h5"
@@ -44,7 +42,7 @@ KEPT_TWINS = 256
 class _Setting:
     """An episode before it is planned: the task on its furniture, and the scene that it is of, if any."""
 
-    task: Task
+    task: PickPlaceTask
     furniture: Furniture
     ambient: tuple[float, float, float]
     lights: tuple[Light, ...]
@@ -144,7 +142,7 @@ class EpisodesStage:
                         return self._placeable(twin.twin_id)
 
             furniture, (ambient, lights) = make_furniture("table", rng), make_lights(rng)
-            room = Room(workspace, furniture.supports[0])
+            room = PlacingArea(workspace, furniture.supports[0])
             task = sample_task(self._placeable(batch.twin_id), other, self.settings.others, room, rng)
             return None if task is None else _Setting(task, furniture, ambient, lights)
         assert batch.scene_id is not None and self.scenes is not None
@@ -160,10 +158,10 @@ class EpisodesStage:
         ]
         supports = {support.name: support for support in record.furniture.supports}
         for target in rng.permutation(able):
-            room = Room(workspace, supports[record.objects[int(target)].surface])
+            room = PlacingArea(workspace, supports[record.objects[int(target)].surface])
             goal = free_goal(objects, int(target), room, rng)
             if goal is not None:
-                task = Task(objects, int(target), goal)
+                task = PickPlaceTask(objects, int(target), goal)
                 return _Setting(task, record.furniture, record.ambient, record.lights, batch.scene_id)
         return None
 

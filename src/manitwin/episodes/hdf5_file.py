@@ -17,13 +17,12 @@ from typing import Any
 import h5py
 import numpy as np
 
-from manitwin.episodes.action_deltas import joint_delta, tip_delta
+from manitwin.episodes.attempts import attempt_from
 from manitwin.episodes.beside import file_beside
-from manitwin.episodes.recording import RATE_HZ, Recording
+from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta
 from manitwin.episodes.stored_episode import (
     RecordedObject,
     StoredEpisode,
-    attempt_from,
     robot_from,
     to_json,
 )

@@ -10,10 +10,10 @@ from typing import Any, TextIO
 
 import h5py
 
+from manitwin.episodes.attempts import attempt_from
 from manitwin.episodes.beside import file_beside
 from manitwin.episodes.hdf5_file import LIBVER, EpisodeFile
 from manitwin.episodes.recording import RATE_HZ
-from manitwin.episodes.stored_episode import attempt_from
 from manitwin.errors import EpisodesError
 
 TRAJECTORIES, METADATA = "trajectory.h5", "trajectory.json"

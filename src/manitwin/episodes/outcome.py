@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import rotation_angle_rad, transform_points
-from manitwin.scenes.app_config import EpisodeSettings
 
 
 @dataclass(frozen=True)

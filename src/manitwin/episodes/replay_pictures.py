@@ -1,4 +1,4 @@
-"""Pictures of a recorded episode: its states are shown again, nothing is simulated."""
+"""Pictures of recorded states: the robot's links by the visual shapes of its URDF, the objects, and the furniture."""
 
 from __future__ import annotations
 
@@ -10,18 +10,52 @@ from types import TracebackType
 import numpy as np
 import trimesh
 
+from manitwin.assets.asset_files import AssetFiles
+from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.episodes.cameras import NamedCamera
 from manitwin.episodes.recording import Recording
-from manitwin.episodes.robot_visuals import link_drawables, link_poses
 from manitwin.errors import UsageError
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.render.drawable import Drawable, drawable
 from manitwin.render.scene_lighting import STUDIO, Lighting
 from manitwin.render.scene_renderer import SceneFrame, SceneRenderer
+from manitwin.robots.links import links_of_urdf, poses_at
 from manitwin.robots.robot import Robot
+from manitwin.robots.urdf import UrdfTree
 from manitwin.scenes.furniture_pictures import add_furniture
 from manitwin.scenes.scene import Furniture, SurfaceBox
+
+
+@lru_cache(maxsize=4)
+def link_visuals(urdf: str) -> dict[str, tuple[trimesh.Trimesh, ...]]:
+    """Return the visual parts of a URDF's links that have any, by name, in the links' frames.
+
+    COLLADA files keep their own colours, STL files and plain shapes have those of the URDF. Raises AssetError where a mesh
+    cannot be read.
+    """
+    tree = UrdfTree.of_text(urdf)
+    shapes = LinkShapes(tree, Path("robot.urdf"), AssetFiles(Path(Path.cwd().anchor)))
+    parts = {name: tuple(shapes.visual(link, np.eye(4))) for name, link in tree.links.items()}
+    return {name: found for name, found in parts.items() if found}
+
+
+@lru_cache(maxsize=4)
+def link_drawables(urdf: str, tolerance_m: float) -> dict[str, Drawable]:
+    """Return the links that have visual parts, ready to be drawn, simplified by about a tolerance; kept for the next call."""
+    return {link: drawable(parts, tolerance_m=tolerance_m) for link, parts in link_visuals(urdf).items()}
+
+
+def link_poses(robot: Robot, joint_positions_rad: np.ndarray, gripper_opening_m: float) -> dict[str, np.ndarray]:
+    """Return every link's ``link_to_world (4, 4)``, by name; the fingers stand at half of the opening each.
+
+    ``joint_positions_rad`` are the arm's, in the order of ``robot.arm_joints``; fingers that a recording has in front of
+    them follow the opening alone.
+    """
+    joints = dict(zip(robot.arm_joints, np.asarray(joint_positions_rad, float), strict=False))
+    joints.update(dict.fromkeys(robot.finger_joints, float(gripper_opening_m) / 2))
+    return poses_at(links_of_urdf(robot.urdf), joints)
+
 
 TOLERANCE_M = 0.0004  # of simplified surfaces: a third of a pixel's width at 1 m in a picture of 640 pixels
 TABLE = Furniture(
@@ -38,7 +72,7 @@ def twin_drawable(folder: Path) -> Drawable:
     return drawable(read_glb(folder / "visual.glb"), tolerance_m=TOLERANCE_M)
 
 
-class Replay:
+class EpisodeReplay:
     """A robot, objects and furniture, uploaded once, that recordings are shown with. Close it, or use a ``with`` statement.
 
     ``objects`` are those of the recording, in its order: ready to be drawn (``twin_drawable``), or their visual parts in
@@ -61,13 +95,13 @@ class Replay:
         for name, thing in zip(self._objects, objects, strict=True):
             ready = thing if isinstance(thing, Drawable) else drawable(thing, tolerance_m=TOLERANCE_M)
             self._renderer.add(name, ready)
-        links = link_drawables(robot, tolerance_m=TOLERANCE_M)
+        links = link_drawables(robot.urdf, TOLERANCE_M)
         self._links = list(links)
         for link, visual in links.items():
             self._renderer.add(f"{robot.name}/{link}", visual)
         add_furniture(self._renderer, furniture, seed=seed)
 
-    def __enter__(self) -> Replay:
+    def __enter__(self) -> EpisodeReplay:
         return self
 
     def __exit__(

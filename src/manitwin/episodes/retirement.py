@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
-from manitwin.episodes.attempt import EXECUTION_FAILURES, Attempt
+from manitwin.episodes.attempts import EXECUTION_FAILURES, Attempt
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import amend

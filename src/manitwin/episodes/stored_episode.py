@@ -6,9 +6,8 @@ import json
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from manitwin.episodes.attempt import Attempt
+from manitwin.episodes.attempts import Attempt
 from manitwin.episodes.recording import Recording
-from manitwin.errors import EpisodesError
 from manitwin.robots.robot import Robot
 from manitwin.robots.urdf import UrdfTree
 
@@ -79,16 +78,6 @@ def to_json(episode: StoredEpisode) -> str:
         "facts": episode.facts,
     }
     return json.dumps(said, sort_keys=True, allow_nan=False, separators=(",", ":"))
-
-
-def attempt_from(said: dict[str, Any]) -> Attempt:
-    """Return the attempt of a dict with its fields; raises EpisodesError where one is missing or unknown."""
-    try:
-        return Attempt(**{**said, "instructions": tuple(said["instructions"])})
-    except (TypeError, KeyError) as error:
-        raise EpisodesError(
-            f"an attempt with other fields than this version's ({error}); run the episodes again"
-        ) from error
 
 
 def robot_from(said: dict[str, Any]) -> RecordedRobot:

@@ -52,11 +52,6 @@ def shuffled(grasps: Iterable[TargetGrasp], rng: np.random.Generator) -> tuple[T
     return tuple(chosen[i] for i in np.argsort(-keys, kind="stable"))
 
 
-def without_retired(grasps: Iterable[TargetGrasp], retired: frozenset[str]) -> tuple[TargetGrasp, ...]:
-    """Leave out those whose ids are retired."""
-    return tuple(grasp for grasp in grasps if grasp.grasp.grasp_id not in retired)
-
-
 def _sources(twin: Twin, wanted: str) -> list[str]:
     """Return the parallel grippers that the twin has grasps of: the one that is wanted, its own, then by name."""
     summary = twin.record.grasps

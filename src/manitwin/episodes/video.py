@@ -30,21 +30,11 @@ ANIMATIONS = (".webp", ".gif")
 
 @dataclass(frozen=True)
 class Span:
-    """Where an episode is in its file: ``frames`` pictures from ``first_frame`` on, 20 a second."""
+    """The place of an episode in its file: ``frames`` pictures from ``first_frame`` on, 20 a second."""
 
     file: Path
     first_frame: int
     frames: int
-
-    @property
-    def from_timestamp_s(self) -> float:
-        """When its first picture is shown."""
-        return self.first_frame / RATE_HZ
-
-    @property
-    def to_timestamp_s(self) -> float:
-        """When its last picture ends."""
-        return (self.first_frame + self.frames) / RATE_HZ
 
 
 def require_encoder(codec: Codec) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
 from manitwin.scenes.scene import Furniture, SceneObject, SceneRecord
-from manitwin.scenes.scene_file import read_scene
+from manitwin.scenes.scene_files import read_scene
 from manitwin.twin.loaded_twin import Twin, TwinSource
 
 if TYPE_CHECKING:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 from grasped_twins import write_brick
-from manitwin.episodes.run import make_episodes
+from manitwin.episodes.episodes_run import make_episodes
+from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.pipeline.dataset_run import ExecutorName
-from manitwin.scenes.app_config import LayoutsConfig, LayoutSettings, TrajectoriesConfig
-from manitwin.scenes.layouts.run import make_layouts
+from manitwin.scenes.layouts.layouts_run import make_layouts
+from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 
 
 def files(root: Path) -> dict[str, bytes]:

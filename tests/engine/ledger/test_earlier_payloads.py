@@ -14,11 +14,11 @@ from manitwin.config import RunConfig
 from manitwin.engine.ledger.ledger import Ledger, read_ledger
 from manitwin.engine.task import Payload
 from manitwin.episodes.batch import Batch
-from manitwin.episodes.pictures_recipe import BatchDrawing
+from manitwin.episodes.episode_pictures import BatchDrawing
 from manitwin.pipeline.dataset_run import drive
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.rehearsal import RehearsalRecipe
-from manitwin.scenes.layouts.layout_stages import LayoutNumber
+from manitwin.scenes.layouts.layouts_recipe import LayoutNumber
 from manitwin.twin.dataset_root import DatasetRoot
 
 UNSAID = {"file": None, "name": None, "units": "auto", "up": "auto", "license": None, "attribution": None}

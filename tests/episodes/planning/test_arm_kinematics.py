@@ -7,7 +7,7 @@ from mujoco_witness import simulated_urdf
 from planar_arm import LENGTHS_M, planar_arm
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
-from manitwin.episodes.planning.known_poses import KnownPoses
+from manitwin.episodes.planning.arm_solutions import KnownPoses
 from manitwin.geometry.poses import rotation_angle_rad, transform
 from manitwin.robots.load import load_robot
 

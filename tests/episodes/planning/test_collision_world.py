@@ -6,11 +6,10 @@ from mujoco_witness import Witness
 from planning_problems import above, body, box_hull, brick, problem, standing
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
+from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.convex_shapes import ShapeStore
 from manitwin.episodes.planning.kinematic_body import floating_hand_of
-from manitwin.episodes.planning.problem import Phase
-from manitwin.episodes.planning.problem_world import ProblemWorld
-from manitwin.episodes.planning.settings import PlannerSettings
+from manitwin.episodes.planning.problem import Phase, PlannerSettings
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.load import load_robot

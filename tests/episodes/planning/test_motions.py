@@ -6,14 +6,13 @@ from mujoco_witness import Witness
 from planning_problems import TABLE, above, problem, standing, wall
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
+from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.convex_shapes import ShapeStore
-from manitwin.episodes.planning.free_segment import is_segment_free
+from manitwin.episodes.planning.joint_paths import is_segment_free
 from manitwin.episodes.planning.kinematic_body import floating_hand_of
 from manitwin.episodes.planning.motions import Motions
-from manitwin.episodes.planning.problem import Motion, Phase
-from manitwin.episodes.planning.problem_world import ProblemWorld
-from manitwin.episodes.planning.settings import PlannerSettings
-from manitwin.episodes.planning.straight_line import straight_line
+from manitwin.episodes.planning.problem import Motion, Phase, PlannerSettings
+from manitwin.episodes.planning.straight_lines import straight_line
 from manitwin.geometry.poses import inverse, rotation_angle_rad, transform
 from manitwin.robots.load import load_robot
 

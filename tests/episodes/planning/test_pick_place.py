@@ -19,8 +19,7 @@ from planning_problems import (
 )
 
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.planning.problem import Grasp
-from manitwin.episodes.planning.settings import PlannerSettings
+from manitwin.episodes.planning.problem import Grasp, PlannerSettings
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.load import load_robot

@@ -5,7 +5,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from manitwin.episodes.planning.joint_paths import JointSegment
-from manitwin.episodes.planning.rest_to_rest import time_rest_to_rest
+from manitwin.episodes.planning.timing import time_rest_to_rest
 
 TIMESTEP_S = 1 / 240
 VELOCITY, ACCELERATION = np.array([1.0, 2.0]), np.array([3.0, 4.0])

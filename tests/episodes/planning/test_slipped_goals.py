@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from planning_problems import above, brick, standing
 
-from manitwin.episodes.planning.slipped_goals import DROP_M, goals_after_slip
+from manitwin.episodes.planning.placement import DROP_M, goals_after_slip
 from manitwin.geometry.poses import transform, transform_points
 
 GOAL = standing(0.5, -0.2, 0.7, 0.001)

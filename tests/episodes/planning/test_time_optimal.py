@@ -5,10 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from manitwin.episodes.planning.joint_paths import JointSegment
-from manitwin.episodes.planning.rest_to_rest import time_rest_to_rest
-from manitwin.episodes.planning.smoothing import path_lengths, round_corners, shortcut
-from manitwin.episodes.planning.time_optimal import time_optimal
+from manitwin.episodes.planning.joint_paths import JointSegment, path_lengths, round_corners, shortcut
+from manitwin.episodes.planning.timing import time_optimal, time_rest_to_rest
 
 TIMESTEP_S = 1 / 240
 VELOCITY, ACCELERATION = np.full(3, 1.0), np.full(3, 3.0)

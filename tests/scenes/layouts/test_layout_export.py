@@ -9,12 +9,12 @@ from pxr import Usd, UsdGeom, UsdPhysics
 
 from manitwin.assets.writers.write import write_exported
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
-from manitwin.scenes.app_config import LayoutSettings
 from manitwin.scenes.layouts.export_mjcf import export_mjcf
 from manitwin.scenes.layouts.export_usd import export_usd
 from manitwin.scenes.layouts.pool import read_pool
 from manitwin.scenes.layouts.sample import sample_layout
 from manitwin.scenes.loaded_scene import Scene
+from manitwin.scenes.settings import LayoutSettings
 from manitwin.twin.loaded_twin import TwinSource
 from scene_twins import slab, write_things
 

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manitwin.scenes.layouts.furniture import MATERIALS, make_furniture
+from manitwin.scenes.layouts.surroundings import MATERIALS, make_furniture
 
 
 @pytest.mark.parametrize(("kind", "height_m"), [("table", 0.0), ("shelf", 0.02), ("tray", 0.01)])

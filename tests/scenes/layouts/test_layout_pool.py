@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from manitwin.errors import UsageError
+from manitwin.scenes.layouts.layouts_run import without_upright
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose, pool_of, read_pool
-from manitwin.scenes.layouts.run import without_upright
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import RECORD, seal
 from scene_twins import BOWL_HEIGHT_M, THINGS, bowl, pool_of_things, slab, write_things

@@ -16,7 +16,7 @@ from manitwin.geometry.poses import transform_points
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera
 from manitwin.render.raycast import cast_camera
-from manitwin.scenes.layouts.preview import scene_pictures, write_previews
+from manitwin.scenes.layouts.previews import scene_pictures, write_previews
 from manitwin.scenes.loaded_scene import object_pose
 from manitwin.scenes.scene import (
     SCENE_SCHEMA_VERSION,

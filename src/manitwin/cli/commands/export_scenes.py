@@ -10,7 +10,7 @@ from manitwin.cli.console import out_console
 def scenes_among(given: list[str]) -> list[Path]:
     """Return the files of the scenes that are given; none where twins are. Raises UsageError where both are given."""
     from manitwin.errors import UsageError
-    from manitwin.scenes.scene_folders import scene_files
+    from manitwin.scenes.scene_files import scene_files
 
     by_place = {each: scene_files(Path(each)) for each in given}
     found = [file for files in by_place.values() for file in files]

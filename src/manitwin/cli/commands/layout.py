@@ -14,8 +14,8 @@ from manitwin.cli.json_output import Json, print_document
 from manitwin.cli.why import causes_of, print_causes
 
 if TYPE_CHECKING:
-    from manitwin.scenes.app_config import LayoutsConfig
-    from manitwin.scenes.layouts.run import LayoutTotals
+    from manitwin.scenes.layouts.layouts_run import LayoutTotals
+    from manitwin.scenes.settings import LayoutsConfig
 
 
 def layout(
@@ -65,7 +65,7 @@ def layout(
     settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
     from manitwin.cli.watched_run import WatchedRun
     from manitwin.pipeline.dataset_run import local_log
-    from manitwin.scenes.layouts.run import CONTACT_SHEET, layout_totals, make_layouts, without_upright
+    from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, layout_totals, make_layouts, without_upright
     from manitwin.twin.dataset_root import DatasetRoot
 
     sheet = sheet or settings.pictures or DatasetRoot(out).exists(CONTACT_SHEET)  # one that is there is kept up to date
@@ -83,7 +83,7 @@ def layout(
         out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}", markup=False)
     _print_totals(totals)
     if sheet and totals.accepted:
-        from manitwin.scenes.layouts.contact_sheet import write_contact_sheet
+        from manitwin.scenes.layouts.previews import write_contact_sheet
 
         shown = write_contact_sheet(dataset, out)
         out_console.print(f"{shown} of {totals.accepted} scenes in {out}/{CONTACT_SHEET}", markup=False)
@@ -122,7 +122,8 @@ def _range(text: str) -> tuple[int, int]:
 def _settings(
     file: Path | None, layout: dict[str, Any], seed: int | None, pictures: bool, jobs: int | None
 ) -> LayoutsConfig:
-    from manitwin.scenes.app_config import LayoutsConfig, load_app_config
+    from manitwin.scenes.run_settings import load_settings
+    from manitwin.scenes.settings import LayoutsConfig
 
     given = {"seed": seed, "pictures": pictures or None, "layout": layout, "run": options.run_settings(jobs)}
-    return load_app_config(LayoutsConfig, file, given)
+    return load_settings(LayoutsConfig, file, given)

@@ -47,7 +47,7 @@ def publish(
 ) -> None:
     """Write a data set as WebDataset shards, Parquet tables and a card; or episodes as a LeRobot data set with a card."""
     from manitwin.dataset.publish.publish import publish_dataset
-    from manitwin.episodes.attempts_table import ATTEMPTS
+    from manitwin.episodes.attempts import ATTEMPTS
     from manitwin.errors import UsageError
     from manitwin.twin.dataset_root import DatasetRoot
 

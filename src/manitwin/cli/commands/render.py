@@ -33,13 +33,14 @@ def render(
     address: options.Address = None,
 ) -> None:
     """Draw the kept episodes by showing their states again, and add the films to the LeRobot data set."""
-    from manitwin.scenes.app_config import PicturesConfig, load_app_config
+    from manitwin.episodes.settings import PicturesConfig
+    from manitwin.scenes.run_settings import load_settings
 
     names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
     given = {"cameras": names, "size_px": size, "codec": codec, "run": options.run_settings(jobs)}
-    settings = load_app_config(PicturesConfig, config, given)
+    settings = load_settings(PicturesConfig, config, given)
     from manitwin.cli.watched_run import WatchedRun
-    from manitwin.episodes.render_run import PICTURES, draw_episodes, write_with_pictures
+    from manitwin.episodes.episode_pictures import PICTURES, draw_episodes, write_with_pictures
     from manitwin.episodes.video import require_encoder
     from manitwin.pipeline.dataset_run import local_log
     from manitwin.render.device import require_renderer

@@ -32,7 +32,7 @@ def stats(
 ) -> None:
     """Write the statistics of a data set, or of episodes: a page, its figures, and its numbers with the SQL of each."""
     from manitwin.dataset.statistics.report import write_dataset_report
-    from manitwin.episodes.attempts_table import ATTEMPTS
+    from manitwin.episodes.attempts import ATTEMPTS
     from manitwin.twin.dataset_root import DatasetRoot
 
     root = DatasetRoot(dataset)

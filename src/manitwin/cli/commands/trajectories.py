@@ -55,14 +55,15 @@ def trajectories(
     json: Json = False,
 ) -> None:
     """Plan and execute pick-and-place episodes, and keep what succeeded; run it again to go on where it stopped."""
-    from manitwin.scenes.app_config import TrajectoriesConfig, load_app_config
+    from manitwin.episodes.settings import TrajectoriesConfig
+    from manitwin.scenes.run_settings import load_settings
 
     given = {"seed": seed, "robot": robot, "skill": skill, "others": others, "run": options.run_settings(jobs)}
-    settings = load_app_config(TrajectoriesConfig, config, given)
+    settings = load_settings(TrajectoriesConfig, config, given)
     from manitwin.cli.documents import trajectories_document
     from manitwin.cli.watched_run import WatchedRun
     from manitwin.episodes.collect import chosen_formats, collect
-    from manitwin.episodes.run import make_episodes, retire_failing
+    from manitwin.episodes.episodes_run import make_episodes, retire_failing
     from manitwin.pipeline.dataset_run import local_log
     from manitwin.twin.dataset_root import DatasetRoot
 

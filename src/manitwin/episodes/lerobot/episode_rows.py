@@ -10,10 +10,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from manitwin.episodes.attempt import Attempt
+from manitwin.episodes.attempts import Attempt
 from manitwin.episodes.lerobot.feature_statistics import Statistics
-from manitwin.episodes.lerobot.features import Feature
-from manitwin.episodes.lerobot.layout import EPISODES_PATH, QUANTILES, STATISTICS, place_of
+from manitwin.episodes.lerobot.frame_features import Feature
+from manitwin.episodes.lerobot.lerobot_format import EPISODES_PATH, QUANTILES, STATISTICS, place_of
 
 FACTS: dict[str, pa.DataType] = {
     "episode_id": pa.string(),

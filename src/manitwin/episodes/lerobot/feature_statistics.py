@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 
-from manitwin.episodes.lerobot.features import Feature
-from manitwin.episodes.lerobot.layout import QUANTILES
+from manitwin.episodes.lerobot.frame_features import Feature
+from manitwin.episodes.lerobot.lerobot_format import QUANTILES
 
 Statistics = dict[str, list[Any]]
 """``min, max, mean, std, q01, ...`` as lists of a number per dimension, ``count`` as a list of one number."""

@@ -16,15 +16,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from manitwin.episodes.lerobot.check_frames import (
+from manitwin.episodes.lerobot.checks import (
     EpisodeStatistics,
     check_statistics,
+    check_videos,
     checked_frames,
     statistics_of,
 )
-from manitwin.episodes.lerobot.check_videos import check_videos
-from manitwin.episodes.lerobot.columns import arrays_of
-from manitwin.episodes.lerobot.layout import (
+from manitwin.episodes.lerobot.lerobot_format import (
     DEFAULT_FEATURES,
     EPISODES_PATH,
     INFO,
@@ -32,6 +31,7 @@ from manitwin.episodes.lerobot.layout import (
     STATS,
     TASKS,
     VERSION,
+    arrays_of,
     place_of,
 )
 from manitwin.errors import EpisodesError

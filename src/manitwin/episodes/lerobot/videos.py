@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from manitwin.episodes.lerobot.feature_statistics import Statistics
-from manitwin.episodes.lerobot.layout import QUANTILES, VIDEO_PATH, place_of, video_key
+from manitwin.episodes.lerobot.lerobot_format import QUANTILES, VIDEO_PATH, place_of, video_key
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.errors import EpisodesError
 

@@ -1,4 +1,4 @@
-"""Write episodes as a LeRobotDataset v3.0. Source: see ``layout``; docs/episodes.md says every feature."""
+"""Write episodes as a LeRobotDataset v3.0. Source: see ``lerobot_format``; docs/episodes.md says every feature."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ import pyarrow.parquet as pq
 from manitwin.episodes.beside import folder_beside
 from manitwin.episodes.lerobot.episode_rows import EpisodeRows
 from manitwin.episodes.lerobot.feature_statistics import Pooled, episode_statistics, quantiles_of_files
-from manitwin.episodes.lerobot.features import Feature, features_of, frames_of, schema_of, table_of
-from manitwin.episodes.lerobot.layout import (
+from manitwin.episodes.lerobot.frame_features import Feature, features_of, frames_of, schema_of, table_of
+from manitwin.episodes.lerobot.lerobot_format import (
     CHUNKS_SIZE,
     DATA_FILES_SIZE_IN_MB,
     DATA_PATH,
@@ -37,7 +37,7 @@ from manitwin.errors import EpisodesError
 
 
 @dataclass(frozen=True)
-class Written:
+class LeRobotSummary:
     """What a set holds."""
 
     episodes: int
@@ -52,7 +52,7 @@ def write_lerobot(
     seed: int = 0,
     data_files_size_in_mb: int = DATA_FILES_SIZE_IN_MB,
     videos: Sequence[CameraVideos] = (),
-) -> Written:
+) -> LeRobotSummary:
     """Write the episodes of one robot as a data set, numbered as they come; it appears whole or not at all.
 
     Every instruction is a task; ``seed`` and the episode's id choose the one that its frames have. With ``videos`` each
@@ -70,7 +70,7 @@ def write_lerobot(
         if writer is None:
             raise EpisodesError(f"{place}: no episode, and LeRobot reads no empty set; keep at least one episode")
         writer.describe()
-        return Written(writer.rows.count, writer.frames, len(writer.tasks))
+        return LeRobotSummary(writer.rows.count, writer.frames, len(writer.tasks))
 
 
 class _Set:
@@ -89,7 +89,6 @@ class _Set:
         self.tasks: dict[str, int] = {}
         self.frames = 0
         self.pooled: dict[str, Pooled] = {}
-        self.picture_quantiles: dict[str, Any] = {}
 
     def __enter__(self) -> _Set:
         return self

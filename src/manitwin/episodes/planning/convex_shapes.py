@@ -40,7 +40,7 @@ def corners_of(shape: Any) -> np.ndarray | None:
 
 
 @dataclass(frozen=True)
-class BodyShapes:
+class ConvexBody:
     """A body's hulls and the one hull of all of them, in the object frame."""
 
     body: RigidBody
@@ -74,13 +74,13 @@ class ShapeStore:
     """Makes the shapes of bodies once, and keeps those last used; a body is known by its identity."""
 
     def __init__(self) -> None:
-        self._kept: OrderedDict[int, BodyShapes] = OrderedDict()
+        self._kept: OrderedDict[int, ConvexBody] = OrderedDict()
 
-    def __call__(self, body: RigidBody) -> BodyShapes:
+    def __call__(self, body: RigidBody) -> ConvexBody:
         """Return the shapes of this very body."""
         key = id(body)  # the kept shapes hold the body, so that its identity is not given to another
         if key not in self._kept:
-            self._kept[key] = BodyShapes(body)
+            self._kept[key] = ConvexBody(body)
             if len(self._kept) > KEPT_BODIES:
                 self._kept.popitem(last=False)
         self._kept.move_to_end(key)

@@ -9,15 +9,11 @@ from scipy.interpolate import CubicSpline
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
 from manitwin.episodes.planning.collision_world import CollisionWorld, is_path_free
-from manitwin.episodes.planning.free_segment import is_segment_free
-from manitwin.episodes.planning.joint_paths import JointPath, JointSegment
-from manitwin.episodes.planning.problem import Motion, Phase, PlanFailure
-from manitwin.episodes.planning.rest_to_rest import time_rest_to_rest
+from manitwin.episodes.planning.joint_paths import JointPath, JointSegment, is_segment_free, round_corners, shortcut
+from manitwin.episodes.planning.problem import Motion, Phase, PlanFailure, PlannerSettings
 from manitwin.episodes.planning.rrt_connect import rrt_connect
-from manitwin.episodes.planning.settings import PlannerSettings
-from manitwin.episodes.planning.smoothing import round_corners, shortcut
-from manitwin.episodes.planning.straight_line import straight_line
-from manitwin.episodes.planning.time_optimal import time_optimal
+from manitwin.episodes.planning.straight_lines import straight_line
+from manitwin.episodes.planning.timing import time_optimal, time_rest_to_rest
 from manitwin.robots.robot import Robot
 
 CORNER_RADII_RAD = (0.4, 0.2, 0.1, 0.03)

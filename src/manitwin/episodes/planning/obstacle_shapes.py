@@ -1,4 +1,4 @@
-"""What stands around the robot in one problem, as convex shapes: which of them are merged, and which bear the target."""
+"""The obstacles of one problem as convex shapes: which of them are merged, and which bear the target."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.episodes.planning.convex_shapes import BodyShapes, ShapeStore
+from manitwin.episodes.planning.convex_shapes import ConvexBody, ShapeStore
 from manitwin.episodes.planning.libraries import coal, pin
 from manitwin.episodes.planning.problem import PickPlaceProblem
 
@@ -99,7 +99,7 @@ def _transform(pose: Any) -> Any:
     return coal.Transform3s(pose.rotation, pose.translation)
 
 
-def _gap_m(obstacle: BodyShapes, pose: Any, target: BodyShapes, target_pose: Any) -> float:
+def _gap_m(obstacle: ConvexBody, pose: Any, target: ConvexBody, target_pose: Any) -> float:
     """Return the distance of the common hulls, or a lower bound of it that is larger than any that matters."""
     bound = float(np.linalg.norm(pose.translation - target_pose.translation)) - obstacle.radius_m - target.radius_m
     if bound > HAND_REACH_M:

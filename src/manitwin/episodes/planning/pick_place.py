@@ -8,15 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
-from manitwin.episodes.planning.arm_solutions import ArmSolutions
-from manitwin.episodes.planning.candidates import TURNS, Candidates
+from manitwin.episodes.planning.arm_solutions import ArmSolutions, KnownPoses
+from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.convex_shapes import ShapeStore
-from manitwin.episodes.planning.hand_room import HandRoom
+from manitwin.episodes.planning.grasp_candidates import TURNS, GraspCandidates, HandRoom
 from manitwin.episodes.planning.kinematic_body import floating_hand_of
-from manitwin.episodes.planning.known_poses import KnownPoses
-from manitwin.episodes.planning.line_ends import LineEnds
 from manitwin.episodes.planning.motions import Motions
-from manitwin.episodes.planning.placement import Placement, PlacementPlanner
+from manitwin.episodes.planning.placement import Placement, PlacementPlanner, goals_after_slip
 from manitwin.episodes.planning.problem import (
     Grasp,
     Motion,
@@ -24,12 +22,11 @@ from manitwin.episodes.planning.problem import (
     PickPlacePlan,
     PickPlaceProblem,
     PlanFailure,
+    PlannerSettings,
     PlanReport,
+    later,
 )
-from manitwin.episodes.planning.problem_world import ProblemWorld
-from manitwin.episodes.planning.settings import PlannerSettings
-from manitwin.episodes.planning.slipped_goals import goals_after_slip
-from manitwin.episodes.planning.stages import later
+from manitwin.episodes.planning.straight_lines import LineEnds
 from manitwin.robots.robot import Robot
 
 
@@ -42,7 +39,7 @@ class PickPlacePlanner:
         self.arm = ArmKinematics(robot)
         self._hand = floating_hand_of(self.arm.body)
         known, self._ends = KnownPoses(self.arm), LineEnds(self.settings)
-        self._candidates = Candidates(HandRoom(self._hand), known, self.settings)
+        self._candidates = GraspCandidates(HandRoom(self._hand), known, self.settings)
         self._solutions = ArmSolutions(self.arm, known, self.settings)
         self._motions = Motions(robot, self.arm, timestep_s, self.settings)
         self._placements = PlacementPlanner(self.arm, self._solutions, self._motions, self._ends)

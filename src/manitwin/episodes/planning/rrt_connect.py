@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from manitwin.episodes.planning.free_segment import is_segment_free
+from manitwin.episodes.planning.joint_paths import is_segment_free
 
 IsFree = Callable[[np.ndarray], bool]
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from manitwin.dataset.publish.licences import UNKNOWN, Allowed, check_some_go_out
-from manitwin.episodes.attempt import Attempt
+from manitwin.episodes.attempts import Attempt
 from manitwin.episodes.batch import read_batch
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile

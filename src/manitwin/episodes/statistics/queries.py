@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from manitwin.dataset.statistics.query import PRELUDE as SHARES
 from manitwin.dataset.statistics.query import Column, Query, summary, summary_columns, text
-from manitwin.episodes.attempt import EXECUTION_FAILURES, OUTCOMES
+from manitwin.episodes.attempts import EXECUTION_FAILURES, OUTCOMES
 
 SUCCEEDED = ("kept", "unplanned_contact", "disturbed")
 MEANINGS = {

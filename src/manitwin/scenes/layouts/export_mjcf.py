@@ -14,7 +14,7 @@ from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.formats.xml_file import add, document, new_element, number_text
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION
 from manitwin.physics.mujoco.body import ROLLING_FRICTION_M, TIMESTEP_S, TORSIONAL_FRICTION_M
-from manitwin.scenes.layouts.looks import camera_axes
+from manitwin.scenes.layouts.surroundings import camera_axes
 from manitwin.scenes.loaded_scene import Scene
 from manitwin.scenes.sapien_scene import PLAIN_COLORS
 

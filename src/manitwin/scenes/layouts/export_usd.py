@@ -13,7 +13,7 @@ from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.usd_stage import CANNOT_SAY
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION
-from manitwin.scenes.layouts.looks import camera_axes
+from manitwin.scenes.layouts.surroundings import camera_axes
 from manitwin.scenes.loaded_scene import Scene
 from manitwin.scenes.sapien_scene import PLAIN_COLORS
 from manitwin.scenes.scene import SceneCamera, SurfaceBox

@@ -12,11 +12,11 @@ from manitwin.geometry.hull_distance import ConvexParts, PlacedParts, least_dist
 from manitwin.geometry.poses import rotation_angle_rad, transform_points
 from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 from manitwin.physics.sapien.settle import SettledScene, settle_scene
-from manitwin.scenes.app_config import LayoutSettings
 from manitwin.scenes.layouts.pool import Pool
 from manitwin.scenes.layouts.slots import Slot
 from manitwin.scenes.layouts.stacking import mouth_of
 from manitwin.scenes.scene import SceneMeasures
+from manitwin.scenes.settings import LayoutSettings
 
 LOADED_S = 1.0  # for so long a scene stays as it is recorded when it is loaded
 GIVE_UP = 3.0  # times the limit: no need to see where it ends

@@ -11,23 +11,19 @@ import numpy as np
 
 from manitwin.errors import Rejected, UsageError
 from manitwin.geometry.poses import quaternion_wxyz, transform_points
-from manitwin.scenes.app_config import LayoutSettings
-from manitwin.scenes.layouts.clutter import Patch, clutter_of, workspace_of
-from manitwin.scenes.layouts.furniture import make_furniture
 from manitwin.scenes.layouts.judging import Judgement, judge
-from manitwin.scenes.layouts.looks import make_cameras, make_lights
-from manitwin.scenes.layouts.placing import Obstacles, put_on_surface
+from manitwin.scenes.layouts.placing import Obstacles, Patch, clutter_of, put_on_surface, workspace_of
 from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin, StandingPose
 from manitwin.scenes.layouts.slots import Put, Slot, draw_slots, draw_twin
 from manitwin.scenes.layouts.stacking import level_poses, mouth_of, open_poses, put_into, put_onto
+from manitwin.scenes.layouts.surroundings import make_cameras, make_furniture, make_lights
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.scenes.scene import SCENE_SCHEMA_VERSION, Furniture, SceneObject, SceneRecord
+from manitwin.scenes.settings import LayoutSettings
 
 LAYOUT = "layout"
-LAYOUT_REASONS = frozenset({"no_room", "nothing_fits", "unstable"})
-"""Why there is no layout: objects have no room on the surface; nothing drawn goes in or on what should hold it; something
-would not stay however often it was sampled again."""
-
+"""The stage of rejections: ``no_room`` for objects on the surface, ``nothing_fits`` in or on what should hold it, ``unstable``:
+something would not stay however often it was sampled again."""
 TWINS_TRIED, NEEDED_TWINS_TRIED = 4, 40  # for a distractor; for what must be there
 CARRIERS_TRIED = 8  # what holds or carries others is drawn again so often where nothing fits
 PLACES_A_TWIN = 3  # shares of the places tried

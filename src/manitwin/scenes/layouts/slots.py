@@ -9,8 +9,8 @@ import numpy as np
 
 from manitwin.errors import UsageError
 from manitwin.geometry.hull_distance import PlacedParts
-from manitwin.scenes.app_config import LayoutSettings
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
+from manitwin.scenes.settings import LayoutSettings
 
 Role = Literal["stand", "on", "in"]
 

@@ -1,10 +1,10 @@
-"""What a run makes of a finished batch: films of its kept episodes, by showing their states again."""
+"""Pictures of recorded episodes: films of the kept episodes of each batch, which show their states again."""
 
 from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from manitwin.config import Resource
+from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.folder_recipe import FolderRecipe, FolderRecord
 from manitwin.engine.recipe import Ending, Identity
 from manitwin.engine.stage import Draft, Stage
@@ -23,17 +24,22 @@ from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
 from manitwin.episodes.batch import batch_name
 from manitwin.episodes.cameras import NamedCamera, named_cameras
+from manitwin.episodes.collect import LEROBOT, batch_folders, stored_episodes
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
-from manitwin.episodes.replay_pictures import Replay, twin_drawable
+from manitwin.episodes.lerobot.videos import CameraVideos, Clip
+from manitwin.episodes.lerobot.write import LeRobotSummary, write_lerobot
+from manitwin.episodes.replay_pictures import EpisodeReplay, twin_drawable
+from manitwin.episodes.settings import PicturesConfig
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.video import EpisodesVideo
 from manitwin.errors import EpisodesError, Rejected
+from manitwin.pipeline.dataset_run import CONFIG, ExecutorName, RunReport, drive
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
-from manitwin.scenes.app_config import PicturesConfig
 from manitwin.scenes.furniture_pictures import lighting_of
 from manitwin.scenes.scene import Furniture, Light
+from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import digests_below, sha256_of_json
 
@@ -66,7 +72,7 @@ class PicturesRecord(FolderRecord):
     files: dict[str, str]
 
 
-class PicturesStage:
+class EpisodeFilmsStage:
     """Draw the kept episodes of a batch: one film a camera, all episodes in it, frame t of an episode showing state t."""
 
     name = "films"
@@ -109,7 +115,7 @@ class PicturesStage:
         facts, size = episode.facts, self.settings.size_px
         lights = tuple(Light(**light) for light in facts["lights"])
         pictures: list[list[np.ndarray]] = [[] for _ in cameras]
-        with Replay(
+        with EpisodeReplay(
             self._robot,
             [twin_drawable(self._source.folder(thing.twin_id)) for thing in episode.objects],
             furniture=Furniture(**facts["furniture"]),
@@ -142,7 +148,7 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
     @cached_property
     def sha256(self) -> str:
         """The digest of what decides a picture."""
-        return sha256_of_json([self.config.model_dump(mode="json", exclude={"run"}), PicturesStage.version])
+        return sha256_of_json([self.config.model_dump(mode="json", exclude={"run"}), EpisodeFilmsStage.version])
 
     @property
     def seed(self) -> int:
@@ -159,7 +165,7 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
 
     def stages(self, kind: str) -> list[Stage]:
         """Return the one stage."""
-        return [PicturesStage(self.config, self.episodes, self.dataset, self.robot)]
+        return [EpisodeFilmsStage(self.config, self.episodes, self.dataset, self.robot)]
 
     def write(
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
@@ -181,3 +187,67 @@ def read_pictures(folder: Path) -> PicturesRecord:
         return PicturesRecord(**json.loads(path.read_bytes()))
     except (OSError, ValueError) as error:
         raise EpisodesError(f"{path}: no record of pictures ({error}); run manitwin render again") from error
+
+
+PICTURES = "pictures"
+
+
+def draw_episodes(
+    out: Path,
+    config: PicturesConfig,
+    *,
+    twins: str | Path | None = None,
+    executor: ExecutorName = "local",
+    address: str | None = None,
+    on_start: Callable[[int, int], None] = lambda items, opened: None,
+    on_stage: OnStage = lambda event: None,
+    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+) -> RunReport:
+    """Draw the kept episodes of a finished run below ``out/pictures``; what is there already stays.
+
+    ``twins`` names where their twins are now, None: where they were as the episodes were made.
+    Raises EpisodesError where there are none, UsageError for an unknown camera.
+    """
+    said = _said(out)
+    named_cameras(config.cameras, load_robot(said["robot"]))
+    dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
+    TwinSource(dataset)
+    drawings = (BatchDrawing(folder.name) for folder in batch_folders(out))
+    recipe = PicturesRecipe(config, str(out.resolve()), dataset, said["robot"])
+    return drive(
+        recipe,
+        drawings,
+        DatasetRoot(out / PICTURES),
+        config.run,
+        configuration={"kind": PICTURES, **config.model_dump(mode="json")},
+        executor=executor,
+        address=address,
+        on_start=on_start,
+        on_stage=on_stage,
+        on_ended=on_ended,
+    )
+
+
+def write_with_pictures(out: Path, cameras: tuple[str, ...]) -> LeRobotSummary:
+    """Write the LeRobot data set of a run again, with the films of these cameras."""
+    folders = batch_folders(out)
+    clips: dict[str, dict[str, Clip]] = {camera: {} for camera in cameras}
+    for folder in folders:
+        place = out / PICTURES / batch_name(folder.name)
+        for episode_id, first in read_pictures(place).first_frames.items():
+            for camera in cameras:
+                clips[camera][episode_id] = Clip(place / f"{camera}.mp4", first)
+    videos = [CameraVideos(camera, clips[camera]) for camera in cameras]
+    return write_lerobot(stored_episodes(folders), out / LEROBOT, videos=videos)
+
+
+def _said(out: Path) -> dict[str, str]:
+    try:
+        said: dict[str, str] = json.loads((out / CONFIG).read_bytes())
+    except (OSError, ValueError) as error:
+        raise EpisodesError(
+            f"{out}/{CONFIG}: no episodes there ({error}); `manitwin trajectories` makes some"
+        ) from error
+    if "robot" not in said:
+        raise EpisodesError(f"{out}/{CONFIG}: not of episodes; give the folder that `manitwin trajectories` wrote")
+    return said

@@ -1,4 +1,4 @@
-"""The gripper on a straight line: joint positions by continuation from one end."""
+"""Straight lines of the gripper: where they end beside an object, and the arm's path along them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
+from manitwin.episodes.planning.problem import PlannerSettings
+from manitwin.geometry.poses import transform
 
 KNOT_STEP_M = 0.02
 TURN_SCALE_M = 0.1  # a turn of one radian counts as this far
@@ -55,3 +57,26 @@ def _stays_on_line(arm: ArmKinematics, configurations: np.ndarray, poses: np.nda
     off_m = np.linalg.norm(reached[:, :3, 3] - poses[:, :3, 3], axis=1)
     off_rad = np.linalg.norm(reached[:, :3, :3] - poses[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
     return bool((off_m < OFF_LINE_M).all() and (off_rad < OFF_LINE_RAD).all())
+
+
+HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
+"""About the approach axis: the same grasp with its fingers exchanged."""
+
+
+class LineEnds:
+    """Poses beside a gripper's pose ``(..., 4, 4)``."""
+
+    def __init__(self, settings: PlannerSettings):
+        """Take the lengths of the lines."""
+        self._back = transform(translation=np.array([0, 0, -settings.approach_m]))
+        self._lift_m = settings.lift_m
+
+    def before(self, gripper_to_world: np.ndarray) -> np.ndarray:
+        """Return where the approach to a pose begins, and the retreat from it ends."""
+        return gripper_to_world @ self._back
+
+    def above(self, gripper_to_world: np.ndarray) -> np.ndarray:
+        """Return where the lift from a pose ends, and the lowering to it begins."""
+        result = gripper_to_world.copy()
+        result[..., 2, 3] += self._lift_m
+        return result

@@ -11,14 +11,12 @@ from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.ledger.ledger import read_ledger
 from manitwin.errors import UsageError
 from manitwin.pipeline.dataset_run import ExecutorName, RunReport, drive, local_ledger
-from manitwin.scenes.app_config import LayoutsConfig
-from manitwin.scenes.earlier_settings import check_settings, earlier_settings
-from manitwin.scenes.layouts.layout_stages import LayoutNumber
+from manitwin.scenes.layouts.layouts_recipe import LayoutNumber, LayoutsRecipe
 from manitwin.scenes.layouts.pool import pool_of
-from manitwin.scenes.layouts.recipe import LayoutsRecipe
+from manitwin.scenes.run_settings import check_settings, earlier_settings
 from manitwin.scenes.scene import SCENE
-from manitwin.scenes.scene_file import parse_scene
-from manitwin.scenes.scene_folders import scene_name
+from manitwin.scenes.scene_files import parse_scene, scene_name
+from manitwin.scenes.settings import LayoutsConfig
 from manitwin.twin.dataset_root import DatasetRoot
 
 CONTACT_SHEET = "contact_sheet.webp"

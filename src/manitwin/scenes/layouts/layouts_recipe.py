@@ -1,24 +1,96 @@
-"""What a run makes of a layout's number: a folder with its scene. The engine drives it like the building of twins."""
+"""The recipe of layouts: stages that sample a scene by its number and draw it, and the folder that they are finished in."""
 
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
+from pydantic import BaseModel
+
+from manitwin.config import Resource
 from manitwin.engine.folder_recipe import FolderRecipe, FolderRecord
 from manitwin.engine.recipe import Ending, Identity
 from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
+from manitwin.engine.task import Payload
 from manitwin.errors import Rejected
-from manitwin.scenes.app_config import LayoutsConfig
-from manitwin.scenes.layouts.layout_stages import PICTURES, LayoutNumber, LayoutStage, PicturesStage
+from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.sample import sample_layout
 from manitwin.scenes.scene import SCENE
-from manitwin.scenes.scene_file import parse_scene
-from manitwin.scenes.scene_folders import scene_name
+from manitwin.scenes.scene_files import parse_scene, read_scene, scene_name, write_scene
+from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
+from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import sha256_of_json
+
+PICTURES = "pictures/"
+
+
+@dataclass(frozen=True)
+class LayoutNumber(Payload):
+    """The number of a layout to sample, from 0."""
+
+    number: int
+
+    @property
+    def title(self) -> str:
+        """The layout's number in words."""
+        return f"layout {self.number}"
+
+    @classmethod
+    def from_json(cls, fields: Mapping[str, Any]) -> LayoutNumber:
+        """Return the number that a ledger keeps; those of earlier versions kept it as the text ``layout 17``."""
+        return cls(int(fields["text"].split()[-1]) if "text" in fields else fields["number"])
+
+
+class LayoutStage:
+    """Sample the layout of a number."""
+
+    name = "layout"
+    version = "1"
+    reads: tuple[str, ...] = ()
+    writes: tuple[str, ...] = (SCENE,)
+    needs: Resource = "cpu"
+    backend = "sapien"
+    model: str | None = None
+
+    def __init__(self, settings: LayoutSettings, dataset: str):
+        self.settings: BaseModel = settings
+        self._layout, self._dataset = settings, dataset
+
+    def run(self, draft: Draft[LayoutNumber], folder: Path) -> dict[str, Any]:
+        """Write the scene; raises Rejected where none could be made."""
+        number = draft.payload.number
+        write_scene(sample_layout(pool_of(self._dataset), self._layout, draft.seed, number), folder)
+        return {}
+
+
+class ScenePicturesStage:
+    """Draw a scene from its cameras: colours, depth, normals and instance ids."""
+
+    name = "pictures"
+    version = "2"
+    reads: tuple[str, ...] = (SCENE,)
+    writes: tuple[str, ...] = (PICTURES,)
+    needs: Resource = "cpu"
+    backend = "sapien"
+    model: str | None = None
+
+    def __init__(self, settings: LayoutsConfig, dataset: str):
+        self.settings: BaseModel = settings
+        self._px, self._source = settings.picture_px, TwinSource(dataset)
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Write the pictures of every camera."""
+        from manitwin.scenes.layouts.previews import write_previews  # needs a renderer
+
+        scene = read_scene(draft.path(SCENE))
+        write_previews(scene, self._source.folder, folder / PICTURES, size_px=self._px)
+        return {}
+
 
 LAYOUT_RECORD = "layout.json"
 LAYOUT_SCHEMA_VERSION = 1
@@ -48,7 +120,7 @@ class LayoutsRecipe(FolderRecipe[LayoutRecord]):
     def sha256(self) -> str:
         """The digest of what decides a layout, but for the twins: their revisions stand in the scene's record."""
         decides = self.config.model_dump(mode="json", exclude={"run"})
-        return sha256_of_json([decides, LayoutStage.version, PicturesStage.version])
+        return sha256_of_json([decides, LayoutStage.version, ScenePicturesStage.version])
 
     @property
     def seed(self) -> int:
@@ -67,7 +139,7 @@ class LayoutsRecipe(FolderRecipe[LayoutRecord]):
         """Return the sampling, and the drawing where pictures are wanted."""
         stages: list[Stage] = [LayoutStage(self.config.layout, self.dataset)]
         if self.config.pictures:
-            stages.append(PicturesStage(self.config, self.dataset))
+            stages.append(ScenePicturesStage(self.config, self.dataset))
         return stages
 
     def write(

@@ -1,15 +1,17 @@
-"""Pictures of a layout from its cameras: colour, depth, normals and instance ids, as files."""
+"""Pictures of layouts: each scene from its cameras (colour, depth, normals, instance ids), and one sheet of the first scenes."""
 
 from __future__ import annotations
 
+import io
 import json
+import math
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageDraw, ImageFont
 
 from manitwin.errors import UsageError
 from manitwin.formats.glb import read_glb
@@ -18,9 +20,14 @@ from manitwin.render.cameras import Camera, look_at
 from manitwin.render.false_colors import depth_picture, id_color, ids_picture
 from manitwin.render.scene_renderer import SceneFrame, SceneRenderer
 from manitwin.scenes.furniture_pictures import add_furniture, lighting_of
-from manitwin.scenes.scene import SceneCamera, SceneRecord
+from manitwin.scenes.layouts.layouts_recipe import PICTURES
+from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, accepted_scenes
+from manitwin.scenes.scene import SCENE, SceneCamera, SceneRecord
+from manitwin.scenes.scene_files import parse_scene, scene_name
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.loaded_twin import TwinSource
 
-PICTURES = "pictures.json"
+PICTURES_FACTS = "pictures.json"
 WEBP_QUALITY = 90
 DEPTH_UNIT_M = 0.001
 """Depth is written in whole millimetres, as the cameras that it stands for write it: up to 65 m in 16 bits."""
@@ -76,8 +83,8 @@ def write_previews(
     called = {thing.name: f"{thing.name} {thing.category}" for thing in record.objects}
     names = {called.get(name, name): number for name, number in ids.items()}
     files = [path for name, frame in frames.items() for path in _write_frame(frame, folder, name, names)]
-    (folder / PICTURES).write_text(json.dumps(facts, indent=1) + "\n")
-    return sorted([*files, folder / PICTURES])
+    (folder / PICTURES_FACTS).write_text(json.dumps(facts, indent=1) + "\n")
+    return sorted([*files, folder / PICTURES_FACTS])
 
 
 def _camera(camera: SceneCamera, width_px: int, height_px: int) -> Camera:
@@ -100,3 +107,55 @@ def _write_frame(frame: SceneFrame, folder: Path, name: str, ids_by_name: Mappin
     depth_picture(frame.depth_m, frame.ids).save(depth_colors)
     ids_picture(frame.ids, ids_by_name).save(ids_colors)
     return [rgb, depth, normals, ids, depth_colors, ids_colors]
+
+
+SCENES_SHOWN = 48
+CAMERA = "oblique"
+TILE_PX, MOST_COLUMNS, CAPTION_PX, GAP_PX = 256, 8, 18, 4
+SHEET_QUALITY = 85
+
+
+def write_contact_sheet(dataset: str | Path, out: str | Path, *, most: int = SCENES_SHOWN) -> int:
+    """Write ``contact_sheet.webp`` of the first scenes of a run at ``out``; returns how many it shows.
+
+    A scene whose pictures were made already is not drawn again. Raises UsageError for a run without an accepted scene,
+    RendererMissing.
+    """
+    root, source = DatasetRoot(out), TwinSource(dataset)
+    shown = accepted_scenes(out)[:most]
+    if not shown:
+        raise UsageError(f"{out}: no scene was accepted, so that there is none to show")
+    sheet = contact_sheet([(scene_id, _picture(root, source, scene_id)) for scene_id in shown])
+    stream = io.BytesIO()
+    sheet.save(stream, "WEBP", quality=SHEET_QUALITY, method=4)
+    root.write_bytes(CONTACT_SHEET, stream.getvalue())
+    return len(shown)
+
+
+def contact_sheet(pictures: Sequence[tuple[str, np.ndarray]]) -> Image.Image:
+    """Return pictures ``(TILE_PX, TILE_PX, 3) uint8`` RGB row by row, each with its caption below it."""
+    columns = min(MOST_COLUMNS, math.ceil(math.sqrt(1.5 * len(pictures))))
+    rows = -(-len(pictures) // columns)
+    width, height = TILE_PX + GAP_PX, TILE_PX + CAPTION_PX + GAP_PX
+    page = Image.new("RGB", (columns * width + GAP_PX, rows * height + GAP_PX), "white")
+    draw, font = ImageDraw.Draw(page), ImageFont.load_default(CAPTION_PX - 4)
+    for place, (caption, picture) in enumerate(pictures):
+        x, y = GAP_PX + place % columns * width, GAP_PX + place // columns * height
+        page.paste(Image.fromarray(picture), (x, y))
+        draw.text((x + TILE_PX / 2, y + TILE_PX + CAPTION_PX / 2), caption, "black", font, anchor="mm")
+    return page
+
+
+def _picture(root: DatasetRoot, source: TwinSource, scene_id: str) -> np.ndarray:
+    """Return a scene from its oblique camera, ``(TILE_PX, TILE_PX, 3) uint8``."""
+    folder = scene_name(scene_id)
+    drawn = f"{folder}/{PICTURES}{CAMERA}_rgb.webp"
+    if root.exists(drawn):
+        with Image.open(io.BytesIO(root.read_bytes(drawn))) as image:
+            return np.asarray(image.convert("RGB").resize((TILE_PX, TILE_PX), Image.Resampling.LANCZOS))
+    scene = parse_scene(root.read_bytes(f"{folder}/{SCENE}"), scene_id)
+    camera = tuple(each for each in scene.cameras if each.name == CAMERA)
+    frames, _ = scene_pictures(
+        scene.model_copy(update={"cameras": camera}), source.folder, width_px=TILE_PX, height_px=TILE_PX
+    )
+    return frames[CAMERA].rgb

@@ -50,7 +50,7 @@ class Placeable:
 
 
 @dataclass(frozen=True)
-class Task:
+class PickPlaceTask:
     """Objects at rest, and where one of them is to go: ``objects[target]`` to ``goal_object_to_world``."""
 
     objects: tuple[PlacedObject, ...]
@@ -59,13 +59,13 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Room:
+class PlacingArea:
     """Where objects may be put: in a robot's workspace, and wholly on a level surface."""
 
     workspace: Workspace
     support: SupportRegion
 
-    def wider(self) -> Room:
+    def wider(self) -> PlacingArea:
         """Return the room for things that nobody has to reach."""
         workspace = self.workspace
         wide = Workspace(
@@ -73,7 +73,7 @@ class Room:
             workspace.max_radius_m * OTHERS_RADIUS_FACTOR,
             workspace.half_angle_rad * OTHERS_ANGLE_FACTOR,
         )
-        return Room(wide, self.support)
+        return PlacingArea(wide, self.support)
 
     def draw(self, corners: np.ndarray, taken: Sequence[np.ndarray], rng: np.random.Generator) -> np.ndarray | None:
         """Draw a pose for a footprint ``(K, 2)`` that is free of those that are ``taken``; None where none was found."""
@@ -91,59 +91,65 @@ class Room:
 
 
 def sample_task(
-    target: Placeable, others: Callable[[], Placeable], count: int, room: Room, rng: np.random.Generator
-) -> Task | None:
+    target: Placeable, others: Callable[[], Placeable], count: int, area: PlacingArea, rng: np.random.Generator
+) -> PickPlaceTask | None:
     """Draw start and goal of a target in a room on the table z = 0, and ``count`` drawn ``others`` around.
 
     Neither start nor goal is nearer than ``MIN_GAP_M`` to another object. None: no room was found.
     """
     for _ in range(OTHERS_TRIED):
-        start = room.draw(target.footprint, [], rng)
-        goal = None if start is None else _elsewhere(target.footprint, start[:2, 3], [], room, rng)
+        start = area.draw(target.footprint, [], rng)
+        goal = None if start is None else _elsewhere(target.footprint, start[:2, 3], [], area, rng)
         if start is None or goal is None:
             continue
-        around = _others(others, count, [_at(target.footprint, pose) for pose in (start, goal)], room.wider(), rng)
+        around = _others(others, count, [_at(target.footprint, pose) for pose in (start, goal)], area.wider(), rng)
         if around is not None:
             first = PlacedObject("object_00", target.twin_id, target.body, target.at(start))
-            return Task((first, *around), 0, target.at(goal))
+            return PickPlaceTask((first, *around), 0, target.at(goal))
     return None
 
 
-def free_goal(objects: Sequence[PlacedObject], target: int, room: Room, rng: np.random.Generator) -> np.ndarray | None:
-    """Draw a free pose for ``objects[target]`` on its surface, turned about Z alone; None: no room."""
+def free_goal(
+    objects: Sequence[PlacedObject], target: int, area: PlacingArea, rng: np.random.Generator
+) -> np.ndarray | None:
+    """Draw a free pose for ``objects[target]`` on its surface, turned about Z alone; None: no area."""
     moved = objects[target]
     hulls = np.concatenate(moved.body.hulls)
     here = moved.object_to_world
     center = transform(translation=np.array([here[0, 3], here[1, 3], 0.0]))
     object_to_plane = inverse(center) @ here
-    object_to_plane[2, 3] += room.support.height_m - float(transform_points(here, hulls)[:, 2].min())
+    object_to_plane[2, 3] += area.support.height_m - float(transform_points(here, hulls)[:, 2].min())
     corners = footprint(transform_points(object_to_plane, hulls))
     taken = [
         footprint(transform_points(other.object_to_world, np.concatenate(other.body.hulls)))
         for number, other in enumerate(objects)
         if number != target
     ]
-    pose = _elsewhere(corners, here[:2, 3], taken, room, rng)
+    pose = _elsewhere(corners, here[:2, 3], taken, area, rng)
     return None if pose is None else pose @ object_to_plane
 
 
 def _elsewhere(
-    corners: np.ndarray, here_m: np.ndarray, taken: Sequence[np.ndarray], room: Room, rng: np.random.Generator
+    corners: np.ndarray, here_m: np.ndarray, taken: Sequence[np.ndarray], area: PlacingArea, rng: np.random.Generator
 ) -> np.ndarray | None:
     for _ in range(POSES_TRIED):
-        pose = room.draw(corners, taken, rng)
+        pose = area.draw(corners, taken, rng)
         if pose is None or np.linalg.norm(pose[:2, 3] - here_m) >= MIN_MOVE_M:
             return pose
     return None
 
 
 def _others(
-    others: Callable[[], Placeable], count: int, kept_free: list[np.ndarray], room: Room, rng: np.random.Generator
+    others: Callable[[], Placeable],
+    count: int,
+    kept_free: list[np.ndarray],
+    area: PlacingArea,
+    rng: np.random.Generator,
 ) -> list[PlacedObject] | None:
     taken, placed = list(kept_free), []
     for number in range(count):
         other = others()
-        pose = room.draw(other.footprint, taken, rng)
+        pose = area.draw(other.footprint, taken, rng)
         if pose is None:
             return None
         taken.append(_at(other.footprint, pose))

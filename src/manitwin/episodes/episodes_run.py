@@ -1,42 +1,110 @@
-"""Make many episodes: the engine's run over batches, and what is made of them at its end."""
+"""Make many episodes: the recipe of their batches, the engine's run over these, and what is made of them at its end."""
 
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 from manitwin.engine.events import ItemEnded, OnStage
+from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.ledger.ledger import read_ledger
-from manitwin.episodes.attempts_table import ATTEMPTS, read_attempts
-from manitwin.episodes.batch import Batch, batches
-from manitwin.episodes.recipe import EpisodesRecipe
+from manitwin.engine.recipe import Ending, Identity
+from manitwin.engine.stage import Draft, Stage
+from manitwin.engine.stage_runner import StageCost
+from manitwin.episodes.attempts import ATTEMPTS, read_attempts
+from manitwin.episodes.batch import BATCH_RECORD, BATCH_SCHEMA_VERSION, Batch, BatchRecord, batch_name, batches
+from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
-from manitwin.errors import UsageError
+from manitwin.episodes.settings import TrajectoriesConfig
+from manitwin.errors import Rejected, UsageError
 from manitwin.pipeline.dataset_run import CONFIG, ExecutorName, RunReport, drive, local_ledger
 from manitwin.robots.load import load_robot
-from manitwin.scenes.app_config import TrajectoriesConfig
-from manitwin.scenes.earlier_settings import check_settings
 from manitwin.scenes.layouts.pool import pool_of
-from manitwin.scenes.scene_file import read_scene
-from manitwin.scenes.scene_folders import SCENES, scene_ids, scene_name
+from manitwin.scenes.run_settings import check_settings
+from manitwin.scenes.scene_files import SCENES, read_scene, scene_ids, scene_name
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
+from manitwin.twin.store import RUN, canonical_json, digests_below, sha256_of_json, write_bytes_atomically
+
+
+@dataclass(frozen=True)
+class EpisodesRecipe(FolderRecipe[BatchRecord]):
+    """Batches of episodes. ``dataset`` and ``scenes`` are where twins and scenes are read from (no scenes: None)."""
+
+    payload: ClassVar[type[Batch]] = Batch
+    record: ClassVar[str] = BATCH_RECORD
+    record_type: ClassVar[type[BatchRecord]] = BatchRecord
+    can_reject: ClassVar[bool] = False
+
+    config: TrajectoriesConfig
+    dataset: str
+    scenes: str | None = None
+
+    @cached_property
+    def sha256(self) -> str:
+        """The digest of what decides an episode, but for the twins: their revisions stand in the batch's record."""
+        decides = self.config.model_dump(mode="json", exclude={"run", "batch", "retire_failed_share"})
+        decides["robot"] = load_robot(self.config.robot).sha256
+        return sha256_of_json([decides, EpisodesStage.version])
+
+    @property
+    def seed(self) -> int:
+        """The seed of everything random."""
+        return self.config.seed
+
+    def folder_of(self, item_id: str) -> str:
+        """Return the batch's folder."""
+        return batch_name(item_id)
+
+    def identify(self, payload: Batch) -> Identity:
+        """Return the batch's id."""
+        return Identity(payload.batch_id, "batch")
+
+    def stages(self, kind: str) -> list[Stage]:
+        """Return the one stage."""
+        return [EpisodesStage(self.config, self.dataset, self.scenes)]
+
+    def write(
+        self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
+    ) -> BatchRecord:
+        """Write the batch's folder."""
+        for name in (EPISODES, ATTEMPTS):
+            shutil.copyfile(draft.path(name), fresh / name)
+        files = digests_below(fresh)
+        cost = {"stages": {name: vars(each) for name, each in costs.items()}}
+        write_bytes_atomically(fresh / RUN, canonical_json(cost).encode())
+        said = {
+            "schema_version": BATCH_SCHEMA_VERSION,
+            "batch_id": draft.item_id,
+            "files": files,
+            **draft.field("batch"),
+        }
+        return self.seal(fresh, said)
+
+    def ending(self, record: BatchRecord) -> Ending:
+        """Return how a batch's record says that it ended."""
+        detail = f"{record.kept} of {record.attempted} episodes kept, {record.planned} executed, {record.succeeded} succeeded"
+        return Ending("accepted", record.revision, None, detail)
+
 
 KIND = "trajectories"
 DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "run", "batch", "retire_failed_share"))
 
 
 @dataclass(frozen=True)
-class Source:
+class EpisodesSource:
     """Where episodes come from: a data set of twins, and scenes of them or none."""
 
     dataset: str
     scenes: str | None
 
     @classmethod
-    def of(cls, place: str | Path, twins: str | Path | None = None) -> Source:
+    def of(cls, place: str | Path, twins: str | Path | None = None) -> EpisodesSource:
         """Tell scenes from twins; raises UsageError for what is neither, and for scenes whose twins are gone.
 
         ``twins`` names where those of the scenes are now, None: where they were as the layouts were made.
@@ -66,7 +134,7 @@ def _check_twins(dataset: str, scenes: Path) -> None:
     source.check(named)
 
 
-def _check_out(out: DatasetRoot, source: Source) -> None:
+def _check_out(out: DatasetRoot, source: EpisodesSource) -> None:
     """Raise UsageError where a folder has episodes of scenes and is to get some of twins alone, or the other way."""
     if not out.exists(CONFIG):
         return
@@ -100,7 +168,7 @@ def make_episodes(
     """
     if count < 1:
         raise UsageError(f"{count} episodes; ask for 1 or more")
-    robot, source, root = load_robot(config.robot), Source.of(place, twins), DatasetRoot(out)
+    robot, source, root = load_robot(config.robot), EpisodesSource.of(place, twins), DatasetRoot(out)
     _check_out(root, source)
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
     check_settings(root, configuration, free=DECIDE_NO_EPISODE, made="batches of episodes")

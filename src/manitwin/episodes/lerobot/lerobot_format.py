@@ -1,4 +1,4 @@
-"""Names of files and features of a LeRobotDataset v3.0.
+"""Names of files and features of a LeRobotDataset v3.0, and its columns as arrays.
 
 Source: lerobot 0.4.4, datasets/utils.py, datasets/lerobot_dataset.py and datasets/compute_stats.py.
 """
@@ -8,6 +8,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+import pyarrow as pa
 
 VERSION = "v3.0"
 INFO, STATS, TASKS = "meta/info.json", "meta/stats.json", "meta/tasks.parquet"
@@ -49,3 +52,17 @@ def write_json(path: Path, value: Any) -> None:
     """Write JSON as LeRobot has it: keys in their order, four blanks, no NaN."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(value, indent=4, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def arrays_of(table: pa.Table, features: dict[str, dict[str, Any]]) -> dict[str, np.ndarray]:
+    """Return the columns of rows as arrays."""
+    result = {}
+    for name, feature in features.items():
+        if feature["dtype"] == "video":
+            continue
+        column = table[name].combine_chunks()
+        width = feature["shape"][0]
+        flat = column if width == 1 else column.flatten()
+        array = flat.to_numpy(zero_copy_only=False)
+        result[name] = array if width == 1 else array.reshape(-1, width)
+    return result

@@ -10,8 +10,8 @@ import pyarrow.parquet as pq
 import pytest
 from synthetic_episodes import attempt
 
-from manitwin.episodes import attempts_table as table
-from manitwin.episodes.attempt import OUTCOMES, Attempt
+from manitwin.episodes import attempts as table
+from manitwin.episodes.attempts import OUTCOMES, Attempt
 from manitwin.errors import EpisodesError
 
 

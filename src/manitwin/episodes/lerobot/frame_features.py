@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from manitwin.episodes.action_deltas import joint_delta, tip_delta
-from manitwin.episodes.lerobot.layout import DEFAULT_FEATURES
-from manitwin.episodes.recording import RATE_HZ
+from manitwin.episodes.lerobot.lerobot_format import DEFAULT_FEATURES
+from manitwin.episodes.recording import RATE_HZ, joint_delta, tip_delta
 from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode
 
 OPENING = "gripper_opening_m"

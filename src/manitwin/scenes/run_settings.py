@@ -1,15 +1,35 @@
-"""What the folder of an application was made with: nothing in it is made again because a command was typed otherwise."""
+"""Settings of a run that makes layouts or episodes: read, and compared with those that its folder was made with."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
-from typing import Any
+from pathlib import Path
+from typing import Any, TypeVar
 
+from manitwin.config import Section, read_toml, validated
 from manitwin.engine.ledger.ledger import read_ledger
 from manitwin.errors import UsageError
 from manitwin.pipeline.dataset_run import CONFIG, local_ledger
 from manitwin.twin.dataset_root import DatasetRoot
+
+Application = TypeVar("Application", bound=Section)
+
+
+def load_settings(kind: type[Application], file: Path | None, given: dict[str, Any]) -> Application:
+    """Return an application's settings: a TOML file's, where one is named, below those ``given`` by hand.
+
+    A given value that is None was not given; one that is a dict adds to its section. Raises ConfigError naming the file, or
+    the command line, and the key.
+    """
+    said = {} if file is None else read_toml(file)
+    validated(kind, said, str(file))
+    for name, value in given.items():
+        if isinstance(value, dict):
+            said[name] = {**said.get(name, {}), **value}
+        elif value is not None:
+            said[name] = value
+    return validated(kind, said, "the command line")
 
 
 def earlier_settings(root: DatasetRoot) -> dict[str, Any]:

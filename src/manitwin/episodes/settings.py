@@ -1,0 +1,69 @@
+"""Settings of episodes and of their pictures: frozen sections, like those of a build."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from manitwin.config import RunConfig, Section
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION
+from manitwin.scenes.settings import application_run
+
+
+class EpisodeSettings(Section):
+    """The physics of an episode, and what counts as success (metres, seconds, newtons; angles in degrees).
+
+    ``closing_force_n``: without it the gripper's own. ``solver_iterations_held`` are those while something is held: 24 at
+    1/120 s do as well as 40 at 1/240 s, and 12 drop some (docs/measured.md).
+    ``release_height_m`` is how far above its goal an object is let go. What moved less than ``max_placed_m`` and tilted less
+    than ``max_tilt_deg`` from its goal stands where it should, if it moves by no more than ``max_rest_*`` in half a second;
+    ``max_start_*`` is what a start may move until it rests,
+    ``max_disturbed_*`` what may happen to the other objects.
+    """
+
+    timestep_s: float = Field(default=1 / 120, gt=0)
+    solver_iterations: int = Field(default=10, ge=1)
+    solver_iterations_held: int = Field(default=24, ge=1)
+    contact_offset_m: float = Field(default=0.001, gt=0)
+    furniture_friction: float = Field(default=FURNITURE_FRICTION, ge=0)
+    closing_force_n: float | None = Field(default=None, gt=0)
+    release_height_m: float = Field(default=0.001, ge=0, le=0.02)
+    max_settle_s: float = Field(default=1.0, ge=0)
+    max_rest_s: float = Field(default=2.0, gt=0)
+    max_placed_m: float = Field(default=0.02, gt=0)
+    max_tilt_deg: float = Field(default=10.0, gt=0, lt=180)
+    max_rest_m: float = Field(default=0.001, gt=0)
+    max_rest_deg: float = Field(default=0.5, gt=0, lt=180)
+    max_start_m: float = Field(default=0.01, gt=0)
+    max_start_deg: float = Field(default=5.0, gt=0, lt=180)
+    max_disturbed_m: float = Field(default=0.01, gt=0)
+    max_disturbed_deg: float = Field(default=5.0, gt=0, lt=180)
+    max_contact_force_n: float = Field(default=0.5, ge=0)
+
+
+class TrajectoriesConfig(Section):
+    """Everything that decides what episodes are made of twins or scenes.
+
+    ``robot`` is a name or a TOML file. ``others`` objects stand around where twins are given and no scenes. ``batch`` episodes
+    of one object are made by one worker, and lost with it. Grasps of which more than ``retire_failed_share`` of the
+    executions failed are retired.
+    """
+
+    seed: int = 0
+    robot: str = "panda"
+    skill: Literal["pick_place"] = "pick_place"
+    others: int = Field(default=0, ge=0, le=20)
+    batch: int = Field(default=10, ge=1)
+    retire_failed_share: float = Field(default=1 / 3, ge=0, lt=1)
+    episode: EpisodeSettings = EpisodeSettings()
+    run: RunConfig = Field(default_factory=application_run)
+
+
+class PicturesConfig(Section):
+    """How recorded episodes are drawn. ``vp9`` plays in browsers; ``mpeg4`` does not, and takes a hundredth of the time."""
+
+    cameras: tuple[str, ...] = ("front", "wrist")
+    size_px: int = Field(default=256, ge=64, le=2048)
+    codec: Literal["vp9", "mpeg4"] = "vp9"
+    run: RunConfig = Field(default_factory=application_run)

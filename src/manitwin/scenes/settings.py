@@ -1,0 +1,74 @@
+"""Settings of layouts: frozen sections, like those of a build."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from manitwin.config import RunConfig, Section
+
+
+def application_run() -> RunConfig:
+    """Return how an application's run works: no tables are kept of what it makes, and no results of single stages."""
+    return RunConfig(index_every=0, keep_work=False)
+
+
+class LayoutSettings(Section):
+    """What a layout holds, how close it stands, and what it may do as it settles (metres, seconds, degrees).
+
+    ``objects`` is the least and the largest number. ``include`` names categories that must be there, one object for each
+    mention; the others are distractors. ``stacked`` objects stand on others, ``contained`` ones lie in a vessel. Without
+    ``min_gap_m`` the gap is that of the clutter level. ``upright``: what has an upright placement that stayed is put down in
+    one; what has none comes as it rests. ``workspace`` is where the named robot, or any, reaches from above:
+    least and largest radius about the origin, and half of the angle about +X. ``poses_tried`` bounds the places tried for an
+    object, ``repairs`` how many objects are sampled again before the layout is given up.
+    """
+
+    objects: tuple[int, int] = (3, 12)
+    surface: Literal["table", "shelf", "tray"] = "table"
+    clutter: Literal["sparse", "medium", "dense"] = "medium"
+    min_gap_m: float | None = Field(default=None, ge=0.001, le=0.5)
+    include: tuple[str, ...] = ()
+    stacked: int = Field(default=0, ge=0)
+    contained: int = Field(default=0, ge=0)
+    upright: bool = False
+    robot: str | None = None
+    workspace: tuple[float, float, float] | None = None
+    poses_tried: int = Field(default=120, ge=1)
+    repairs: int = Field(default=12, ge=0)
+    settle_s: float = Field(default=3.0, gt=0, le=20)
+    max_moved_m: float = Field(default=0.01, gt=0)
+    max_turned_deg: float = Field(default=5.0, gt=0, lt=90)
+    max_penetration_m: float = Field(default=0.001, gt=0)
+
+    @model_validator(mode="after")
+    def _possible(self) -> LayoutSettings:
+        low, high = self.objects
+        if not 1 <= low <= high:
+            raise ValueError(f"objects is the least and the largest number, at least 1; it is {low} to {high}")
+        needed = self.least_standing + self.stacked + self.contained
+        if needed > high:
+            raise ValueError(f"include, stacked and contained ask for {needed} objects or more; objects allows {high}")
+        if self.workspace is not None:
+            near, far, half_deg = self.workspace
+            if not (0 <= near < far and 0 < half_deg <= 180):
+                raise ValueError(
+                    f"workspace is least radius, largest radius (m), half angle (deg); it is {self.workspace}"
+                )
+        return self
+
+    @property
+    def least_standing(self) -> int:
+        """How many objects stand on the furniture at least: what is asked for, something below each stacked one, a vessel."""
+        return max(len(self.include), self.stacked + min(self.contained, 1), 1)
+
+
+class LayoutsConfig(Section):
+    """Everything that decides what layouts are made. ``pictures``: also a picture, depth, normals and ids of each camera."""
+
+    seed: int = 0
+    layout: LayoutSettings = LayoutSettings()
+    pictures: bool = False
+    picture_px: int = Field(default=512, ge=64, le=2048)
+    run: RunConfig = Field(default_factory=application_run)
