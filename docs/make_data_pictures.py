@@ -19,23 +19,19 @@ from PIL import Image
 
 from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.collect import batch_folders, stored_episodes
-from manitwin.episodes.replay_pictures import EpisodeReplay, twin_drawable
 from manitwin.episodes.episodes_run import make_episodes
+from manitwin.episodes.replay_pictures import EpisodeReplay, twin_drawable
+from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.video import write_animation
 from manitwin.render.false_colors import depth_in_colors, depth_range_m, ids_in_colors
 from manitwin.robots.load import load_robot
-from manitwin.episodes.settings import TrajectoriesConfig
-from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 from manitwin.scenes.furniture_pictures import lighting_of
-from manitwin.scenes.layouts.previews import scene_pictures
 from manitwin.scenes.layouts.layouts_run import make_layouts
+from manitwin.scenes.layouts.previews import scene_pictures
 from manitwin.scenes.scene import Furniture, Light
-from manitwin.scenes.scene_files import read_scene
-from manitwin.scenes.scene_files import scene_name
-from manitwin.twin.loaded_twin import TwinSource
-from manitwin.scenes.scene_files import read_scene
-from manitwin.scenes.scene_files import scene_name
+from manitwin.scenes.scene_files import read_scene, scene_name
+from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 from manitwin.twin.loaded_twin import TwinSource
 
 DOCS = Path(__file__).resolve().parent
@@ -79,7 +75,9 @@ def pictures(episode: StoredEpisode, twins: Path, size_px: int) -> list[list[np.
     robot, source = load_robot(episode.robot.name), TwinSource(twins)
     visuals = [twin_drawable(source.folder(thing.twin_id)) for thing in episode.objects]
     lighting = lighting_of(tuple(episode.facts["ambient"]), tuple(Light(**each) for each in episode.facts["lights"]))
-    with EpisodeReplay(robot, visuals, furniture=Furniture(**episode.facts["furniture"]), lighting=lighting, seed=1) as replay:
+    with EpisodeReplay(
+        robot, visuals, furniture=Furniture(**episode.facts["furniture"]), lighting=lighting, seed=1
+    ) as replay:
         frames = replay.frames(episode.recording, named_cameras(CAMERAS, robot), width_px=size_px, height_px=size_px)
         return [[frame.rgb for frame in each] for each in frames]
 

@@ -38,7 +38,7 @@ def _interrupted(ledger: Ledger) -> Iterator[Disagreement]:
     if count:
         yield Disagreement(
             f"{count} stages are marked as running, and no run is at work",
-            _repairs(_execute, ledger, "UPDATE stages SET state = 'waiting' WHERE state = 'running'"),
+            partial(_execute, ledger, "UPDATE stages SET state = 'waiting' WHERE state = 'running'", [()]),
         )
 
 
@@ -49,13 +49,7 @@ def _ended_without_folder(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagre
     for number, twin_id, state, revision in rows:
         wrong = _what_is_wrong(root, twin_id, state, revision)
         if wrong:
-            yield Disagreement(
-                f"item {number}, twin {twin_id}: {wrong}", _repairs(_redo, ledger, root, number, twin_id)
-            )
-
-
-def _repairs(repair: Callable[..., None], *arguments: object) -> Callable[[], None]:
-    return partial(repair, *arguments)
+            yield Disagreement(f"item {number}, twin {twin_id}: {wrong}", partial(_redo, ledger, root, number, twin_id))
 
 
 def _what_is_wrong(root: DatasetRoot, twin_id: str, state: str, revision: str) -> str | None:
@@ -93,11 +87,11 @@ def _half_folders(root: DatasetRoot) -> Iterator[Disagreement]:
     for pattern in ("*/*/.*", "*.finished", "*.replaced"):
         for path in sorted(work.glob(pattern)):
             name = path.relative_to(root.local).as_posix()
-            yield Disagreement(f"{name}: left half-made", _repairs(root.remove, name))
+            yield Disagreement(f"{name}: left half-made", partial(root.remove, name))
     for path in sorted((root.local / "twins").glob("*/*")):
         if not (path / RECORD).is_file():
             name = path.relative_to(root.local).as_posix()
-            yield Disagreement(f"{name}: a twin's folder without {RECORD}", _repairs(root.remove, name))
+            yield Disagreement(f"{name}: a twin's folder without {RECORD}", partial(root.remove, name))
 
 
 def _done_without_result(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
@@ -111,7 +105,7 @@ def _done_without_result(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagree
             continue
         yield Disagreement(
             f"item {number}, stage {stage}: done in the ledger, and its result is not there",
-            _repairs(_forget, ledger, number, stage),
+            partial(_execute, ledger, "DELETE FROM stages WHERE number = ? AND stage = ?", [(number, stage)]),
         )
 
 
@@ -128,7 +122,9 @@ def _index(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
     if lost:
         yield Disagreement(
             f"{len(lost)} twins are marked as indexed, and no table has them as they are ({lost[0]} ...)",
-            _repairs(_execute_many, ledger, "UPDATE items SET indexed = 0 WHERE twin_id = ?", lost),
+            partial(
+                _execute, ledger, "UPDATE items SET indexed = 0 WHERE twin_id = ?", [(twin_id,) for twin_id in lost]
+            ),
         )
     finished = {twin_id for (twin_id,) in ledger.connection.execute("SELECT twin_id FROM items")}
     strangers = sorted(in_tables.keys() - finished)
@@ -153,16 +149,6 @@ def _redo(ledger: Ledger, root: DatasetRoot, number: int, twin_id: str) -> None:
     ledger.reopen([number])
 
 
-def _forget(ledger: Ledger, number: int, stage: str) -> None:
-    ledger.connection.execute("DELETE FROM stages WHERE number = ? AND stage = ?", (number, stage))
-    ledger.commit()
-
-
-def _execute(ledger: Ledger, statement: str) -> None:
-    ledger.connection.execute(statement)
-    ledger.commit()
-
-
-def _execute_many(ledger: Ledger, statement: str, values: list[str]) -> None:
-    ledger.connection.executemany(statement, ((value,) for value in values))
+def _execute(ledger: Ledger, statement: str, rows: list[tuple[object, ...]]) -> None:
+    ledger.connection.executemany(statement, rows)
     ledger.commit()

@@ -46,29 +46,8 @@ def batches(
             raise UsageError(f"{name} is {value}; give 1 or more")
     convert = _converter(framework)
     order = np.random.default_rng(seed).permutation(len(twins))
-    return _batches(
-        index,
-        twins,
-        [order[i : i + size] for i in range(0, len(order), size)],
-        points,
-        grasps,
-        verified_only,
-        seed,
-        convert,
-    )
 
-
-def _batches(
-    index: Index,
-    twins: pa.Table,
-    chunks: list[np.ndarray],
-    points: int,
-    grasps: int,
-    verified_only: bool,
-    seed: int,
-    convert: Callable[[np.ndarray], Any],
-) -> Iterator[dict[str, Any]]:
-    for chunk in chunks:
+    def batch(chunk: np.ndarray) -> dict[str, Any]:
         some = twins.take(pa.array(chunk))
         ids = some["twin_id"].to_pylist()
         found = _grasps(index, some, verified_only)
@@ -77,10 +56,9 @@ def _batches(
         drawn = [_drawn(*found[twin_id], grasps, rng) for twin_id, rng in zip(ids, rngs, strict=True)]
         poses, mask, verified = (np.stack(each) for each in zip(*drawn, strict=True))
         arrays = {"points": np.stack(clouds), "grasps": poses, "mask": mask, "verified": verified}
-        yield {
-            **{name: convert(array) for name, array in arrays.items()},
-            "twin_ids": ids,
-        }
+        return {**{name: convert(array) for name, array in arrays.items()}, "twin_ids": ids}
+
+    return (batch(order[i : i + size]) for i in range(0, len(order), size))
 
 
 def _converter(framework: str) -> Callable[[np.ndarray], Any]:

@@ -120,7 +120,7 @@ def _connect(root: DatasetRoot, parts: PartList) -> duckdb.DuckDBPyConnection:
         connection.register_filesystem(root.fs)
     allowed: list[str] = []
     for table, schema in TABLES.items():
-        files = [_location(root, part.file(table)) for part in parts.parts if part.rows[table]]
+        files = [location(root, part.file(table)) for part in parts.parts if part.rows[table]]
         allowed += files
         if files:
             connection.execute(f"CREATE VIEW {table} AS SELECT * FROM read_parquet([{sql_texts(files)}])")
@@ -131,14 +131,20 @@ def _connect(root: DatasetRoot, parts: PartList) -> duckdb.DuckDBPyConnection:
     return connection
 
 
-def _location(root: DatasetRoot, name: str) -> str:
+def location(root: DatasetRoot, name: str) -> str:
+    """Return a file's place as DuckDB names it."""
     full = root.full(name)
     return full if root.local is not None else str(root.fs.unstrip_protocol(full))
 
 
 def sql_texts(values: Iterable[str]) -> str:
     """Return texts as SQL writes them, with commas between."""
-    return ", ".join("'" + value.replace("'", "''") + "'" for value in values)
+    return ", ".join(map(sql_text, values))
+
+
+def sql_text(value: str) -> str:
+    """Return a text as an SQL literal."""
+    return "'" + value.replace("'", "''") + "'"
 
 
 def grasps_of(twins: pa.Table) -> list[str]:

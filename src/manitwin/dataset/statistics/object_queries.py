@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from manitwin.dataset.statistics.query import Column, Query, summary, summary_columns, text
+from manitwin.dataset.index.query import sql_text
+from manitwin.dataset.statistics.query import Column, Query, summary, summary_columns
 from manitwin.models.annotators.priors import Prior, lookup
 
 ATTRIBUTES = ("category", "color", "material", "size", "shape", "function")
@@ -163,7 +164,7 @@ def _double(value: float) -> str:
 def mass_in_prior(priors: dict[str, Prior]) -> Query:
     """Return the query that holds twins' masses and sizes against the package's priors, which it spells out."""
     rows = ",\n  ".join(
-        f"({text(category)}, {_double(prior.mass_kg.low)}, {_double(prior.mass_kg.typical)}, "
+        f"({sql_text(category)}, {_double(prior.mass_kg.low)}, {_double(prior.mass_kg.typical)}, "
         f"{_double(prior.mass_kg.high)}, {_double(prior.longest_axis_m.low)}, {_double(prior.longest_axis_m.high)})"
         for category, prior in sorted(priors.items())
     )

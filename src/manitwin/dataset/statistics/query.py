@@ -10,9 +10,9 @@ import duckdb
 import pyarrow as pa
 from fsspec import AbstractFileSystem
 
-from manitwin.dataset.index.query import Index
+from manitwin.dataset.index.query import Index, location, sql_texts
 from manitwin.dataset.index.tables import TABLES
-from manitwin.errors import ManiTwinError, UsageError
+from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 
 Kind = Literal["text", "count", "number", "given", "share", "signed", "usd"]
@@ -62,14 +62,9 @@ class Result:
         return row
 
 
-def text(value: str) -> str:
-    """Return a string as an SQL literal."""
-    return "'" + value.replace("'", "''") + "'"
-
-
 def summary(table: str, quantities: Sequence[tuple[str, str]]) -> str:
     """Return SQL with a row a quantity ``(name, expression)``: its distribution over the rows of a table that have it."""
-    names = ", ".join(text(name) for name, _ in quantities)
+    names = sql_texts(name for name, _ in quantities)
     values = ", ".join(f"({expression})::DOUBLE" for _, expression in quantities)
     return f"""SELECT quantity, count(value) AS objects, favg(value) AS mean, median(value) AS median,
   quantile_cont(value, 0.1) AS p10, quantile_cont(value, 0.9) AS p90,
@@ -105,28 +100,30 @@ CREATE OR REPLACE TEMP MACRO own(proposer) AS NOT unfiltered(proposer) AND NOT j
 
 
 class ReportTables:
-    """Answer the report's queries from the tables of an index."""
+    """Answer a report's queries from named tables."""
 
-    def __init__(self, tables: Mapping[str, pa.Table | str], file_system: AbstractFileSystem | None = None):
-        """Take for every table of the index a pyarrow table, or SQL that yields it: ``read_parquet('...')``.
+    def __init__(
+        self,
+        tables: Mapping[str, pa.Table | str],
+        *,
+        prelude: str = PRELUDE,
+        file_system: AbstractFileSystem | None = None,
+    ):
+        """Take for every table a pyarrow table, or SQL that yields it: ``read_parquet('...')``; ``prelude`` has the macros.
 
         ``file_system`` is what reads files that are not local. One thread: sums of floats then do not depend on which one
-        came first, and memory stays flat. Raises ManiTwinError where a table is missing.
+        came first, and memory stays flat.
         """
-        missing = [name for name in TABLES if name not in tables]
-        if missing:
-            raise ManiTwinError(f"the index lacks the tables {', '.join(missing)}; write it again with manitwin index")
         self.connection = duckdb.connect()
         self.connection.execute("SET threads = 1; SET preserve_insertion_order = false")
         if file_system is not None:
             self.connection.register_filesystem(file_system)
-        for name in TABLES:
-            table = tables[name]
+        for name, table in tables.items():
             if isinstance(table, str):
                 self.connection.execute(f"CREATE TEMP VIEW {name} AS SELECT * FROM {table}")
             else:
                 self.connection.register(name, table)
-        self.connection.execute(PRELUDE)
+        self.connection.execute(prelude)
 
     @classmethod
     def of_index(cls, root: DatasetRoot) -> ReportTables:
@@ -134,9 +131,9 @@ class ReportTables:
         parts = Index(root).parts.parts
         tables: dict[str, pa.Table | str] = {}
         for name, schema in TABLES.items():
-            files = [_location(root, part.file(name)) for part in parts if part.rows[name]]
-            tables[name] = f"read_parquet([{', '.join(map(text, files))}])" if files else schema.empty_table()
-        return cls(tables, None if root.local is not None else root.fs)
+            files = [location(root, part.file(name)) for part in parts if part.rows[name]]
+            tables[name] = f"read_parquet([{sql_texts(files)}])" if files else schema.empty_table()
+        return cls(tables, file_system=None if root.local is not None else root.fs)
 
     def result(self, query: Query) -> Result:
         """Run a query; floats come with 12 digits, which do not depend on how rows are spread over files.
@@ -155,8 +152,3 @@ class ReportTables:
 
 def _rounded(value: Any) -> Any:
     return float(f"{value:.12g}") if isinstance(value, float) else value
-
-
-def _location(root: DatasetRoot, name: str) -> str:
-    full = root.full(name)
-    return full if root.local is not None else str(root.fs.unstrip_protocol(full))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from manitwin.dataset.statistics.query import Column, Query, text
+from manitwin.dataset.index.query import sql_text
+from manitwin.dataset.statistics.query import Column, Query
 from manitwin.engine.stage_order import STAGE_ORDER
 from manitwin.twin.record import REJECTION_REASONS
 
@@ -12,7 +13,7 @@ STAGES = tuple(REJECTION_REASONS)
 _ITEMS = """items AS (
   SELECT twin_id, kind, NULL AS stage, NULL AS reason FROM twins
   UNION ALL SELECT twin_id, kind, stage, reason FROM rejections)"""
-_ORDER = ", ".join(f"({text(stage)}, {position})" for position, stage in enumerate(STAGES))
+_ORDER = ", ".join(f"({sql_text(stage)}, {position})" for position, stage in enumerate(STAGES))
 
 TOTALS = Query(
     "totals",
@@ -147,7 +148,7 @@ GROUP BY source_sha256 HAVING count(*) > 1 ORDER BY items DESC, source_sha256"""
 )
 
 
-_PLACE = f"list_position([{', '.join(map(text, STAGE_ORDER))}], split_part(stage, '-', 1))"
+_PLACE = f"list_position([{', '.join(map(sql_text, STAGE_ORDER))}], split_part(stage, '-', 1))"
 """A stage's place in the pipeline; the stages of further grippers (``verify-robotiq_2f85``) stand by the first one's."""
 
 COST_BY_STAGE = Query(

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from manitwin.dataset.index.query import sql_text
 from manitwin.dataset.statistics.query import PRELUDE as SHARES
-from manitwin.dataset.statistics.query import Column, Query, summary, summary_columns, text
+from manitwin.dataset.statistics.query import Column, Query, summary, summary_columns
 from manitwin.episodes.attempts import EXECUTION_FAILURES, OUTCOMES
 
 SUCCEEDED = ("kept", "unplanned_contact", "disturbed")
@@ -23,7 +24,7 @@ MEANINGS = {
 
 
 def _among(outcomes: tuple[str, ...]) -> str:
-    return f"outcome IN ({', '.join(map(text, outcomes))})"
+    return f"outcome IN ({', '.join(map(sql_text, outcomes))})"
 
 
 PRELUDE = f"""{SHARES}-- attempts by how far they came
@@ -76,7 +77,7 @@ FROM (SELECT unnest(['attempted', 'set up and standing', 'planned and executed',
     "Intervals are Wilson's, as if attempts were independent; those with one object are alike, so they are a little narrow.",
 )
 
-_MEANINGS = ", ".join(f"({text(name)}, {place}, {text(MEANINGS[name])})" for place, name in enumerate(OUTCOMES))
+_MEANINGS = ", ".join(f"({sql_text(name)}, {place}, {sql_text(MEANINGS[name])})" for place, name in enumerate(OUTCOMES))
 OUTCOMES_COUNTED = Query(
     "outcomes",
     "What became of the attempts.",

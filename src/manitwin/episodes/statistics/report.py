@@ -8,13 +8,14 @@ from html import escape, unescape
 from pathlib import Path
 from typing import Any
 
+from manitwin.dataset.index.query import sql_text
 from manitwin.dataset.statistics.page import Page, ReportSection, SectionPart, written
-from manitwin.dataset.statistics.query import Column, Result, Row
+from manitwin.dataset.statistics.query import Column, ReportTables, Result, Row
 from manitwin.dataset.statistics.style import Figure, drawing
 from manitwin.episodes.attempts import ATTEMPTS
 from manitwin.episodes.statistics import figures as drawn
 from manitwin.episodes.statistics import queries as q
-from manitwin.episodes.statistics.episode_tables import EpisodeTables, joint_ranges
+from manitwin.episodes.statistics.joint_ranges import joint_ranges
 from manitwin.errors import EpisodesError
 from manitwin.twin.store import canonical_json, write_bytes_atomically
 
@@ -193,6 +194,7 @@ def episode_statistics(folder: Path) -> EpisodeReport:
             f"{folder}: no {ATTEMPTS}, so this is no folder of finished episodes; run manitwin trajectories"
         )
     files = sorted(folder.glob(EPISODE_FILES)) or [path for path in [folder / _MERGED] if path.is_file()]
-    tables = EpisodeTables(attempts, joint_ranges(files))
+    views = {"attempts": f"read_parquet({sql_text(str(attempts))})", "joints": joint_ranges(files)}
+    tables = ReportTables(views, prelude=q.PRELUDE)
     title = f"Statistics of the episodes in {folder.resolve().name}"
     return EpisodeReport(title, {query.name: tables.result(query) for query in q.QUERIES})
