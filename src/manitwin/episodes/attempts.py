@@ -54,12 +54,12 @@ class Attempt:
 
     @property
     def planned(self) -> bool:
-        """Whether a plan was found, so that it was executed."""
+        """True where a plan was found, so that it was executed."""
         return self.outcome not in ("no_plan", "no_room", "unsettled")
 
     @property
     def succeeded(self) -> bool:
-        """Whether the object stands where it should, whatever was touched on the way."""
+        """True where the object stands where it should, whatever was touched on the way."""
         return self.outcome in ("kept", "unplanned_contact", "disturbed")
 
 

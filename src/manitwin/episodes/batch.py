@@ -1,4 +1,4 @@
-"""What one worker does at a time: some episodes of one object, or in one scene; and what it leaves."""
+"""Batches of episodes: some of one object, or in one scene, made by one worker at a time; and their records."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Make of a run's batches what people load: one table of attempts, a LeRobot data set, and a ManiSkill file."""
+"""Collect a run's batches into what people load: one table of attempts, a LeRobot data set, and a ManiSkill file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class AttemptTotals:
 
 @dataclass(frozen=True)
 class Collected:
-    """What a person reads at a run's end, and the numbers in it."""
+    """The lines that a person reads at a run's end, and the numbers in them."""
 
     lines: list[str]
     totals: AttemptTotals

@@ -31,7 +31,7 @@ LEAST_LIFT_SHARE = 0.5  # of what the hand rose: less, and the object was left b
 
 
 class Planner(Protocol):
-    """What an episode wants of a planner (``planning.pick_place.PickPlacePlanner``)."""
+    """The protocol of an episode's planner (``planning.pick_place.PickPlacePlanner``)."""
 
     def plan(self, problem: PickPlaceProblem) -> PlanReport:
         """Plan all of it."""

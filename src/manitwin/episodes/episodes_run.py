@@ -98,7 +98,7 @@ DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "run", "batch", "retire_fail
 
 @dataclass(frozen=True)
 class EpisodesSource:
-    """Where episodes come from: a data set of twins, and scenes of them or none."""
+    """The source of episodes: a data set of twins, and scenes of them or none."""
 
     dataset: str
     scenes: str | None

@@ -1,4 +1,4 @@
-"""What a person would tell the robot to do: one episode in several phrasings, from its twin's words and the way it goes."""
+"""Instructions as a person would give them: one episode in several phrasings, from its twin's words and the way it goes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an object may be called in an instruction: "mug", "red mug", "mug for holding hot drinks"."""
+"""Names of an object in an instruction: "mug", "red mug", "mug for holding hot drinks"."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _COLORS = 2
 
 @dataclass(frozen=True)
 class Name:
-    """What stands behind "the"; ``in_pairs``: one of them is a pair. ``uses`` are the attributes that it tells."""
+    """The words behind "the"; ``in_pairs``: one of them is a pair. ``uses`` are the attributes that it tells."""
 
     words: str
     plural: bool
@@ -96,7 +96,7 @@ def _before(told: _Told, *attributes: str) -> str | None:
 
 
 def _fits(name: Name, told: _Told, other: _Told) -> bool:
-    """Whether a name could mean another object too."""
+    """Tell whether a name could mean another object too."""
     if other.noun != told.noun and told.noun != NAMELESS:
         return False
     return all(getattr(other, attribute) == getattr(told, attribute) for attribute in name.uses)

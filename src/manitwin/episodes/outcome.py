@@ -1,4 +1,4 @@
-"""How an episode is judged: where the object stands against its goal, and what became of the others."""
+"""Outcomes of episodes: where the object stands against its goal, and whether the others stayed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.geometry.poses import rotation_angle_rad, transform_points
 
 @dataclass(frozen=True)
 class PlacementErrors:
-    """How far an object is from its goal: its centre of mass, the angle between the upward directions of both, its heading."""
+    """Distances of an object from its goal: its centre of mass, the angle between the upward directions of both, its heading."""
 
     position_error_m: float
     tilt_rad: float

@@ -1,4 +1,4 @@
-"""Where an episode begins and ends: random poses on a table in front of a robot, with or without other objects."""
+"""Pick-and-place tasks: random starts and goals on a table in front of a robot, with or without other objects."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class PickPlaceTask:
 
 @dataclass(frozen=True)
 class PlacingArea:
-    """Where objects may be put: in a robot's workspace, and wholly on a level surface."""
+    """The area where objects may be put: in a robot's workspace, and wholly on a level surface."""
 
     workspace: Workspace
     support: SupportRegion

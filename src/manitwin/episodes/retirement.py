@@ -31,7 +31,7 @@ class Retirement:
 
     @property
     def failed(self) -> int:
-        """How many executions failed."""
+        """The number of executions that failed."""
         return sum(self.outcomes.values())
 
 

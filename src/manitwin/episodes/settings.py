@@ -61,7 +61,7 @@ class TrajectoriesConfig(Section):
 
 
 class PicturesConfig(Section):
-    """How recorded episodes are drawn. ``vp9`` plays in browsers; ``mpeg4`` does not, and takes a hundredth of the time."""
+    """Settings of the pictures of episodes. ``vp9`` plays in browsers; ``mpeg4`` does not, and takes a hundredth of the time."""
 
     cameras: tuple[str, ...] = ("front", "wrist")
     size_px: int = Field(default=256, ge=64, le=2048)

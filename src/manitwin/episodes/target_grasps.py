@@ -1,4 +1,4 @@
-"""Which of a twin's grasps an episode may use, and in which order: robust ones sooner, never the same order twice."""
+"""The grasps of a twin that an episode may use, in a random order in which robust ones tend to come sooner."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class SupportRegion(_Record):
 
 
 class Furniture(_Record):
-    """What the objects stand on: ``kind`` table, shelf or tray.
+    """The furniture that objects stand on: ``kind`` table, shelf or tray.
 
     Objects stand on the ``supports``; ``support_height_m`` is the height of the lowest of these, 0 for a table. The table's
     top is larger than the region on it that is sampled: a robot's base stands beside that.
@@ -86,7 +86,7 @@ class SceneCamera(_Record):
 
 
 class SceneMeasures(_Record):
-    """What physics said of it: how far objects moved and turned as they settled, and what was left of gaps."""
+    """Measurements by physics: how far objects moved and turned as they settled, and what was left of gaps."""
 
     max_moved_m: float
     max_turned_rad: float

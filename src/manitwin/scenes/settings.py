@@ -15,7 +15,7 @@ def application_run() -> RunConfig:
 
 
 class LayoutSettings(Section):
-    """What a layout holds, how close it stands, and what it may do as it settles (metres, seconds, degrees).
+    """Settings of a layout: its objects, their density, and the limits of their settling (metres, seconds, degrees).
 
     ``objects`` is the least and the largest number. ``include`` names categories that must be there, one object for each
     mention; the others are distractors. ``stacked`` objects stand on others, ``contained`` ones lie in a vessel. Without
@@ -60,7 +60,7 @@ class LayoutSettings(Section):
 
     @property
     def least_standing(self) -> int:
-        """How many objects stand on the furniture at least: what is asked for, something below each stacked one, a vessel."""
+        """The least number of objects on the furniture: what is asked for, something below each stacked one, a vessel."""
         return max(len(self.include), self.stacked + min(self.contained, 1), 1)
 
 

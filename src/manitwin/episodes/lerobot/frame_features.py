@@ -1,4 +1,4 @@
-"""What a frame holds: one table of features for a robot, and an episode's frames as arrays."""
+"""Features of a frame: one table of them for a robot, and an episode's frames as arrays."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Feature:
 
     @property
     def width(self) -> int:
-        """How many numbers a frame has."""
+        """The number of values that a frame has."""
         return 1 if self.names is None else len(self.names)
 
     @property

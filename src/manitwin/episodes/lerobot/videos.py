@@ -31,7 +31,7 @@ _PIXEL_STEP = 4
 
 @dataclass(frozen=True)
 class Clip:
-    """Where an episode's pictures are: frame ``first_frame + t`` of an mp4 of 20 frames a second shows state t."""
+    """The place of an episode's pictures: frame ``first_frame + t`` of an mp4 of 20 frames a second shows state t."""
 
     file: Path
     first_frame: int = 0
@@ -47,7 +47,7 @@ class CameraVideos:
 
 @dataclass(frozen=True)
 class VideoFacts:
-    """What an mp4 says of itself."""
+    """The size, rate, codec and number of frames that an mp4 states."""
 
     frames: int
     rate_hz: float

@@ -38,7 +38,7 @@ from manitwin.errors import EpisodesError
 
 @dataclass(frozen=True)
 class LeRobotSummary:
-    """What a set holds."""
+    """The numbers of episodes, frames and tasks of a set that was written."""
 
     episodes: int
     frames: int

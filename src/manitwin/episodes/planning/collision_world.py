@@ -1,4 +1,4 @@
-"""Which configurations of a body are free, phase by phase; the target is in the world twice and never rebuilt."""
+"""Collision worlds: which configurations of a body are free, phase by phase; the target is in a world twice, never rebuilt."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class CollisionWorld:
 
 
 class _Pairs:
-    """Which pairs of shapes each phase tests, as upper triangles over all shapes."""
+    """The pairs of shapes that each phase tests, as upper triangles over all shapes."""
 
     def __init__(
         self,

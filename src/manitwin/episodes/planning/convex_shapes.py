@@ -61,7 +61,7 @@ class ConvexBody:
 
     @cached_property
     def is_solid(self) -> bool:
-        """Whether the one hull stands well for the hulls: it adds little room that a hand could use."""
+        """True where the one hull stands well for the hulls: it adds little room that a hand could use."""
         return sum(ConvexHull(vertices).volume for vertices in self.body.hulls) >= SOLID_SHARE * self._whole.volume
 
     @cached_property

@@ -175,7 +175,7 @@ class PickPlacePlanner:
 
 @dataclass
 class _Tally:
-    """Which grasps were tried, beyond a look or not, and what they failed of."""
+    """The grasps that were tried, beyond a look or not, and what they failed of."""
 
     tried: set[int] = field(default_factory=set)
     beyond_a_look: set[int] = field(default_factory=set)

@@ -13,7 +13,7 @@ from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 
 
 class Phase(IntEnum):
-    """What the robot is doing; the numbers are part of the recorded format."""
+    """The phase of an episode; the numbers are part of the recorded format."""
 
     REACH = 0
     APPROACH = 1

@@ -76,7 +76,7 @@ OF_EPISODES = (
 
 @dataclass(frozen=True)
 class EpisodesCard:
-    """What the card tells. ``info`` is meta/info.json; ``made_of`` names the data set, scenes and versions, without folders."""
+    """The card's facts. ``info`` is meta/info.json; ``made_of`` names the data set, scenes and versions, without folders."""
 
     name: str
     info: Mapping[str, Any]

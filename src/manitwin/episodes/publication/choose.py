@@ -1,4 +1,4 @@
-"""Which episodes may go out: those whose objects all come from twins under an allowed licence."""
+"""Choose the episodes to publish: those whose objects all come from twins under an allowed licence."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from manitwin.twin.loaded_twin import TwinSource
 
 @dataclass(frozen=True)
 class TwinInEpisodes:
-    """What is to be known of a twin that episodes show: whom to credit, and the numbers of the published episodes.
+    """A twin that published episodes show: whom to credit, and the numbers of these episodes.
 
     ``revisions`` are those that it had when the batches were made: what it is today may be another (``--retire`` amends it).
     """

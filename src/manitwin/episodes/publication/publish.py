@@ -111,7 +111,7 @@ TWINS_SCHEMA = pa.schema(
 
 @dataclass(frozen=True)
 class PublishedEpisodes:
-    """What went out and what did not; ``left_out`` counts kept episodes by the licences that keep them here.
+    """The counts of what was published and what was not; ``left_out`` counts kept episodes by the licences that keep them here.
 
     ``rehearsals`` are those left out because a rehearsal server had a part in one of their twins.
     """

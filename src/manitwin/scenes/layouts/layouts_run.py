@@ -1,4 +1,4 @@
-"""Make many layouts: the engine's run, and what came of it in a few lines."""
+"""Make many layouts: the engine's run, and its totals."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ DECIDE_NO_SCENE = frozenset(("dataset", "run", "pictures", "picture_px"))
 
 @dataclass(frozen=True)
 class LayoutTotals:
-    """What came of all layouts below a root; the most of each measure is over the accepted ones."""
+    """Totals of all layouts below a root; the most of each measure is over the accepted ones."""
 
     accepted: int
     rejected: dict[str, int]

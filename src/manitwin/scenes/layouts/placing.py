@@ -110,7 +110,7 @@ GROW_AFTER = 20  # places tried in vain in one patch
 
 
 class Obstacles:
-    """What an object on a support must keep away from: other objects, and furniture that rises above the support."""
+    """The obstacles of an object on a support: other objects, and furniture that rises above the support."""
 
     def __init__(self, boxes: Sequence[StaticBox], objects: Sequence[PlacedParts]):
         self.boxes = [ConvexParts.of_box(box).at(box.box_to_world) for box in boxes]

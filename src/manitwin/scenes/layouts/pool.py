@@ -1,4 +1,4 @@
-"""What layouts are made of: a data set's accepted twins as a light table, their bodies read when they are drawn."""
+"""The pool that layouts are made of: a data set's accepted twins as a light table, their bodies read when they are drawn."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class PoolTwin:
 
     @property
     def stands(self) -> bool:
-        """Whether one of its placements is upright."""
+        """True where one of its placements is upright."""
         return any(pose.upright for pose in self.poses)
 
     def is_a(self, category: str) -> bool:
@@ -58,7 +58,7 @@ class PoolTwin:
 
 @dataclass(frozen=True)
 class PoolBody:
-    """What is known of a twin once it is drawn."""
+    """A twin's data that is read once it is drawn."""
 
     body: RigidBody
     parts: ConvexParts

@@ -17,7 +17,7 @@ Role = Literal["stand", "on", "in"]
 
 @dataclass(frozen=True)
 class Put:
-    """Where an object was put: the support's name, the placement it is in, its pose and its parts there."""
+    """An object's place: the support's name, the placement it is in, its pose and its parts there."""
 
     surface: str
     placement: int | None
@@ -54,7 +54,7 @@ class Slot:
 
     @property
     def needed(self) -> bool:
-        """Whether the layout would not be what was asked for without it."""
+        """True where the layout would not be what was asked for without it."""
         return self.category is not None or self.role != "stand" or self.vessel or self.base
 
     def related(self, other: Slot) -> bool:
