@@ -95,7 +95,7 @@ def _wrong_names(source: str) -> list[str]:
 
 
 def test_what_is_not_public_is_seen() -> None:
-    assert _wrong_names("import manitwin.dataset.publish.unpack") == ["manitwin.dataset.publish.unpack"]
+    assert _wrong_names("import manitwin.dataset.publish.shards") == ["manitwin.dataset.publish.shards"]
     assert _wrong_names("from manitwin.dataset.index.query import Index") == ["manitwin.dataset.index.query.Index"]
     assert _wrong_names("import manitwin\nmanitwin.nothing()") == ["manitwin.nothing"]
     assert _wrong_names("from manitwin import Dataset\nfrom manitwin.backends import Generator") == []

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from manitwin.dataset.index.query import Index
     from manitwin.dataset.index.twins import Twins
     from manitwin.dataset.publish.publish import Published, publish_dataset
-    from manitwin.dataset.publish.unpack import unpack_shard
+    from manitwin.dataset.publish.shards import unpack_shard
     from manitwin.episodes.hdf5_file import EpisodeFile
     from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
     from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
@@ -160,7 +160,7 @@ _DEFINED_IN = {
         "Published",
         "publish_dataset",
     ),
-    "manitwin.dataset.publish.unpack": ("unpack_shard",),
+    "manitwin.dataset.publish.shards": ("unpack_shard",),
     "manitwin.episodes.hdf5_file": ("EpisodeFile",),
     "manitwin.episodes.lerobot.read": (
         "LeRobotSet",

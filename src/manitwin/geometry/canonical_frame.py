@@ -32,6 +32,14 @@ _NEARLY_AS_LIKELY = 0.6
 _ELONGATED = 1.5
 _ROUND = 0.1  # relative difference of the two moments across the axis
 
+PLAUSIBLE_M = (0.005, 1.0)
+"""Longest axes that an object held in one hand or on a table can have (the paper's objects: 3 to 50 cm)."""
+
+_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
+_GUESSES_M = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254}  # in the order in which they are common
+_NORMALISED = (1.0, 2.0)  # the longest axis of meshes that a generator or a viewer scaled to a unit cube
+_SLACK = 2.0  # a size outside the usual interval by more than this speaks against the unit
+
 
 @dataclass(frozen=True)
 class UpChoice:
@@ -169,15 +177,6 @@ def object_frame(vertices: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     turned = vertices @ rotation.T
     low, high = turned.min(0), turned.max(0)
     return transform(rotation, np.array([-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]]))
-
-
-PLAUSIBLE_M = (0.005, 1.0)
-"""Longest axes that an object held in one hand or on a table can have (the paper's objects: 3 to 50 cm)."""
-
-_UNITS_M = {"m": 1.0, "cm": 0.01, "mm": 0.001}
-_GUESSES_M = {"millimetres": 0.001, "centimetres": 0.01, "inches": 0.0254}  # in the order in which they are common
-_NORMALISED = (1.0, 2.0)  # the longest axis of meshes that a generator or a viewer scaled to a unit cube
-_SLACK = 2.0  # a size outside the usual interval by more than this speaks against the unit
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,13 @@ _AT_ONCE = 4096  # pairs in one go: bounds the memory
 _FIRST_PAIRS = 16  # where two bodies meet, the nearest boxes mostly say so
 SAME_NORMAL = 1e-4
 
+MAX_ITERATIONS = 60
+TOLERANCE_M = 1e-7  # of the distance: far below any gap or overlap that is asked for
+_EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
+_FACES = np.array([(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])
+_OPPOSITE = np.array([3, 2, 1, 0])  # the corner that a face leaves out
+_FLAT = 1e-18  # of a squared volume or area by its edges: rounding, no thickness
+
 
 @dataclass(frozen=True)
 class ConvexParts:
@@ -182,14 +189,6 @@ def _distinct(normals: np.ndarray) -> np.ndarray:
     """Return the normals without those of other triangles of the same face."""
     cells = np.round(normals / SAME_NORMAL)
     return normals[np.sort(np.unique(cells, axis=0, return_index=True)[1])]
-
-
-MAX_ITERATIONS = 60
-TOLERANCE_M = 1e-7  # of the distance: far below any gap or overlap that is asked for
-_EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
-_FACES = np.array([(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])
-_OPPOSITE = np.array([3, 2, 1, 0])  # the corner that a face leaves out
-_FLAT = 1e-18  # of a squared volume or area by its edges: rounding, no thickness
 
 
 def convex_distances(first: np.ndarray, second: np.ndarray, *, beyond_m: float = np.inf) -> np.ndarray:

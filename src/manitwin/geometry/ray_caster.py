@@ -12,6 +12,8 @@ from embreex.rtcore_scene import EmbreeScene
 
 MILLIMETRES = 1000.0  # Embree works in float32 with absolute tolerances: objects of a hand's size want larger units
 
+_START_BELOW_SURFACE_M = 1e-5  # the ray must not meet the face that it starts on
+
 
 class RayCaster:
     """A mesh prepared for rays, at the first of them."""
@@ -52,9 +54,6 @@ class RayCaster:
         )
         face = hits["primID"].astype(np.int64)
         return np.where(face >= 0, hits["tfar"].astype(float) / MILLIMETRES, np.inf), face
-
-
-_START_BELOW_SURFACE_M = 1e-5  # the ray must not meet the face that it starts on
 
 
 def local_thickness(mesh: trimesh.Trimesh, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -19,7 +19,7 @@ import manitwin
 from manitwin.dataset.index.parts import indexed_twins, write_part
 from manitwin.dataset.publish.publish import publish_dataset
 from manitwin.dataset.publish.shard_plan import archive_bytes
-from manitwin.dataset.publish.unpack import unpack_shard
+from manitwin.dataset.publish.shards import unpack_shard
 from manitwin.errors import TwinError, UsageError
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.store import RECORD, read_record, seal

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 from made_twins import make_twin
 
-from manitwin.dataset.publish.shards import pack, parts_of, unpack
-from manitwin.dataset.publish.unpack import unpack_shard
+from manitwin.dataset.publish.shards import pack, parts_of, unpack, unpack_shard
 from manitwin.errors import TwinError, UsageError
 from manitwin.twin.store import RECORD, canonical_json, revision_of
 

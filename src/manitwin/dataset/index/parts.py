@@ -28,6 +28,12 @@ from manitwin.twin.dataset_root import DatasetRoot
 MERGE_WIDTH = 8
 """So many parts of one order of size are merged into one: a twin is written log8 times, and readers open few files."""
 
+PART_ROWS = 1 << 20
+"""Grasps of a merged part, about: 60 MB on disk, 0.6 GB of memory to sort."""
+
+Files = Mapping[str, Sequence[str]]
+"""The files to read of each table, as the file system names them."""
+
 
 class IndexTables:
     """The index as the tables that a run keeps of its twins."""
@@ -147,13 +153,6 @@ class _Writer:
         after = PartList(in_order_of_twins(self.parts), self.next)
         after.write(self.root)
         return after
-
-
-PART_ROWS = 1 << 20
-"""Grasps of a merged part, about: 60 MB on disk, 0.6 GB of memory to sort."""
-
-Files = Mapping[str, Sequence[str]]
-"""The files to read of each table, as the file system names them."""
 
 
 def file_system(root: DatasetRoot) -> Any:

@@ -20,6 +20,21 @@ _Answer = TypeVar("_Answer")
 _FILE_IS_GONE = (duckdb.IOException, duckdb.PermissionException, FileNotFoundError)
 """What a file of the list raises that is not there any more: DuckDB then looks for a folder of that name, and may not."""
 
+EXAMPLE = "\"category = 'mug' and mass_kg < 0.4\""
+_ALONE: dict[str, Any] = {
+    **dict.fromkeys(("where_clause", "having", "qualify", "sample")),
+    **{name: [] for name in ("modifiers", "group_expressions", "group_sets")},
+    "aggregate_handling": "STANDARD_HANDLING",
+}
+"""What DuckDB's parser says of a SELECT that has no more than its list of expressions."""
+
+_REFUSED = {
+    "TABLE_FUNCTION": "functions that make tables",
+    "SHOW_REF": "DESCRIBE and SHOW",
+    "PIVOT": "PIVOT",
+    "PARAMETER": "parameters",
+}
+
 
 class Index:
     """The six tables of a data set's index, as they are when first asked; reads the files, holds nothing.
@@ -172,21 +187,6 @@ def _explained(error: duckdb.Error, table: str) -> str:
 
 def _first_line(error: Exception) -> str:
     return " ".join(str(error).split("\n")[0].split())
-
-
-EXAMPLE = "\"category = 'mug' and mass_kg < 0.4\""
-_ALONE: dict[str, Any] = {
-    **dict.fromkeys(("where_clause", "having", "qualify", "sample")),
-    **{name: [] for name in ("modifiers", "group_expressions", "group_sets")},
-    "aggregate_handling": "STANDARD_HANDLING",
-}
-"""What DuckDB's parser says of a SELECT that has no more than its list of expressions."""
-_REFUSED = {
-    "TABLE_FUNCTION": "functions that make tables",
-    "SHOW_REF": "DESCRIBE and SHOW",
-    "PIVOT": "PIVOT",
-    "PARAMETER": "parameters",
-}
 
 
 def check_condition(connection: duckdb.DuckDBPyConnection, condition: str) -> None:

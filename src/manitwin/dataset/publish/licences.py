@@ -17,6 +17,13 @@ LICENSES_MD = "LICENSES.md"
 _IDS_SHOWN = 50
 """Twins of one author that are listed; of more the index tells."""
 
+OF_TWINS = (
+    "Each twin is a work made of its source (a photo, a text or a mesh, which is in the shard too) and stays under that source's "
+    "licence. Licence, attribution and the source's sha256 of every single twin are the columns `license`, `attribution` and "
+    "`source_sha256` of `index/twins-*.parquet`."
+)
+_HUB_NAMES = {"odbl-1.0": "odbl", "odc-by-1.0": "odc-by", "pddl-1.0": "pddl"}
+
 
 @dataclass(frozen=True)
 class Selection:
@@ -92,13 +99,6 @@ def check_some_go_out(noun: str, count: int, left_out: Mapping[str, int], rehear
 def without_attribution(twins: Iterable[Mapping[str, Any]]) -> list[str]:
     """Return the ids of twins under a Creative Commons licence that asks for attribution, of which none is known."""
     return [t["twin_id"] for t in twins if t["license"].upper().startswith("CC-BY") and not t["attribution"]]
-
-
-OF_TWINS = (
-    "Each twin is a work made of its source (a photo, a text or a mesh, which is in the shard too) and stays under that source's "
-    "licence. Licence, attribution and the source's sha256 of every single twin are the columns `license`, `attribution` and "
-    "`source_sha256` of `index/twins-*.parquet`."
-)
 
 
 def licenses_page(name: str, twins: Sequence[Mapping[str, Any]], *, introduction: str = OF_TWINS) -> str:
@@ -193,8 +193,6 @@ HUB_LICENSES = frozenset(
 )
 """The identifiers that a card may name, as far as they are SPDX's in lower case:
 https://huggingface.co/docs/hub/repositories-licenses"""
-
-_HUB_NAMES = {"odbl-1.0": "odbl", "odc-by-1.0": "odc-by", "pddl-1.0": "pddl"}
 
 
 def hub_license(licences: Iterable[str]) -> dict[str, str]:

@@ -34,6 +34,8 @@ TAR_RECORD = 10_240
 
 _SLUG_LENGTH = 64
 
+_END_OF_ZIP = 22  # bytes of the end-of-central-directory record (APPNOTE.TXT 4.3.16)
+
 
 @dataclass(frozen=True)
 class ShardTwin:
@@ -145,9 +147,6 @@ def check_hub_limits(sizes: dict[str, int]) -> None:
             f"{largest}: {sizes[largest]:,} bytes, the hub takes files below {HUB_FILE_BYTES:,}; "
             "give a smaller --shard-size-mb"
         )
-
-
-_END_OF_ZIP = 22  # bytes of the end-of-central-directory record (APPNOTE.TXT 4.3.16)
 
 
 def tar_bytes_of_twins(root: DatasetRoot) -> dict[str, int]:

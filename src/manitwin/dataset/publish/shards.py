@@ -1,4 +1,4 @@
-"""Write a shard: the members of its twins, each file checked against its twin's digests, in a tar of no date and no owner.
+"""Write shards and read them back: each file checked against its twin's digests; a tar has no date and no owner.
 
 webdataset splits a member's name at the first dot: what is before it is the sample's key (the twin's id), what is after it
 the name of the part. A part has no folder, so ``views/rgb_00.webp`` is ``rgb_00.webp``, and every other folder is one
@@ -12,10 +12,11 @@ import io
 import json
 import re
 import tarfile
+import tempfile
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from hashlib import sha256
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
 from pydantic import ValidationError
@@ -25,7 +26,13 @@ from manitwin.dataset.publish.shard_plan import VIEWS, Shard, ShardTwin
 from manitwin.errors import TwinError, UsageError
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.record import TwinRecord
-from manitwin.twin.store import RECORD, RUN, canonical_json, revision_of
+from manitwin.twin.store import RECORD, RUN, canonical_json, read_record, replace_folder, revision_of
+
+KEY = re.compile(r"[0-9A-Za-z_-]+")
+"""What can be the key of a sample and the name of a folder."""
+
+_FILE = re.compile(r"[0-9A-Za-z_-][0-9A-Za-z_.-]*(?:/[0-9A-Za-z_-][0-9A-Za-z_.-]*)*")
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date of a ZIP entry
 
 
 def write_shard(stream: BinaryIO, root: DatasetRoot, shard: Shard, places: tuple[bytes, ...]) -> None:
@@ -96,13 +103,6 @@ def _run(root: DatasetRoot, folder: str) -> bytes | None:
         raise TwinError(f"{root.full(name)}: cannot be read ({error}); build the twin again") from error
 
 
-KEY = re.compile(r"[0-9A-Za-z_-]+")
-"""What can be the key of a sample and the name of a folder."""
-
-_FILE = re.compile(r"[0-9A-Za-z_-][0-9A-Za-z_.-]*(?:/[0-9A-Za-z_-][0-9A-Za-z_.-]*)*")
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date of a ZIP entry
-
-
 def parts_of(files: Iterable[str]) -> dict[str, list[str]]:
     """Return ``{part: names of its files}``, sorted, of a twin's files.
 
@@ -159,3 +159,75 @@ def unpack(files: list[str], content: bytes) -> dict[str, bytes]:
             return {f"{folder}/{entry.filename}": archive.read(entry) for entry in entries}
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError) as error:
         raise TwinError(f"{folder}.zip: cannot be read ({error}); download the shard again") from error
+
+
+def unpack_shard(shard: str | Path, out: str | Path) -> list[Path]:
+    """Write the twins of a shard into a data set at ``out`` (``out/twins/<2 hex>/<twin_id>/``); returns their folders.
+
+    A twin is written beside its place, verified against its own digests and renamed, so that no folder is ever half made;
+    one that is there already is replaced. Raises UsageError for a shard that is not there, and TwinError, naming the
+    member, for anything that no shard of ours has: links, devices, sparse files, names with folders, parts that twin.json
+    does not name, altered files.
+    """
+    path, place = Path(shard), Path(out)
+    if not path.is_file():
+        raise UsageError(f"{shard}: no such file; give a .tar of a published data set")
+    place.mkdir(parents=True, exist_ok=True)
+    folders = []
+    with tempfile.TemporaryDirectory(prefix=".unpack-", dir=place) as scratch:
+        try:
+            for twin_id, parts in samples(path):
+                fresh = _write_twin(path, twin_id, parts, Path(scratch))
+                folders.append(place / twin_name(twin_id))
+                replace_folder(fresh, folders[-1])
+        except tarfile.TarError as error:
+            raise TwinError(f"{path}: not a whole tar file ({error}); download it again") from error
+    return folders
+
+
+def samples(shard: Path) -> Iterator[tuple[str, dict[str, bytes]]]:
+    """Yield the key and the parts of each sample of a shard; raises TwinError for a member that none of ours has."""
+    key, parts = "", dict[str, bytes]()
+    with tarfile.open(shard, "r:") as tar:
+        for member in tar:
+            this, _, part = member.name.partition(".")
+            if not KEY.fullmatch(this) or not part or "/" in part or "\\" in part:
+                raise TwinError(f"{shard}: member {member.name!r} is not named <twin_id>.<part>; not unpacked")
+            if not member.isreg() or member.issparse():
+                raise TwinError(f"{shard}: member {member.name!r} is no plain file; not unpacked")
+            if key and this != key:
+                yield key, parts
+                parts = {}
+            key = this
+            if part in parts:
+                raise TwinError(f"{shard}: member {member.name!r} is there twice; not unpacked")
+            stream = tar.extractfile(member)
+            content = stream.read() if stream is not None else b""
+            if len(content) != member.size:
+                raise TwinError(f"{shard}: member {member.name!r} is cut off; download it again")
+            parts[part] = content
+    if key:
+        yield key, parts
+
+
+def _write_twin(shard: Path, twin_id: str, parts: dict[str, bytes], scratch: Path) -> Path:
+    folder = scratch / twin_id
+    folder.mkdir()
+    if RECORD not in parts:
+        raise TwinError(f"{shard}: sample {twin_id} has no {RECORD}; not unpacked")
+    (folder / RECORD).write_bytes(parts[RECORD])
+    record = read_record(folder)
+    if record.twin_id != twin_id:
+        raise TwinError(f"{shard}: sample {twin_id} has the record of {record.twin_id!r}; not unpacked")
+    named = parts_of([*record.files, RECORD, *([RUN] if RUN in parts else [])])
+    if set(named) != set(parts):
+        odd = sorted(set(named) ^ set(parts))
+        raise TwinError(
+            f"{shard}: sample {twin_id}: {', '.join(odd)} is missing or not named by {RECORD}; not unpacked"
+        )
+    for part, files in named.items():
+        for name, content in unpack(files, parts[part]).items():
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_bytes(content)
+    read_record(folder, verify=True)
+    return folder

@@ -18,6 +18,20 @@ from manitwin.twin.dataset_root import DatasetRoot
 Kind = Literal["text", "count", "number", "given", "share", "signed", "usd"]
 Row = dict[str, Any]
 
+PRELUDE = """-- Wilson's 95 % interval of a share k of n (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927); z = 1.96, z^2 = 3.84
+CREATE OR REPLACE TEMP MACRO wilson_centre(k, n) AS (k + 3.841458820694124 / 2) / (n + 3.841458820694124);
+CREATE OR REPLACE TEMP MACRO wilson_half(k, n) AS
+  1.959963984540054 * sqrt(k * (n - k) / n + 3.841458820694124 / 4) / (n + 3.841458820694124);
+CREATE OR REPLACE TEMP MACRO wilson_low(k, n) AS
+  CASE WHEN n > 0 THEN greatest(wilson_centre(k, n) - wilson_half(k, n), 0) END;
+CREATE OR REPLACE TEMP MACRO wilson_high(k, n) AS
+  CASE WHEN n > 0 THEN least(wilson_centre(k, n) + wilson_half(k, n), 1) END;
+-- rows of grasps.parquet by what they are: the twin's own, the unfiltered sample, the jittered controls
+CREATE OR REPLACE TEMP MACRO unfiltered(proposer) AS suffix(proposer, ':unfiltered');
+CREATE OR REPLACE TEMP MACRO jittered(proposer) AS suffix(proposer, ':jittered');
+CREATE OR REPLACE TEMP MACRO own(proposer) AS NOT unfiltered(proposer) AND NOT jittered(proposer);
+"""
+
 
 @dataclass(frozen=True)
 class Column:
@@ -82,21 +96,6 @@ def summary_columns(heading: str, *, total: bool = True) -> tuple[Column, ...]:
     shown = tuple(Column(name, name, "number") for name in numbers)
     last = (Column("total", "total", "number"),) if total else ()
     return (Column("quantity", heading, "text"), Column("objects", "objects"), *shown, *last)
-
-
-PRELUDE = """-- Wilson's 95 % interval of a share k of n (E. B. Wilson, J. Am. Stat. Assoc. 22, 1927); z = 1.96, z^2 = 3.84
-CREATE OR REPLACE TEMP MACRO wilson_centre(k, n) AS (k + 3.841458820694124 / 2) / (n + 3.841458820694124);
-CREATE OR REPLACE TEMP MACRO wilson_half(k, n) AS
-  1.959963984540054 * sqrt(k * (n - k) / n + 3.841458820694124 / 4) / (n + 3.841458820694124);
-CREATE OR REPLACE TEMP MACRO wilson_low(k, n) AS
-  CASE WHEN n > 0 THEN greatest(wilson_centre(k, n) - wilson_half(k, n), 0) END;
-CREATE OR REPLACE TEMP MACRO wilson_high(k, n) AS
-  CASE WHEN n > 0 THEN least(wilson_centre(k, n) + wilson_half(k, n), 1) END;
--- rows of grasps.parquet by what they are: the twin's own, the unfiltered sample, the jittered controls
-CREATE OR REPLACE TEMP MACRO unfiltered(proposer) AS suffix(proposer, ':unfiltered');
-CREATE OR REPLACE TEMP MACRO jittered(proposer) AS suffix(proposer, ':jittered');
-CREATE OR REPLACE TEMP MACRO own(proposer) AS NOT unfiltered(proposer) AND NOT jittered(proposer);
-"""
 
 
 class ReportTables:

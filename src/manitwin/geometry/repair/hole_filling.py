@@ -20,6 +20,8 @@ from manitwin.geometry.repair.surface import NEW, Surface, face_normals
 _LARGEST_EXACT_LOOP = 120  # edges; the dynamic programme is O(n^3), longer loops are cut in two first
 _BENDING_WEIGHT = 0.25  # of an edge's squared length, times 1 - cos of the fold over it, against area
 
+_SAME_FAN_PENALTY = 4.0  # more than any 1 - cosine: prefer to cross the gap between two fans that meet at a vertex
+
 
 @dataclass(frozen=True)
 class FilledSurface:
@@ -196,9 +198,6 @@ def _collect(apex: np.ndarray, count: int) -> np.ndarray:
         triangles.append((i, j, middle))
         open_spans += [(i, middle), (middle, j)]
     return np.array(triangles)
-
-
-_SAME_FAN_PENALTY = 4.0  # more than any 1 - cosine: prefer to cross the gap between two fans that meet at a vertex
 
 
 def boundary_loops(surface: Surface) -> list[np.ndarray]:

@@ -16,6 +16,14 @@ _MOST_STRETCH = 2.0  # a corner moves at most so many thicknesses: sharper ones 
 _DAMPING = 1e-2  # keeps vertices of flat neighbourhoods from sliding along them
 _SHARE_OF_ROOM = 0.4  # of the free way inward: opposite walls must not meet
 
+_SAMPLES = 32  # points on a closing surface
+_DIRECTIONS = 128  # rays from each
+_FOLD_COSINE = (
+    0.7  # a lid is folded off the wall around it by 45 degrees or more on average; a patch carries its surface on
+)
+_BAND = 0.25  # of a patch's size: how wide a band of the surface around it is looked at
+_OPENNESS = 0.5  # of the half space before a lid; a patch deep in a crevice sees less of the outside
+
 
 def thicken(surface: Surface, thickness_m: float) -> Surface:
     """Turn outward wound open sheets into closed walls; their rims become narrow bands.
@@ -112,15 +120,6 @@ def _room_inward(surface: Surface, normal: np.ndarray, thickness_m: float) -> np
     skip = 0.1 * thickness_m
     distance, _ = caster.first_hits(surface.vertices - skip * normal, -normal)
     return skip + distance
-
-
-_SAMPLES = 32  # points on a closing surface
-_DIRECTIONS = 128  # rays from each
-_FOLD_COSINE = (
-    0.7  # a lid is folded off the wall around it by 45 degrees or more on average; a patch carries its surface on
-)
-_BAND = 0.25  # of a patch's size: how wide a band of the surface around it is looked at
-_OPENNESS = 0.5  # of the half space before a lid; a patch deep in a crevice sees less of the outside
 
 
 def lids_of_openings(
