@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from manitwin.physics.sapien import shapes
@@ -12,42 +13,44 @@ from rigid_boxes import block, box
 TWO = (block([0, 0, 0], [0.1, 0.1, 0.1]), block([0.2, 0, 0], [0.3, 0.1, 0.1]))
 
 
-def test_what_is_lent_is_not_lent_again_until_it_is_given_back() -> None:
+def lent(cache: HullCache, hulls: tuple[np.ndarray, ...]) -> shapes.HullShapes:
+    """Borrow the shapes of hulls for an empty block."""
+    with cache.lent([hulls]) as (borrowed,):
+        return borrowed
+
+
+def test_what_is_lent_is_not_lent_again_until_the_block_ends() -> None:
     cache = HullCache()
-    first, second = cache.take(TWO), cache.take(TWO)
-    assert len(first) == 2
-    assert not {id(shape) for shape in first} & {id(shape) for shape in second}
-    cache.give_back(TWO, first)
-    assert cache.take(tuple(hull.copy() for hull in TWO)) is first
+    with cache.lent([TWO, TWO]) as (first, second), cache.lent([TWO]) as (third,):
+        assert len(first) == 2
+        assert len({id(shape) for lot in (first, second, third) for shape in lot}) == 6
+    with cache.lent([tuple(hull.copy() for hull in TWO)]) as (again,):
+        assert again in (first, second, third)
 
 
 def test_hulls_of_other_bodies_are_other_shapes() -> None:
     cache = HullCache()
     cube = box([0.04, 0.04, 0.04], 0.1).hulls
-    cache.give_back(cube, cache.take(cube))
-    assert len(cache.take(TWO)) == 2
-    assert len(cache.take((TWO[1], TWO[0]))) == 2
-    assert len(cache.take(cube)) == 1
+    lent(cache, cube)
+    assert len(lent(cache, TWO)) == 2
+    assert len(lent(cache, (TWO[1], TWO[0]))) == 2
+    assert len(lent(cache, cube)) == 1
 
 
 def test_bodies_that_were_not_asked_for_lately_are_forgotten(monkeypatch) -> None:
     monkeypatch.setattr(shapes, "KEPT_HULLS", 2)
     cache = HullCache()
-    kept = cache.take(TWO)
-    cache.give_back(TWO, kept)
-    cube = box([0.04, 0.04, 0.04], 0.1).hulls
-    cache.give_back(cube, cache.take(cube))
-    assert cache.take(TWO) is not kept
+    kept = lent(cache, TWO)
+    assert lent(cache, TWO) is kept
+    lent(cache, box([0.04, 0.04, 0.04], 0.1).hulls)
+    assert lent(cache, TWO) is not kept
 
 
-def test_a_block_borrows_each_body_its_own_set_and_a_failed_one_gives_none_back() -> None:
+def test_what_a_failed_scene_may_still_hold_is_not_lent_again() -> None:
     cache = HullCache()
-    with cache.lent([TWO, TWO]) as (first, second):
-        assert first is not second
     with pytest.raises(KeyError), cache.lent([TWO]) as (failed,):
         raise KeyError
-    assert cache.take(TWO) is not failed
-    assert cache.take(TWO) is not failed
+    assert lent(cache, TWO) is not failed
 
 
 def test_a_shape_forgets_how_it_touched_in_the_scene_before() -> None:

@@ -25,10 +25,8 @@ class RayCaster:
     def of_hulls(cls, hulls: Sequence[np.ndarray]) -> RayCaster:
         """Return that of the faces of convex hulls, each ``(V, 3)`` m; those inside other hulls are among them."""
         surfaces = [trimesh.convex.convex_hull(vertices) for vertices in hulls]
-        offsets = np.cumsum([0] + [len(surface.vertices) for surface in surfaces[:-1]])
-        faces = [surface.faces + offset for surface, offset in zip(surfaces, offsets, strict=True)]
-        vertices = np.concatenate([surface.vertices for surface in surfaces])
-        return cls(trimesh.Trimesh(vertices, np.concatenate(faces), process=False))
+        vertices, faces = trimesh.util.append_faces([s.vertices for s in surfaces], [s.faces for s in surfaces])
+        return cls(trimesh.Trimesh(vertices, faces, process=False))
 
     @cached_property
     def face_normals(self) -> np.ndarray:

@@ -55,11 +55,6 @@ class PadContacts:
         """Return the contacts at ``index``."""
         return PadContacts(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
 
-    @staticmethod
-    def joined(parts: list[PadContacts]) -> PadContacts:
-        """Return the contacts of all parts, one after the other."""
-        return PadContacts(**{f.name: np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(PadContacts)})
-
 
 def pad_contacts(
     gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: RayCaster, center_of_mass_m: np.ndarray

@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 import trimesh
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
 
 from manitwin.geometry.hulls.reduction import convex_corners
 from manitwin.render.cameras import hero_camera
@@ -30,6 +30,7 @@ from manitwin.render.card_panels import (
     mesh_panel,
     render_panel,
 )
+from manitwin.render.markers import font_of
 from manitwin.render.raycast import merged
 from manitwin.render.renderer import BACKDROP
 
@@ -95,11 +96,11 @@ def make_card(
     for index, (picture, caption) in enumerate(columns):
         left = MARGIN + index * (PANEL + GAP)
         card.paste(Image.fromarray(picture), (left, TOP), _rounded_mask())
-        draw.text((left + 2, TOP + PANEL + 18), caption, fill=INK, font=_font(15), anchor="lm")
+        draw.text((left + 2, TOP + PANEL + 18), caption, fill=INK, font=font_of(15), anchor="lm")
         if text.stamp is not None and index > 0:  # the input is the input
             _stamp(card, text.stamp, left, TOP)
     _legend(draw)
-    draw.text((MARGIN + 2, HEIGHT - 16), _shortened(text.footer, 1400, 12), fill=GREY, font=_font(12), anchor="lm")
+    draw.text((MARGIN + 2, HEIGHT - 16), _shortened(text.footer, 1400, 12), fill=GREY, font=font_of(12), anchor="lm")
     stream = io.BytesIO()
     card.save(stream, "PNG", compress_level=5)
     return stream.getvalue()
@@ -107,7 +108,7 @@ def make_card(
 
 def _stamp(card: Image.Image, word: str, left: int, top: int) -> None:
     """Put a word in a frame aslant over a panel; what is under it shows through."""
-    font = _font(46)
+    font = font_of(46)
     width, height = round(font.getlength(word)) + 36, 74
     stamp = Image.new("RGBA", (width, height), (255, 255, 255, 150))
     draw = ImageDraw.Draw(stamp)
@@ -121,23 +122,23 @@ def _header(draw: ImageDraw.ImageDraw, text: CardText) -> None:
     """Write the facts from the right edge, and the title in the room that is left."""
     right = WIDTH - MARGIN
     for name, value in reversed(text.facts):
-        width = max(_font(21).getlength(value), _font(13).getlength(name))
-        draw.text((right - width, 30), name, fill=GREY, font=_font(13), anchor="lm")
-        draw.text((right - width, 57), value, fill=INK, font=_font(21), anchor="lm")
+        width = max(font_of(21).getlength(value), font_of(13).getlength(name))
+        draw.text((right - width, 30), name, fill=GREY, font=font_of(13), anchor="lm")
+        draw.text((right - width, 57), value, fill=INK, font=font_of(21), anchor="lm")
         right -= round(width) + 20
         draw.line((right, 24, right, 68), fill=PALE, width=1)
         right -= 20
     room = right - MARGIN
-    draw.text((MARGIN, 38), _shortened(text.title, room, 34), fill=INK, font=_font(34), anchor="lm")
-    draw.text((MARGIN + 1, 72), _shortened(text.sentence, room, 15), fill=GREY, font=_font(15), anchor="lm")
+    draw.text((MARGIN, 38), _shortened(text.title, room, 34), fill=INK, font=font_of(34), anchor="lm")
+    draw.text((MARGIN + 1, 72), _shortened(text.sentence, room, 15), fill=GREY, font=font_of(15), anchor="lm")
 
 
 def _legend(draw: ImageDraw.ImageDraw) -> None:
     """Explain the colours of the last column."""
     x, y = WIDTH - MARGIN, HEIGHT - 16
     for label, color in (("verified grasp", GRASP_COLORS[0]), ("grasp point", GRASP), ("functional point", FUNCTIONAL)):
-        x -= round(_font(12).getlength(label))
-        draw.text((x, y), label, fill=GREY, font=_font(12), anchor="lm")
+        x -= round(font_of(12).getlength(label))
+        draw.text((x, y), label, fill=GREY, font=font_of(12), anchor="lm")
         x -= 14
         draw.ellipse((x, y - 4, x + 8, y + 4), fill=color)
         x -= 18
@@ -148,14 +149,14 @@ def _prompt_panel(prompt: str) -> np.ndarray:
     panel = Image.new("RGB", (PANEL, PANEL), BACKDROP)
     lines = textwrap.wrap(f"“{prompt}”", 30)[:10]
     ImageDraw.Draw(panel).multiline_text(
-        (PANEL / 2, PANEL / 2), "\n".join(lines), fill=INK, font=_font(20), anchor="mm", align="center", spacing=8
+        (PANEL / 2, PANEL / 2), "\n".join(lines), fill=INK, font=font_of(20), anchor="mm", align="center", spacing=8
     )
     return np.asarray(panel)
 
 
 def _shortened(text: str, room_px: float, size_px: int) -> str:
     """Cut a line to the room that it has."""
-    font = _font(size_px)
+    font = font_of(size_px)
     if font.getlength(text) <= room_px:
         return text
     while text and font.getlength(text + "...") > room_px:
@@ -168,8 +169,3 @@ def _rounded_mask() -> Image.Image:
     mask = Image.new("L", (4 * PANEL, 4 * PANEL), 0)
     ImageDraw.Draw(mask).rounded_rectangle((0, 0, 4 * PANEL - 1, 4 * PANEL - 1), radius=40, fill=255)
     return mask.reduce(4)
-
-
-@cache
-def _font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    return ImageFont.load_default(size_px)

@@ -10,7 +10,9 @@ from collections.abc import Mapping, Sequence
 
 import cv2
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw
+
+from manitwin.render.markers import Font, font_of
 
 NOTHING_RGB = (40, 40, 40)
 """Of what has no depth, and of the id 0: floor and backdrop."""
@@ -66,7 +68,7 @@ def depth_picture(depth_m: np.ndarray, ids: np.ndarray) -> Image.Image:
     height = len(depth_m)
     marks = [f"{value:.3f} m" for value in np.linspace(near, far, DEPTH_TICKS)]
     marks[-1] += " +"  # what is farther has this colour too
-    font = _font(max(8, height // 28))
+    font = font_of(max(8, height // 28))
     margin, bar = max(4, height // 32), max(6, height // 20)
     strip = _strip(height, 3 * margin + bar + _widest(marks, font))
     scale = _turbo(np.linspace(255, 0, height - 2 * margin).round().astype(np.uint8)[:, None])
@@ -86,7 +88,7 @@ def ids_picture(ids: np.ndarray, names: Mapping[str, int]) -> Image.Image:
     if not shown:
         return Image.fromarray(ids_in_colors(ids))
     font_px = max(8, min(height // 28, height // (len(shown) + 1)))
-    font, row = _font(font_px), round(1.4 * font_px)
+    font, row = font_of(font_px), round(1.4 * font_px)
     rows = max(1, height // row)
     column = 2 * row + _widest([name for name, _ in shown], font)
     strip = _strip(height, column * -(-len(shown) // rows))
@@ -116,9 +118,5 @@ def _side_by_side(picture: np.ndarray, strip: Image.Image) -> Image.Image:
     return page
 
 
-def _widest(words: Sequence[str], font: ImageFont.FreeTypeFont | ImageFont.ImageFont) -> int:
+def _widest(words: Sequence[str], font: Font) -> int:
     return round(max(font.getlength(word) for word in words)) + 1
-
-
-def _font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    return ImageFont.load_default(size_px)

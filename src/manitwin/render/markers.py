@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 DOT = (226, 26, 92)
 INK = (18, 22, 30)
 PAPER = (255, 255, 255)
@@ -48,7 +49,7 @@ def draw_markers(
     for label, center, extent, fill in zip(labels, centers, sizes, fills, strict=True):
         low = np.rint(center - extent / 2)
         draw.rounded_rectangle((*low, *(low + extent - 1)), radius=font_px / 4, fill=fill, outline=PAPER)
-        draw.text(tuple(low + extent / 2), label, fill=PAPER, font=_font(font_px), anchor="mm")
+        draw.text(tuple(low + extent / 2), label, fill=PAPER, font=font_of(font_px), anchor="mm")
     return np.asarray(image)
 
 
@@ -114,12 +115,13 @@ def _covered_share(occupied: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 
 @cache
-def _font(size_px: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+def font_of(size_px: int) -> Font:
+    """Return the font of all pictures."""
     return ImageFont.load_default(size_px)
 
 
 def _box_size(label: str, font_px: int) -> tuple[int, int]:
-    left, _, right, _ = _font(font_px).getbbox(label)
+    left, _, right, _ = font_of(font_px).getbbox(label)
     return int(right - left) + round(font_px * 0.55), round(font_px * 1.25)
 
 

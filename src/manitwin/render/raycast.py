@@ -56,9 +56,5 @@ def visible_points(
 
 def merged(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Return the bare geometry of visual parts as one mesh."""
-    offsets = np.cumsum([0] + [len(part.vertices) for part in parts[:-1]])
-    return trimesh.Trimesh(
-        np.concatenate([part.vertices for part in parts]),
-        np.concatenate([part.faces + offset for part, offset in zip(parts, offsets, strict=True)]),
-        process=False,
-    )
+    vertices, faces = trimesh.util.append_faces([part.vertices for part in parts], [part.faces for part in parts])
+    return trimesh.Trimesh(vertices, faces, process=False)

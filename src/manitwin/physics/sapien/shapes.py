@@ -67,32 +67,26 @@ class HullCache:
 
     @contextmanager
     def lent(self, bodies: Sequence[Hulls]) -> Iterator[list[HullShapes]]:
-        """Lend shapes for each body's hulls; a body that comes twice gets two sets.
+        """Lend shapes for each body's hulls, each ``(V, 3)`` m; a body that comes twice gets two sets.
 
         When the block ends, nothing may step the scene that had them any more. After an exception they are not lent again.
         """
-        shapes = [self.take(hulls) for hulls in bodies]
+        keys = [_digest(hulls) for hulls in bodies]
+        shapes = [self._take(key, hulls) for key, hulls in zip(keys, bodies, strict=True)]
         yield shapes
-        for hulls, lent in zip(bodies, shapes, strict=True):
-            self.give_back(hulls, lent)
+        for key, lent in zip(keys, shapes, strict=True):
+            self._free.setdefault(key, []).append(lent)
+            self._free.move_to_end(key)
+            self._count += len(lent)
+        while self._count > KEPT_HULLS:
+            self._count -= sum(map(len, self._free.popitem(last=False)[1]))
 
-    def take(self, hulls: Hulls) -> HullShapes:
-        """Return the shapes of hulls, each ``(V, 3)`` m: kept ones that nobody has, else fresh ones."""
-        free = self._free.get(_digest(hulls))
+    def _take(self, key: bytes, hulls: Hulls) -> HullShapes:
+        free = self._free.get(key)
         if not free:
             return hull_shapes(hulls)
         self._count -= len(hulls)
         return free.pop()
-
-    def give_back(self, hulls: Hulls, shapes: HullShapes) -> None:
-        """Take shapes back that are to be lent again; the component that had them must be gone, or never used again."""
-        key = _digest(hulls)
-        self._free.setdefault(key, []).append(shapes)
-        self._free.move_to_end(key)
-        self._count += len(shapes)
-        while self._count > KEPT_HULLS:
-            _, oldest = self._free.popitem(last=False)
-            self._count -= sum(map(len, oldest))
 
 
 def _digest(hulls: Hulls) -> bytes:

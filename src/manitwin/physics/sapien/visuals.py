@@ -16,10 +16,10 @@ from lxml import etree  # type: ignore[import-untyped]
 from sapien import physx
 
 from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of
+from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
 _GREY = (0.7, 0.7, 0.7, 1.0)
-Visual = tuple[str, np.ndarray, str, tuple[Any, ...], tuple[float, ...] | None]
+_X_TO_Z = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 
 def glb_visual(path: Path) -> Any:
@@ -45,9 +45,9 @@ def add_robot_visuals(
 ) -> None:
     """Give the bodies in a scene the visuals of their links; ``part_of`` has each link's body and pose in it."""
     shapes: dict[str, list[Any]] = {}
-    for link, shape_to_link, kind, numbers, rgba in _visuals(urdf):
+    for link, shape_to_link, geometry, rgba in _visuals(urdf):
         body, link_to_body = part_of[link]
-        shape = _shape(kind, numbers, rgba)
+        shape = _shape(geometry, rgba)
         shape.local_pose = sapien.Pose(link_to_body @ shape_to_link)
         shapes.setdefault(body, []).append(shape)
     for name, of_body in shapes.items():
@@ -69,28 +69,26 @@ def _plain_material(rgba: tuple[float, ...], *, roughness: float) -> Any:
     return render.RenderMaterial(base_color=list(rgba), roughness=roughness, metallic=0.0)
 
 
-def _shape(kind: str, numbers: tuple[Any, ...], rgba: tuple[float, ...] | None) -> Any:
+def _shape(geometry: etree._Element, rgba: tuple[float, ...] | None) -> Any:
     from sapien import render
 
     material = _plain_material(rgba or _GREY, roughness=0.6)
-    if kind == "mesh":
-        path, scale = numbers
-        own = rgba is None and not path.lower().endswith(".stl")  # an STL has no colours of its own
-        scale_xyz = np.array(scale, np.float32)
-        return (
-            render.RenderShapeTriangleMesh(path, scale_xyz)
-            if own
-            else render.RenderShapeTriangleMesh(path, scale_xyz, material)
-        )
-    if kind == "box":
-        return render.RenderShapeBox(np.array(numbers, np.float32) / 2, material)
-    if kind == "sphere":
-        return render.RenderShapeSphere(numbers[0], material)
-    return render.RenderShapeCylinder(numbers[0], numbers[1] / 2, material)
+    if geometry.tag == "mesh":
+        path, scale = geometry.get("filename"), values_of(geometry, "scale", "1 1 1").astype(np.float32)
+        if rgba is None and not path.lower().endswith(".stl"):  # an STL has no colours of its own
+            return render.RenderShapeTriangleMesh(path, scale)
+        return render.RenderShapeTriangleMesh(path, scale, material)
+    if geometry.tag == "box":
+        return render.RenderShapeBox(values_of(geometry, "size").astype(np.float32) / 2, material)
+    radius_m = float(geometry.get("radius"))
+    if geometry.tag == "sphere":
+        return render.RenderShapeSphere(radius_m, material)
+    return render.RenderShapeCylinder(radius_m, float(geometry.get("length")) / 2, material)
 
 
 @lru_cache(maxsize=16)
-def _visuals(urdf: str) -> tuple[Visual, ...]:
+def _visuals(urdf: str) -> tuple[tuple[str, np.ndarray, etree._Element, tuple[float, ...] | None], ...]:
+    """Return the link, the pose in it, the geometry and the colour of each visual, in SAPIEN's axes."""
     tree = UrdfTree.of_text(urdf)
     named = {one.get("name"): _color(one) for one in tree.element.findall("material")}
     found = []
@@ -98,26 +96,12 @@ def _visuals(urdf: str) -> tuple[Visual, ...]:
         for visual in link.findall("visual"):
             material, geometry = visual.find("material"), geometry_of(visual)
             rgba = None if material is None else (_color(material) or named.get(material.get("name")))
-            pose, numbers = origin_of(visual), _numbers(geometry)
-            if geometry.tag == "cylinder":  # URDF's lies along Z, SAPIEN's along X
-                pose = pose @ _X_TO_Z
-            found.append((name, pose, geometry.tag, numbers, rgba))
+            # URDF's cylinder lies along Z, SAPIEN's along X
+            pose = origin_of(visual) @ (_X_TO_Z if geometry.tag == "cylinder" else np.eye(4))
+            found.append((name, pose, geometry, rgba))
     return tuple(found)
-
-
-_X_TO_Z = np.array([[0.0, 0, -1, 0], [0, 1, 0, 0], [1, 0, 0, 0], [0, 0, 0, 1]])
 
 
 def _color(material: etree._Element) -> tuple[float, ...] | None:
     color = material.find("color")
-    return None if color is None else tuple(float(word) for word in color.get("rgba").split())
-
-
-def _numbers(geometry: etree._Element) -> tuple[Any, ...]:
-    if geometry.tag == "mesh":
-        return geometry.get("filename"), tuple(float(word) for word in geometry.get("scale", "1 1 1").split())
-    if geometry.tag == "box":
-        return tuple(float(word) for word in geometry.get("size").split())
-    if geometry.tag == "sphere":
-        return (float(geometry.get("radius")),)
-    return float(geometry.get("radius")), float(geometry.get("length"))
+    return None if color is None else tuple(values_of(color, "rgba").tolist())

@@ -64,9 +64,9 @@ class RobotWorld:
         self._system = system_with_gravity(timestep_s)
         self._scene = sapien.Scene([self._system])
         surfaces = [self._add_box(box, furniture_friction) for box in boxes]
-        self._shapes = [COOKED.take(placed.body.hulls) for placed in self.placed]
+        self._loan = COOKED.lent([placed.body.hulls for placed in self.placed])
         self.bodies = [
-            self._add_object(placed, shapes) for placed, shapes in zip(self.placed, self._shapes, strict=True)
+            self._add_object(placed, shapes) for placed, shapes in zip(self.placed, self._loan.__enter__(), strict=True)
         ]
         self.robot = SapienRobot(self._scene, robot, finger_force_n=closing_force_n, contact_offset_m=contact_offset_m)
         self.expect_load(False)
@@ -79,8 +79,7 @@ class RobotWorld:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         del self.contacts, self.robot, self.bodies, self._scene, self._system
-        for placed, shapes in zip(self.placed, self._shapes, strict=True):
-            COOKED.give_back(placed.body.hulls, shapes)
+        self._loan.__exit__(kind, error, trace)
 
     def step(self, count: int = 1) -> None:
         """Let ``count`` timesteps pass."""
