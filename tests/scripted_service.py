@@ -11,7 +11,7 @@ import pytest
 from manitwin.config import ServicesConfig
 from manitwin.errors import ManiTwinError
 from manitwin.models.fakes.server import Request, Response
-from manitwin.models.services.http import Service
+from manitwin.models.services.http import HttpService
 
 KEY = "sk-the-secret-key-of-tests"
 OK = Response(200, {"fine": True})
@@ -35,7 +35,7 @@ class Client:
     def __init__(self, url: str, **settings: Any):
         self.waits: list[float] = []
         refusal = settings.pop("refusal", None)
-        self.service = Service(
+        self.service = HttpService(
             "vendor",
             url,
             authorization={"Authorization": f"Bearer {KEY}"},

@@ -52,6 +52,12 @@ def test_bad_setting_names_key_and_remedy(tmp_path: Path, text: str, message: st
         load(tmp_path, text)
 
 
+def test_empty_section_of_earlier_settings_is_read_over(tmp_path: Path) -> None:
+    assert load(tmp_path, "seed = 3\n[caption]\n[points]\n[finish]\n") == BuildConfig(seed=3)
+    with pytest.raises(ConfigError, match="caption"):
+        load(tmp_path, "[caption]\nwords = 5\n")
+
+
 def test_missing_file_is_a_config_error(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="not there"):
         load_config(tmp_path / "none.toml")

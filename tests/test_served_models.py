@@ -29,7 +29,7 @@ from manitwin.dataset.index.parts import IndexTables
 from manitwin.models.fakes.anthropic_messages import FakeAnthropic
 from manitwin.models.fakes.catalog import serving
 from manitwin.models.fakes.faults import ALWAYS, Faults
-from manitwin.models.fakes.graspgen import FakeGraspGen
+from manitwin.models.fakes.grasp_servers import FakeGraspGen
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.rodin import FakeRodin
 from manitwin.models.fakes.server import FakeServer

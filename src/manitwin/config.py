@@ -15,7 +15,7 @@ from pydantic_core import ErrorDetails
 from manitwin.errors import ConfigError, choose_from
 
 Resource = Literal["cpu", "gpu", "vlm", "generator"]
-"""What a stage runs on: each has slots of its own in a run."""
+"""The resource that a stage runs on; each has slots of its own in a run."""
 
 
 AbsolutePath = Annotated[Path, AfterValidator(Path.absolute)]
@@ -30,6 +30,13 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+NO_SETTINGS = Section()
+"""The settings of a stage that has nothing to choose."""
+
+RETIRED_SECTIONS = ("caption", "points", "finish")
+"""Sections that once were there without any setting in them: empty ones are read over."""
+
+
 class ViewsConfig(Section):
     """The eight pictures of the object (paper, "Physical Property Estimation"); no size: the one the annotator reads best."""
 
@@ -39,7 +46,7 @@ class ViewsConfig(Section):
 
 
 class CandidatesConfig(Section):
-    """The candidate points and the pictures that show them (paper, "Point Sampling and Selection")."""
+    """The candidate points and the pictures that show them (paper, "Candidate Point Sampling")."""
 
     samples: int = Field(default=20_000, ge=1000)
     count: int = Field(default=42, ge=4, le=99)
@@ -47,7 +54,7 @@ class CandidatesConfig(Section):
 
 
 class RepairConfig(Section):
-    """How far repair may go (``geometry.repair.repair``); shares are of the bounding box's diagonal."""
+    """Limits of repair (``geometry.repair``); shares are of the bounding box's diagonal."""
 
     weld_tolerance: float = Field(default=1e-4, gt=0, lt=0.01)
     lid_length: float = Field(default=0.15, gt=0)
@@ -57,7 +64,7 @@ class RepairConfig(Section):
 
 
 class MeshConfig(Section):
-    """How large a mesh file may be, and how large its textures stay."""
+    """Limits of a mesh file's size, and of its textures."""
 
     max_bytes: int = Field(default=1 << 30, gt=0)
     max_faces: int = Field(default=4_000_000, gt=0)
@@ -133,7 +140,7 @@ class RobustnessConfig(Section):
 
 
 class GateConfig(Section):
-    """What is too bad to build (paper, "Quality Gate"); shares are of the bounding box's diagonal unless said."""
+    """Limits beyond which nothing is built (paper, "Quality Verification"); shares of the box's diagonal unless said."""
 
     min_longest_side_m: float = Field(default=0.005, gt=0)
     max_longest_side_m: float = Field(default=1.0, gt=0)
@@ -153,7 +160,7 @@ class CollisionConfig(Section):
 
 
 class PlacementConfig(Section):
-    """How the object is set down, and when it counts as staying (2 s, 1 cm, 5 degrees).
+    """Setting the object down, and the limits within which it counts as staying (2 s, 1 cm, 5 degrees).
 
     ``tilt_rise_m`` is how far the centre of mass must rise to tilt by ``max_turned_deg``. Of 120 quasi-static poses of 25
     objects released 1 mm up in MuJoCo, 13 of the 27 below 0.08 mm turned by more than 5 degrees, none of the 93 above it.
@@ -170,25 +177,13 @@ class PlacementConfig(Section):
 
 
 class PhysicalConfig(Section):
-    """When size, mass or density are beyond what any such thing has; margins are factors beyond the prior's interval."""
+    """Limits of size, mass and density beyond which there is no such thing; margins are factors beyond the prior's interval."""
 
     size_margin: float = Field(default=2.0, ge=1)
     mass_margin: float = Field(default=2.0, ge=1)
     min_density_kg_m3: float = Field(default=2.0, ge=0)  # expanded foam has 10 and more
     max_density_kg_m3: float = Field(default=23_000.0, gt=0)  # osmium has 22,590
     max_texture_size: int = Field(default=2048, ge=16)
-
-
-class CaptionConfig(Section):
-    """Nothing to choose: the annotator describes what it is shown."""
-
-
-class PointsConfig(Section):
-    """Nothing to choose: the number of points is the paper's, the opening is the gripper's."""
-
-
-class FinishConfig(Section):
-    """Nothing to choose: the card shows what is there."""
 
 
 class MattingConfig(Section):
@@ -224,7 +219,7 @@ class VlmConfig(Section):
 
 
 class ServicesConfig(Section):
-    """What services cost and how they are reached; nothing here decides what a twin is.
+    """Prices of services, and how they are reached; nothing here decides what a twin is.
 
     ``usd_per_million_tokens`` is ``[read, written]``, ``usd_per_job`` that of the generator: what your plan says. A server
     on this machine costs nothing; for any other one a price has to be known, so that ``max_cost_usd`` can hold.
@@ -244,7 +239,7 @@ class ServicesConfig(Section):
 
 
 class RunConfig(Section):
-    """How a run works through its items; nothing here decides what a twin is.
+    """Slots, retries and patience of a run; nothing here decides what a twin is.
 
     ``cpu``, ``gpu``, ``vlm`` and ``generator`` are slots: so many stages of that kind at a time (cpu 0: one a core). On a
     Ray cluster the gpu slots are its cards, and cpu 0 is all of its cores.
@@ -286,17 +281,21 @@ class BuildConfig(Section):
     gate: GateConfig = GateConfig()
     physical: PhysicalConfig = PhysicalConfig()
     collision: CollisionConfig = CollisionConfig()
-    caption: CaptionConfig = CaptionConfig()
     candidates: CandidatesConfig = CandidatesConfig()
-    points: PointsConfig = PointsConfig()
     grasps: GraspConfig = GraspConfig()
     verify: VerifyConfig = VerifyConfig()
     second_opinion: SecondOpinionConfig = SecondOpinionConfig()
     robustness: RobustnessConfig = RobustnessConfig()
     placement: PlacementConfig = PlacementConfig()
-    finish: FinishConfig = FinishConfig()
     services: ServicesConfig = ServicesConfig()
     run: RunConfig = RunConfig()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_retired(cls, data: Any) -> Any:
+        if not isinstance(data, dict):
+            return data
+        return {name: value for name, value in data.items() if value != {} or name not in RETIRED_SECTIONS}
 
 
 @overload

@@ -14,7 +14,7 @@ from manitwin.config import BuildConfig
 from manitwin.engine.charges import charge
 from manitwin.errors import AccessDenied, ConfigError, UsageError
 from manitwin.models import registry
-from manitwin.models.fakes.graspgen import FakeGraspGen
+from manitwin.models.fakes.grasp_servers import FakeGraspGen
 
 
 class Charging:
@@ -43,7 +43,7 @@ def backends(monkeypatch: pytest.MonkeyPatch) -> None:
         "annotator": {"rules": "manitwin.models.annotators.rules:RulesAnnotator"},
         "generator": {"lift": "manitwin.models.generators.lift:LiftGenerator", "made": f"{__name__}:Charging"},
         "grasper": {
-            "antipodal": "manitwin.models.graspers.antipodal:AntipodalGrasper",
+            "antipodal": "manitwin.models.graspers.surface_sampling:AntipodalGrasper",
             "graspgen": "manitwin.models.graspers.graspgen:GraspGenGrasper",
         },
     }

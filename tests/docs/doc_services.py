@@ -10,7 +10,7 @@ from pathlib import Path
 from urllib.parse import urlsplit
 
 from manitwin.models.fakes.catalog import REHEARSALS, serving
-from manitwin.models.fakes.server import FakeServer, Request, Response, Service
+from manitwin.models.fakes.server import FakeServer, FakeService, Request, Response
 
 KEY = "rehearsal-key"
 REDIRECTED = Path(__file__).parent / "redirected"
@@ -34,7 +34,7 @@ ADDRESSES = {
 class WithoutKey:
     """A service on one's own machine: it asks for no key."""
 
-    service: Service
+    service: FakeService
 
     def answer(self, request: Request, base_url: str) -> Response:
         keyed = replace(request, headers=request.headers | {"authorization": f"Bearer {KEY}"})

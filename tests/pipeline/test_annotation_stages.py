@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from handmade import candidates, mug, visual
-from manitwin.config import CaptionConfig, PointsConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
 from manitwin.formats.glb import write_glb
@@ -49,13 +48,13 @@ def draft(tmp_path: Path) -> Draft:
 
 
 def test_the_caption_stage_returns_language(draft: Draft, tmp_path: Path) -> None:
-    fields = CaptionStage(CaptionConfig(), RulesAnnotator()).run(draft, tmp_path)
+    fields = CaptionStage(RulesAnnotator()).run(draft, tmp_path)
     language = Language(**json.loads(json.dumps(fields["language"])))
     assert (language.category, language.color, language.material) == ("mug", "red", "ceramic")
 
 
 def test_the_points_stage_returns_candidates_at_their_places(draft: Draft, tmp_path: Path) -> None:
-    points = PointsStage(PointsConfig(), RulesAnnotator(), GRIPPER).run(draft, tmp_path)["points"]
+    points = PointsStage(RulesAnnotator(), GRIPPER).run(draft, tmp_path)["points"]
     json.dumps(points, allow_nan=False)
     positions = draft.field("candidates")["positions_m"]
     functional = [FunctionalPoint(**point) for point in points["functional"]]
@@ -91,4 +90,4 @@ class Changes(RulesAnnotator):
 )
 def test_points_that_are_no_candidates_are_no_answer(draft: Draft, tmp_path: Path, change, message: str) -> None:
     with pytest.raises(BadReply, match=message):
-        PointsStage(PointsConfig(), Changes(change), GRIPPER).run(draft, tmp_path)
+        PointsStage(Changes(change), GRIPPER).run(draft, tmp_path)

@@ -9,7 +9,7 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.pipeline.collision import CollisionStage
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_arrays import load_hulls
+from manitwin.pipeline.object_state import load_hulls
 from manitwin.twin.record import Hulls
 from manitwin.twin.store import canonical_json
 from real_meshes import cup

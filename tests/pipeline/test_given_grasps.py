@@ -10,10 +10,10 @@ from foreign_assets import given_record
 from grasp_drafts import box_draft
 from manitwin.config import GraspConfig
 from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.models.graspers.antipodal import AntipodalGrasper
-from manitwin.pipeline.given_grasps import given_proposals
+from manitwin.models.graspers.surface_sampling import AntipodalGrasper
 from manitwin.pipeline.grasps import GraspsStage
 from manitwin.pipeline.item import Item
+from manitwin.pipeline.proposals import given_proposals
 from manitwin.robots.grippers.gripper import load_gripper
 
 PANDA = load_gripper("panda")

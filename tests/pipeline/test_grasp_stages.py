@@ -14,7 +14,7 @@ from manitwin.config import GraspConfig, RobustnessConfig, SecondOpinionConfig, 
 from manitwin.engine.stage import Draft, Stage
 from manitwin.errors import Rejected
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
-from manitwin.models.graspers.antipodal import AntipodalGrasper
+from manitwin.models.graspers.surface_sampling import AntipodalGrasper
 from manitwin.physics.mujoco.trial import MujocoTrial
 from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.pipeline.grasps import GraspsStage

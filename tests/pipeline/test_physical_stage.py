@@ -19,7 +19,7 @@ from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_arrays import load_solid
+from manitwin.pipeline.object_state import load_solid
 from manitwin.pipeline.physical import PhysicalStage
 from manitwin.twin.record import Estimate, Physical
 

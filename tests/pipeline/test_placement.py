@@ -15,7 +15,7 @@ from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.pipeline.collision import CollisionStage
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_arrays import load_hulls
+from manitwin.pipeline.object_state import load_hulls
 from manitwin.pipeline.placement import PlacementStage
 from manitwin.twin.record import Placement
 from manitwin.twin.store import canonical_json

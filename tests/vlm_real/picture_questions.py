@@ -13,10 +13,10 @@ from tiny_engine import MODEL
 from manitwin.config import ServicesConfig, VlmConfig
 from manitwin.models.vlm.anthropic_messages import AnthropicMessages
 from manitwin.models.vlm.client import ChatClient
-from manitwin.models.vlm.json_text import json_object_in
 from manitwin.models.vlm.openai_chat import OpenAiChat
 from manitwin.models.vlm.protocol import ChatModel, Picture, Question, Reply, Turn
 from manitwin.models.vlm.strict_schema import strict_schema
+from manitwin.models.vlm.structured import json_object_in
 
 Protocol = Literal["openai", "anthropic"]
 

@@ -22,12 +22,10 @@ from manitwin.config import BuildConfig, ServicesConfig, VlmConfig
 from manitwin.engine.charges import counted
 from manitwin.errors import BadReply, RateLimited, Unavailable
 from manitwin.models.vlm.chat_from_spec import anthropic_from_spec, openai_from_spec, replay_from_spec
-from manitwin.models.vlm.json_text import json_object_in
 from manitwin.models.vlm.openai_chat import OpenAiChat
 from manitwin.models.vlm.openai_dialect import Dialect
-from manitwin.models.vlm.probe import probe
 from manitwin.models.vlm.protocol import Picture
-from manitwin.models.vlm.structured import ask
+from manitwin.models.vlm.structured import ask, json_object_in, probe
 
 pytestmark = [pytest.mark.slow, pytest.mark.vlm_real]
 

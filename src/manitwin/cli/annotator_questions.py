@@ -12,8 +12,7 @@ import numpy as np
 from manitwin.config import BuildConfig
 from manitwin.errors import UsageError
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.models.annotators.protocol import PointsRequest, Subject
-from manitwin.models.annotators.protocol import Question as Topic
+from manitwin.models.annotators.protocol import AnnotatorQuestion, PointsRequest, Subject
 from manitwin.models.annotators.vlm.annotator import ANSWER_TOKENS, PROMPTS, VlmAnnotator
 from manitwin.models.registry import without_url
 from manitwin.models.vlm.openai_dialect import instructions_with_schema
@@ -49,7 +48,7 @@ class AskedQuestion:
     """
 
     folder: str
-    topic: Topic
+    topic: AnnotatorQuestion
     prompt: str
     question: Question
     system: str
@@ -80,7 +79,7 @@ def questions_about(twin_folder: Path, config: BuildConfig, spec: str) -> AskedQ
         request = _request(twin, config, Path(folder))
         physical = twin.physical
         asked = annotator.questions(request, physical.material, np.array(physical.extents_m))
-    topics: dict[str, Topic] = {prompt: topic for topic, names in PROMPTS.items() for prompt in names}
+    topics: dict[str, AnnotatorQuestion] = {prompt: topic for topic, names in PROMPTS.items() for prompt in names}
     questions = tuple(
         AskedQuestion(
             folder=f"{number}_{q.name}{f'_{q.vote + 1}' if q.name == 'grasp_points' else ''}",

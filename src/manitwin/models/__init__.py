@@ -1,1 +1,1 @@
-"""What someone else trained or serves, each behind a small protocol, with a built-in default that needs no weights and no key."""
+"""Models that others trained or serve, behind small protocols, with built-in defaults that need no weights and no key."""

@@ -17,8 +17,8 @@ BACKENDS: dict[str, dict[str, str]] = {
         "replay": "manitwin.models.annotators.vlm.annotator:ReplayAnnotator",
     },
     "grasper": {
-        "antipodal": "manitwin.models.graspers.antipodal:AntipodalGrasper",
-        "suction": "manitwin.models.graspers.suction:SuctionGrasper",
+        "antipodal": "manitwin.models.graspers.surface_sampling:AntipodalGrasper",
+        "suction": "manitwin.models.graspers.surface_sampling:SuctionGrasper",
         "postures": "manitwin.models.graspers.postures:PostureGrasper",
         "graspgen": "manitwin.models.graspers.graspgen:GraspGenGrasper",
         "graspgenx": "manitwin.models.graspers.graspgenx:GraspGenXGrasper",

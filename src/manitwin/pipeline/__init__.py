@@ -1,1 +1,13 @@
-"""The paper's pipeline: one module a stage, and the recipe that lists them."""
+"""The paper's pipeline: one module a stage, and ``recipe``, which lists them.
+
+Stages in order, with the sections of the paper (figure 2) that they do:
+
+I. Asset Generation: ``photo``, ``generate`` ("3D Generation"); ``mesh``, ``views``, ``gate`` ("Quality Verification");
+``physical`` ("Physical Property Estimation"); ``collision``, ``placement``; ``caption`` ("Semantic Captioning").
+
+II. Asset Annotation: ``candidates`` ("Candidate Point Sampling"); ``points`` ("VLM-Based Point Selection"); ``grasps``, with
+``proposals`` ("Grasp Proposal Generation", "Spatial Filtering and Semantic Association").
+
+III. Verification: ``verify``, ``second_opinion``, ``robustness`` ("Simulation Verification"); ``record_grasps``, ``finish``
+("Consolidated Output").
+"""

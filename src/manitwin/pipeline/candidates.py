@@ -1,4 +1,4 @@
-"""The points among which functional and grasp points are chosen, and pictures that show them by number."""
+"""Sample the points among which others are chosen, and draw pictures that number them (paper, "Candidate Point Sampling")."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ON_SURFACE_SHARE = 0.01  # and of small objects to this share of the longest sid
 
 
 class CandidatesStage:
-    """Sample the surface, keep 42 far-apart points and mark them on the views (paper, "Point Sampling and Selection").
+    """Sample the surface, keep 42 far-apart points and mark them on the views (paper, "Candidate Point Sampling").
 
     Only what some view shows is sampled: nobody can choose a point that no picture shows. Fields: ``candidates``
     ``{positions_m, normals}`` in the object frame; ``visible_candidates``, for each view the ids (rows of

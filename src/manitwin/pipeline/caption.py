@@ -1,4 +1,4 @@
-"""The caption stage: category, color, material, size, shape and function in words (paper, "Semantic Captioning")."""
+"""Describe category, color, material, size, shape and function in words (paper, "Semantic Captioning")."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from manitwin.config import CaptionConfig, Resource
+from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.models.annotators.protocol import Annotator
-from manitwin.pipeline.subject import read_subject
+from manitwin.pipeline.object_state import read_subject
 
 
 class CaptionStage:
@@ -21,8 +21,9 @@ class CaptionStage:
     reads: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "views/", "cameras", "geometry?")
     writes: ClassVar[tuple[str, ...]] = ("language",)
 
-    def __init__(self, settings: CaptionConfig, annotator: Annotator):
-        self.settings = settings
+    settings = NO_SETTINGS
+
+    def __init__(self, annotator: Annotator):
         self._annotator = annotator
         self.backend = annotator.name
         self.model = annotator.model_for("captions")

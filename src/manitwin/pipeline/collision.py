@@ -1,4 +1,4 @@
-"""Convex hulls for physics, and how well they stand for the solid."""
+"""Make convex hulls for physics, and measure how well they stand for the solid (paper, "3D Generation": sim-ready)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.hulls.decomposition import convex_decomposition
 from manitwin.geometry.hulls.error import hull_error
 from manitwin.physics.sapien.settle import ball_stays_inside
-from manitwin.pipeline.object_arrays import load_solid
+from manitwin.pipeline.object_state import load_solid
 
 HULLS = "hulls.npz"
 

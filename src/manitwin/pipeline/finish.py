@@ -1,4 +1,4 @@
-"""Finish: collect the findings and draw the card (paper, "Dataset Examples": four columns)."""
+"""Collect the findings and draw the card (paper, "Consolidated Output"; appendix, "Dataset Examples": four columns)."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 import pyarrow.parquet
 from PIL import Image
 
-from manitwin.config import FinishConfig, Resource
+from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_arrays import load_hulls, load_solid
+from manitwin.pipeline.object_state import load_hulls, load_solid
 from manitwin.pipeline.quality import quality_checks
 from manitwin.render.card import CardText, make_card
 from manitwin.render.card_panels import CardGrasp, CardPoint
@@ -49,8 +49,10 @@ class FinishStage:
     backend: str = "builtin"
     model: str | None = None
 
-    def __init__(self, settings: FinishConfig, gripper: Gripper):
-        self.settings, self.gripper = settings, gripper
+    settings = NO_SETTINGS
+
+    def __init__(self, gripper: Gripper):
+        self.gripper = gripper
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Draw the card of an accepted twin."""

@@ -1,4 +1,4 @@
-"""The gate: one object, a real solid, of a size that hands can hold (paper, "Quality Gate")."""
+"""Let through one object, a real solid, of a size that hands can hold (paper, "Quality Verification")."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.geometry.repair.components import separate_objects
 from manitwin.models.annotators.protocol import Annotator, QualityVerdict
-from manitwin.pipeline.subject import read_subject
+from manitwin.pipeline.object_state import read_subject
 from manitwin.twin.record import Check
 
 
@@ -29,7 +29,7 @@ class GateStage:
     writes: ClassVar[tuple[str, ...]] = ("gate",)
 
     def __init__(self, settings: GateConfig, annotator: Annotator | None = None):
-        """Take the settings and who looks at the views; without an annotator nothing is judged by eye."""
+        """Take the settings and the annotator that looks at the views; without one nothing is judged by eye."""
         self.settings, self.annotator = settings, annotator
         self.backend = "geometry" if annotator is None else annotator.name
         self.model: str | None = None if annotator is None else annotator.model_for("quality")

@@ -1,4 +1,4 @@
-"""Paper, Asset Generation: a 3D generator turns the matted photo, or a text, into a mesh."""
+"""Turn the matted photo, or a text, into a mesh with a 3D generator (paper, "3D Generation")."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from PIL import Image
 
 from manitwin.config import GenerateConfig, Resource
 from manitwin.engine.stage import Draft
-from manitwin.models.generators.mesh_file import as_glb
+from manitwin.models.generators.generated_mesh import as_glb
 from manitwin.models.generators.protocol import GenerationRequest, Generator
 from manitwin.models.generators.run import run_generator
 from manitwin.pipeline.item import Item
@@ -25,7 +25,7 @@ class GenerateStage:
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 
     def __init__(self, settings: GenerateConfig, generator: Generator, submit_again: bool = False):
-        """Take the settings, who generates, and whether a submit of unknown outcome may be made again (it may pay twice)."""
+        """Take the settings, the generator, and whether a submit of unknown outcome may be made again (it may pay twice)."""
         self.settings, self._submit_again = settings, submit_again
         self.generator = generator
         self.backend: str = generator.name

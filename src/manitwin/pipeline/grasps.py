@@ -1,7 +1,7 @@
 """Propose grasps: near the selected points, touching well, free of collision, and different from each other.
 
-Source: paper, "Grasp Proposal Generation" and "Spatial Filtering and Semantic Association"; implementation details
-(4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
+Source: paper, "Grasp Proposal Generation", "Spatial Filtering and Semantic Association" and, in the appendix, "Grasp Generation
+and Filtering" (4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
 """
 
 from __future__ import annotations
@@ -17,13 +17,17 @@ from manitwin.geometry.grasp_diversity import approach_octants
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest
 from manitwin.physics.grasp_selection import select_likely
-from manitwin.pipeline.association import associate, distances_to_grasps
-from manitwin.pipeline.given_grasps import with_given
 from manitwin.pipeline.gripper_kinds import KINDS
-from manitwin.pipeline.object_arrays import JOINTS, load_hulls, load_solid
-from manitwin.pipeline.proposal_rounds import Kept, propose_in_rounds
-from manitwin.pipeline.subject import read_given
-from manitwin.pipeline.support_rounds import on_support, with_support_rounds
+from manitwin.pipeline.object_state import JOINTS, load_hulls, load_solid, read_given
+from manitwin.pipeline.proposals import (
+    Kept,
+    associate,
+    distances_to_grasps,
+    on_support,
+    propose_in_rounds,
+    with_given,
+    with_support_rounds,
+)
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 
@@ -43,7 +47,7 @@ class GraspsStage:
     reads: ClassVar[tuple[str, ...]] = ("solid.npz", "hulls.npz", "points", "physical", "placements", "geometry?")
 
     def __init__(self, settings: GraspConfig, grasper: Grasper, gripper: Gripper, suffix: str = ""):
-        """Take the settings, who proposes, and for which gripper."""
+        """Take the settings, the grasper and the gripper."""
         self.name = f"grasps{suffix}"
         self.file, self.proposed = PROPOSALS.format(suffix), PROPOSED.format(suffix)
         self.writes: tuple[str, ...] = (self.file, self.proposed)
@@ -140,7 +144,7 @@ class GraspsStage:
         drawn = np.sort(np.random.default_rng(request.seed).choice(len(raw), count, replace=False))
         others = raw.take(drawn)
         both = GraspProposals.joined([kept.proposals.take(chosen), others])
-        distance_m = np.concatenate([kept.distance_m[chosen], _distances(request.focus_points_m, others)])
+        distance_m = np.concatenate([kept.distance_m[chosen], distances_to_grasps(request.focus_points_m, others)])
         functional = [point["id"] for point in points["functional"]]
         grasp = [point["id"] for point in points["grasp"]]
         name = self.grasper.name
@@ -198,7 +202,3 @@ def _hand_joints(proposals: GraspProposals) -> dict[str, np.ndarray]:
     if proposals.joints_rad is None:
         return {}
     return dict(zip(JOINTS, proposals.joints_rad.transpose(1, 0, 2), strict=True))
-
-
-def _distances(points_m: np.ndarray, grasps: GraspProposals) -> np.ndarray:
-    return distances_to_grasps(points_m, grasps.gripper_to_object, grasps.depth_m, grasps.width_m)

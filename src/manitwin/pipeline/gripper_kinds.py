@@ -1,20 +1,63 @@
-"""What each kind of gripper brings to the pipeline: who proposes and screens, where it is tried, what failures say."""
+"""The kinds of grippers in the pipeline: who proposes and screens, where grasps are tried, why none of them held."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from manitwin.config import BuildConfig
+from manitwin.geometry.grasp_diversity import fingertips
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.models.graspers.hand_screen import HandScreen
-from manitwin.models.graspers.pad_screen import PadScreen
 from manitwin.models.graspers.protocol import GraspRequest, Screen
-from manitwin.models.graspers.seal_screen import SealScreen
-from manitwin.physics.trial import TrialResult, TrialSettings
-from manitwin.pipeline.why_none import outcomes_of, why_none_held
+from manitwin.models.graspers.screens import HandScreen, PadScreen, SealScreen
+from manitwin.physics.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2, torque_ratio
+from manitwin.physics.trial import GRAVITY_M_S2, TrialResult, TrialSettings
+
+
+def why_none_held(
+    results: list[TrialResult],
+    gripper_to_object: np.ndarray,
+    depth_m: np.ndarray,
+    body: RigidBody,
+    settings: TrialSettings,
+) -> str:
+    """Say how often which outcome came, then whether jaws have too little friction or the centre of mass is out of reach."""
+    friction = (settings.finger_friction + body.friction_static) / 2
+    needed_n = body.mass_kg * (GRAVITY_M_S2 + PEAK_SLIDE_ACCELERATION_M_S2)
+    carried_n = 2 * friction * settings.force_n
+    reasons = []
+    if needed_n > carried_n:
+        reasons.append(
+            f"slippery for its weight: friction carries {carried_n:.1f} N, lift and slides need {needed_n:.1f} N"
+        )
+    if len(results):
+        lever_m = nearest_lever_m(gripper_to_object, depth_m, body.center_of_mass_m)
+        ratio = float(
+            torque_ratio(np.array([lever_m]), mass_kg=body.mass_kg, force_n=settings.force_n, friction=friction)[0]
+        )
+        if ratio > 1:
+            reasons.append(
+                f"centre of mass out of reach: {1000 * lever_m:.0f} mm from the nearest grip, whose pads carry "
+                f"{1 / ratio:.2f} of the torque"
+            )
+    return "; ".join([outcomes_of(results), *reasons])
+
+
+def outcomes_of(results: list[TrialResult]) -> str:
+    """Say how often which outcome came."""
+    failures = Counter(result.outcome for result in results)
+    counted = ", ".join(f"{count} {outcome}" for outcome, count in sorted(failures.items()))
+    return f"none of {len(results)} simulated grasps held: {counted}"
+
+
+def nearest_lever_m(gripper_to_object: np.ndarray, depth_m: np.ndarray, center_of_mass_m: np.ndarray) -> float:
+    """Return the least distance (m) of the centre of mass from the closing axes of grasps ``(N, 4, 4)``."""
+    arms = center_of_mass_m - fingertips(gripper_to_object, depth_m)
+    return float(np.linalg.norm(np.cross(arms, gripper_to_object[:, :3, 0]), axis=1).min())
+
 
 WhyNoneHeld = Callable[[list[TrialResult], np.ndarray, np.ndarray, RigidBody, TrialSettings], str]
 """From the results, the grasps ``(N, 4, 4)`` and their depths, the object and the settings: one line."""

@@ -1,4 +1,4 @@
-"""The mesh stage: any mesh becomes textured parts and a watertight solid, upright in the object frame, in metres."""
+"""Make any mesh textured parts and a watertight solid, upright in the object frame, in metres (paper, "3D Generation")."""
 
 from __future__ import annotations
 

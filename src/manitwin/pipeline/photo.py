@@ -1,4 +1,4 @@
-"""Paper, Asset Generation: the photo is read and its object cut out of the background."""
+"""Read a photo and cut its object out of the background (paper, "3D Generation": background removal, resolution)."""
 
 from __future__ import annotations
 

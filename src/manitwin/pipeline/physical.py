@@ -1,4 +1,4 @@
-"""The physical stage: true size, mass, friction, and how the mass is spread (paper, "Physical Property Estimation")."""
+"""Estimate true size, mass, friction, and how the mass is spread (paper, "Physical Property Estimation")."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from manitwin.geometry.mass_properties import MassProperties, shell_mass_propert
 from manitwin.models.annotators.priors import Interval, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.subject import findings_of, read_subject
+from manitwin.pipeline.object_state import findings_of, read_subject
 from manitwin.twin.record import Estimate, OrientedBox, Physical
 
 CONFIRMED = ("measured", "user")

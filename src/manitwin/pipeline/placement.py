@@ -1,4 +1,4 @@
-"""The poses in which the object stays when it is set down on a plane."""
+"""Find the poses in which the object stays when it is set down on a plane (paper, "Consolidated Output": placements)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from manitwin.geometry.rigid_body import RigidBody
 from manitwin.geometry.stable_poses import easiest_tilt, stable_poses
 from manitwin.physics.mujoco.settle import settle_on_plane_in_mujoco
 from manitwin.physics.sapien.settle import Settled, settle_on_plane
-from manitwin.pipeline.object_arrays import load_body, load_solid
+from manitwin.pipeline.object_state import load_body, load_solid
 from manitwin.twin.resting import rest_of
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -1,4 +1,4 @@
-"""The points stage: functional and grasp points among the candidates (paper, "VLM-Based Point Selection")."""
+"""Choose functional and grasp points among the candidates (paper, "VLM-Based Point Selection")."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from manitwin.config import PointsConfig, Resource
+from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints
-from manitwin.pipeline.subject import findings_of, pictures, read_subject
+from manitwin.pipeline.object_state import findings_of, pictures, read_subject
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.record import FunctionalPoint, GraspPoint
 
@@ -30,8 +30,9 @@ class PointsStage:
     )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = ("points", "points_findings")
 
-    def __init__(self, settings: PointsConfig, annotator: Annotator, gripper: Gripper):
-        self.settings = settings
+    settings = NO_SETTINGS
+
+    def __init__(self, annotator: Annotator, gripper: Gripper):
         self._annotator = annotator
         self._gripper = gripper
         self.backend = annotator.name

@@ -1,4 +1,4 @@
-"""What was found about a twin that does not reject it: shown, counted, filterable."""
+"""Findings about a twin that do not reject it: shown, counted, filterable (paper, "Failure Cases and Filtering")."""
 
 from __future__ import annotations
 

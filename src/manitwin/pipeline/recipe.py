@@ -96,12 +96,12 @@ def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
         PhysicalStage(config.physical, annotator),
         CollisionStage(config.collision),
         PlacementStage(config.placement),
-        CaptionStage(config.caption, annotator),
+        CaptionStage(annotator),
         CandidatesStage(config.candidates),
-        PointsStage(config.points, annotator, first),
+        PointsStage(annotator, first),
         *(stage for gripper, suffix in grippers for stage in _trials(gripper, suffix, config)),
         RecordGraspsStage(config.second_opinion, grippers),
-        FinishStage(config.finish, first),
+        FinishStage(first),
     ]
 
 

@@ -1,4 +1,4 @@
-"""Put together what all trials found: the table of grasps, best first, and the summary of every gripper."""
+"""Write the table of grasps, best first, and the summary of every gripper (paper, "Consolidated Output")."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How robust each held grasp is: tried again under seeded perturbations until a sequential test is settled."""
+"""Try each held grasp again under perturbations until a sequential test is settled (paper, "Simulation Verification")."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.engine.stage import Draft
 from manitwin.physics.robustness import Robustness, SequentialTest, Spread, draw_perturbations, try_until_clear
 from manitwin.physics.trial import GraspTrial
 from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
-from manitwin.pipeline.object_arrays import joints_of, load_body
+from manitwin.pipeline.object_state import joints_of, load_body
 from manitwin.pipeline.verify import VERDICTS, trial_settings
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.record import RobustnessSummary

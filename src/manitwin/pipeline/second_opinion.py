@@ -1,4 +1,4 @@
-"""The same grasps in a second engine, and negative controls in both: a verdict that means something outside one solver."""
+"""Try the grasps in a second engine, and negative controls in both (paper, "Simulation Verification", beyond one solver)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from manitwin.engine.stage import Draft
 from manitwin.physics.robustness import jittered
 from manitwin.physics.trial import GraspTrial, TrialResult
 from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
-from manitwin.pipeline.object_arrays import joints_of, load_body
+from manitwin.pipeline.object_state import joints_of, load_body
 from manitwin.pipeline.verify import VERDICTS, trial_settings
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.record import SecondOpinion as SecondOpinionRecord

@@ -14,7 +14,7 @@ from manitwin.errors import Rejected
 from manitwin.physics.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
 from manitwin.pipeline.gripper_kinds import KINDS
-from manitwin.pipeline.object_arrays import joints_of, load_body
+from manitwin.pipeline.object_state import joints_of, load_body
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.record import Trial
 

@@ -1,4 +1,4 @@
-"""Eight pictures of the object, for people and for annotators that see."""
+"""Draw eight pictures of the object, for people and for annotators that see (paper, "Physical Property Estimation")."""
 
 from __future__ import annotations
 

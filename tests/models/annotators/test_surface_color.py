@@ -10,8 +10,7 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from handmade import visual
-from manitwin.models.annotators.color_names import color_name, lab_from_srgb
-from manitwin.models.annotators.surface_color import measure_colors
+from manitwin.models.annotators.surface_color import color_name, lab_from_srgb, measure_colors
 
 
 def textured_square(image: np.ndarray, u_range: tuple[float, float]) -> trimesh.Trimesh:

@@ -14,8 +14,7 @@ import zmq
 from manitwin.engine.charges import REHEARSAL_MARK
 from manitwin.errors import UsageError
 from manitwin.models.fakes.faults import Faults
-from manitwin.models.fakes.graspgen import FakeGraspGen
-from manitwin.models.fakes.graspgenx import FakeGraspGenX
+from manitwin.models.fakes.grasp_servers import FakeGraspGen, FakeGraspGenX
 from manitwin.models.fakes.message_server import MessageServer
 
 

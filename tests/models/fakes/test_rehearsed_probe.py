@@ -10,7 +10,7 @@ from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.server import FakeServer
 from manitwin.models.vlm.anthropic_messages import AnthropicMessages
 from manitwin.models.vlm.openai_chat import OpenAiChat
-from manitwin.models.vlm.probe import probe
+from manitwin.models.vlm.structured import probe
 
 
 @pytest.mark.parametrize("formats", [("json_schema",), ("json_object",), ()])

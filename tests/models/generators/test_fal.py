@@ -15,7 +15,7 @@ from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.fal import FalGenerator, first_glb
 from manitwin.models.generators.run import run_generator
-from manitwin.models.services.http import Gone, Unanswered
+from manitwin.models.services.refusal import Gone, Unanswered
 
 TRELLIS, RODIN, HUNYUAN = "fal-ai/trellis", "fal-ai/hyper3d/rodin", "fal-ai/hunyuan3d-v3/text-to-3d"
 

@@ -16,8 +16,8 @@ from manitwin.models.fakes.hunyuan3d import FakeHunyuan3d
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.hunyuan3d import Hunyuan3dGenerator
 from manitwin.models.generators.run import run_generator
-from manitwin.models.generators.service import png_of
-from manitwin.models.services.http import Gone, Unanswered
+from manitwin.models.generators.vendor import png_of
+from manitwin.models.services.refusal import Gone, Unanswered
 
 PLAIN: dict[str, str | int | float | bool] = {"texture": False}
 

@@ -14,9 +14,8 @@ from manitwin.errors import Rejected, Unsupported
 from manitwin.formats.glb import read_glb
 from manitwin.formats.image_file import read_image
 from manitwin.models.generators.lift import LiftGenerator
-from manitwin.models.generators.lift.hint import ShapeHint
 from manitwin.models.generators.lift.inflation import inflate
-from manitwin.models.generators.lift.lifting import Lifted, lift
+from manitwin.models.generators.lift.lifting import Lifted, ShapeHint, lift
 from manitwin.models.generators.lift.posture import tip_angle_deg
 from manitwin.models.generators.lift.surface import to_manifold
 from manitwin.models.generators.protocol import GenerationRequest

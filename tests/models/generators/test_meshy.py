@@ -23,7 +23,7 @@ from manitwin.models.fakes.meshy import FakeMeshy
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.meshy import MeshyGenerator
 from manitwin.models.generators.run import run_generator
-from manitwin.models.services.http import Unanswered
+from manitwin.models.services.refusal import Unanswered
 
 IMAGE, TEXTS, FILE = "/openapi/v1/image-to-3d", "/openapi/v2/text-to-3d", "GET /files/ID/model.glb"
 

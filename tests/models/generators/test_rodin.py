@@ -17,7 +17,7 @@ from manitwin.formats.meshes.read import read_mesh
 from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.fakes.rodin import FakeRodin
 from manitwin.models.fakes.server import FakeServer, Request, Response
-from manitwin.models.generators.mesh_file import as_glb
+from manitwin.models.generators.generated_mesh import as_glb
 from manitwin.models.generators.rodin import URL, RodinGenerator
 
 
@@ -164,10 +164,9 @@ def test_specs_that_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
         RodinGenerator.from_spec("Sketch", config(options={"tier": "Detail"}))
     with pytest.raises(ConfigError, match=r"services\.usd_per_job"):
         RodinGenerator.from_spec("", config(usd=None))
-    assert RodinGenerator.from_spec("", config())._service.base_url == URL
     monkeypatch.delenv("RODIN_API_KEY")
     with pytest.raises(ConfigError, match="RODIN_API_KEY or HYPER3D_API_KEY"):
         RodinGenerator.from_spec("", config())
     monkeypatch.setenv("HYPER3D_API_KEY", KEY)
     generator = RodinGenerator.from_spec("Sketch", config())
-    assert generator.model == "Sketch" and KEY not in repr(generator)
+    assert f"'Sketch', '{URL}'" in repr(generator) and KEY not in repr(generator)

@@ -16,7 +16,7 @@ from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.fakes.tripo import FakeTripo
 from manitwin.models.generators.tripo import URL, TripoGenerator
-from manitwin.models.services.http import Gone
+from manitwin.models.services.refusal import Gone
 
 
 @pytest.fixture(autouse=True)
@@ -121,17 +121,17 @@ def test_expired_task_is_gone() -> None:
 
 
 OUTPUTS = [
-    ({"pbr_model": "P", "model": "M", "base_model": "B"}, "P"),
-    ({"model": "M", "base_model": "B"}, "M"),
-    ({"base_model": "B", "rendered_image": "R"}, "B"),
+    ({"pbr_model": "P://", "model": "M://", "base_model": "B://"}, "p"),
+    ({"model": "M://", "base_model": "B://"}, "m"),
+    ({"base_model": "B://", "rendered_image": "R://"}, "b"),
 ]
 
 
 @pytest.mark.parametrize(("output", "link"), OUTPUTS)
 def test_textured_model_is_taken_before_others(output: dict[str, str], link: str) -> None:
     body = {"code": 0, "data": {"status": "success", "output": output}}
-    with FakeServer(Fixed(200, body)) as server:
-        assert TripoGenerator.from_spec(f"@{server.url}", config())._link("task") == link
+    with FakeServer(Fixed(200, body)) as server, pytest.raises(BadReply, match=f"is at a {link} address"):
+        TripoGenerator.from_spec(f"@{server.url}", config()).fetch("task", Path())
 
 
 def test_finished_task_without_a_model_is_a_bad_reply() -> None:
@@ -163,6 +163,9 @@ def test_specs_that_cannot_be(monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("quad", "compress", "generate_parts"):
         with pytest.raises(ConfigError, match=rf"generate\.options\.{name}"):
             TripoGenerator.from_spec("", config(options={name: "geometry" if name == "compress" else True}))
+    assert URL in repr(TripoGenerator.from_spec("", config())) and KEY not in repr(
+        TripoGenerator.from_spec("", config())
+    )
     monkeypatch.delenv("TRIPO_API_KEY")
     with pytest.raises(ConfigError, match="TRIPO_API_KEY"):
         TripoGenerator.from_spec("", config())
@@ -183,4 +186,3 @@ def test_price_is_the_vendors_list_unless_the_settings_say_another() -> None:
     ):
         with pytest.raises(ConfigError, match=r"services\.usd_per_job"):
             usd(spec, **options)
-    assert TripoGenerator.from_spec("", config())._service.base_url == URL

@@ -15,8 +15,7 @@ from manitwin.config import BuildConfig, CollisionConfig, GraspConfig, ServicesC
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply, ConfigError, Rejected, Unavailable, UsageError
 from manitwin.models.fakes.faults import Faults
-from manitwin.models.fakes.graspgen import FakeGraspGen
-from manitwin.models.fakes.graspgenx import FakeGraspGenX
+from manitwin.models.fakes.grasp_servers import FakeGraspGen, FakeGraspGenX
 from manitwin.models.graspers.graspgen import GraspGenGrasper
 from manitwin.models.graspers.graspgenx import GraspGenXGrasper
 from manitwin.models.graspers.protocol import Grasper, GraspRequest

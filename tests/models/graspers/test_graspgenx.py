@@ -11,11 +11,11 @@ from test_graspgen import BAR, request_for
 
 from manitwin.config import BuildConfig, ServicesConfig
 from manitwin.errors import BadReply, Unavailable
-from manitwin.models.fakes import graspgenx as fake_module
+from manitwin.models.fakes import grasp_servers as fake_module
 from manitwin.models.fakes.faults import Faults
-from manitwin.models.fakes.graspgenx import FakeGraspGenX
+from manitwin.models.fakes.grasp_servers import FakeGraspGenX
 from manitwin.models.graspers.graspgenx import GraspGenXGrasper, sweep_volume
-from manitwin.models.graspers.pad_screen import PadScreen
+from manitwin.models.graspers.screens import PadScreen
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 

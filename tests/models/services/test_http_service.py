@@ -13,7 +13,8 @@ import pytest
 from manitwin.config import ServicesConfig
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Rejected, Unavailable
 from manitwin.models.fakes.server import FakeServer, Request, Response
-from manitwin.models.services.http import FormFile, Gone, Refusal, Service, Unanswered
+from manitwin.models.services.http import FormFile, HttpService
+from manitwin.models.services.refusal import Gone, Refusal, Unanswered
 from scripted_service import KEY, OK, Client, Script, error_of
 
 STATUSES = [
@@ -162,7 +163,7 @@ def test_key_stays_with_its_host() -> None:
 @pytest.mark.parametrize("key", ["two words", "line\nbreak", "schlüssel"])
 def test_key_that_cannot_be_one_is_refused_without_showing_it(key: str) -> None:
     with pytest.raises(ConfigError) as caught:
-        Service("v", "http://localhost", authorization={}, services=ServicesConfig(), key=key)
+        HttpService("v", "http://localhost", authorization={}, services=ServicesConfig(), key=key)
     assert key not in str(caught.value)
     with pytest.raises(ConfigError, match="ftp://x"):
-        Service("v", "ftp://x", authorization={}, services=ServicesConfig(), key=None)
+        HttpService("v", "ftp://x", authorization={}, services=ServicesConfig(), key=None)

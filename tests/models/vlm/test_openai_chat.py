@@ -19,11 +19,9 @@ from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Un
 from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.server import FakeServer, Response
-from manitwin.models.vlm.openai_chat import OpenAiChat
-from manitwin.models.vlm.openai_completion import completion
-from manitwin.models.vlm.probe import probe
+from manitwin.models.vlm.openai_chat import OpenAiChat, completion
 from manitwin.models.vlm.protocol import Turn
-from manitwin.models.vlm.structured import ask
+from manitwin.models.vlm.structured import ask, probe
 from scripted_service import Script
 
 

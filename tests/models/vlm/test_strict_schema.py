@@ -7,7 +7,7 @@ from typing import Literal
 import pytest
 from pydantic import BaseModel, Field
 
-from manitwin.models.fakes.json_subset import anthropic_complaint, openai_complaint
+from manitwin.models.fakes.chat import anthropic_complaint, openai_complaint
 from manitwin.models.vlm.strict_schema import strict_schema
 
 

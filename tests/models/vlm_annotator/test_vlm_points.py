@@ -15,9 +15,9 @@ from scripted_chat import ScriptedChat, annotator, points_request
 from handmade import mug
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import PointsRequest
-from manitwin.models.annotators.vlm.pictures import marked_views
 from manitwin.models.annotators.vlm.place_checks import PlaceChecks
 from manitwin.models.annotators.vlm.points import Numbering, functional_numbering, grasp_numbering
+from manitwin.models.annotators.vlm.question_parts import marked_views
 from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.render.cameras import project
 from manitwin.render.markers import DOT

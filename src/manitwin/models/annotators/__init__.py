@@ -1,1 +1,1 @@
-"""What an object is, weighs and is for: a VLM's work in the paper; the built-in ``rules`` reads priors and geometry."""
+"""Annotators: category, mass and use of an object. A VLM's work in the paper; the built-in ``rules`` read priors and shape."""

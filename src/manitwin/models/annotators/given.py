@@ -3,22 +3,131 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar, get_args
 
 import numpy as np
 
 from manitwin.config import Resource
-from manitwin.models.annotators.given_points import GivenPoints
 from manitwin.models.annotators.protocol import (
     Annotator,
+    AnnotatorQuestion,
     PhysicalEstimates,
     PointsRequest,
     QualityVerdict,
-    Question,
     SelectedPoints,
     Subject,
 )
-from manitwin.twin.import_record import ImportRecord
-from manitwin.twin.record import Estimate, Language
+from manitwin.twin.import_record import GivenPoint, ImportRecord
+from manitwin.twin.record import Estimate, FunctionalPoint, GraspPoint, GraspType, Language
+
+NEAR_M, NEAR_SHARE = 0.02, 0.1
+"""A candidate stands for a given point within 2 cm, or 10 % of the longest side: 42 candidates lie about so far apart."""
+
+LEAST, MOST = {"functional": 2, "grasp": 2}, {"functional": 4, "grasp": 3}
+"""How many points an object has (paper: 2-4 functional and 2-3 grasp points)."""
+
+Point = TypeVar("Point", FunctionalPoint, GraspPoint)
+
+
+class GivenPoints:
+    """The given points of one object, snapped to candidates; what has no candidate near is a finding."""
+
+    def __init__(self, given: ImportRecord, request: PointsRequest):
+        self._given, self._request = given, request
+        extents = np.ptp(request.subject.solid.vertices, axis=0)
+        self._limit_m = max(NEAR_M, NEAR_SHARE * float(extents.max()))
+        self.findings: list[str] = []
+        self._functional = [
+            self._functional_point(n, point, candidate, distance_m)
+            for n, (point, candidate, distance_m) in enumerate(self._snapped("functional", given.functional_points))
+        ]
+        self._grasp = [
+            self._grasp_point(n, point, candidate, distance_m)
+            for n, (point, candidate, distance_m) in enumerate(self._snapped("grasp", given.grasp_points))
+        ]
+
+    def enough(self) -> bool:
+        """Tell whether nobody else has to be asked."""
+        return len(self._functional) >= LEAST["functional"] and len(self._grasp) >= LEAST["grasp"]
+
+    def selection(self, others: SelectedPoints | None) -> SelectedPoints:
+        """Return the given points, filled up with others to as many as an object has at least."""
+        functional, grasp, findings = self._functional, self._grasp, self.findings
+        if others is not None:
+            functional = _filled(functional, others.functional, LEAST["functional"], "f")
+            grasp = _filled(grasp, others.grasp, LEAST["grasp"], "g")
+            findings = findings + list(others.findings or ())
+        return SelectedPoints(tuple(functional), tuple(grasp), tuple(findings))
+
+    def _snapped(self, kind: str, points: list[GivenPoint]) -> list[tuple[GivenPoint, int, float]]:
+        """Return each point with its candidate and the distance (m), no candidate twice."""
+        snapped: list[tuple[GivenPoint, int, float]] = []
+        taken: set[int] = set()
+        for number, point in enumerate(points):
+            distances_m = self._distances(point)
+            distances_m[list(taken)] = np.inf
+            candidate = int(distances_m.argmin())
+            if distances_m[candidate] > self._limit_m:
+                nearest = f"{distances_m[candidate] * 1000:.0f} mm" if np.isfinite(distances_m[candidate]) else "none"
+                self.findings.append(
+                    f"{kind} point {number} ({self._given.source}) has no candidate within {self._limit_m * 1000:.0f} mm"
+                    f" (the nearest free one: {nearest})"
+                )
+            elif len(snapped) == MOST[kind]:
+                self.findings.append(
+                    f"{kind} points beyond the first {MOST[kind]} of {len(points)} ({self._given.source}) were left out"
+                )
+                break
+            else:
+                taken.add(candidate)
+                snapped.append((point, candidate, float(distances_m[candidate])))
+        return snapped
+
+    def _distances(self, point: GivenPoint) -> np.ndarray:
+        """Return how far the candidates are; where fingers close, from the line between them: it ends on the surface."""
+        offset = self._request.positions_m - np.array(point.position_m)
+        if point.closing is not None:
+            closing, half = np.array(point.closing), self._request.max_opening_m / 2
+            offset = offset - np.clip(offset @ closing, -half, half)[:, None] * closing
+        return np.asarray(np.linalg.norm(offset, axis=1))
+
+    def _functional_point(self, number: int, point: GivenPoint, candidate: int, distance_m: float) -> FunctionalPoint:
+        label = point.label or "functional point"
+        return FunctionalPoint(
+            id=f"f{number}",
+            candidate=candidate,
+            position_m=self._request.positions_m[candidate].tolist(),
+            normal=self._request.normals[candidate].tolist(),
+            label=label,
+            description=label,
+            confidence=1.0,
+            rationale=self._rationale(distance_m),
+        )
+
+    def _grasp_point(self, number: int, point: GivenPoint, candidate: int, distance_m: float) -> GraspPoint:
+        said = point.label.lower().replace(" ", "_")
+        kind: GraspType = next((name for name in get_args(GraspType) if name == said), "parallel_jaw")
+        return GraspPoint(
+            id=f"g{number}",
+            candidate=candidate,
+            position_m=self._request.positions_m[candidate].tolist(),
+            normal=self._request.normals[candidate].tolist(),
+            type=kind,
+            scenario=point.label or "hold it here",
+            confidence=1.0,
+            rationale=self._rationale(distance_m),
+        )
+
+    def _rationale(self, distance_m: float) -> str:
+        return f"{self._given.source}: annotated {distance_m * 1000:.0f} mm from this candidate"
+
+
+def _filled(given: list[Point], others: tuple[Point, ...], least: int, letter: str) -> list[Point]:
+    filled = list(given)
+    for point in others:
+        if len(filled) < least and point.candidate not in {kept.candidate for kept in given}:
+            filled.append(point)
+    return [point.model_copy(update={"id": f"{letter}{number}"}) for number, point in enumerate(filled)]
 
 
 class KeepsGiven:
@@ -35,11 +144,11 @@ class KeepsGiven:
         self.needs: Resource = inner.needs
         self.picture_px = inner.picture_px
 
-    def model_for(self, question: Question) -> str | None:
+    def model_for(self, question: AnnotatorQuestion) -> str | None:
         """Return what decides the inner annotator's answer; what is given is part of the twin's id."""
         return self._inner.model_for(question)
 
-    def expected_usd(self, question: Question) -> float:
+    def expected_usd(self, question: AnnotatorQuestion) -> float:
         """Return about what the inner annotator's answer costs."""
         return self._inner.expected_usd(question)
 

@@ -1,4 +1,4 @@
-"""What is usually true of things people handle: a table of priors, keyed by what a person calls the thing.
+"""The priors: a table of usual sizes, masses, parts and uses of things, keyed by what a person calls the thing.
 
 The table is ``prior_tables/*.toml`` beside this module: ``materials.toml`` (friction, restitution), ``forms.toml`` (shape, parts
 and how they are used, shared by many categories) and one file a domain with the categories. docs/priors.md says how it
@@ -24,6 +24,9 @@ from manitwin.twin.record import Estimate, Finite, GraspType, Record
 TABLES = resources.files("manitwin.models.annotators") / "prior_tables"
 VOCABULARY_FILES = ("materials", "forms")
 """The files of the folder that are not a domain."""
+
+HEAVIEST_CONTENTS_KG_M3 = 2000.0
+"""Closed packages hold no more: sugar, sand and shampoo in a jar are below."""
 
 Distribution = Literal["full", "solid", "shell"]
 """Full of its contents or of one matter; solid: the mesh is the matter itself; shell: hollow behind a closed skin."""
@@ -83,7 +86,7 @@ class Material(Record):
 
 
 class Form(Record):
-    """What a family of categories shares: shape, how it rests, and its parts."""
+    """The shape, rest and parts that a family of categories shares."""
 
     shape: str
     stands: bool | None = None
@@ -96,7 +99,7 @@ class Form(Record):
 
 
 class Prior(Form):
-    """What is usually true of one category of things.
+    """The usual values of one category of things.
 
     ``longest_axis_m`` is that of the oriented box. ``bulk_density_kg_m3`` is mass per volume of a repaired scan, not of
     the matter; None where a scan's volume says nothing of the mass. ``stands``: whether it is put down upright (None:
@@ -122,7 +125,7 @@ class Prior(Form):
 
     @property
     def source(self) -> str:
-        """Who says so, as an Estimate's source."""
+        """The source of its Estimates."""
         return f"prior:{self.category}"
 
 

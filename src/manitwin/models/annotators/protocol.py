@@ -46,7 +46,7 @@ class QualityVerdict:
 
 @dataclass(frozen=True)
 class PhysicalEstimates:
-    """What an annotator believes of size, mass, friction and how the mass is spread.
+    """An annotator's estimates of size, mass, friction and how the mass is spread.
 
     ``longest_axis_m`` is the longest axis of the oriented box (None: keep the scale as it is). ``wall_thickness_m`` is given
     for hollow things whose mesh is only an outer skin (None: the mesh is the solid matter, or full). ``mass_kg`` may be
@@ -87,7 +87,7 @@ class SelectedPoints:
     findings: tuple[str, ...] | None = None
 
 
-Question = Literal["quality", "physical", "captions", "points"]
+AnnotatorQuestion = Literal["quality", "physical", "captions", "points"]
 """The paper's four questions to a VLM."""
 
 
@@ -101,11 +101,11 @@ class Annotator(Protocol):
     needs: Resource
     picture_px: int
 
-    def model_for(self, question: Question) -> str | None:
+    def model_for(self, question: AnnotatorQuestion) -> str | None:
         """Return what decides the answer to a question besides the code: the model, and the prompt it is asked with."""
         ...
 
-    def expected_usd(self, question: Question) -> float:
+    def expected_usd(self, question: AnnotatorQuestion) -> float:
         """Return about what a question costs."""
         ...
 

@@ -9,10 +9,10 @@ from manitwin.models.annotators.physical_rules import estimate_physical
 from manitwin.models.annotators.point_rules import select_points
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import (
+    AnnotatorQuestion,
     PhysicalEstimates,
     PointsRequest,
     QualityVerdict,
-    Question,
     SelectedPoints,
     Subject,
 )
@@ -30,11 +30,11 @@ class RulesAnnotator:
     needs: Resource = "cpu"
     picture_px = 512  # nobody but people looks at them
 
-    def model_for(self, question: Question) -> str | None:
+    def model_for(self, question: AnnotatorQuestion) -> str | None:
         """Return None: there is no model."""
         return None
 
-    def expected_usd(self, question: Question) -> float:
+    def expected_usd(self, question: AnnotatorQuestion) -> float:
         """Return 0."""
         return 0.0
 

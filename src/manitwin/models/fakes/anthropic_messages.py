@@ -13,11 +13,10 @@ import json
 from collections.abc import Sequence
 from typing import Any
 
+from manitwin.models.fakes.chat import Answer, ChatRequest, anthropic_complaint, hang, write
 from manitwin.models.fakes.faults import Faults
-from manitwin.models.fakes.json_subset import anthropic_complaint
 from manitwin.models.fakes.server import Request, Response
 from manitwin.models.fakes.vlm_answers import rehearsal_answer
-from manitwin.models.fakes.vlm_requests import Answer, Asked, hang, write
 
 FIELDS = frozenset(
     [
@@ -85,7 +84,7 @@ class FakeAnthropic:
                 raise ValueError("no object")
         except ValueError:
             return _error(400, "invalid_request_error", "The request body is not valid JSON")
-        asked = Asked()
+        asked = ChatRequest()
         complaint = self._complaint_of_fields(body) or self._complaint_of_format(body, asked) or _read(body, asked)
         if complaint is not None:
             return _error(400, "invalid_request_error", complaint)
@@ -147,7 +146,7 @@ class FakeAnthropic:
                 return "temperature: range: 0..1"
         return None
 
-    def _complaint_of_format(self, body: dict[str, Any], asked: Asked) -> str | None:
+    def _complaint_of_format(self, body: dict[str, Any], asked: ChatRequest) -> str | None:
         if "output_config" not in body:
             return None
         if not self._structured or self._faults.strike("no_json_schema"):
@@ -167,7 +166,7 @@ class FakeAnthropic:
         return f"output_config.format.schema: {complaint}" if complaint else None
 
 
-def _read(body: dict[str, Any], asked: Asked) -> str | None:
+def _read(body: dict[str, Any], asked: ChatRequest) -> str | None:
     system, messages = body.get("system", ""), body["messages"]
     blocks = [{"type": "text", "text": system}] if isinstance(system, str) else system
     if not isinstance(blocks, list) or not all(isinstance(b, dict) and b.get("type") == "text" for b in blocks):
@@ -197,7 +196,7 @@ def _read(body: dict[str, Any], asked: Asked) -> str | None:
     return f"messages: an image is larger than {side_px} pixels" if asked.longest_side_px > side_px else None
 
 
-def _read_block(part: Any, role: str, asked: Asked) -> str | None:
+def _read_block(part: Any, role: str, asked: ChatRequest) -> str | None:
     if not isinstance(part, dict):
         return "type: Input should be an object"
     if part.get("type") == "text":

@@ -53,8 +53,8 @@ REHEARSALS = {
     "meshy": Rehearsal("manitwin.models.fakes.meshy:FakeMeshy", "--generator", "meshy@{url}", "MESHY_API_KEY"),
     "hunyuan3d": Rehearsal("manitwin.models.fakes.hunyuan3d:FakeHunyuan3d", "--generator", "hunyuan3d@{url}"),
     "fal": Rehearsal("manitwin.models.fakes.fal:FakeFal", "--generator", "fal@{url}", "FAL_KEY"),
-    "graspgen": Rehearsal("manitwin.models.fakes.graspgen:FakeGraspGen", "--grasper", "graspgen@{url}"),
-    "graspgenx": Rehearsal("manitwin.models.fakes.graspgenx:FakeGraspGenX", "--grasper", "graspgenx@{url}"),
+    "graspgen": Rehearsal("manitwin.models.fakes.grasp_servers:FakeGraspGen", "--grasper", "graspgen@{url}"),
+    "graspgenx": Rehearsal("manitwin.models.fakes.grasp_servers:FakeGraspGenX", "--grasper", "graspgenx@{url}"),
 }
 
 

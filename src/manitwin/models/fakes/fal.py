@@ -10,17 +10,14 @@ that is asked for too early, and that the app refuses fields it does not know.
 
 from __future__ import annotations
 
-import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.json_fields import Check, complaint, number, one_of, picture_url, text, whole
-from manitwin.models.fakes.meshes import mesh_file
-from manitwin.models.fakes.outages import with_outages
 from manitwin.models.fakes.server import Request, Response
+from manitwin.models.fakes.vendor import FILES, FakeVendor
 
-FILES = "/files/"
 REFUSALS = {
     "unauthorized": (401, {"detail": "Cannot access application. Authentication is required."}),
     "out_of_credit": (
@@ -85,48 +82,47 @@ class _Request:
     status: str = "IN_QUEUE"
 
 
-@dataclass
-class FakeFal:
+class FakeFal(FakeVendor):
     """fal's queue on this machine: a request is complete after ``polls`` looks at its status.
 
     ``names`` are the addresses that a submitted request is told to ask, instead of this server's: for a reply that leads
     elsewhere.
     """
 
-    faults: Faults = field(default_factory=Faults)
-    key: str = "rehearsal-key"
-    polls: int = 2
-    names: dict[str, str] = field(default_factory=dict)
-    _requests: dict[str, _Request] = field(default_factory=dict)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
+    refusals = REFUSALS
+
+    def __init__(self, faults: Faults | None = None, key: str = "rehearsal-key", polls: int = 2):
+        super().__init__(faults, key, polls)
+        self.names: dict[str, str] = {}
+        self._requests: dict[str, _Request] = {}
 
     def __repr__(self) -> str:
         return f"FakeFal({len(self._requests)} requests)"
 
     @property
     def submitted(self) -> int:
-        """How many requests were taken, and so charged."""
+        """The number of requests that were taken, and so charged."""
         return len(self._requests)
 
-    def answer(self, request: Request, base_url: str) -> Response:
-        """Answer a request as fal's queue does."""
-        if request.path.startswith(FILES):
-            return self._file(request)
-        if request.headers.get("authorization") != f"Key {self.key}":
-            return Response(*REFUSALS["unauthorized"])
-        return with_outages(self.faults, REFUSALS, lambda: self._api(request, base_url))
+    def authorization(self) -> str:
+        """Return the header that holds the key."""
+        return f"Key {self.key}"
 
-    def _api(self, request: Request, base_url: str) -> Response:
-        with self._lock:
-            place = request.path.strip("/")
-            if request.method == "POST":
-                return self._submit(request, place, base_url)
-            app, _, rest = place.partition("/requests/")
-            id, _, what = rest.partition("/")
-            asked = self._requests.get(id)
-            if request.method != "GET" or asked is None or app != _app(asked.endpoint) or what not in ("", "status"):
-                return Response(404, {"detail": "Not found"})
-            return self._status(asked, base_url) if what else self._result(asked, base_url)
+    def seed_of(self, job: str) -> int | None:
+        """Return the seed of a request's mesh; None where there is no such request."""
+        return self._requests[job].seed if job in self._requests else None
+
+    def api(self, request: Request, base_url: str) -> Response:
+        """Answer a request that has the right key."""
+        place = request.path.strip("/")
+        if request.method == "POST":
+            return self._submit(request, place, base_url)
+        app, _, rest = place.partition("/requests/")
+        id, _, what = rest.partition("/")
+        asked = self._requests.get(id)
+        if request.method != "GET" or asked is None or app != _app(asked.endpoint) or what not in ("", "status"):
+            return Response(404, {"detail": "Not found"})
+        return self._status(asked, base_url) if what else self._result(asked, base_url)
 
     def _submit(self, request: Request, endpoint: str, base_url: str) -> Response:
         if endpoint not in ENDPOINTS:
@@ -173,15 +169,6 @@ class FakeFal:
         link = f"{base_url}{FILES}{asked.id}/model.glb"
         made = {"url": link, "content_type": "model/gltf-binary", "file_name": "model.glb", "file_size": 1}
         return Response(200, {"timings": {"prepare": 0.1, "generation": 3.0}, endpoint.output: made})
-
-    def _file(self, request: Request) -> Response:
-        id = request.path.removeprefix(FILES).partition("/")[0]
-        if "authorization" in request.headers:
-            return Response(400, b"<Error><Code>InvalidArgument</Code></Error>", {"Content-Type": "application/xml"})
-        if id not in self._requests or self.faults.strike("expired_link"):
-            return Response(403, b"<Error><Code>AccessDenied</Code></Error>", {"Content-Type": "application/xml"})
-        made = mesh_file("glb", self.faults, self._requests[id].seed)
-        return Response(200, made, {"Content-Type": "model/gltf-binary"})
 
 
 def _app(endpoint: str) -> str:

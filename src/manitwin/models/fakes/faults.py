@@ -1,4 +1,4 @@
-"""What can go wrong at a service, on purpose."""
+"""Faults that a fake service shows on purpose."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ALWAYS = -1
 
 
 class Faults:
-    """How often each fault is still to happen (``ALWAYS``: every time); safe to use from several threads.
+    """The number of times that each fault is still to happen (``ALWAYS``: every time); safe to use from several threads.
 
     Raises UsageError for an unknown name.
     """

@@ -16,8 +16,8 @@ from typing import Any, Literal
 from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.json_fields import Check, flag, number, picture_base64, whole
 from manitwin.models.fakes.meshes import mesh_file
-from manitwin.models.fakes.outages import with_outages
 from manitwin.models.fakes.server import Request, Response
+from manitwin.models.fakes.vendor import with_outages
 
 SAID_OF_ANY_FAILURE = "**NETWORK ERROR DUE TO HIGH TRAFFIC. PLEASE REGENERATE OR REFRESH THIS PAGE.**"
 FIELDS_2_1: dict[str, Check] = {
@@ -58,7 +58,7 @@ class FakeHunyuan3d:
 
     @property
     def sent(self) -> int:
-        """How many jobs were taken by ``/send`` or ``/generate``."""
+        """The number of jobs that ``/send`` or ``/generate`` took."""
         return len(self._jobs)
 
     def answer(self, request: Request, base_url: str) -> Response:

@@ -1,4 +1,4 @@
-"""What the fake generators make: a textured bottle as the vendors' file formats, whole or with one of their faults.
+"""The meshes of the fake generators: a textured bottle in the vendors' file formats, whole or with one of their faults.
 
 The files are written by trimesh and by the USD library, not by this package's own writer.
 """
@@ -38,7 +38,7 @@ Format = Literal["glb", "usdz"]
 
 
 @dataclass(frozen=True)
-class Surface:
+class TexturedMesh:
     """A closed surface of revolution about +Y: ``uv`` has its origin at the lower left, ``texture`` is RGB uint8.
 
     Texture coordinates repeat the first meridian, so its vertices are there twice: closed once equal points are welded.
@@ -51,12 +51,12 @@ class Surface:
     texture: np.ndarray
 
 
-def bottle(seed: int = 0) -> Surface:
+def bottle(seed: int = 0) -> TexturedMesh:
     """Return a capped bottle, 1 high and 0.34 wide, standing on y = 0, of about 5,000 faces; the seed gives its colour."""
     return revolution("bottle", (*BODY, *NECK[:2], (0.07, 0.881), *CAP[2:]), rings=28, seed=seed)
 
 
-def body_and_cap(seed: int = 0) -> list[Surface]:
+def body_and_cap(seed: int = 0) -> list[TexturedMesh]:
     """Return the same bottle as two closed surfaces, the cap 1/1000 above the neck."""
     return [
         revolution("body", (*BODY, *NECK), rings=30, seed=seed),
@@ -64,7 +64,7 @@ def body_and_cap(seed: int = 0) -> list[Surface]:
     ]
 
 
-def revolution(name: str, profile: tuple[tuple[float, float], ...], *, rings: int, seed: int) -> Surface:
+def revolution(name: str, profile: tuple[tuple[float, float], ...], *, rings: int, seed: int) -> TexturedMesh:
     """Turn a profile of (radius, height), whose ends lie on the axis, into a surface of revolution."""
     points = np.asarray(profile)
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
@@ -78,7 +78,7 @@ def revolution(name: str, profile: tuple[tuple[float, float], ...], *, rings: in
     side_uv = np.stack([across, np.tile((inner / along[-1])[:, None], (1, SEGMENTS + 1))], axis=2)
     vertices = np.vstack([side.reshape(-1, 3), [[0, points[0, 1], 0], [0, points[-1, 1], 0]]])
     uv = np.vstack([side_uv.reshape(-1, 2), [[0.5, 0.0], [0.5, 1.0]]])
-    return Surface(name, vertices, _faces(len(inner)), uv, _texture(seed))
+    return TexturedMesh(name, vertices, _faces(len(inner)), uv, _texture(seed))
 
 
 def mesh_file(format: Format, faults: Faults, seed: int = 0) -> bytes:
@@ -91,7 +91,7 @@ def mesh_file(format: Format, faults: Faults, seed: int = 0) -> bytes:
 
 
 def glb(
-    surfaces: list[Surface], *, texture_format: Literal["PNG", "JPEG"] = "JPEG", up: Literal["y", "z"] = "y"
+    surfaces: list[TexturedMesh], *, texture_format: Literal["PNG", "JPEG"] = "JPEG", up: Literal["y", "z"] = "y"
 ) -> bytes:
     """Return a binary glTF 2.0 of surfaces; ``up`` 'z' stands them along Z, which glTF does not allow."""
     scene = trimesh.Scene()
@@ -111,7 +111,7 @@ def glb(
     return bytes(scene.export(file_type="glb"))
 
 
-def usdz(surfaces: list[Surface]) -> bytes:
+def usdz(surfaces: list[TexturedMesh]) -> bytes:
     """Return a USDZ package of surfaces, one mesh each, with UsdPreviewSurface materials; Y-up, 1 unit = 1 m."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -178,16 +178,18 @@ def webp_glb(seed: int = 0) -> bytes:
     return _edited(glb([bottle(seed)]), exchange)
 
 
-def open_surface(seed: int = 0) -> Surface:
+def open_surface(seed: int = 0) -> TexturedMesh:
     """Return scraps of the bottle, one face in twenty-five: they enclose nothing, and nothing closes them to a bottle."""
     whole = bottle(seed)
     rng = np.random.default_rng(seed)
     chosen = rng.choice(len(whole.faces), 200, replace=False)
     rows = whole.faces[chosen].reshape(-1)
-    return Surface("scraps", whole.vertices[rows], np.arange(len(rows)).reshape(-1, 3), whole.uv[rows], whole.texture)
+    return TexturedMesh(
+        "scraps", whole.vertices[rows], np.arange(len(rows)).reshape(-1, 3), whole.uv[rows], whole.texture
+    )
 
 
-def _either(format: Format, surfaces: list[Surface]) -> bytes:
+def _either(format: Format, surfaces: list[TexturedMesh]) -> bytes:
     return usdz(surfaces) if format == "usdz" else glb(surfaces)
 
 
@@ -236,7 +238,7 @@ def _image(texture: np.ndarray, format: str) -> bytes:
     return stream.getvalue()
 
 
-def _define_mesh(stage: Usd.Stage, surface: Surface) -> None:
+def _define_mesh(stage: Usd.Stage, surface: TexturedMesh) -> None:
     mesh = UsdGeom.Mesh.Define(stage, f"/model/{surface.name}")
     mesh.CreatePointsAttr([Gf.Vec3f(*map(float, row)) for row in surface.vertices])
     mesh.CreateFaceVertexCountsAttr([3] * len(surface.faces))

@@ -7,17 +7,15 @@ credits that an image costs. Links of files end as those of a CDN do: 403 once t
 
 from __future__ import annotations
 
-import threading
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.json_fields import complaint, flag, list_of, one_of, picture_url, text, whole
-from manitwin.models.fakes.meshes import mesh_file
-from manitwin.models.fakes.outages import with_outages
 from manitwin.models.fakes.server import Request, Response
+from manitwin.models.fakes.vendor import FILES, FakeVendor
 
-IMAGE, TEXT, BALANCE, FILES = "/openapi/v1/image-to-3d", "/openapi/v2/text-to-3d", "/openapi/v1/balance", "/files/"
+IMAGE, TEXT, BALANCE = "/openapi/v1/image-to-3d", "/openapi/v2/text-to-3d", "/openapi/v1/balance"
 MODELS = ("latest", "meshy-5", "meshy-6")
 FORMATS = ("glb", "obj", "fbx", "stl", "usdz", "3mf")
 LONGEST_TEXT = 600
@@ -78,17 +76,16 @@ class _Task:
     links: int = 0
 
 
-@dataclass
-class FakeMeshy:
+class FakeMeshy(FakeVendor):
     """Meshy on this machine: a task is done after ``polls`` looks at it and costs ``credits`` of ``balance``."""
 
-    faults: Faults = field(default_factory=Faults)
-    key: str = "rehearsal-key"
-    polls: int = 2
-    balance: int = 1000
-    _tasks: dict[str, _Task] = field(default_factory=dict)
-    _lock: threading.Lock = field(default_factory=threading.Lock)
-    _now_ms: int = FIRST_MS
+    refusals = REFUSALS
+
+    def __init__(self, faults: Faults | None = None, key: str = "rehearsal-key", polls: int = 2, balance: int = 1000):
+        super().__init__(faults, key, polls)
+        self.balance = balance
+        self._tasks: dict[str, _Task] = {}
+        self._now_ms = FIRST_MS
 
     def __repr__(self) -> str:
         return f"FakeMeshy({len(self._tasks)} tasks)"
@@ -97,26 +94,22 @@ class FakeMeshy:
         """Return how many tasks of a type were taken, and so charged."""
         return sum(task.type == type for task in self._tasks.values())
 
-    def answer(self, request: Request, base_url: str) -> Response:
-        """Answer a request as Meshy does."""
-        if request.path.startswith(FILES):
-            return self._file(request)
-        if request.headers.get("authorization") != f"Bearer {self.key}":
-            return Response(*REFUSALS["unauthorized"])
-        return with_outages(self.faults, REFUSALS, lambda: self._api(request, base_url))
+    def seed_of(self, job: str) -> int | None:
+        """Return the seed of a task's mesh; None where there is no such task."""
+        return self._tasks[job].seed if job in self._tasks else None
 
-    def _api(self, request: Request, base_url: str) -> Response:
-        with self._lock:
-            where = (request.method, request.path)
-            if where == ("GET", BALANCE):
-                return Response(200, {"balance": self.balance})
-            if where in (("POST", IMAGE), ("POST", TEXT)):
-                return self._submit(request)
-            if where == ("GET", TEXT):
-                return self._list(request, base_url)
-            if request.method == "GET" and request.path.rpartition("/")[0] in (IMAGE, TEXT):
-                return self._look(request.path, base_url)
-            return _message(404, "Not found")
+    def api(self, request: Request, base_url: str) -> Response:
+        """Answer a request that has the right key."""
+        where = (request.method, request.path)
+        if where == ("GET", BALANCE):
+            return Response(200, {"balance": self.balance})
+        if where in (("POST", IMAGE), ("POST", TEXT)):
+            return self._submit(request)
+        if where == ("GET", TEXT):
+            return self._list(request, base_url)
+        if request.method == "GET" and request.path.rpartition("/")[0] in (IMAGE, TEXT):
+            return self._look(request.path, base_url)
+        return _message(404, "Not found")
 
     def _submit(self, request: Request) -> Response:
         try:
@@ -198,14 +191,6 @@ class FakeMeshy:
             "task_error": {"message": "The mesh could not be made" if task.status == "FAILED" else ""},
             "consumed_credits": CREDITS[task.type] if done else 0,
         }
-
-    def _file(self, request: Request) -> Response:
-        id = request.path.removeprefix(FILES).partition("/")[0]
-        if "authorization" in request.headers:
-            return Response(400, b"<Error><Code>InvalidArgument</Code></Error>", {"Content-Type": "application/xml"})
-        if id not in self._tasks or self.faults.strike("expired_link"):
-            return Response(403, b"<Error><Code>AccessDenied</Code></Error>", {"Content-Type": "application/xml"})
-        return Response(200, mesh_file("glb", self.faults, self._tasks[id].seed), {"Content-Type": "model/gltf-binary"})
 
     def _tick(self) -> int:
         self._now_ms += 1000

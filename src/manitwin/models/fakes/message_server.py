@@ -22,7 +22,7 @@ LISTEN_MS = 50
 
 
 class MessageService(Protocol):
-    """What stands behind a server of messages."""
+    """A service behind a server of messages."""
 
     def answer(self, request: dict[str, Any]) -> dict[str, Any]:
         """Answer a request; what is raised becomes the service's own error."""

@@ -10,11 +10,10 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
+from manitwin.models.fakes.chat import Answer, ChatRequest, WrittenAnswer, hang, openai_complaint, write
 from manitwin.models.fakes.faults import Faults
-from manitwin.models.fakes.json_subset import openai_complaint
 from manitwin.models.fakes.server import Request, Response
 from manitwin.models.fakes.vlm_answers import rehearsal_answer
-from manitwin.models.fakes.vlm_requests import Answer, Asked, Written, hang, write
 
 FIELDS = frozenset(
     [
@@ -104,7 +103,7 @@ class FakeOpenAi:
             return _error(400, "We could not parse the JSON body of your request.")
         if not isinstance(body, dict):
             return _error(400, "We could not parse the JSON body of your request.")
-        asked = Asked()
+        asked = ChatRequest()
         problem = self._problem_of_fields(body) or self._problem_of_format(body, asked) or _read_messages(body, asked)
         if problem is not None:
             return problem
@@ -155,7 +154,7 @@ class FakeOpenAi:
                 return _error(400, f"Invalid value for '{name}'.", param=name, code="invalid_value")
         return None
 
-    def _problem_of_format(self, body: dict[str, Any], asked: Asked) -> Response | None:
+    def _problem_of_format(self, body: dict[str, Any], asked: ChatRequest) -> Response | None:
         wanted = body.get("response_format")
         if wanted is None:
             return None
@@ -173,7 +172,7 @@ class FakeOpenAi:
         return _read_schema(wanted["json_schema"], asked) if kind == "json_schema" else None
 
 
-def _read_schema(described: Any, asked: Asked) -> Response | None:
+def _read_schema(described: Any, asked: ChatRequest) -> Response | None:
     param = "response_format.json_schema"
     if not isinstance(described, dict) or not re.fullmatch(r"[a-zA-Z0-9_-]{1,64}", str(described.get("name", ""))):
         return _error(400, f"Invalid value for '{param}.name'.", param=f"{param}.name")
@@ -189,7 +188,7 @@ def _read_schema(described: Any, asked: Asked) -> Response | None:
     return None
 
 
-def _read_messages(body: dict[str, Any], asked: Asked) -> Response | None:
+def _read_messages(body: dict[str, Any], asked: ChatRequest) -> Response | None:
     messages = body["messages"]
     if not isinstance(messages, list) or not messages:
         return _error(400, "Invalid 'messages': empty array.", param="messages")
@@ -209,7 +208,7 @@ def _read_messages(body: dict[str, Any], asked: Asked) -> Response | None:
     return None
 
 
-def _read_part(part: Any, role: str, asked: Asked) -> str | None:
+def _read_part(part: Any, role: str, asked: ChatRequest) -> str | None:
     if not isinstance(part, dict):
         return "a content part is no object"
     if part.get("type") == "text" and isinstance(part.get("text"), str):
@@ -231,7 +230,7 @@ def _read_part(part: Any, role: str, asked: Asked) -> str | None:
     return asked.picture(found.group(1), found.group(2))
 
 
-def _completion(model: str, asked: Asked, written: Written) -> dict[str, Any]:
+def _completion(model: str, asked: ChatRequest, written: WrittenAnswer) -> dict[str, Any]:
     refused = written.stopped == "refusal"
     read = asked.tokens()
     return {

@@ -8,15 +8,12 @@ Unverified: the HTTP status of refusals other than 401 (400 here), and the answe
 from __future__ import annotations
 
 import json
-import threading
 from dataclasses import dataclass
 from typing import Any
 
 from manitwin.models.fakes.faults import Faults
-from manitwin.models.fakes.meshes import mesh_file
-from manitwin.models.fakes.object_store import served_file
-from manitwin.models.fakes.outages import with_outages
 from manitwin.models.fakes.server import Request, Response
+from manitwin.models.fakes.vendor import FILES, FakeVendor
 
 PREFIX = "/api/v2"
 GEN_1 = ("Sketch", "Regular", "Detail", "Smooth")
@@ -49,16 +46,15 @@ ONLY_FOR = {
 RANGES = {"seed": (0, 65535), "quality_override": (500, 2_000_000)}
 FREE_TEXT = ("prompt", "bbox_condition", "image_label")
 MAX_IMAGES = 5
-NO_KEY = ("UNAUTHORIZED", "Active API key is required.")
 REFUSALS = {
-    "unauthorized": (401, {"error": NO_KEY[0], "message": NO_KEY[1]}),
+    "unauthorized": (401, {"error": "UNAUTHORIZED", "message": "Active API key is required."}),
     "rate_limited": (429, {"error": "TOO_MANY_REQUESTS", "message": "slow down"}),
     "server_error": (500, {"error": "UNKNOWN", "message": "Internal server error"}),
 }
 
 
 @dataclass
-class Task:
+class RodinTask:
     """A task: its form and how often it has been polled."""
 
     form: dict[str, str]
@@ -66,34 +62,28 @@ class Task:
     polls: int = 0
 
 
-class FakeRodin:
+class FakeRodin(FakeVendor):
     """Answer as Rodin does; ``tasks`` are those that were taken, in order, each worth half a credit.
 
     A task is Waiting at the first poll, Generating until ``polls`` of them, then Done. Its base URL is ``.url + "/api/v2"``.
     """
 
+    refusals = REFUSALS
+
     def __init__(
         self, faults: Faults | None = None, key: str = "rehearsal-key", *, credits: float = 12, polls: int = 3
     ):
-        self.faults, self.key, self.polls = faults or Faults(), key, polls
+        super().__init__(faults, key, polls)
         self.credits = credits
-        self.tasks: dict[str, Task] = {}
+        self.tasks: dict[str, RodinTask] = {}
         self._links = 0
-        self._lock = threading.Lock()
 
-    def answer(self, request: Request, base_url: str) -> Response:
-        """Answer a request."""
-        if request.path.startswith("/files/"):
-            return self._file(request)
-        if request.headers.get("authorization") != f"Bearer {self.key}":
-            return _error(401, *NO_KEY)
-        return with_outages(self.faults, REFUSALS, lambda: self._answer(request, base_url))
+    def seed_of(self, job: str) -> int | None:
+        """Return the seed of a task's mesh; None where there is no such task."""
+        return int(self.tasks[job].form.get("seed", "0")) if job in self.tasks else None
 
-    def _answer(self, request: Request, base_url: str) -> Response:
-        with self._lock:
-            return self._locked(request, base_url)
-
-    def _locked(self, request: Request, base_url: str) -> Response:
+    def api(self, request: Request, base_url: str) -> Response:
+        """Answer a request that has the right key."""
         if (request.method, request.path) == ("GET", f"{PREFIX}/check_balance"):
             return Response(200, {"balance": self.credits})
         if request.method != "POST":
@@ -125,7 +115,7 @@ class FakeRodin:
         self.credits -= 0.5
         number = len(self.tasks)
         task = f"00000000-0000-4000-8000-{number:012d}"
-        self.tasks[task] = Task(form, images)
+        self.tasks[task] = RodinTask(form, images)
         jobs = {"uuids": [f"{task}-geometry", f"{task}-texture"], "subscription_key": f"subscription-{number}"}
         return Response(201, {"error": None, "message": "Submitted.", "uuid": task, "jobs": jobs})
 
@@ -158,16 +148,8 @@ class FakeRodin:
         self._links += 1
         suffix = task.form.get("geometry_file_format", "glb")
         files = ("preview.webp", f"model.{suffix}")
-        links = [{"url": f"{base_url}/files/{name}/{file}?signature={self._links}", "name": file} for file in files]
+        links = [{"url": f"{base_url}{FILES}{name}/{file}?signature={self._links}", "name": file} for file in files]
         return Response(201, {"error": "OK", "list": links})
-
-    def _file(self, request: Request) -> Response:
-        _, _, name, file = request.path.split("/", 3)
-        if name not in self.tasks or not request.query.get("signature"):
-            return Response(404, b"<Error><Code>NoSuchKey</Code></Error>")
-        suffix = "usdz" if file.endswith(".usdz") else "glb"
-        seed = int(self.tasks[name].form.get("seed", "0"))
-        return served_file(self.faults, request, mesh_file(suffix, self.faults, seed))  # type: ignore[arg-type]
 
 
 def _error(status: int, code: str, message: str) -> Response:

@@ -61,8 +61,8 @@ class Response:
         return json.dumps(self.body).encode(), {"Content-Type": "application/json", **self.headers}
 
 
-class Service(Protocol):
-    """What stands behind a server."""
+class FakeService(Protocol):
+    """A service behind a fake server."""
 
     def answer(self, request: Request, base_url: str) -> Response:
         """Answer a request; ``base_url`` is where this server is reached."""
@@ -72,7 +72,7 @@ class Service(Protocol):
 class FakeServer:
     """Serve a service on this machine while the context lasts; ``requests`` keeps what was asked, in order."""
 
-    def __init__(self, service: Service, port: int = 0):
+    def __init__(self, service: FakeService, port: int = 0):
         self.service, self.requests = service, list[Request]()
         self._server = _Server(("127.0.0.1", port), _Handler)
         self._server.fake = self

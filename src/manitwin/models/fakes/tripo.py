@@ -7,15 +7,12 @@ Unverified: which of the bad fields get code 1004 (all here).
 
 from __future__ import annotations
 
-import threading
 from dataclasses import dataclass
 from typing import Any
 
 from manitwin.models.fakes.faults import Faults
-from manitwin.models.fakes.meshes import mesh_file
-from manitwin.models.fakes.object_store import served_file
-from manitwin.models.fakes.outages import with_outages
 from manitwin.models.fakes.server import Request, Response
+from manitwin.models.fakes.vendor import FILES, FakeVendor
 
 PREFIX = "/v2/openapi"
 VERSIONS = (
@@ -52,41 +49,35 @@ REFUSALS = {
 
 
 @dataclass
-class Task:
+class TripoTask:
     """A task: what was asked and how often it has been polled."""
 
     input: dict[str, Any]
     polls: int = 0
 
 
-class FakeTripo:
+class FakeTripo(FakeVendor):
     """Answer as Tripo does; ``tasks`` are those that were taken, in order, each worth thirty credits.
 
     A task is queued at the first poll, running until ``polls`` of them, then success. Its base URL is
     ``.url + "/v2/openapi"``.
     """
 
+    refusals = REFUSALS
+
     def __init__(self, faults: Faults | None = None, key: str = "rehearsal-key", *, credits: int = 600, polls: int = 3):
-        self.faults, self.key, self.polls = faults or Faults(), key, polls
+        super().__init__(faults, key, polls)
         self.credits = credits
-        self.tasks: dict[str, Task] = {}
+        self.tasks: dict[str, TripoTask] = {}
         self.uploads: dict[str, bytes] = {}
         self._links = 0
-        self._lock = threading.Lock()
 
-    def answer(self, request: Request, base_url: str) -> Response:
-        """Answer a request."""
-        if request.path.startswith("/files/"):
-            return self._file(request)
-        if request.headers.get("authorization") != f"Bearer {self.key}":
-            return Response(*REFUSALS["unauthorized"])
-        return with_outages(self.faults, REFUSALS, lambda: self._answer(request, base_url))
+    def seed_of(self, job: str) -> int | None:
+        """Return the seed of a task's mesh; None where there is no such task."""
+        return self.tasks[job].input.get("model_seed", 0) if job in self.tasks else None
 
-    def _answer(self, request: Request, base_url: str) -> Response:
-        with self._lock:
-            return self._locked(request, base_url)
-
-    def _locked(self, request: Request, base_url: str) -> Response:
+    def api(self, request: Request, base_url: str) -> Response:
+        """Answer a request that has the right key."""
         path = request.path.removeprefix(PREFIX)
         if (request.method, path) == ("GET", "/user/balance"):
             return _data({"balance": self.credits, "frozen": 0})
@@ -125,7 +116,7 @@ class FakeTripo:
             return _error(403, 2010, "You need more credits to start a new task.", "Please purchase more credits.")
         self.credits -= CREDITS_PER_TASK
         task = f"task-{len(self.tasks)}"
-        self.tasks[task] = Task(body)
+        self.tasks[task] = TripoTask(body)
         return _data({"task_id": task})
 
     def _wrong(self, body: Any) -> Response | None:
@@ -158,17 +149,9 @@ class FakeTripo:
         if task.polls < self.polls or self.faults.strike("job_never_ends"):
             return _data({**data, "status": "running", "progress": 50, "running_left_time": 9})
         self._links += 1
-        link = f"{base_url}/files/{name}/model.glb?signature={self._links}"
+        link = f"{base_url}{FILES}{name}/model.glb?signature={self._links}"
         made = "pbr_model" if task.input.get("pbr", True) else "model"
         return _data({**data, "status": "success", "progress": 100, "output": {made: link, "rendered_image": link}})
-
-    def _file(self, request: Request) -> Response:
-        name = request.path.split("/")[2]
-        if name not in self.tasks or not request.query.get("signature"):
-            return Response(404, b"<Error><Code>NoSuchKey</Code></Error>")
-        return served_file(
-            self.faults, request, mesh_file("glb", self.faults, self.tasks[name].input.get("model_seed", 0))
-        )
 
 
 def _data(data: dict[str, Any]) -> Response:

@@ -24,7 +24,7 @@ from manitwin.errors import BadReply, ConfigError, InputError, Rejected, Unavail
 from manitwin.formats.sniff import sniff
 from manitwin.models.generators import supervisor
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.service import png_of
+from manitwin.models.generators.vendor import png_of
 from manitwin.models.services.keys import redacted
 from manitwin.models.services.refusal import Gone
 

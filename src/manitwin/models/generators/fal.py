@@ -15,14 +15,12 @@ from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import urlsplit
 
-from manitwin.config import BuildConfig, Resource
+from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError, Unsupported
-from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.service import usd_per_job
-from manitwin.models.generators.submission import checked_address, data_uri, submit_paid
-from manitwin.models.services.http import Gone, Refusal, Service, refusal_by_status
-from manitwin.models.services.keys import key_from_environment, split_url
-from manitwin.models.services.refusal import words_of
+from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
+from manitwin.models.generators.vendor import VendorGenerator, checked_address, data_uri, submit_paid
+from manitwin.models.services.http import HttpService
+from manitwin.models.services.refusal import Gone, Refusal, refusal_by_status, words_of
 
 VENDOR = "https://queue.fal.run"
 # the queue's hosts as documented (.../inference-api/openapi/queue.json, "servers"): a key for one is good for the other
@@ -35,7 +33,7 @@ MOST_PARTS = 100_000  # of a result that is searched for a mesh
 
 @dataclass(frozen=True)
 class Endpoint:
-    """What an endpoint takes: the field of the picture and whether it is a list, a prompt, a seed below ``seeds``."""
+    """The input of an endpoint: the field of the picture and whether it is a list, a prompt, a seed below ``seeds``."""
 
     image: str | None
     image_list: bool = False
@@ -54,73 +52,51 @@ ENDPOINTS = {
 }
 
 
-class FalGenerator:
+class FalGenerator(VendorGenerator):
     """Have an endpoint of fal make a mesh; ``generate.options`` are added to its input.
 
     The addresses that a reply names to ask next are asked only on the host that was chosen, or on the queue's other one.
     """
 
     name = "fal"
-    needs: Resource = "generator"
-    asked_with: frozenset[Asked] = IMAGE_OR_TEXT  # by endpoint; so as long as none is chosen
+    url, keys = VENDOR, (KEY,)
+    default_model = DEFAULT
+    remedy = f"check {KEY} and your balance at https://fal.ai/dashboard/billing"
 
     def __init__(
-        self,
-        endpoint: str,
-        base_url: str,
-        key: str | None,
-        config: BuildConfig,
-        sleep: Callable[[float], None] = time.sleep,
+        self, endpoint: str, url: str, key: str | None, config: BuildConfig, sleep: Callable[[float], None] = time.sleep
     ):
         if endpoint.count("/") < 1 or not all(endpoint.split("/")):
             raise ConfigError(f"fal: {endpoint!r} is no endpoint; give OWNER/APP such as {DEFAULT}")
-        self.model: str | None = endpoint
         self.takes = ENDPOINTS.get(endpoint) or _guessed(endpoint)
+        super().__init__(endpoint, url, key, config, sleep, listed_usd=self.takes.usd if url == VENDOR else None)
         takes: dict[Asked, bool] = {"image": self.takes.image is not None, "text": self.takes.prompt}
         self.asked_with = frozenset(asked for asked, taken in takes.items() if taken)
-        listed = self.takes.usd if base_url == VENDOR else None
-        self.usd_per_job = usd_per_job(f"fal:{endpoint}", base_url, config.services, listed)
-        self._options = dict(config.generate.options)
-        hosts = [base_url]
-        if base_url.startswith("https://") and urlsplit(base_url).netloc in VENDOR_HOSTS:
-            hosts += [f"https://{host}" for host in VENDOR_HOSTS if f"https://{host}" != base_url]
+        hosts = [url]
+        if url.startswith("https://") and urlsplit(url).netloc in VENDOR_HOSTS:
+            hosts += [f"https://{host}" for host in VENDOR_HOSTS if f"https://{host}" != url]
+        # where a request that was taken is asked after
+        self._begun = [self._served(host, key, config, sleep, _unless_failed) for host in hosts]
 
-        def service(host: str, refusal: Callable[[int, Any], Refusal | None]) -> Service:
-            return Service(
-                "fal",
-                host,
-                authorization={"Authorization": f"Key {key}"} if key else {},
-                services=config.services,
-                key=key,
-                remedy=f"check {KEY} and your balance at https://fal.ai/dashboard/billing",
-                refusal=refusal,
-                sleep=sleep,
-            )
+    def priced_as(self, model: str) -> str:
+        """Return the name by which a missing price is asked for: prices are those of endpoints."""
+        return f"fal:{model}"
 
-        self._queue = service(base_url, refusal_by_status)
-        self._begun = [service(host, _unless_failed) for host in hosts]  # where a request that was taken is asked after
-
-    def __repr__(self) -> str:
-        return f"FalGenerator({self.model!r}, {self._queue.base_url!r})"
-
-    @classmethod
-    def from_spec(cls, argument: str, config: BuildConfig) -> FalGenerator:
-        """Create it from ``ENDPOINT@URL``, each with a default; raises ConfigError for a missing key or price."""
-        endpoint, url = split_url(argument)
-        base_url = url or VENDOR
-        return cls(endpoint or DEFAULT, base_url, key_from_environment([KEY], base_url, "fal"), config)
+    def authorization(self, key: str | None) -> dict[str, str]:
+        """Return the headers that hold the key."""
+        return {"Authorization": f"Key {key}"} if key else {}
 
     def probe(self) -> str:
         """Ask for a request that cannot be, which only a valid key is told of (not documented; costs nothing)."""
         app = "/".join(str(self.model).split("/")[:2])
         with suppress(Gone):  # the answer that is hoped for
-            self._queue.get_json(f"/{app}/requests/00000000-0000-0000-0000-000000000000/status")
+            self._service.get_json(f"/{app}/requests/00000000-0000-0000-0000-000000000000/status")
         return "the queue takes the key"
 
     def submit(self, request: GenerationRequest) -> str:
         """Put a request into the queue; raises Unsupported where the endpoint does not take what is asked."""
         body = self._input(request) | self._options
-        answer = submit_paid(self._queue, f"/{self.model}", body, ("status_url", "response_url"))
+        answer = submit_paid(self._service, f"/{self.model}", body, ("status_url", "response_url"))
         # fal's addresses use the app without its path, so they are kept and not built from the request's id
         status, response = (checked_address(answer.get(n), "fal", n) for n in ("status_url", "response_url"))
         self._service_of(status)
@@ -134,10 +110,10 @@ class FalGenerator:
         if status in WORKING:
             return JobState(WORKING[status])
         if status != "COMPLETED":
-            raise BadReply(f"fal: the request has the unknown status {self._queue.said(str(status))!r}")
+            raise BadReply(f"fal: the request has the unknown status {self._service.said(str(status))!r}")
         result = self._result(response_url)
         if _is_failure(result):
-            return JobState("failed", self._queue.said(words_of(result)))
+            return JobState("failed", self._service.said(words_of(result)))
         return JobState("done")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
@@ -148,7 +124,7 @@ class FalGenerator:
             return checked_address(first_glb(self._result(response_url)), "fal", "GLB")
 
         path = folder / "generated.glb"
-        self._queue.download(link(), path, fresh_url=link)
+        self._service.download(link(), path, fresh_url=link)
         return Generated(path, self.model, {"endpoint": self.model})
 
     def _input(self, request: GenerationRequest) -> dict[str, Any]:
@@ -172,14 +148,14 @@ class FalGenerator:
     def _result(self, response_url: str) -> dict[str, Any]:
         return self._service_of(response_url).get_json(response_url)
 
-    def _service_of(self, url: str) -> Service:
+    def _service_of(self, url: str) -> HttpService:
         asked = urlsplit(url)
         for service in self._begun:
             own = urlsplit(service.base_url)
             if (asked.scheme, asked.netloc) == (own.scheme, own.netloc):
                 return service
         raise BadReply(
-            f"fal: it names {self._queue.said(asked.netloc)!r} to ask next, which is not its own host; the key goes to"
+            f"fal: it names {self._service.said(asked.netloc)!r} to ask next, which is not its own host; the key goes to"
             " no other"
         )
 

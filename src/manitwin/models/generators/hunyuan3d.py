@@ -23,10 +23,10 @@ from urllib.parse import quote
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, ConfigError, Unavailable, Unsupported, choose_from
 from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.service import png_of
-from manitwin.models.generators.submission import submit_paid
-from manitwin.models.services.http import Gone, Refusal, Service, refusal_by_status
+from manitwin.models.generators.vendor import png_of, submit_paid
+from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import split_url
+from manitwin.models.services.refusal import Gone, Refusal, refusal_by_status
 
 VENDOR = "http://localhost:8081"  # the port that api_server.py listens on by itself
 VERSION = "2.1"
@@ -144,9 +144,11 @@ class Hunyuan3dGenerator:
             raise Gone(f"hunyuan3d: job {job_id} ended with the process that began it; run it again")
         return how, uid
 
-    def _served(self, base_url: str, config: BuildConfig, timeout_s: float, sleep: Callable[[float], None]) -> Service:
+    def _served(
+        self, base_url: str, config: BuildConfig, timeout_s: float, sleep: Callable[[float], None]
+    ) -> HttpService:
         services = config.services.model_copy(update={"timeout_s": timeout_s})
-        return Service(
+        return HttpService(
             "hunyuan3d", base_url, authorization={}, services=services, key=None, refusal=_refusal, sleep=sleep
         )
 

@@ -13,13 +13,10 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from manitwin.config import BuildConfig, Resource
+from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, Rejected
-from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.service import usd_per_job
-from manitwin.models.generators.submission import checked_address, data_uri, submit_paid
-from manitwin.models.services.http import Service
-from manitwin.models.services.keys import bearer, key_from_environment, split_url
+from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+from manitwin.models.generators.vendor import VendorGenerator, checked_address, data_uri, submit_paid
 
 VENDOR = "https://api.meshy.ai"
 KEY = "MESHY_API_KEY"
@@ -33,7 +30,7 @@ PAGE = 50  # tasks of a page of the list: the most that is documented
 PAGES = 20
 
 
-class MeshyGenerator:
+class MeshyGenerator(VendorGenerator):
     """Have Meshy make a textured mesh; ``generate.options`` are added to what is asked.
 
     A text takes two paid tasks, a preview and the refine that textures it, as one job named by its preview. A process that
@@ -41,41 +38,16 @@ class MeshyGenerator:
     """
 
     name = "meshy"
-    needs: Resource = "generator"
-    asked_with: frozenset[Asked] = IMAGE_OR_TEXT
+    url, keys = VENDOR, (KEY,)
+    default_model, model_option = MODEL, "ai_model"
+    remedy = f"check {KEY} and your credits at https://www.meshy.ai/settings/api"
 
     def __init__(
-        self,
-        model: str,
-        base_url: str,
-        key: str | None,
-        config: BuildConfig,
-        sleep: Callable[[float], None] = time.sleep,
+        self, model: str, url: str, key: str | None, config: BuildConfig, sleep: Callable[[float], None] = time.sleep
     ):
-        self.model: str | None = model
-        self.usd_per_job = usd_per_job("meshy", base_url, config.services)
-        self._options = dict(config.generate.options)
-        self._service = Service(
-            "meshy",
-            base_url,
-            authorization=bearer(key),
-            services=config.services,
-            key=key,
-            remedy=f"check {KEY} and your credits at https://www.meshy.ai/settings/api",
-            sleep=sleep,
-        )
+        super().__init__(model, url, key, config, sleep)
         self._own_previews: set[str] = set()  # begun by this object and not yet refined
         self._refines: dict[str, str] = {}
-
-    def __repr__(self) -> str:
-        return f"MeshyGenerator({self.model!r}, {self._service.base_url!r})"
-
-    @classmethod
-    def from_spec(cls, argument: str, config: BuildConfig) -> MeshyGenerator:
-        """Create it from ``AI_MODEL@URL``, each with a default; raises ConfigError for a missing key or price."""
-        model, url = split_url(argument)
-        base_url = url or VENDOR
-        return cls(model or MODEL, base_url, key_from_environment([KEY], base_url, "meshy"), config)
 
     def probe(self) -> str:
         """Ask for the balance."""

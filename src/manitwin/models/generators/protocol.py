@@ -17,7 +17,7 @@ IMAGE_OR_TEXT: frozenset[Asked] = frozenset({"image", "text"})
 
 @dataclass(frozen=True)
 class GenerationRequest:
-    """What a generator is asked for.
+    """A request for a mesh of a photo or a text.
 
     ``rgba`` is the matted photo, ``(H, W, 4) uint8`` upright sRGB whose alpha is the object's mask, or None where ``text`` is
     given. ``name`` is what the user says it is. ``seed`` makes the answer repeatable where the generator can.
@@ -31,7 +31,7 @@ class GenerationRequest:
 
 @dataclass(frozen=True)
 class JobState:
-    """Where a job stands; ``message`` says why it failed, in the generator's own words."""
+    """The state of a job; ``message`` says why it failed, in the generator's own words."""
 
     state: Literal["queued", "running", "done", "failed"]
     message: str = ""

@@ -10,16 +10,17 @@ PARALLELISM_LIMIT_REACHED, the prefix API_) are those that public clients of the
 from __future__ import annotations
 
 import json
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from manitwin.config import BuildConfig, Resource
+from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError, choose_from
-from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.service import address, chosen, png_of, usd_per_job
-from manitwin.models.services.http import FormFile, Gone, Refusal, Service, refusal_by_status
-from manitwin.models.services.keys import bearer, key_from_environment, split_url
-from manitwin.models.services.refusal import kind_of_status
+from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+from manitwin.models.generators.vendor import VendorGenerator, png_of
+from manitwin.models.services.http import FormFile
+from manitwin.models.services.refusal import Gone, Refusal, kind_of_status, refusal_by_status
 
 URL = "https://api.hyper3d.com/api/v2"
 KEYS = ("RODIN_API_KEY", "HYPER3D_API_KEY")
@@ -49,7 +50,7 @@ DENIED = {
 OF_THE_INPUT = {"IMAGE_CONTENT_VIOLATION", "OBJECT_NOT_FOUND_ON_IMAGE"}
 
 
-class RodinGenerator:
+class RodinGenerator(VendorGenerator):
     """Ask Rodin for a textured mesh of an image or a text.
 
     Settings ``generate.options`` go into the form as they are; ``geometry_file_format`` may be glb or usdz (the paper's).
@@ -57,38 +58,21 @@ class RodinGenerator:
     """
 
     name = "rodin"
-    needs: Resource = "generator"
-    asked_with: frozenset[Asked] = IMAGE_OR_TEXT
+    url, keys = URL, KEYS
+    default_model, model_option = "Regular", "tier"  # the vendor's own default
+    remedy = f"check {' or '.join(KEYS)}, and the plan and credits at hyper3d.ai"
 
-    def __init__(self, tier: str, url: str, key: str | None, config: BuildConfig, **service: Any):
+    def __init__(
+        self, tier: str, url: str, key: str | None, config: BuildConfig, sleep: Callable[[float], None] = time.sleep
+    ):
         if tier not in TIERS:
             raise ConfigError(choose_from("tier of rodin", tier, TIERS))
-        self.model: str | None = tier
-        self.usd_per_job = usd_per_job(self.name, url, config.services)
+        super().__init__(tier, url, key, config, sleep, refusal=refusal_of)
         self._fields = {"tier": tier, "geometry_file_format": "glb", "material": "PBR", "mesh_mode": "Raw"}
-        self._fields |= {name: _form_value(value) for name, value in config.generate.options.items()}
+        self._fields |= {name: _form_value(value) for name, value in self._options.items()}
         self._format = self._fields["geometry_file_format"]
         if self._format not in READABLE:
             raise ConfigError(choose_from("geometry_file_format of rodin", self._format, READABLE))
-        self._service = Service(
-            self.name,
-            url,
-            authorization=bearer(key),
-            services=config.services,
-            key=key,
-            remedy=f"check {' or '.join(KEYS)}, and the plan and credits at hyper3d.ai",
-            refusal=refusal_of,
-            **service,
-        )
-
-    @classmethod
-    def from_spec(cls, argument: str, config: BuildConfig) -> RodinGenerator:
-        """Create it from ``TIER@URL``; the tier is the vendor's default, Regular, where none is said."""
-        tier, url = split_url(argument)
-        url = address(url, URL)
-        return cls(
-            chosen("rodin", tier, config, "tier", "Regular"), url, key_from_environment(KEYS, url, "rodin"), config
-        )
 
     def probe(self) -> str:
         """Ask for the account's credits."""

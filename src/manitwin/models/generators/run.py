@@ -16,7 +16,7 @@ from manitwin.config import GenerateConfig
 from manitwin.engine.charges import charge
 from manitwin.engine.job_memory import JobMemory, NoMemory
 from manitwin.errors import BackendError, BadReply, Rejected, Unavailable
-from manitwin.models.generators.acceptance import flaw
+from manitwin.models.generators.generated_mesh import flaw
 from manitwin.models.generators.protocol import Generated, GenerationRequest, Generator
 from manitwin.models.services.refusal import Gone, Unanswered
 
@@ -105,7 +105,7 @@ class _Failed(Exception):
 
 @dataclass(frozen=True)
 class _Note:
-    """Where a request stands: which attempt, its job, and why the earlier attempts came to nothing.
+    """The state of a request: which attempt, its job, and why the earlier attempts came to nothing.
 
     ``submitting`` is true while a submit is under way: it is what a crash in the middle of one leaves. ``unsettled_usd`` was
     charged by a process that may have crashed before anybody counted it: the next one charges it again.

@@ -9,16 +9,17 @@ Not verified: how a picture's alpha is used. A version 3 of the API exists besid
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from manitwin.config import BuildConfig, Resource
+from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError
-from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.service import address, chosen, png_of, usd_per_job
-from manitwin.models.services.http import FormFile, Gone, Refusal, Service, refusal_by_status
-from manitwin.models.services.keys import bearer, key_from_environment, split_url
-from manitwin.models.services.refusal import kind_of_status
+from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
+from manitwin.models.generators.vendor import VendorGenerator, png_of
+from manitwin.models.services.http import FormFile
+from manitwin.models.services.refusal import Gone, Refusal, kind_of_status, refusal_by_status
 
 URL = "https://api.tripo3d.ai/v2/openapi"
 KEYS = ("TRIPO_API_KEY",)
@@ -37,7 +38,7 @@ LINKS = ("pbr_model", "model", "base_model")
 NO_CREDIT, NO_TASK, REFUSED_INPUT, TOO_MANY = 2010, 2001, 2008, 2000
 
 
-class TripoGenerator:
+class TripoGenerator(VendorGenerator):
     """Ask Tripo for a textured mesh of an image or a text.
 
     Settings ``generate.options`` go into the task as they are; with ``auto_size = true`` the mesh is taken to be in true
@@ -45,35 +46,20 @@ class TripoGenerator:
     """
 
     name = "tripo"
-    needs: Resource = "generator"
-    asked_with: frozenset[Asked] = IMAGE_OR_TEXT
+    url, keys = URL, KEYS
+    default_model, model_option = DEFAULT_MODEL, "model_version"
+    remedy = f"check {' or '.join(KEYS)} (an API key begins with tsk_), and the credits at platform.tripo3d.ai"
 
-    def __init__(self, model: str, url: str, key: str | None, config: BuildConfig, **service: Any):
-        self.model: str | None = model
-        self._options = {"model_version": model, "texture": True, "pbr": True, **config.generate.options}
-        known = _listed_usd(self._options) if url == URL else None
-        self.usd_per_job = usd_per_job(self.name, url, config.services, known)
-        wrong = [name for name in UNREADABLE if self._options.get(name)]
+    def __init__(
+        self, model: str, url: str, key: str | None, config: BuildConfig, sleep: Callable[[float], None] = time.sleep
+    ):
+        options = {"model_version": model, "texture": True, "pbr": True, **config.generate.options}
+        listed_usd = _listed_usd(options) if url == URL else None
+        super().__init__(model, url, key, config, sleep, listed_usd=listed_usd, refusal=refusal_of)
+        self._options = options
+        wrong = [name for name in UNREADABLE if options.get(name)]
         if wrong:
             raise ConfigError(f"generator tripo: meshes of generate.options.{wrong[0]} cannot be read; leave it out")
-        self._service = Service(
-            self.name,
-            url,
-            authorization=bearer(key),
-            services=config.services,
-            key=key,
-            remedy=f"check {' or '.join(KEYS)} (an API key begins with tsk_), and the credits at platform.tripo3d.ai",
-            refusal=refusal_of,
-            **service,
-        )
-
-    @classmethod
-    def from_spec(cls, argument: str, config: BuildConfig) -> TripoGenerator:
-        """Create it from ``MODEL_VERSION@URL``."""
-        model, url = split_url(argument)
-        url = address(url, URL)
-        model = chosen("tripo", model, config, "model_version", DEFAULT_MODEL)
-        return cls(model, url, key_from_environment(KEYS, url, "tripo"), config)
 
     def probe(self) -> str:
         """Ask for the account's credits."""

@@ -1,1 +1,1 @@
-"""Where a gripper may hold an object: proposals, before any physics."""
+"""Grasp proposals: where a gripper may hold an object, before any physics."""

@@ -3,6 +3,11 @@
 A REQ socket whose answer never came can neither send nor receive again (ZeroMQ guide, "Client-Side Reliability (Lazy
 Pirate Pattern)"), so every question has a socket of its own, closed with LINGER 0. A server works on one question at a
 time and keeps those of others in a queue: one that is busy does not answer.
+
+Messages are msgpack with numpy arrays in them, as the library msgpack-numpy writes them: a map with the binary keys ``nd``,
+``type``, ``kind``, ``shape`` and ``data``. msgpack-numpy itself calls ``pickle.loads`` on arrays of the kind ``O`` (its
+``decode``, version 0.4.8): whoever answers could run anything. So answers are decoded here, and only arrays of plain numbers
+are taken.
 """
 
 from __future__ import annotations
@@ -12,18 +17,22 @@ from collections.abc import Callable
 from typing import Any
 from urllib.parse import urlsplit
 
+import msgpack
+import msgpack_numpy
+import numpy as np
 import zmq
 
 from manitwin.config import ServicesConfig
 from manitwin.engine.charges import REHEARSAL_MARK, note_rehearsal
 from manitwin.errors import BadReply, ConfigError, Unavailable
-from manitwin.models.graspers.array_messages import pack, unpack
 from manitwin.models.services.keys import redacted, split_url
 
 DEFAULT_URL = "tcp://localhost:5556"  # the port of both servers' documentation
 CONNECT_TIMEOUT_S = 5.0
 MAX_REPLY_BYTES = 64 << 20  # 4,000 grasps are 0.3 MB
 FIRST_PAUSE_S = 1.0
+PLAIN_KINDS = "biuf"
+"""Kinds of numpy types whose bytes are the numbers themselves: bool, integers, floats."""
 
 
 class ServerError(BadReply):
@@ -49,7 +58,7 @@ def server_url(argument: str, what: str) -> str:
 
 
 class GraspServer:
-    """What is asked of a server at ``url``; ``what`` names it in messages."""
+    """A client of the grasp server at ``url``; ``what`` names the server in messages."""
 
     def __init__(self, url: str, what: str, services: ServicesConfig, sleep: Callable[[float], None] = time.sleep):
         self.url, self.what, self._services, self._sleep = url, what, services, sleep
@@ -109,3 +118,29 @@ class GraspServer:
             detail = redacted(str(answer["error"]), None)
             raise ServerError(f"{self.what}: the server at {self.url} says: {detail}", detail)
         return answer
+
+
+def pack(message: dict[str, Any]) -> bytes:
+    """Return a message as bytes."""
+    return msgpack.packb(message, default=msgpack_numpy.encode, use_bin_type=True)
+
+
+def unpack(data: bytes) -> dict[str, Any]:
+    """Read a message; raises ValueError for what is none, or holds an array that is not of plain numbers."""
+    try:
+        message = msgpack.unpackb(data, raw=False, object_hook=_array_of)
+    except (msgpack.UnpackException, ValueError, TypeError, LookupError) as error:
+        raise ValueError(f"not a message of msgpack: {str(error) or type(error).__name__}") from error
+    if not isinstance(message, dict):
+        raise ValueError(f"not a map, but {type(message).__name__}")
+    return message
+
+
+def _array_of(item: dict[Any, Any]) -> Any:
+    if b"nd" not in item:
+        return item
+    kind, name = item.get(b"kind", b""), item[b"type"]
+    if kind != b"" or not isinstance(name, str) or np.dtype(name).kind not in PLAIN_KINDS:
+        raise ValueError(f"an array of kind {kind!r} and type {name!r}, which is not of plain numbers")
+    values = np.frombuffer(item[b"data"], np.dtype(name))
+    return values.reshape(item[b"shape"]) if item[b"nd"] else values[0]

@@ -14,10 +14,9 @@ from typing import Any
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import ConfigError, Unavailable
-from manitwin.models.graspers.base_link_frames import BASE_LINK_Z_M, HANDS
 from manitwin.models.graspers.grasp_server import GraspServer, server_url
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
-from manitwin.models.graspers.served_proposals import ASKED_FOR, ask_for_proposals, point_cloud
+from manitwin.models.graspers.served_proposals import ASKED_FOR, BASE_LINK_Z_M, HANDS, ask_for_proposals, point_cloud
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 

@@ -9,18 +9,21 @@ from manitwin.config import Resource
 from manitwin.geometry.antipodal import AntipodalPairs, antipodal_pairs, tangents
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
-from manitwin.models.graspers.starting_points import starting_points
+from manitwin.models.graspers.surface_sampling import (
+    CONE_SAFETY,
+    HALF_LEVER_M,
+    LEVER_SLOPE_M,
+    MIN_WIDTH_M,
+    ROLLS,
+    starting_points,
+)
 from manitwin.robots.grippers.gripper import of_kind
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper, Posture
 
-ROLLS = 8  # approach directions a pair
-CONE_SAFETY = 1.5  # as for parallel jaws: contacts are patches, and hulls are not the surface
-MIN_WIDTH_M = 0.0005
 OPENING_STEP_M = 0.004  # hands open to multiples of this: so few of them are looked at for collisions
 SQUEEZE_M = 0.03  # how far inside the surface each fingertip's target ends
 PALM_GAP_M = 0.003
 SUITED_SHARE = 0.75  # of the grasps near a point take the posture that suits its type
-HALF_LEVER_M, LEVER_SLOPE_M = 0.08, 0.02  # as for parallel jaws
 
 
 class PostureGrasper:

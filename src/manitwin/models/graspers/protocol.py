@@ -16,7 +16,7 @@ from manitwin.robots.grippers.gripper import Gripper
 
 @dataclass(frozen=True)
 class GraspRequest:
-    """What to propose grasps for.
+    """An object, a gripper and the places to propose grasps for.
 
     ``solid`` is the watertight mesh, ``hulls`` the convex collision vertices (each ``(V, 3)``), both in the object frame in
     metres. ``focus_points_m`` ``(P, 3)`` are the selected points: proposals should be denser around them.
@@ -97,7 +97,7 @@ class Grasper(Protocol):
 
 @dataclass(frozen=True)
 class Screened:
-    """What is left of proposals: with the widths as measured, their merits, and how many were left after each filter."""
+    """The proposals that are left: with the widths as measured, their merits, and how many were left after each filter."""
 
     proposals: GraspProposals
     merits: Merits
@@ -105,7 +105,7 @@ class Screened:
 
 
 class Screen(Protocol):
-    """What one kind of gripper can tell of proposals for one object before any trial."""
+    """A filter of proposals for one object and one kind of gripper, before any trial."""
 
     def __call__(self, raw: GraspProposals) -> Screened:
         """Keep the proposals that are worth a trial."""

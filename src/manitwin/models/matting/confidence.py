@@ -1,4 +1,4 @@
-"""How far a mask can be believed, measured on the photo that it was cut from."""
+"""The confidence in a mask, measured on the photo that it was cut from."""
 
 from __future__ import annotations
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 from manitwin.models.matting.background import Background
-from manitwin.models.matting.edge_cut import cut_along_edges
 from manitwin.models.matting.outline import dilated, disk, eroded, opened
 from manitwin.models.matting.shadow import MAX_SHADE, falls_inward, light_ratio
 
@@ -19,11 +20,13 @@ LEAST_ATTACHED, MOST_ATTACHED = 0.35, 0.65  # share of the rim that lies on the 
 STRONGER = 1.1  # the object's edge against the shadow's edge towards the light
 PENUMBRA_PX = 1.5  # a perfect edge is 1.05 wide under the gradient's blur, and a light of some extent widens a shadow's
 LEAST_PIXELS = 5e-5  # of the picture: smaller strips than this are left to the graph cut
+STEEPNESS = 5.0  # an edge as strong as ``edge`` costs exp(-5) of what flat ground costs
+FLAT_COST = 10_000  # capacities are whole numbers
 
 
 @dataclass(frozen=True)
 class _Evidence:
-    """What a region shows: shares, edges in L*a*b* per pixel, and the width of the edge towards the light in pixels."""
+    """Measures of a region: shares, edges in L*a*b* per pixel, and the width of the edge towards the light in pixels."""
 
     attached: float
     object_edge: float
@@ -134,3 +137,31 @@ def _loose_share(solid: np.ndarray, region: np.ndarray) -> float:
     _, _, stats, _ = cv2.connectedComponentsWithStats((solid & ~region).astype(np.uint8), connectivity=4)
     sizes = np.sort(stats[1:, cv2.CC_STAT_AREA])[::-1]
     return float(sizes[before - 1 :].sum() / region.sum())
+
+
+def cut_along_edges(outside: np.ndarray, inside: np.ndarray, gradient: np.ndarray, edge: float) -> np.ndarray:
+    """Return what ``outside`` gets of the pixels (H, W) that are neither, when both are parted where it costs least.
+
+    A cut between two pixels costs exp(-5 g / edge) of their gradient g (Boykov and Jolly 2001, without colours), so it runs
+    along the edges that are strongest on the whole, and a weak spot in one does not let the other side through.
+    """
+    free = ~outside & ~inside
+    node = np.where(outside, 0, 1)
+    node[free] = 2 + np.arange(int(free.sum()))
+    ends, costs = [], []
+    for first, second in (((slice(None, -1),), (slice(1, None),)), (np.s_[:, :-1], np.s_[:, 1:])):
+        a, b = node[first], node[second]
+        used = (a != b) & (np.maximum(a, b) > 1)
+        steepest = np.maximum(gradient[first], gradient[second])[used]
+        ends.append(np.stack([a[used], b[used]]))
+        costs.append(1 + FLAT_COST * np.exp(-STEEPNESS * steepest / edge))
+    pairs, cost = np.concatenate(ends, axis=1), np.round(np.concatenate(costs))
+    both = np.concatenate([pairs, pairs[::-1]], axis=1)
+    size = 2 + int(free.sum())
+    # entries of one pair add up: a pixel may touch a terminal on several sides
+    graph = coo_matrix((np.concatenate([cost, cost]), both), shape=(size, size)).tocsr().astype(np.int32)
+    left = graph - maximum_flow(graph, 0, 1).flow
+    left.eliminate_zeros()
+    reached = np.zeros(size, bool)
+    reached[breadth_first_order(left, 0, return_predecessors=False)] = True
+    return np.asarray(reached[node] & free)

@@ -16,17 +16,15 @@ from urllib.parse import urljoin, urlsplit
 import httpx2
 
 from manitwin.config import ServicesConfig
+from manitwin.engine.charges import REHEARSAL_MARK, note_rehearsal
 from manitwin.errors import BadReply, ConfigError, ManiTwinError, RateLimited
-from manitwin.models.services import rehearsed
-from manitwin.models.services.download import MAX_FILE_BYTES, Gone, download_file
+from manitwin.models.services.download import MAX_FILE_BYTES, download_file
 from manitwin.models.services.keys import is_local, redacted
-from manitwin.models.services.refusal import Refusal, Unanswered, error_for, refusal_by_status, retry_after_s
+from manitwin.models.services.refusal import Gone, Refusal, Unanswered, error_for, refusal_by_status, retry_after_s
 
 FIRST_WAIT_S = 1.0
 MAX_ANSWER_BYTES = 64 << 20
 MAX_CONNECT_S = 30.0
-
-__all__ = ["MAX_FILE_BYTES", "FormFile", "Gone", "Refusal", "Service", "Unanswered", "refusal_by_status"]
 
 # the connection was never made: nothing of the request has left this machine
 _NOT_SENT = (httpx2.ConnectError, httpx2.ConnectTimeout, httpx2.PoolTimeout, httpx2.UnsupportedProtocol)
@@ -55,7 +53,7 @@ class _Failure:
     wait_s: float | None = None
 
 
-class Service:
+class HttpService:
     """A vendor's API below ``base_url``.
 
     ``authorization`` are the headers that hold the key; they go to this host and no other, and show nowhere. ``refusal`` reads
@@ -86,7 +84,7 @@ class Service:
         self._services, self._remedy, self._refusal, self._sleep = services, remedy, refusal, sleep
 
     def __repr__(self) -> str:
-        return f"Service({self.name!r}, {self.base_url!r})"
+        return f"HttpService({self.name!r}, {self.base_url!r})"
 
     def get_json(self, path: str, *, max_bytes: int = MAX_ANSWER_BYTES) -> dict[str, Any]:
         """Return the JSON object at ``path`` (below the base URL, or a whole address on the same host)."""
@@ -234,7 +232,7 @@ class Service:
         # nobody knows whether it was taken
         timeout = httpx2.Timeout(self._services.timeout_s, connect=min(self._services.timeout_s, MAX_CONNECT_S))
         trust_env = not is_local(self.base_url)
-        hooks = {"response": [rehearsed.note_rehearsal_answer]}
+        hooks = {"response": [note_rehearsal_answer]}
         return httpx2.Client(
             timeout=timeout, verify=_tls(), follow_redirects=False, trust_env=trust_env, event_hooks=hooks
         )
@@ -250,6 +248,12 @@ class Service:
         if not isinstance(value, dict):
             raise self.unreadable(f"JSON object but {self.said(data.decode(errors='replace'))[:60]!r}", pays)
         return value
+
+
+def note_rehearsal_answer(response: httpx2.Response) -> None:
+    """Note an answer of a rehearsal server (``manitwin fake``) by its header: an event hook of HTTP clients."""
+    if REHEARSAL_MARK in response.headers:
+        note_rehearsal()
 
 
 @cache

@@ -1,4 +1,4 @@
-"""What a service's refusals mean in this package's errors."""
+"""A service's refusals as errors of this package."""
 
 from __future__ import annotations
 

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from manitwin.engine.charges import counted, note_rehearsal
 from manitwin.models.vlm.client import Around, ChatClient
-from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
-from manitwin.models.vlm.question_digest import question_digest
+from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage, question_digest
 
 
 def default_folder() -> Path:

@@ -16,10 +16,10 @@ from typing import Any
 
 from manitwin.config import ServicesConfig, VlmConfig
 from manitwin.errors import BadReply, ConfigError
-from manitwin.models.services.http import Service
+from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import bearer
 from manitwin.models.services.refusal import Refusal, refusal_by_status
-from manitwin.models.vlm.completion import Completion
+from manitwin.models.vlm.client import Completion
 from manitwin.models.vlm.openai_dialect import instructions_with_schema, titled_schema
 from manitwin.models.vlm.prices import estimated_usage, token_price
 from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn, Usage
@@ -66,7 +66,7 @@ class AnthropicMessages:
         self.price = token_price(model, base_url, services)
         self._settings, self._who = settings, f"{model} at {self.base_url}"
         self._schema_taken, self._temperature_taken = True, settings.temperature is not None
-        self._service = Service(
+        self._service = HttpService(
             self._who,
             self.base_url,
             authorization={"anthropic-version": VERSION, **_key_headers(self.base_url, key)},
@@ -82,7 +82,7 @@ class AnthropicMessages:
 
     @property
     def decides(self) -> Mapping[str, str | float | None]:
-        """What decides an answer besides the question: the server, the model, and how it is asked."""
+        """The server, the model and the settings that decide an answer besides the question."""
         settings = {"max_tokens": self._settings.max_tokens, "temperature": self._settings.temperature}
         return {"protocol": self.name, "server": self.base_url, "model": self.model, **settings}
 

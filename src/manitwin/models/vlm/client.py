@@ -1,12 +1,15 @@
-"""What this package's own chat models have besides answering: a price, and what decides their answers."""
+"""Chat clients: chat models with a price, and with what decides their answers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from manitwin.engine.charges import charge
+from manitwin.errors import BadReply
 from manitwin.models.vlm.prices import TokenPrice
-from manitwin.models.vlm.protocol import ChatModel, Question, Turn
+from manitwin.models.vlm.protocol import ChatModel, Question, Reply, Turn, Usage
 
 
 class ChatClient(ChatModel, Protocol):
@@ -32,12 +35,12 @@ class Around:
 
     @property
     def price(self) -> TokenPrice:
-        """What tokens cost, where they have to be paid."""
+        """The price of tokens, where they have to be paid."""
         return self.inner.price
 
     @property
     def decides(self) -> Mapping[str, str | float | None]:
-        """What decides an answer besides the question."""
+        """The server, the model and the settings that decide an answer besides the question."""
         return self.inner.decides
 
 
@@ -48,3 +51,22 @@ class Forgetful(Protocol):
     def forget(self, question: Question, turns: tuple[Turn, ...] = ()) -> None:
         """Drop the answer to a question: it will be asked again."""
         ...
+
+
+@dataclass(frozen=True)
+class Completion:
+    """A server's report of what a model wrote, with its tokens; ``fault`` says why it is no answer."""
+
+    text: str
+    usage: Usage
+    model: str
+    fault: str | None = None
+
+    def paid(self, price: TokenPrice, who: str) -> Reply:
+        """Charge for it, and return it as an answer; raises BadReply, charged all the same, where it is none."""
+        charge(price.usd(self.usage))
+        if self.fault is None and not self.text.strip():
+            raise BadReply(f"{who}: its answer is empty; ask again, or choose another model")
+        if self.fault is not None:
+            raise BadReply(f"{who}: {self.fault}")
+        return Reply(self.text, self.usage, self.model)

@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import httpx2
 import openai
 
 from manitwin.config import ServicesConfig, VlmConfig
-from manitwin.errors import ConfigError, ManiTwinError, RateLimited
-from manitwin.models.services import rehearsed
+from manitwin.errors import BadReply, ConfigError, ManiTwinError, RateLimited
+from manitwin.models.services.http import note_rehearsal_answer
 from manitwin.models.services.keys import is_local, redacted
-from manitwin.models.services.refusal import Refusal, error_for, retry_after_s
-from manitwin.models.vlm.completion import Completion
-from manitwin.models.vlm.openai_completion import completion, openai_refusal
+from manitwin.models.services.refusal import Refusal, error_for, refusal_by_status, retry_after_s
+from manitwin.models.vlm.client import Completion
 from manitwin.models.vlm.openai_dialect import Dialect, request_body
-from manitwin.models.vlm.prices import token_price
-from manitwin.models.vlm.protocol import Question, Reply, Turn
+from manitwin.models.vlm.prices import estimated_usage, token_price
+from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
 
 OPENAI_URL = "https://api.openai.com/v1"
 FIRST_WAIT_S = 1.0
@@ -30,6 +31,9 @@ _HEADERS = frozenset(
     | {"x-stainless-raw-response"}
 )
 _HEADERS_OF_OPENAI = _HEADERS | {"openai-organization", "openai-project"}
+# an account without credit: a 429 whose type, and mostly code, is the first one, as in
+# https://github.com/OpenHands/OpenHands/issues/998; the others are unverified
+OUT_OF_CREDIT = ("insufficient_quota", "billing_hard_limit_reached", "billing_not_active")
 
 
 @dataclass(frozen=True)
@@ -82,7 +86,7 @@ class OpenAiChat:
 
     @property
     def decides(self) -> Mapping[str, str | float | None]:
-        """What decides an answer besides the question: the server, the model, and how it is asked."""
+        """The server, the model and the settings that decide an answer besides the question."""
         settings = {"max_tokens": self._settings.max_tokens, "temperature": self._settings.temperature}
         return {"protocol": self.name, "server": self.base_url, "model": self.model, **settings}
 
@@ -165,5 +169,53 @@ class OpenAiChat:
             timeout=timeout,
             follow_redirects=False,
             trust_env=not is_local(self.base_url),
-            event_hooks={"request": [only_ours], "response": [rehearsed.note_rehearsal_answer]},
+            event_hooks={"request": [only_ours], "response": [note_rehearsal_answer]},
         )
+
+
+def openai_refusal(status: int, body: Any) -> Refusal | None:
+    """Read an error body ``{"error": {"message", "type", "param", "code"}}``; None for 2xx."""
+    refusal = refusal_by_status(status, body)
+    error = body.get("error") if isinstance(body, dict) else None
+    if refusal is not None and isinstance(error, dict) and {error.get("code"), error.get("type")} & {*OUT_OF_CREDIT}:
+        return Refusal(refusal.message, "denied")
+    return refusal
+
+
+def completion(content: bytes, question: Question, who: str, key: str | None, max_tokens: int) -> Completion:
+    """Read the body of an answer (https://platform.openai.com/docs/api-reference/chat/object).
+
+    Tokens are estimated where the server counts none (``estimated_usage``). Raises BadReply for a body of another form.
+    """
+    try:
+        body = json.loads(content)
+        choice = body["choices"][0]
+        message, finish = choice["message"], choice.get("finish_reason")
+        text, refused = message.get("content") or "", message.get("refusal")
+        if not isinstance(text, str):
+            raise TypeError("its content is no text")
+    except (ValueError, RecursionError, LookupError, TypeError, AttributeError) as error:
+        said = redacted(content[:10_000].decode(errors="replace"), key)
+        cause = f"{type(error).__name__}: {redacted(str(error), key)}"
+    else:
+        counted = _usage(body.get("usage")) or estimated_usage(question, text)
+        model = redacted(str(body.get("model") or ""), key)
+        return Completion(text, counted, model, _fault(finish, refused, key, max_tokens))
+    raise BadReply(f"{who}: its answer is no chat completion ({cause}): {said!r}")
+
+
+def _fault(finish: Any, refused: Any, key: str | None, max_tokens: int) -> str | None:
+    if refused:
+        return f"it refuses to answer: {redacted(str(refused), key)}"
+    if finish == "length":
+        return f"its answer was cut at {max_tokens} tokens; raise vlm.max_tokens (a model's thinking counts)"
+    if finish == "content_filter":
+        return "its answer was withheld by a content filter"
+    return None
+
+
+def _usage(counted: Any) -> Usage | None:
+    if not isinstance(counted, dict):
+        return None
+    read, written = counted.get("prompt_tokens"), counted.get("completion_tokens")
+    return Usage(read, written) if isinstance(read, int) and isinstance(written, int) else None

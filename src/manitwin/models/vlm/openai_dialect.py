@@ -1,4 +1,4 @@
-"""What differs between servers of the chat completions API, learned from what they refuse.
+"""Differences between servers of the chat completions API, learned from what they refuse.
 
 Every server takes the request of https://platform.openai.com/docs/api-reference/chat/create, each with gaps of its own: models
 that reason take no ``max_tokens`` and only their own temperature; Ollama knows ``max_tokens`` alone
@@ -25,7 +25,7 @@ _FORMATS: tuple[Literal["json_schema", "json_object", "prompt"], ...] = ("json_s
 
 @dataclass(frozen=True)
 class Dialect:
-    """What a server takes, as far as it has said: ``format`` is how it is told the form of the answer."""
+    """The fields that a server takes, as far as it has said: ``format`` is how it is told the form of the answer."""
 
     format: Literal["json_schema", "json_object", "prompt"] = "json_schema"
     length_fields: tuple[str, ...] = ("max_tokens", "max_completion_tokens")

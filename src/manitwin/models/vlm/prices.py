@@ -1,4 +1,4 @@
-"""What tokens cost, and about how many a question has."""
+"""The price of tokens, and an estimate of how many a question has."""
 
 from __future__ import annotations
 

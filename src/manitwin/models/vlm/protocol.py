@@ -1,8 +1,10 @@
-"""What is asked of a vision-language model, and what comes back."""
+"""Questions to a vision-language model, and its replies."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import Any, Literal, Protocol
 
 
@@ -45,7 +47,7 @@ class Usage:
 
 @dataclass(frozen=True)
 class Reply:
-    """What the model wrote; ``model`` is the server's own name of what answered."""
+    """The text that a model wrote; ``model`` is the server's own name of what answered."""
 
     text: str
     usage: Usage
@@ -64,3 +66,11 @@ class ChatModel(Protocol):
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Answer a question, given the turns that followed it."""
         ...
+
+
+def question_digest(question: Question, turns: tuple[Turn, ...] = ()) -> str:
+    """Return the SHA-256 of a question and the turns after it: instructions, texts, pictures, schema in its order, vote."""
+    said: list[Any] = [question.name, question.instructions, question.schema, question.vote]
+    said.append([part if isinstance(part, str) else {"png": sha256(part.png).hexdigest()} for part in question.parts])
+    said.append([[turn.role, turn.text] for turn in turns])
+    return sha256(json.dumps(said, ensure_ascii=True, separators=(",", ":")).encode("ascii")).hexdigest()

@@ -19,8 +19,7 @@ from manitwin.engine.charges import counted, note_rehearsal
 from manitwin.errors import BadReply, ConfigError
 from manitwin.models.vlm.client import Around, ChatClient, Forgetful
 from manitwin.models.vlm.prices import FREE, TokenPrice
-from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
-from manitwin.models.vlm.question_digest import question_digest
+from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage, question_digest
 
 
 class Replay:
@@ -61,7 +60,7 @@ class Replay:
 
     @property
     def decides(self) -> Mapping[str, str | float | None]:
-        """What decides an answer besides the question."""
+        """The recorded model, which decides an answer besides the question."""
         return {"protocol": self.name, "model": self.model}
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:

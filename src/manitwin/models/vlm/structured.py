@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import io
+import json
+import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Generic, TypeVar
+from typing import Any, Generic, Literal, TypeVar
 
+from PIL import Image, ImageDraw
 from pydantic import BaseModel, ValidationError
 
 from manitwin.errors import BadReply
 from manitwin.models.vlm.client import Forgetful
-from manitwin.models.vlm.json_text import json_object_in
-from manitwin.models.vlm.protocol import ChatModel, Question, Turn
+from manitwin.models.vlm.protocol import ChatModel, Picture, Question, Turn
+from manitwin.models.vlm.strict_schema import strict_schema
 
 T = TypeVar("T", bound=BaseModel)
 MAX_COMPLAINTS = 12
+# models that think aloud put that before the answer: Qwen, DeepSeek
+_THINKING = re.compile(r"<think>.*?</think>", re.DOTALL)
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
+_FENCED = re.compile(r"```[a-zA-Z]*\s*\n(.*?)```", re.DOTALL)
+PICTURE_PX = 256
 
 
 @dataclass(frozen=True)
@@ -89,3 +98,88 @@ def _forget(chat: ChatModel, question: Question, turns: tuple[Turn, ...]) -> Non
     if isinstance(chat, Forgetful):
         for length in range(0, len(turns) + 1, 2):
             chat.forget(question, turns[:length])
+
+
+def json_object_in(text: str) -> dict[str, Any]:
+    """Return the JSON object in a text: alone, in a code fence, or with words around it.
+
+    Control characters inside strings are taken (xgrammar lets them through under ``maxLength``) and become spaces: what a
+    model writes ends on terminals. Of several objects the last one counts: models correct themselves in that order. Raises
+    ValueError saying what is wrong.
+    """
+    return {key: _readable(value) for key, value in _object_in(_THINKING.sub("", text).strip()).items()}
+
+
+def _readable(value: Any) -> Any:
+    if isinstance(value, str):
+        return _CONTROL.sub(" ", value)
+    if isinstance(value, list):
+        return [_readable(part) for part in value]
+    return {key: _readable(part) for key, part in value.items()} if isinstance(value, dict) else value
+
+
+def _object_in(text: str) -> dict[str, Any]:
+    fenced = _FENCED.findall(text)
+    for candidate in (text, *reversed(fenced)):
+        value = _parsed(candidate)
+        if isinstance(value, dict):
+            return value
+    found = list(_objects(text))
+    if found:
+        return found[-1]
+    try:
+        value = _DECODER.decode(text)
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"it is no JSON: {error}") from None
+    raise ValueError(f"it is a JSON {type(value).__name__}, not an object")
+
+
+def _not_finite(word: str) -> float:
+    raise ValueError(f"{word} is no JSON number")
+
+
+_DECODER = json.JSONDecoder(strict=False, parse_constant=_not_finite)
+
+
+def _parsed(text: str) -> Any:
+    try:
+        return _DECODER.decode(text.strip())
+    except (ValueError, RecursionError):
+        return None
+
+
+def _objects(text: str) -> Iterator[dict[str, Any]]:
+    start = text.find("{")
+    while start >= 0:
+        try:
+            value, end = _DECODER.raw_decode(text, start)
+        except (ValueError, RecursionError):
+            end = start + 1
+        else:
+            if isinstance(value, dict):
+                yield value
+        start = text.find("{", end)
+
+
+class _Color(BaseModel):
+    color: Literal["red", "green", "blue", "none"]
+
+
+def probe_question() -> Question:
+    """Return the question: the color of a disc on white."""
+    picture = Image.new("RGB", (PICTURE_PX, PICTURE_PX), "white")
+    ImageDraw.Draw(picture).ellipse((64, 64, 192, 192), fill=(220, 30, 30))
+    png = io.BytesIO()
+    picture.save(png, "PNG")
+    parts = (Picture(png.getvalue()), "Which color has the disc in this picture?")
+    return Question("probe", "You look at pictures and answer in JSON.", parts, strict_schema(_Color))
+
+
+def probe(chat: ChatModel) -> str:
+    """Ask the question and return what works, as a short phrase; raises what ``chat`` raises.
+
+    A wrong color is said, not raised: it is the model's eyesight, not its connection.
+    """
+    seen = ask(chat, probe_question(), _Color).value.color
+    sight = "" if seen == "red" else f", but sees {seen} where red is"
+    return f"{chat.model} answers JSON about a picture{sight}"

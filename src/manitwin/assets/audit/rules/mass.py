@@ -10,7 +10,7 @@ from itertools import pairwise
 from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules.scale import is_of_wrong_size
-from manitwin.models.annotators.priors import load_materials
+from manitwin.models.annotators.priors import HEAVIEST_CONTENTS_KG_M3, load_materials
 
 LEAST_WALL_M = {
     "plastic": 0.0002, "ceramic": 0.002, "glass": 0.0007, "steel": 0.0001, "aluminium": 0.0001, "wood": 0.0005,
@@ -27,9 +27,6 @@ OTHER_WORDS = {
     "plush": "textile", "carton": "cardboard", "sponge": "foam",
 }  # fmt: skip
 """What else the materials of the priors are called; metal may be any."""
-
-HEAVIEST_CONTENTS_KG_M3 = 2000.0
-"""Of a closed package: sugar, sand or shampoo in a jar (as models.annotators.vlm.physical_checks)."""
 
 HOLDS_NOTHING = frozenset({"foam", "textile", "wood", "wax", "food skin"})
 """Materials that no package is made of: their own density is the most there is."""

@@ -12,17 +12,23 @@ from pydantic import BaseModel
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import (
+    AnnotatorQuestion,
     PhysicalEstimates,
     PointsRequest,
     QualityVerdict,
-    Question,
     SelectedPoints,
     Subject,
 )
 from manitwin.models.annotators.vlm.captions import CaptionsAnswer, captions_question, examine_captions, language_of
 from manitwin.models.annotators.vlm.grasp_vote import Ballot, ballots, elect
 from manitwin.models.annotators.vlm.physical import PhysicalAnswer, physical_estimates, physical_question
-from manitwin.models.annotators.vlm.physical_checks import Finding, examine_physical, measure, reject_impossible, texts
+from manitwin.models.annotators.vlm.physical_checks import (
+    PhysicalFinding,
+    examine_physical,
+    measure,
+    reject_impossible,
+    texts,
+)
 from manitwin.models.annotators.vlm.place_checks import PlaceChecks
 from manitwin.models.annotators.vlm.points import (
     examine_points,
@@ -38,14 +44,12 @@ from manitwin.models.annotators.vlm.prompt_files import Prompt, load_prompts
 from manitwin.models.annotators.vlm.quality import QualityAnswer, examine_quality, quality_question, quality_verdict
 from manitwin.models.vlm.chat_from_spec import anthropic_from_spec, openai_from_spec, replay_from_spec
 from manitwin.models.vlm.prices import expected_usd
-from manitwin.models.vlm.probe import probe
-from manitwin.models.vlm.protocol import ChatModel
-from manitwin.models.vlm.protocol import Question as ChatQuestion
+from manitwin.models.vlm.protocol import ChatModel, Question
 from manitwin.models.vlm.strict_schema import strict_schema
-from manitwin.models.vlm.structured import Forgetful, ask
+from manitwin.models.vlm.structured import Forgetful, ask, probe
 from manitwin.twin.record import Language
 
-PROMPTS: dict[Question, tuple[str, ...]] = {
+PROMPTS: dict[AnnotatorQuestion, tuple[str, ...]] = {
     "quality": ("quality",),
     "physical": ("physical",),
     "captions": ("captions",),
@@ -80,13 +84,13 @@ class VlmAnnotator:
         self.picture_px = config.vlm.picture_px
         self.prompts: dict[str, Prompt] = load_prompts(config.vlm.prompts)
 
-    def model_for(self, question: Question) -> str:
+    def model_for(self, question: AnnotatorQuestion) -> str:
         """Return 'MODEL, prompt quality v1 0123abcd': model, prompt, and a digest of all that the question is asked with."""
         names = PROMPTS[question]
         versions = " and ".join(f"{name} v{self.prompts[name].version}" for name in names)
         return f"{self.chat.model}, prompt {versions} {self._digests[question]}"
 
-    def expected_usd(self, question: Question) -> float:
+    def expected_usd(self, question: AnnotatorQuestion) -> float:
         """Return about what a question costs when nothing has to be asked again; 0 where the chat model has no price."""
         price = getattr(self.chat, "price", None)
         if price is None:
@@ -116,7 +120,7 @@ class VlmAnnotator:
         """Estimate size, mass and contact; raises Rejected for what is impossible when asked twice."""
         question, mesh = physical_question(subject, self.prompts["physical"]), measure(subject)
 
-        def check(answer: PhysicalAnswer) -> list[Finding]:
+        def check(answer: PhysicalAnswer) -> list[PhysicalFinding]:
             return examine_physical(answer, mesh, subject.name, self.config.physical)
 
         answered = ask(self.chat, question, PhysicalAnswer, texts(check))
@@ -157,7 +161,7 @@ class VlmAnnotator:
         grasp, more = elect(cast, votes, checks)
         return SelectedPoints(functional, grasp, findings + more)
 
-    def questions(self, request: PointsRequest, material: str, extents_m: np.ndarray) -> list[ChatQuestion]:
+    def questions(self, request: PointsRequest, material: str, extents_m: np.ndarray) -> list[Question]:
         """Return all that an object is asked about in a build, in order, ``select_points`` and its votes last; asks nothing."""
         subject, prompts = request.subject, self.prompts
         grasps = [
@@ -182,15 +186,15 @@ class VlmAnnotator:
         )
         return ballots(answered.value, numbering, checks, vote)
 
-    def _forget(self, question: ChatQuestion) -> None:
+    def _forget(self, question: Question) -> None:
         # A kept answer that cannot be used would be of no use again.
         if isinstance(self.chat, Forgetful):
             self.chat.forget(question)
 
     @cached_property
-    def _digests(self) -> dict[Question, str]:
+    def _digests(self) -> dict[AnnotatorQuestion, str]:
         settings = self.config.vlm.model_dump(mode="json", include={"picture_px", "max_tokens", "temperature"})
-        digests: dict[Question, str] = {}
+        digests: dict[AnnotatorQuestion, str] = {}
         for question, names in PROMPTS.items():
             votes = self.config.vlm.votes if question == "points" else 1
             asked = [(self.prompts[n].instructions, self.prompts[n].question, strict_schema(_FORMS[n])) for n in names]

@@ -11,9 +11,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.vlm.physical import SameAsNamed
-from manitwin.models.annotators.vlm.pictures import clean_views
 from manitwin.models.annotators.vlm.prompt_files import Prompt
-from manitwin.models.annotators.vlm.wording import name_line, size_phrase
+from manitwin.models.annotators.vlm.question_parts import clean_views, name_line, size_phrase
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.twin.record import Language

@@ -30,7 +30,7 @@ class Ballot:
 
     @property
     def confidence(self) -> float:
-        """What the query said, less where geometry contradicts it."""
+        """The query's own confidence, less where geometry contradicts it."""
         return self.choice.confidence * (1.0 if self.contradiction is None else CONTRADICTED)
 
 
@@ -44,7 +44,7 @@ class Elected:
 
     @property
     def support(self) -> int:
-        """How many queries chose this place."""
+        """The number of queries that chose this place."""
         return len(self.ballots)
 
     @property
@@ -54,7 +54,7 @@ class Elected:
 
     @property
     def exact(self) -> int:
-        """How many queries chose this very candidate."""
+        """The number of queries that chose this very candidate."""
         return sum(ballot.candidate == self.candidate for ballot in self.ballots)
 
     @property

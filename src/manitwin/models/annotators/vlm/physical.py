@@ -8,9 +8,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
-from manitwin.models.annotators.vlm.pictures import clean_views
 from manitwin.models.annotators.vlm.prompt_files import Prompt
-from manitwin.models.annotators.vlm.wording import name_line
+from manitwin.models.annotators.vlm.question_parts import clean_views, name_line
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.twin.record import Estimate
@@ -25,7 +24,7 @@ Structure = Literal["solid", "open_container", "hollow_closed", "full_closed"]
 SameAsNamed = Literal["yes", "no", "unsure", "no name given"]
 
 
-class Interval(BaseModel):
+class AnsweredInterval(BaseModel):
     """A quantity with the interval that holds the truth in 19 of 20 cases."""
 
     model_config = ConfigDict(frozen=True)
@@ -35,7 +34,7 @@ class Interval(BaseModel):
     high: float = Field(ge=0)
 
     @model_validator(mode="after")
-    def _ordered(self) -> Interval:
+    def _ordered(self) -> AnsweredInterval:
         if not (self.low <= self.typical <= self.high and math.isfinite(self.high)):
             raise ValueError(f"low <= typical <= high does not hold: {self.low}, {self.typical}, {self.high}")
         return self
@@ -45,13 +44,13 @@ class Interval(BaseModel):
         return Estimate(value=self.typical, low=self.low, high=self.high, source=source)
 
 
-class Positive(Interval):
+class Positive(AnsweredInterval):
     """A quantity that cannot be zero."""
 
     low: float = Field(gt=0)
 
 
-class Share(Interval):
+class Share(AnsweredInterval):
     """A quantity from 0 to 1."""
 
     high: float = Field(ge=0, le=1)
@@ -85,8 +84,8 @@ class PhysicalAnswer(BaseModel):
     mass_rationale: str = Field(description="volume of matter, density and contents behind the mass")
     mass_kg: Positive
     friction_rationale: str = Field(description="the surface where it is held")
-    friction_static: Interval
-    friction_dynamic: Interval
+    friction_static: AnsweredInterval
+    friction_dynamic: AnsweredInterval
     restitution: Share
 
     @property

@@ -11,7 +11,7 @@ from manitwin.config import PhysicalConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.models.annotators.physical_rules import is_outer_skin, median_thickness
-from manitwin.models.annotators.priors import Interval, load_materials, lookup
+from manitwin.models.annotators.priors import HEAVIEST_CONTENTS_KG_M3, Interval, load_materials, lookup
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.vlm.physical import PhysicalAnswer
 
@@ -24,8 +24,8 @@ METRIC_FACTOR = 1.5
 FRICTION = (0.05, 1.5)
 """Dry solids: PTFE on steel 0.04 to 0.1, soft clean rubber on rough ground above 1 (engineering handbooks)."""
 
-LIGHTEST_CONTENTS, HEAVIEST_CONTENTS = 20.0, 2000.0
-"""kg/m3 of a closed package: crisps in a bag and sugar, sand or shampoo in a jar are between."""
+LIGHTEST_CONTENTS_KG_M3 = 20.0
+"""Of a closed package: crisps in a bag have more."""
 
 LIGHTER, HEAVIER = 5.0, 2.0
 """How far the mass by volume of a mesh may be from its matter's density: scans are thicker than thin matter is, so that a
@@ -36,8 +36,8 @@ PARTS_INSIDE = 8.0
 
 
 @dataclass(frozen=True)
-class Finding:
-    """What is wrong, in words for the one who said it; ``rejects`` is the reason where no such object can exist."""
+class PhysicalFinding:
+    """A contradiction, in words for the model that answered; ``rejects`` is the reason where no such object can exist."""
 
     text: str
     rejects: str | None = None
@@ -76,7 +76,7 @@ def measure(subject: Subject) -> MeasuredMesh:
 
 def examine_physical(
     answer: PhysicalAnswer, mesh: MeasuredMesh, name: str | None, settings: PhysicalConfig
-) -> list[Finding]:
+) -> list[PhysicalFinding]:
     """Return all that is wrong with an answer, the impossible first."""
     findings = [
         *_density(answer, mesh, settings),
@@ -90,30 +90,30 @@ def examine_physical(
     return sorted(findings, key=lambda finding: finding.rejects is None)
 
 
-def texts(check: Callable[[PhysicalAnswer], list[Finding]]) -> Callable[[PhysicalAnswer], list[str]]:
+def texts(check: Callable[[PhysicalAnswer], list[PhysicalFinding]]) -> Callable[[PhysicalAnswer], list[str]]:
     """Return a check that says its findings in words only."""
     return lambda answer: [finding.text for finding in check(answer)]
 
 
-def reject_impossible(findings: list[Finding]) -> None:
+def reject_impossible(findings: list[PhysicalFinding]) -> None:
     """Raise Rejected where a finding says that no such object can exist."""
     for finding in findings:
         if finding.rejects is not None:
             raise Rejected(finding.rejects, f"{finding.text} (the model said so when asked twice)")
 
 
-def _density(answer: PhysicalAnswer, mesh: MeasuredMesh, settings: PhysicalConfig) -> list[Finding]:
+def _density(answer: PhysicalAnswer, mesh: MeasuredMesh, settings: PhysicalConfig) -> list[PhysicalFinding]:
     volume_m3 = mesh.volume * mesh.scale(answer) ** 3
     density = answer.mass_kg.typical / volume_m3
     said = f"{answer.mass_kg.typical:.3g} kg in a shape of {1e6 * volume_m3:.3g} cm3 is {density:.3g} kg/m3"
     if not settings.min_density_kg_m3 <= density <= settings.max_density_kg_m3:
-        return [Finding(f"{said}: no matter has that density; mass or size is wrong", "implausible_mass")]
+        return [PhysicalFinding(f"{said}: no matter has that density; mass or size is wrong", "implausible_mass")]
     low, high = _usual_density(answer, mesh)
     if low <= density <= high:
         return []
     matter = ", ".join(dict.fromkeys(part.material for part in answer.materials))
     what = f"a thing of {matter} that is {answer.structure} has {low:.2g} to {high:.2g} kg/m3"
-    return [Finding(f"{said}, but {what}: check mass, size, material and structure")]
+    return [PhysicalFinding(f"{said}, but {what}: check mass, size, material and structure")]
 
 
 def _usual_density(answer: PhysicalAnswer, mesh: MeasuredMesh) -> tuple[float, float]:
@@ -127,7 +127,7 @@ def _usual_density(answer: PhysicalAnswer, mesh: MeasuredMesh) -> tuple[float, f
     share = mesh.area / sides * wall / (mesh.volume * mesh.scale(answer))
     skin_share = min(share, 1.0) if wall > 0 else 1.0
     if answer.structure == "full_closed":
-        return LIGHTEST_CONTENTS, max(HEAVIEST_CONTENTS, heaviest)
+        return LIGHTEST_CONTENTS_KG_M3, max(HEAVIEST_CONTENTS_KG_M3, heaviest)
     if answer.structure == "solid":
         return lightest / LIGHTER, heaviest * HEAVIER
     if answer.structure == "open_container":
@@ -137,7 +137,7 @@ def _usual_density(answer: PhysicalAnswer, mesh: MeasuredMesh) -> tuple[float, f
 
 def _against_prior(
     answer: PhysicalAnswer, mesh: MeasuredMesh, name: str | None, settings: PhysicalConfig
-) -> list[Finding]:
+) -> list[PhysicalFinding]:
     prior = lookup(name) or lookup(answer.object)
     if prior is None:
         return []
@@ -155,15 +155,15 @@ def _against_prior(
 
 def _beyond(
     category: str, what: str, value: float, unit: str, usual: Interval, margin: float, reason: str
-) -> list[Finding]:
+) -> list[PhysicalFinding]:
     if usual.low <= value <= usual.high:
         return []
     impossible = not usual.low / margin <= value <= usual.high * margin
     text = f"{what} {value:.3g} {unit}, but nearly every {category} has {usual.low:.3g} to {usual.high:.3g} {unit}"
-    return [Finding(text, reason if impossible else None)]
+    return [PhysicalFinding(text, reason if impossible else None)]
 
 
-def _proportions(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[Finding]:
+def _proportions(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalFinding]:
     said = np.array([side.typical for side in answer.sides_m])
     said, real = said / said[0], mesh.sides / mesh.sides[0]
     factor = np.maximum(said / real, real / said)
@@ -171,48 +171,50 @@ def _proportions(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[Finding]:
         return []
     proportions = ["1 : " + " : ".join(f"{share:.2f}" for share in sides[1:]) for sides in (said, real)]
     return [
-        Finding(
+        PhysicalFinding(
             f"length, width and height are said to be as {proportions[0]}, but the object's smallest box has"
             f" {proportions[1]}"
         )
     ]
 
 
-def _declared_size(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[Finding]:
+def _declared_size(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalFinding]:
     longest, real = answer.sides_m[0], float(mesh.sides[0])
     if not mesh.metric or longest.low / METRIC_FACTOR <= real <= longest.high * METRIC_FACTOR:
         return []
     return [
-        Finding(
+        PhysicalFinding(
             f"the longest side is said to be {longest.low:.3g} to {longest.high:.3g} m, but the file declares {real:.3g} m"
         )
     ]
 
 
-def _walls(answer: PhysicalAnswer) -> list[Finding]:
+def _walls(answer: PhysicalAnswer) -> list[PhysicalFinding]:
     wall, shortest = answer.wall_thickness_m, answer.sides_m[2].typical
     if answer.structure in ("hollow_closed", "open_container") and wall == 0:
         return [
-            Finding(f"wall_thickness_m is 0, but the thing is said to be {answer.structure}: give its wall in metres")
+            PhysicalFinding(
+                f"wall_thickness_m is 0, but the thing is said to be {answer.structure}: give its wall in metres"
+            )
         ]
     if wall > shortest / 2:
         return [
-            Finding(
+            PhysicalFinding(
                 f"a wall of {1000 * wall:.3g} mm does not fit twice into a shortest side of {1000 * shortest:.3g} mm"
             )
         ]
     return []
 
 
-def _friction(answer: PhysicalAnswer) -> list[Finding]:
+def _friction(answer: PhysicalAnswer) -> list[PhysicalFinding]:
     findings = []
     low, high = FRICTION
     for what, said in (("friction_static", answer.friction_static), ("friction_dynamic", answer.friction_dynamic)):
         if not low <= said.typical <= high:
-            findings.append(Finding(f"{what} {said.typical:.3g}, but dry solids have {low} to {high}"))
+            findings.append(PhysicalFinding(f"{what} {said.typical:.3g}, but dry solids have {low} to {high}"))
     if answer.friction_dynamic.typical > answer.friction_static.typical:
         findings.append(
-            Finding(
+            PhysicalFinding(
                 f"friction_dynamic {answer.friction_dynamic.typical:.3g} is above friction_static"
                 f" {answer.friction_static.typical:.3g}"
             )
@@ -220,7 +222,9 @@ def _friction(answer: PhysicalAnswer) -> list[Finding]:
     return findings
 
 
-def _name(answer: PhysicalAnswer, name: str | None) -> list[Finding]:
+def _name(answer: PhysicalAnswer, name: str | None) -> list[PhysicalFinding]:
     if name is None or answer.same_as_named != "no":
         return []
-    return [Finding(f"the user calls it {name!r}, but the answer says that it is {answer.object!r}: look again")]
+    return [
+        PhysicalFinding(f"the user calls it {name!r}, but the answer says that it is {answer.object!r}: look again")
+    ]

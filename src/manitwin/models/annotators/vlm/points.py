@@ -10,10 +10,15 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, model_validator
 
 from manitwin.models.annotators.protocol import PointsRequest
-from manitwin.models.annotators.vlm.pictures import marked_views
 from manitwin.models.annotators.vlm.place_checks import PlaceChecks
 from manitwin.models.annotators.vlm.prompt_files import Prompt
-from manitwin.models.annotators.vlm.wording import extents_of, length_phrase, name_line, size_phrase
+from manitwin.models.annotators.vlm.question_parts import (
+    extents_of,
+    length_phrase,
+    marked_views,
+    name_line,
+    size_phrase,
+)
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.twin.record import FunctionalPoint, GraspType

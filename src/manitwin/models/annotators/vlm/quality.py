@@ -7,9 +7,8 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from manitwin.models.annotators.protocol import QualityVerdict, Subject
-from manitwin.models.annotators.vlm.pictures import clean_views
 from manitwin.models.annotators.vlm.prompt_files import Prompt
-from manitwin.models.annotators.vlm.wording import name_line
+from manitwin.models.annotators.vlm.question_parts import clean_views, name_line
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 

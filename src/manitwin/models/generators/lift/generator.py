@@ -17,8 +17,7 @@ from manitwin.config import Resource
 from manitwin.errors import Unavailable, Unsupported
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.models.generators.lift.hint import hint_from_name
-from manitwin.models.generators.lift.lifting import Lifted, lift
+from manitwin.models.generators.lift.lifting import Lifted, hint_from_name, lift
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
 from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState

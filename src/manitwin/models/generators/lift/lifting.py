@@ -1,4 +1,4 @@
-"""From a matted photo to a closed, textured surface that rests on a flat face: which primitive, and how it lies."""
+"""Lift a matted photo to a closed, textured surface that rests on a flat face: the choice of the primitive, and how it lies."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from manitwin.errors import Rejected
-from manitwin.models.generators.lift.box import DEPTH_SHARE, make_box
-from manitwin.models.generators.lift.hint import ShapeHint
+from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.lift.inflation import inflate
 from manitwin.models.generators.lift.posture import (
     TILTED_TIP_ANGLE_DEG,
@@ -21,14 +20,12 @@ from manitwin.models.generators.lift.posture import (
     stood,
     tip_angle_deg,
 )
-from manitwin.models.generators.lift.revolution import profile, revolve, trim_caps
+from manitwin.models.generators.lift.primitives import DEPTH_SHARE, make_box, profile, revolve, trim_caps
 from manitwin.models.generators.lift.silhouette import CROP_SIDE_PX, Silhouette, analyse_silhouette
-from manitwin.models.generators.lift.surface import Surface
-from manitwin.models.generators.lift.texture import crop_object
-from manitwin.models.generators.lift.unseen import paint_unseen
+from manitwin.models.generators.lift.surface import LiftedSurface
+from manitwin.models.generators.lift.texture import crop_object, paint_unseen
 
 Primitive = Literal["revolution", "box", "inflation"]
-
 _FLAT_BOX_DEPTH_SHARE = 0.12  # of the shorter side: a book, a tray
 _WALL_SHARE = 0.05  # of the radius: the wall of a hollowed container
 _COMPACT = (
@@ -38,13 +35,39 @@ _RELIEF_RISE = 1.5  # a bar of radius r lies as a relief this many r high: betwe
 
 
 @dataclass(frozen=True)
+class ShapeHint:
+    """``stands``: put down upright (None: unknown); ``container``: open at the top; the others describe its shape."""
+
+    stands: bool | None = None
+    container: bool = False
+    round: bool = False
+    boxy: bool = False
+    flat: bool = False
+
+
+def hint_from_name(name: str | None) -> ShapeHint:
+    """Return the hint of the prior that ``name`` finds; an empty hint where it finds none."""
+    prior = lookup(name)
+    if prior is None:
+        return ShapeHint()
+    words = prior.shape.replace("-", " ").split()
+    return ShapeHint(
+        stands=prior.stands,
+        container=prior.container,
+        round=bool({"cylindrical", "round", "bottle", "bowl"} & set(words)),
+        boxy=bool({"box", "rectangular", "block"} & set(words)),
+        flat=bool({"flat", "shallow"} & set(words)),
+    )
+
+
+@dataclass(frozen=True)
 class Lifted:
     """A solid in glTF's frame (Y up, front +Z, longest side 1, lowest point y = 0), its textures and how it was made.
 
     ``texture (H, W, 3)`` is the photo's, for what it shows; ``unseen (h, w, 3)``, of the same rectangle, is for the rest.
     """
 
-    surface: Surface
+    surface: LiftedSurface
     texture: np.ndarray
     unseen: np.ndarray
     notes: dict[str, Any]
@@ -104,7 +127,7 @@ def _is_turned(silhouette: Silhouette) -> bool:
     return bool((ends - starts).max() > 4 * radii.max())
 
 
-def _revolved(silhouette: Silhouette, hint: ShapeHint) -> tuple[Surface, dict[str, Any]]:
+def _revolved(silhouette: Silhouette, hint: ShapeHint) -> tuple[LiftedSurface, dict[str, Any]]:
     tilt = silhouette.axis_tilt_deg
     rows, radii = profile(silhouette)
     third = len(radii) // 3
@@ -124,7 +147,7 @@ def _revolved(silhouette: Silhouette, hint: ShapeHint) -> tuple[Surface, dict[st
     return laid_round(surface.moved(turn, np.zeros(3))), {"rests": "lying", "hollow": bool(open_top)}
 
 
-def _boxed(silhouette: Silhouette, hint: ShapeHint) -> tuple[Surface, dict[str, Any]]:
+def _boxed(silhouette: Silhouette, hint: ShapeHint) -> tuple[LiftedSurface, dict[str, Any]]:
     flat = hint.flat or hint.stands is False
     share = _FLAT_BOX_DEPTH_SHARE if flat else DEPTH_SHARE
     surface = make_box(silhouette, depth_share=share)
@@ -133,7 +156,7 @@ def _boxed(silhouette: Silhouette, hint: ShapeHint) -> tuple[Surface, dict[str, 
     return surface, {"rests": "standing", "depth_share": share}
 
 
-def _inflated(silhouette: Silhouette, hint: ShapeHint) -> tuple[Surface, dict[str, Any]]:
+def _inflated(silhouette: Silhouette, hint: ShapeHint) -> tuple[LiftedSurface, dict[str, Any]]:
     limit = _depth_limit_px(silhouette, hint)
     sturdy = silhouette.elongation < 2.5 and not (silhouette.holes and silhouette.solidity < 0.6)
     if hint.stands or (hint.stands is None and sturdy):

@@ -1,4 +1,4 @@
-"""What an outline says of the solid behind it: symmetry, fill, corners, slenderness.
+"""Measures of a silhouette: symmetry, fill, corners, slenderness.
 
 Pixels are (row, column) of a crop around the object; angles are in degrees, positive when the axis leans clockwise.
 """

@@ -11,7 +11,7 @@ _EDGE_ON = 1e-6
 
 
 @dataclass(frozen=True)
-class Surface:
+class LiftedSurface:
     """A closed triangle mesh: ``vertices (V, 3)``, ``faces (F, 3)`` wound outward, ``uv (V, 2)`` (v upward).
 
     x to the right of the photo, y up, z towards the camera, in pixels of the mask until scaled. Every vertex has one
@@ -28,19 +28,19 @@ class Surface:
         """Return for each face (F,) whether the photo shows it: no corner looks away from the camera."""
         return np.asarray(self.facing[self.faces].min(axis=1) > -_EDGE_ON)
 
-    def moved(self, matrix: np.ndarray, offset: np.ndarray) -> Surface:
+    def moved(self, matrix: np.ndarray, offset: np.ndarray) -> LiftedSurface:
         """Return the surface under ``x -> matrix @ x + offset``; ``matrix`` must not mirror."""
-        return Surface(self.vertices @ matrix.T + offset, self.faces, self.uv, self.facing)
+        return LiftedSurface(self.vertices @ matrix.T + offset, self.faces, self.uv, self.facing)
 
 
-def unseen_share(surface: Surface) -> float:
+def unseen_share(surface: LiftedSurface) -> float:
     """Return how much of the area the photo does not show."""
     a, b, c = (surface.vertices[surface.faces[:, corner]] for corner in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     return float(areas[~surface.seen()].sum() / areas.sum())
 
 
-def to_manifold(surface: Surface) -> manifold3d.Manifold:
+def to_manifold(surface: LiftedSurface) -> manifold3d.Manifold:
     """Return the solid; raises ValueError naming manifold3d's status where the surface is not closed."""
     properties = np.column_stack([surface.vertices, surface.uv, surface.facing]).astype(np.float32)
     solid = manifold3d.Manifold(manifold3d.Mesh(properties, surface.faces.astype(np.uint32)))
@@ -49,7 +49,7 @@ def to_manifold(surface: Surface) -> manifold3d.Manifold:
     return solid
 
 
-def from_manifold(solid: manifold3d.Manifold) -> Surface:
+def from_manifold(solid: manifold3d.Manifold) -> LiftedSurface:
     """Return the largest part of a solid as a surface."""
     parts = solid.decompose()
     largest = max(parts, key=lambda part: part.volume()) if parts else solid
@@ -59,10 +59,10 @@ def from_manifold(solid: manifold3d.Manifold) -> Surface:
     target = np.arange(len(properties))
     target[np.asarray(mesh.merge_from_vert, np.int64)] = np.asarray(mesh.merge_to_vert, np.int64)
     used, faces = np.unique(target[np.asarray(mesh.tri_verts, np.int64)], return_inverse=True)
-    return Surface(properties[used, :3], faces.reshape(-1, 3), properties[used, 3:5], properties[used, 5])
+    return LiftedSurface(properties[used, :3], faces.reshape(-1, 3), properties[used, 3:5], properties[used, 5])
 
 
-def cut_below(surface: Surface, axis: int, level: float) -> Surface:
+def cut_below(surface: LiftedSurface, axis: int, level: float) -> LiftedSurface:
     """Cut off what lies below ``level`` along a coordinate axis; the cut is closed by a flat face."""
     normal = np.zeros(3)
     normal[axis] = 1.0

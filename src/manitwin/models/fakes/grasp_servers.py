@@ -1,0 +1,177 @@
+"""Fakes of the servers of GraspGen and GraspGenX, as far as their clients can tell: actions, fields, defaults and errors.
+
+They keep the contracts of ``grasp_gen/serving/zmq_server.py`` of github.com/NVlabs/GraspGen and of
+``graspgenx/serving/{zmq_server,types}.py`` of github.com/NVlabs/GraspGenX as read in 2026-11. No model: grasps are facing
+pairs of points of the cloud.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from manitwin.models.fakes.cloud_grasps import FRANKA_PANDA, Jaw, cloud_grasps
+from manitwin.models.fakes.faults import Faults
+from manitwin.models.fakes.message_server import MessageServer
+
+TOPK_WITHOUT_THRESHOLD = 100
+ACTIONS = ("health", "metadata", "infer_object")
+BOXES = ("extents_open", "offset_open", "extents_mid", "offset_mid")
+PLANNERS = ("diffusion", "graspmoe")
+
+
+class FakeGraspGen(MessageServer):
+    """Serve grasps of the hand ``gripper_name``; faults are those of every message server, ``no_grasps``, ``wrong_schema``.
+
+    As in the original, unknown fields are ignored, a threshold of -1 without a topk means the best hundred, and a model that
+    yields nothing makes an error of PyTorch. ``no_grasps`` takes turns: empty arrays, then the error. There is no key: ``key``
+    is there as in every fake, unused.
+    """
+
+    def __init__(
+        self,
+        faults: Faults | None = None,
+        key: str = "",
+        port: int = 0,
+        gripper_name: str = "franka_panda",
+    ):
+        self._faults = faults or Faults()
+        self._gripper_name, self._empty_answers = gripper_name, 0
+        super().__init__(self, self._faults, port)
+
+    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Answer as the original does."""
+        action = request.get("action")
+        if action == "health":
+            return {"status": "ok"}
+        if action == "metadata":
+            return {
+                "gripper_name": self._gripper_name,
+                "model_name": "diffusion-discriminator",
+                "gripper_config": f"/models/checkpoints/graspgen_{self._gripper_name}.yml",
+            }
+        if action == "infer":
+            return self._infer(request)
+        return {"error": f"Unknown action: {action}"}
+
+    def error(self, error: Exception) -> dict[str, Any]:
+        """Return the message of what was raised."""
+        return {"error": str(error)}
+
+    def _infer(self, request: dict[str, Any]) -> dict[str, Any]:
+        cloud = request.get("point_cloud")
+        if cloud is None:
+            return {"error": "Missing required field 'point_cloud'"}
+        cloud = np.asarray(cloud, dtype=np.float32)
+        if cloud.ndim != 2 or cloud.shape[1] != 3:
+            return {"error": f"point_cloud must be (N, 3), got {cloud.shape}"}
+        threshold, topk = float(request.get("grasp_threshold", -1.0)), int(request.get("topk_num_grasps", -1))
+        if threshold == -1.0 and topk == -1:
+            topk = TOPK_WITHOUT_THRESHOLD
+        if self._faults.strike("no_grasps"):
+            self._empty_answers += 1
+            if self._empty_answers % 2 == 0:
+                raise TypeError("expected Tensor as element 0 in argument 0, but got list")
+            cloud = cloud[:0]
+        poses, scores = cloud_grasps(cloud, int(request.get("num_grasps", 200)), FRANKA_PANDA)
+        poses, scores = poses[scores >= threshold], scores[scores >= threshold]
+        if topk != -1:
+            poses, scores = poses[:topk], scores[:topk]
+        answer = {"grasps": poses, "confidences": scores, "num_grasps": len(poses), "timing": {"infer_ms": 1.0}}
+        if self._faults.strike("wrong_schema"):
+            del answer["confidences"]
+        return answer
+
+
+class FakeGraspGenX(MessageServer):
+    """Serve grasps of any parallel gripper; faults are those of every message server, ``no_grasps``, ``wrong_schema``.
+
+    Grasps are for a jaw of the size that is asked for. ``infer`` by a gripper's name and the actions on scenes are not there.
+    There is no key: ``key`` is there as in every fake, unused.
+    """
+
+    def __init__(self, faults: Faults | None = None, key: str = "", port: int = 0):
+        self._faults = faults or Faults()
+        super().__init__(self, self._faults, port)
+
+    def answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Answer as the original does."""
+        action = request.get("action")
+        if action == "health":
+            return {"status": "ok"}
+        if action == "metadata":
+            return {
+                "default_gripper": None,
+                "loaded_grippers": [],
+                "model": {
+                    "generator_backbone": "ptv3vanilla",
+                    "discriminator_backbone": "ptv3vanilla",
+                    "grasp_repr": "r3_so3",
+                    "num_diffusion_iters_eval": 20,
+                },
+                "assets_dir": "/code/assets",
+                "actions": list(ACTIONS),
+                "precision": {"weights": "fp32", "tensorrt": False, "tensorrt_precision": None},
+            }
+        if action == "infer_object":
+            return self._infer_object(request)
+        raise ValueError(f"Unknown action: {action!r}")
+
+    def error(self, error: Exception) -> dict[str, Any]:
+        """Return the type and message of what was raised."""
+        return {"error": f"{type(error).__name__}: {error}"}
+
+    def _infer_object(self, request: dict[str, Any]) -> dict[str, Any]:
+        jaw = _jaw(request)
+        cloud = request.get("point_cloud")
+        if cloud is None:
+            raise ValueError("Request is missing 'point_cloud'.")
+        cloud = np.asarray(cloud, dtype=np.float32)
+        if cloud.ndim != 2 or cloud.shape[1] != 3 or not len(cloud):
+            raise ValueError(f"point_cloud must be non-empty (N, 3); got {cloud.shape}")
+        planner = str(request.get("planner", "graspmoe"))
+        if planner not in PLANNERS:
+            raise ValueError(f"Unknown planner {planner!r}; expected 'diffusion' or 'graspmoe'.")
+        rejected = {"grasp_threshold", "topk_num_grasps"} & set(request)
+        if rejected:
+            raise ValueError(f"{sorted(rejected)} are not accepted by action 'infer_object'")
+        if self._faults.strike("no_grasps"):
+            cloud = cloud[:0]
+        poses, scores = cloud_grasps(cloud, int(request.get("num_grasps", 200)), jaw)
+        answer = {
+            "grasps": poses,
+            "confidences": scores,
+            "branch_tags": ["diff"] * len(poses),
+            "timing": {"infer_ms": 1.0},
+        }
+        if self._faults.strike("wrong_schema"):
+            del answer["confidences"]
+        return answer
+
+
+def _jaw(request: dict[str, Any]) -> Jaw:
+    """Return the jaw that the two boxes describe; raises ValueError where they are not as they have to be."""
+    if "gripper_name" in request:
+        raise ValueError("Action 'infer_object' takes sweep-volume params only — 'gripper_name' is not accepted.")
+    given = request.get("sweep_volume_params")
+    if given is None:
+        raise ValueError("Request is missing 'sweep_volume_params'.")
+    if not isinstance(given, dict):
+        given = dict(zip(BOXES, np.asarray(given, np.float32).reshape(4, 3), strict=True))
+    unknown = set(given) - {*BOXES, "gripper_type", "fingertip_depth"}
+    if unknown:
+        raise ValueError(f"Unknown sweep_volume_params keys: {sorted(unknown)}.")
+    missing = set(BOXES) - set(given)
+    if missing:
+        raise ValueError(f"sweep_volume_params missing keys: {sorted(missing)}")
+    boxes = {name: np.asarray(given[name], np.float32).reshape(-1) for name in BOXES}
+    for name, values in boxes.items():
+        if values.shape != (3,) or not np.isfinite(values).all():
+            raise ValueError(f"SweepVolumeParams.{name} must have 3 finite elements; got {values.tolist()}")
+        if name.startswith("extents") and not (values > 0).all():
+            raise ValueError(f"SweepVolumeParams.{name} must be strictly positive; got {values.tolist()}")
+    if int(given.get("gripper_type", 0)) not in (0, 1, 2):
+        raise ValueError(f"gripper_type must be 0, 1 or 2; got {given['gripper_type']}")
+    width, across, along = (float(value) for value in boxes["extents_open"])
+    return Jaw(width, float(boxes["offset_open"][2]), (across / 2, along / 2))

@@ -1,0 +1,95 @@
+"""The frame of the fake vendors: faults of any web service, a key, and files behind signed links."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from typing import Any, ClassVar
+
+from manitwin.models.fakes.faults import Faults
+from manitwin.models.fakes.meshes import mesh_file
+from manitwin.models.fakes.server import Request, Response
+
+FILES = "/files/"
+XML = {"Content-Type": "application/xml"}
+HANG_S = 3600.0
+RETRY_AFTER_S = 1
+REFUSED = ("unauthorized", "out_of_credit", "rate_limited", "server_error")
+
+
+def with_outages(faults: Faults, refusals: Mapping[str, tuple[int, Any]], answer: Callable[[], Response]) -> Response:
+    """Answer, or fail as ``faults`` say; ``refusals`` are the status and body of each of REFUSED that the service has.
+
+    A refused request does nothing. A hanging one, one that is cut and one whose answer makes no sense have been carried
+    out: whoever asked does not learn of it.
+    """
+    for fault in REFUSED:
+        if fault in refusals and faults.strike(fault):
+            status, body = refusals[fault]
+            return Response(status, body, {"Retry-After": str(RETRY_AFTER_S)} if fault == "rate_limited" else {})
+    response = answer()
+    if faults.strike("hangs"):
+        threading.Event().wait(HANG_S)
+    if faults.strike("disconnects"):
+        return replace(response, cut_after=1)
+    if faults.strike("not_json"):
+        return Response(200, b"<html><body>Back soon</body></html>", {"Content-Type": "text/html"})
+    if faults.strike("wrong_schema"):
+        return Response(200, {"unexpected": ["answer"]})
+    return response
+
+
+class FakeVendor:
+    """A vendor of generated meshes on this machine: an API with a key, and finished files behind links without one.
+
+    ``refusals`` are the vendor's words for the faults of any web service; ``polls`` is how often a job is looked at before it
+    is done.
+    """
+
+    refusals: ClassVar[Mapping[str, tuple[int, Any]]]
+
+    def __init__(self, faults: Faults | None, key: str, polls: int):
+        self.faults, self.key, self.polls = faults or Faults(), key, polls
+        self._lock = threading.Lock()
+
+    def authorization(self) -> str:
+        """Return the header that holds the key."""
+        return f"Bearer {self.key}"
+
+    def answer(self, request: Request, base_url: str) -> Response:
+        """Answer a request as the vendor does, one at a time."""
+        if request.path.startswith(FILES):
+            return self._file(request)
+        if request.headers.get("authorization") != self.authorization():
+            return Response(*self.refusals["unauthorized"])
+        return with_outages(self.faults, self.refusals, lambda: self._locked(request, base_url))
+
+    def api(self, request: Request, base_url: str) -> Response:
+        """Answer a request that has the right key."""
+        raise NotImplementedError
+
+    def seed_of(self, job: str) -> int | None:
+        """Return the seed of a job's mesh; None where there is no such job."""
+        raise NotImplementedError
+
+    def _locked(self, request: Request, base_url: str) -> Response:
+        with self._lock:
+            return self.api(request, base_url)
+
+    def _file(self, request: Request) -> Response:
+        """Serve ``/files/JOB/NAME``, as an object store does behind a signed link.
+
+        A key that is sent along is an error: Amazon S3 answers 400 to a signed link with an Authorization header.
+        """
+        job, _, name = request.path.removeprefix(FILES).partition("/")
+        seed = self.seed_of(job)
+        if "authorization" in request.headers:
+            return Response(400, b"<Error><Code>InvalidArgument</Code></Error>", XML)
+        if seed is None:
+            return Response(404, b"<Error><Code>NoSuchKey</Code></Error>", XML)
+        if self.faults.strike("expired_link"):
+            return Response(403, b"<Error><Code>AccessDenied</Code></Error>", XML)
+        data = mesh_file("usdz" if name.endswith(".usdz") else "glb", self.faults, seed)
+        response = Response(200, data, {"Content-Type": "model/gltf-binary"})
+        return replace(response, cut_after=len(data) // 2) if self.faults.strike("disconnects") else response

@@ -1,0 +1,166 @@
+"""Generators behind a vendor's HTTP service: address, key, price, model, picture, submission."""
+
+from __future__ import annotations
+
+import base64
+import io
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Self
+from urllib.parse import urlsplit
+
+import numpy as np
+from PIL import Image
+
+from manitwin.config import BuildConfig, Resource, ServicesConfig
+from manitwin.errors import BadReply, ConfigError
+from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked
+from manitwin.models.services.http import HttpService
+from manitwin.models.services.keys import bearer, is_local, key_from_environment, split_url
+from manitwin.models.services.refusal import Refusal, refusal_by_status
+
+LONGEST_ADDRESS = 8192
+
+
+class VendorGenerator:
+    """A generator behind a vendor's HTTP service.
+
+    A vendor has a name, the address of its service, the variables of the environment that may hold the key, the model that is
+    asked where none is named, the option of ``generate.options`` that may name one, and what a person does about a refused
+    key. ``listed_usd`` is what a job costs by the vendor's own list.
+    """
+
+    name: str
+    url: ClassVar[str]
+    keys: ClassVar[tuple[str, ...]]
+    default_model: ClassVar[str]
+    model_option: ClassVar[str] = ""
+    remedy: ClassVar[str]
+    needs: Resource = "generator"
+    asked_with: frozenset[Asked] = IMAGE_OR_TEXT
+
+    def __init__(
+        self,
+        model: str,
+        url: str,
+        key: str | None,
+        config: BuildConfig,
+        sleep: Callable[[float], None] = time.sleep,
+        *,
+        listed_usd: float | None = None,
+        refusal: Callable[[int, Any], Refusal | None] = refusal_by_status,
+    ):
+        self.model: str | None = model
+        self.usd_per_job = usd_per_job(self.priced_as(model), url, config.services, listed_usd)
+        self._options: dict[str, Any] = dict(config.generate.options)
+        self._service = self._served(url, key, config, sleep, refusal)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.model!r}, {self._service.base_url!r})"
+
+    @classmethod
+    def from_spec(cls, argument: str, config: BuildConfig) -> Self:
+        """Create it from ``MODEL@URL``, each with a default; raises ConfigError for a missing key or price."""
+        said, given = split_url(argument)
+        url = address(given, cls.url)
+        model = chosen(cls.name, said, config, cls.model_option, cls.default_model)
+        return cls(model, url, key_from_environment(cls.keys, url, cls.name), config)
+
+    def priced_as(self, model: str) -> str:
+        """Return the name by which a missing price is asked for."""
+        return self.name
+
+    def authorization(self, key: str | None) -> dict[str, str]:
+        """Return the headers that hold the key."""
+        return bearer(key)
+
+    def _served(
+        self,
+        url: str,
+        key: str | None,
+        config: BuildConfig,
+        sleep: Callable[[float], None],
+        refusal: Callable[[int, Any], Refusal | None],
+    ) -> HttpService:
+        return HttpService(
+            self.name,
+            url,
+            authorization=self.authorization(key),
+            services=config.services,
+            key=key,
+            remedy=self.remedy,
+            refusal=refusal,
+            sleep=sleep,
+        )
+
+
+def usd_per_job(name: str, url: str, services: ServicesConfig, listed: float | None = None) -> float:
+    """Return what a job costs: as the settings say, nothing on this machine, or as the vendor's list has it.
+
+    Raises ConfigError where none of them says.
+    """
+    if services.usd_per_job is not None:
+        return services.usd_per_job
+    if is_local(url):
+        return 0.0
+    if listed is not None:
+        return listed
+    raise ConfigError(
+        f"generator {name}: what a job costs is not known; set services.usd_per_job to what your plan says"
+        " (0 for a server of your own)"
+    )
+
+
+def address(url: str | None, vendors: str) -> str:
+    """Return where a service is reached: the vendor's own address, or a given one, with the vendor's path if it has none."""
+    if url is None:
+        return vendors
+    return url if urlsplit(url).path.strip("/") else url.rstrip("/") + urlsplit(vendors).path
+
+
+def chosen(name: str, said: str, config: BuildConfig, option: str, default: str) -> str:
+    """Return the model that a spec or an option of the settings names; raises ConfigError where they disagree."""
+    set_to = config.generate.options.get(option)
+    if said and set_to is not None and said != set_to:
+        raise ConfigError(
+            f"generator {name}: it says {said} and generate.options.{option} says {set_to}; leave one out"
+        )
+    return said or str(set_to or default)
+
+
+def png_of(rgba: np.ndarray) -> bytes:
+    """Return the matted photo ``(H, W, 4) uint8`` as a PNG; the same picture gives the same bytes."""
+    stream = io.BytesIO()
+    Image.fromarray(rgba).save(stream, "PNG")
+    return stream.getvalue()
+
+
+def data_uri(rgba: np.ndarray) -> str:
+    """Return a matted photo ``(H, W, 4) uint8`` as a data URI of a PNG (RFC 2397)."""
+    return "data:image/png;base64," + base64.b64encode(png_of(rgba)).decode()
+
+
+def submit_paid(service: HttpService, path: str, body: Mapping[str, Any], needed: tuple[str, ...]) -> dict[str, Any]:
+    """Submit a job that is paid for and return the answer, whose ``needed`` are strings.
+
+    Raises Unanswered for an answer that looks like success and cannot be used: the job may have been taken, and paid for.
+    """
+    answer = service.post_json(path, body, pays=True)
+    for name in needed:
+        if not isinstance(answer.get(name), str) or not answer[name]:
+            raise service.unreadable(name, pays=True)
+    return answer
+
+
+def checked_address(value: Any, who: str, what: str) -> str:
+    """Return an address that a reply names; raises BadReply for what cannot be one."""
+    if not isinstance(value, str) or not value:
+        raise BadReply(f"{who}: its answer names no {what}")
+    try:
+        usable = len(value) <= LONGEST_ADDRESS and value.isprintable() and " " not in value
+        urlsplit(value).port  # noqa: B018 - reading the port is what raises ValueError
+    except ValueError:
+        usable = False
+    if not usable:
+        raise BadReply(f"{who}: what its answer names as {what} is no address")
+    return value

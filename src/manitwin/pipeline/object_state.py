@@ -1,0 +1,88 @@
+"""Read the object from what earlier stages left: solid, hulls, rigid body, annotator's subject; object frame, SI units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from manitwin.engine.stage import Draft
+from manitwin.formats.glb import read_glb
+from manitwin.geometry.poses import OBJECT_TO_GLTF
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.models.annotators.protocol import PhysicalEstimates, SelectedPoints, Subject
+from manitwin.pipeline.item import Item
+from manitwin.render.cameras import Camera
+from manitwin.twin.grasp_table import JOINTS
+from manitwin.twin.import_record import ImportRecord, read_import_record
+
+
+def load_solid(path: Path) -> trimesh.Trimesh:
+    """Load the watertight mesh of ``solid.npz``."""
+    with np.load(path) as arrays:
+        return trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+
+
+def load_hulls(path: Path) -> tuple[np.ndarray, ...]:
+    """Load the convex vertices of ``hulls.npz``, each ``(V, 3)``, in the order of their names."""
+    with np.load(path) as arrays:
+        return tuple(arrays[name] for name in sorted(arrays.files))
+
+
+def load_body(draft: Draft) -> RigidBody:
+    """Load the hulls and the surface of ``solid.npz`` with the mass properties and friction of the field ``physical``."""
+    physical = draft.field("physical")
+    return RigidBody(
+        hulls=load_hulls(draft.path("hulls.npz")),
+        mass_kg=physical["mass_kg"]["value"],
+        center_of_mass_m=np.array(physical["center_of_mass_m"]),
+        inertia_kg_m2=np.array(physical["inertia_kg_m2"]),
+        friction_static=physical["friction_static"]["value"],
+        friction_dynamic=physical["friction_dynamic"]["value"],
+        surface=RayCaster(load_solid(draft.path("solid.npz"))),
+    )
+
+
+def joints_of(proposals: Mapping[str, np.ndarray], index: np.ndarray) -> dict[str, np.ndarray]:
+    """Return what a trial wants to know of the grasps at ``index`` beside their poses: the joints of hands with more."""
+    if JOINTS[0] not in proposals:
+        return {}
+    return {"joints_rad": np.stack([proposals[name][index] for name in JOINTS], axis=1)}
+
+
+def read_subject(draft: Draft[Item], *, solid: str, visual: str, metric: bool, scale: float = 1.0) -> Subject:
+    """Read the subject of a draft; ``solid`` and ``visual`` name the artifacts that hold the meshes.
+
+    ``scale`` is how much larger these are than the canonical mesh, which the views were taken of.
+    """
+    return Subject(
+        name=draft.payload.name,
+        solid=load_solid(draft.path(solid)),
+        parts=tuple(read_glb(draft.path(visual))),
+        metric=metric,
+        views=pictures(draft.path("views/"), "rgb"),
+        cameras=tuple(Camera.from_json(value).scaled(scale) for value in draft.field("cameras")),
+        seed=draft.seed,
+        given=read_given(draft),
+    )
+
+
+def read_given(draft: Draft[Item]) -> ImportRecord | None:
+    """Return what an imported asset gives, moved as the mesh stage moved its mesh; None for every other input."""
+    if draft.payload.given is None:
+        return None
+    record = read_import_record(Path(draft.payload.given))
+    return record.moved(np.array(draft.field("geometry")["input_to_object"]) @ OBJECT_TO_GLTF)
+
+
+def pictures(folder: Path, kind: str) -> tuple[Path, ...]:
+    """Return the eight pictures of a kind ('rgb', 'marked') in the order of their numbers."""
+    return tuple(sorted(folder.glob(f"{kind}_*.webp")))
+
+
+def findings_of(answer: PhysicalEstimates | SelectedPoints) -> list[str] | None:
+    """Return what still spoke against an answer when it was given again; None: nobody looked."""
+    return None if answer.findings is None else list(answer.findings)
