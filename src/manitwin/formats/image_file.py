@@ -64,6 +64,13 @@ def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None 
     return Photo(np.asarray(rgb), tuple(findings))
 
 
+def png_of(pixels: np.ndarray) -> bytes:
+    """Return a picture ``(H, W, 3 or 4) uint8`` as a PNG; equal pictures give equal bytes."""
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return stream.getvalue()
+
+
 def check_header(path: Path, *, frame: int | None = None) -> None:
     """Raise InputError for what an image's header tells already, as ``read_image`` would: its size, and an animation."""
     with warnings.catch_warnings():

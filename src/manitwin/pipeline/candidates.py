@@ -15,6 +15,7 @@ from manitwin.errors import Rejected
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
+from manitwin.pipeline.object_state import load_solid
 from manitwin.pipeline.views import write_webp
 from manitwin.render.cameras import Camera, project
 from manitwin.render.markers import draw_markers, font_px
@@ -45,8 +46,7 @@ class CandidatesStage:
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Choose and mark the candidates; raises Rejected where the solid does not follow the surface that is seen."""
-        with np.load(draft.path("solid.npz")) as arrays:
-            solid = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+        solid = load_solid(draft.path("solid.npz"))
         caster = RayCaster(merged(read_glb(draft.path("visual.glb"))))
         scale = draft.field("physical")["scale_applied"]
         cameras = [Camera.from_json(value).scaled(scale) for value in draft.field("cameras")]

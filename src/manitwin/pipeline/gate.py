@@ -13,7 +13,7 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.geometry.repair.components import separate_objects
 from manitwin.models.annotators.protocol import Annotator, QualityVerdict
-from manitwin.pipeline.object_state import read_subject
+from manitwin.pipeline.object_state import load_solid, read_subject
 from manitwin.twin.record import Check
 
 
@@ -38,8 +38,7 @@ class GateStage:
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return the field ``gate``; raises Rejected with the first check that fails, BackendError of the annotator."""
-        with np.load(draft.path("canonical.npz")) as arrays:
-            solid = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+        solid = load_solid(draft.path("canonical.npz"))
         geometry = draft.field("geometry")
         checks = [
             check_watertight(geometry["watertight"], geometry["repairs"]),

@@ -11,12 +11,12 @@ from rehearsed_jobs import TEXT, KeptJobs, asked, finished, made, photo, refused
 
 from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError, Rejected, Unavailable, Unsupported
+from manitwin.formats.image_file import png_of
 from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.fakes.hunyuan3d import FakeHunyuan3d
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.generators.hunyuan3d import Hunyuan3dGenerator
 from manitwin.models.generators.run import run_generator
-from manitwin.models.generators.vendor import png_of
 from manitwin.models.services.refusal import Gone, Unanswered
 
 PLAIN: dict[str, str | int | float | bool] = {"texture": False}

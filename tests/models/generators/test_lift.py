@@ -16,8 +16,7 @@ from manitwin.formats.image_file import read_image
 from manitwin.models.generators.lift import LiftGenerator
 from manitwin.models.generators.lift.inflation import inflate
 from manitwin.models.generators.lift.lifting import Lifted, ShapeHint, lift
-from manitwin.models.generators.lift.posture import tip_angle_deg
-from manitwin.models.generators.lift.surface import to_manifold
+from manitwin.models.generators.lift.surface import tip_angle_deg, to_manifold
 from manitwin.models.generators.protocol import GenerationRequest
 from manitwin.models.matting import matte_photo
 

@@ -95,9 +95,7 @@ class GivenPoints:
         label = point.label or "functional point"
         return FunctionalPoint(
             id=f"f{number}",
-            candidate=candidate,
-            position_m=self._request.positions_m[candidate].tolist(),
-            normal=self._request.normals[candidate].tolist(),
+            **self._request.place(candidate),
             label=label,
             description=label,
             confidence=1.0,
@@ -109,9 +107,7 @@ class GivenPoints:
         kind: GraspType = next((name for name in get_args(GraspType) if name == said), "parallel_jaw")
         return GraspPoint(
             id=f"g{number}",
-            candidate=candidate,
-            position_m=self._request.positions_m[candidate].tolist(),
-            normal=self._request.normals[candidate].tolist(),
+            **self._request.place(candidate),
             type=kind,
             scenario=point.label or "hold it here",
             confidence=1.0,

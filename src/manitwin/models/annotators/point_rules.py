@@ -152,9 +152,7 @@ class PointSelection:
         i = choice.candidate
         return FunctionalPoint(
             id=f"f{number}",
-            candidate=i,
-            position_m=self.request.positions_m[i].tolist(),
-            normal=self.request.normals[i].tolist(),
+            **self.request.place(i),
             label=part.label,
             description=part.description,
             confidence=self._confidence(choice.score),
@@ -165,9 +163,7 @@ class PointSelection:
         i = choice.candidate
         return GraspPoint(
             id=f"g{number}",
-            candidate=i,
-            position_m=self.request.positions_m[i].tolist(),
-            normal=self.request.normals[i].tolist(),
+            **self.request.place(i),
             type=part.type,
             scenario=part.scenario,
             confidence=self._confidence(choice.score * float(self._fit()[i])),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import trimesh
@@ -76,6 +76,11 @@ class PointsRequest:
     visible: tuple[tuple[int, ...], ...]
     center_of_mass_m: np.ndarray
     max_opening_m: float
+
+    def place(self, candidate: int) -> dict[str, Any]:
+        """Return the fields ``candidate``, ``position_m`` and ``normal`` of a point at a candidate."""
+        position, normal = self.positions_m[candidate].tolist(), self.normals[candidate].tolist()
+        return {"candidate": candidate, "position_m": position, "normal": normal}
 
 
 @dataclass(frozen=True)

@@ -18,28 +18,11 @@ from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.server import Request, Response
 from manitwin.models.fakes.vlm_answers import rehearsal_answer
 
-FIELDS = frozenset(
-    [
-        "cache_control",
-        "container",
-        "inference_geo",
-        "max_tokens",
-        "messages",
-        "metadata",
-        "model",
-        "output_config",
-        "service_tier",
-        "stop_sequences",
-        "stream",
-        "system",
-        "temperature",
-        "thinking",
-        "tool_choice",
-        "tools",
-        "top_k",
-        "top_p",
-    ]
-)
+FIELDS = frozenset({
+    "cache_control", "container", "inference_geo", "max_tokens", "messages", "metadata", "model", "output_config",
+    "service_tier", "stop_sequences", "stream", "system", "temperature", "thinking", "tool_choice", "tools", "top_k",
+    "top_p",
+})  # fmt: skip
 VERSIONS = ("2023-01-01", "2023-06-01")
 MAX_BODY_BYTES = 32 << 20
 MAX_PICTURE_BYTES = 5 << 20

@@ -23,32 +23,12 @@ pictures."""
 # the four types that both vendors read: https://docs.claude.com/en/docs/vision, https://platform.openai.com/docs/guides/images-vision
 PICTURE_FORMATS = {"image/png": "PNG", "image/jpeg": "JPEG", "image/webp": "WEBP", "image/gif": "GIF"}
 _SHARED = {
-    "type",
-    "description",
-    "title",
-    "enum",
-    "const",
-    "anyOf",
-    "properties",
-    "required",
-    "items",
-    "$ref",
-    "$defs",
-} | {
-    "additionalProperties",
-    "default",
-    "format",
-}
+    "type", "description", "title", "enum", "const", "anyOf", "properties", "required", "items", "$ref", "$defs",
+    "additionalProperties", "default", "format",
+}  # fmt: skip
 _OPENAI = _SHARED | {
-    "pattern",
-    "multipleOf",
-    "minimum",
-    "maximum",
-    "exclusiveMinimum",
-    "exclusiveMaximum",
-    "minItems",
-    "maxItems",
-}
+    "pattern", "multipleOf", "minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum", "minItems", "maxItems",
+}  # fmt: skip
 _ANTHROPIC = _SHARED | {"allOf", "minItems", "pattern"}
 MAX_PROPERTIES = 5000
 MAX_ENUM_VALUES = 1000

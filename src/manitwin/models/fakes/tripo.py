@@ -16,14 +16,9 @@ from manitwin.models.fakes.vendor import FILES, FakeVendor
 
 PREFIX = "/v2/openapi"
 VERSIONS = (
-    "v3.1-20260211",
-    "v3.0-20250812",
-    "v2.5-20250123",
-    "v2.0-20240919",
-    "v1.4-20240625",
-    "P1-20260311",
+    "v3.1-20260211", "v3.0-20250812", "v2.5-20250123", "v2.0-20240919", "v1.4-20240625", "P1-20260311",
     "Turbo-v1.0-20250506",
-)
+)  # fmt: skip
 FIELDS: dict[str, Any] = {
     "type": ("image_to_model", "text_to_model", "multiview_to_model"),
     "model_version": VERSIONS,

@@ -21,10 +21,10 @@ from typing import Any
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, ConfigError, InputError, Rejected, Unavailable, Unsupported, choose_from
+from manitwin.formats.image_file import png_of
 from manitwin.formats.sniff import sniff
 from manitwin.models.generators import supervisor
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import png_of
 from manitwin.models.services.keys import redacted
 from manitwin.models.services.refusal import Gone
 

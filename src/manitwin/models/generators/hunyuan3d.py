@@ -22,8 +22,9 @@ from urllib.parse import quote
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, ConfigError, Unavailable, Unsupported, choose_from
+from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import png_of, submit_paid
+from manitwin.models.generators.vendor import submit_paid
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import split_url
 from manitwin.models.services.refusal import Gone, Refusal, refusal_by_status

@@ -17,36 +17,24 @@ from typing import Any
 
 from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError, choose_from
+from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import VendorGenerator, png_of
+from manitwin.models.generators.vendor import VendorGenerator
 from manitwin.models.services.http import FormFile
 from manitwin.models.services.refusal import Gone, Refusal, kind_of_status, refusal_by_status
 
 URL = "https://api.hyper3d.com/api/v2"
 KEYS = ("RODIN_API_KEY", "HYPER3D_API_KEY")
 TIERS = (
-    "Sketch",
-    "Regular",
-    "Detail",
-    "Smooth",
-    "Gen-2",
-    "Gen-2.5-Extreme-Low",
-    "Gen-2.5-Low",
-    "Gen-2.5-Medium",
-    "Gen-2.5-High",
-    "Gen-2.5-Extreme-High",
-)
+    "Sketch", "Regular", "Detail", "Smooth", "Gen-2", "Gen-2.5-Extreme-Low", "Gen-2.5-Low", "Gen-2.5-Medium",
+    "Gen-2.5-High", "Gen-2.5-Extreme-High",
+)  # fmt: skip
 READABLE = ("glb", "usdz")
 SEEDS = 65536
 DENIED = {
-    "UNAUTHORIZED",
-    "NO_ACTIVE_SUBSCRIPTION",
-    "SUBSCRIPTION_PLAN_TOO_LOW",
-    "INSUFFICIENT_FUND",
-    "USER_NOT_FOUND",
-    "GROUP_NOT_FOUND",
-    "PERMISSION_DENIED",
-}
+    "UNAUTHORIZED", "NO_ACTIVE_SUBSCRIPTION", "SUBSCRIPTION_PLAN_TOO_LOW", "INSUFFICIENT_FUND", "USER_NOT_FOUND",
+    "GROUP_NOT_FOUND", "PERMISSION_DENIED",
+}  # fmt: skip
 OF_THE_INPUT = {"IMAGE_CONTENT_VIOLATION", "OBJECT_NOT_FOUND_ON_IMAGE"}
 
 

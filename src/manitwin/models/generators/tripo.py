@@ -16,8 +16,9 @@ from typing import Any
 
 from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError
+from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import VendorGenerator, png_of
+from manitwin.models.generators.vendor import VendorGenerator
 from manitwin.models.services.http import FormFile
 from manitwin.models.services.refusal import Gone, Refusal, kind_of_status, refusal_by_status
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import base64
-import io
 import time
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Self
 from urllib.parse import urlsplit
 
 import numpy as np
-from PIL import Image
 
 from manitwin.config import BuildConfig, Resource, ServicesConfig
 from manitwin.errors import BadReply, ConfigError
+from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import bearer, is_local, key_from_environment, split_url
@@ -126,13 +125,6 @@ def chosen(name: str, said: str, config: BuildConfig, option: str, default: str)
             f"generator {name}: it says {said} and generate.options.{option} says {set_to}; leave one out"
         )
     return said or str(set_to or default)
-
-
-def png_of(rgba: np.ndarray) -> bytes:
-    """Return the matted photo ``(H, W, 4) uint8`` as a PNG; the same picture gives the same bytes."""
-    stream = io.BytesIO()
-    Image.fromarray(rgba).save(stream, "PNG")
-    return stream.getvalue()
 
 
 def data_uri(rgba: np.ndarray) -> str:

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import urljoin, urlsplit
@@ -20,9 +20,17 @@ from manitwin.engine.charges import REHEARSAL_MARK, note_rehearsal
 from manitwin.errors import BadReply, ConfigError, ManiTwinError, RateLimited
 from manitwin.models.services.download import MAX_FILE_BYTES, download_file
 from manitwin.models.services.keys import is_local, redacted
-from manitwin.models.services.refusal import Gone, Refusal, Unanswered, error_for, refusal_by_status, retry_after_s
+from manitwin.models.services.refusal import (
+    Failure,
+    Gone,
+    Refusal,
+    Unanswered,
+    error_for,
+    refusal_by_status,
+    retry_after_s,
+    until_answered,
+)
 
-FIRST_WAIT_S = 1.0
 MAX_ANSWER_BYTES = 64 << 20
 MAX_CONNECT_S = 30.0
 
@@ -42,15 +50,6 @@ class FormFile:
     filename: str
     content: bytes
     mime: str
-
-
-@dataclass(frozen=True)
-class _Failure:
-    """A try that came to nothing: whether it may be made again, and the error where it may not or no tries are left."""
-
-    error: ManiTwinError
-    again: bool
-    wait_s: float | None = None
 
 
 class HttpService:
@@ -122,11 +121,8 @@ class HttpService:
             parts: list[tuple[str, Any]] = [(name, (None, value)) for name, value in fields.items()]
             content["files"] = parts + [(f.field, (f.filename, f.content, f.mime)) for f in files]
         url = self._address(path)
-
-        def attempt() -> bytes | _Failure:
-            return self._once(method, url, content, pays, max_bytes)
-
-        return self._until_answered(attempt)
+        attempt = partial(self._once, method, url, content, pays, max_bytes)
+        return until_answered(attempt, self._services, self._sleep)
 
     def download(
         self,
@@ -144,7 +140,7 @@ class HttpService:
         """
         for again in (True, False):
             try:
-                self._until_answered(lambda url=url: self._file(url, to, max_bytes))  # type: ignore[misc]
+                until_answered(partial(self._file, url, to, max_bytes), self._services, self._sleep)
             except Gone as error:
                 if not again or fresh_url is None:
                     raise BadReply(f"{error}; run it again") from None
@@ -173,52 +169,38 @@ class HttpService:
             )
         return url
 
-    def _until_answered(self, attempt: Callable[[], bytes | _Failure]) -> bytes:
-        pause = FIRST_WAIT_S
-        for left in range(self._services.retries, -1, -1):
-            outcome = attempt()
-            if isinstance(outcome, bytes):
-                return outcome
-            wait = pause if outcome.wait_s is None else outcome.wait_s
-            too_long = outcome.wait_s is not None and wait > self._services.longest_wait_s
-            if not left or not outcome.again or too_long:
-                raise outcome.error
-            self._sleep(min(wait, self._services.longest_wait_s))
-            pause *= 2
-        raise AssertionError("the last try returns or raises")
-
-    def _once(self, method: str, url: str, content: dict[str, Any], pays: bool, max_bytes: int) -> bytes | _Failure:
+    def _once(self, method: str, url: str, content: dict[str, Any], pays: bool, max_bytes: int) -> bytes | Failure:
         headers = {**self._authorization, "Accept": "application/json, */*"}
         try:
             with self._stream(method, url, headers, content) as response:
                 status, after = response.status_code, retry_after_s(response.headers.get("Retry-After"))
                 data = _bounded(response.iter_bytes(), max_bytes)
         except _NOT_SENT as error:
-            return _Failure(self._silent(error, False), again=True)
+            return Failure(self._silent(error, False), again=True)
         except httpx2.RequestError as error:  # timeouts, connections cut, broken HTTP
-            return _Failure(self._silent(error, pays), again=not pays)
+            return Failure(self._silent(error, pays), again=not pays)
         if data is None:
-            return _Failure(self.unreadable(f"end within {max_bytes} bytes", pays), again=False)
+            return Failure(self.unreadable(f"end within {max_bytes} bytes", pays), again=False)
         return self._judged(status, data, after, pays)
 
-    def _judged(self, status: int, data: bytes, after: float | None, pays: bool) -> bytes | _Failure:
+    def _judged(self, status: int, data: bytes, after: float | None, pays: bool) -> bytes | Failure:
         if 300 <= status < 400:
             error: ManiTwinError = BadReply(f"{self.name}: {self.base_url} redirects; give the new address after @")
-            return _Failure(error, again=False)
+            return Failure(error, again=False)
         refusal = self._refusal(status, _parsed(data))
         if refusal is None:
             return data
         error = error_for(self.name, Refusal(self.said(refusal.message), refusal.kind), status, self._remedy, after)
         if pays and status in _ANSWER_LOST:
-            return _Failure(Unanswered(f"{error}; whether it took the job is not known"), again=False)
+            return Failure(Unanswered(f"{error}; whether it took the job is not known"), again=False)
         retryable = refusal.kind == "busy" or (refusal.kind == "down" and (not pays or status in _NOT_TAKEN))
-        return _Failure(error, again=retryable, wait_s=after if isinstance(error, RateLimited) else None)
+        return Failure(error, again=retryable, wait_s=after if isinstance(error, RateLimited) else None)
 
-    def _file(self, url: str, to: Path, max_bytes: int) -> bytes | _Failure:
+    def _file(self, url: str, to: Path, max_bytes: int) -> bytes | Failure:
         schemes = {"https", urlsplit(self.base_url).scheme}
         with self._client() as client:
             error, again = download_file(client, url, to, name=self.name, max_bytes=max_bytes, schemes=schemes)
-        return b"" if error is None else _Failure(error, again)
+        return b"" if error is None else Failure(error, again)
 
     @contextmanager
     def _stream(
@@ -230,12 +212,7 @@ class HttpService:
     def _client(self) -> httpx2.Client:
         # one connection a request: one kept open may be closed by the server just as a job is submitted, and then
         # nobody knows whether it was taken
-        timeout = httpx2.Timeout(self._services.timeout_s, connect=min(self._services.timeout_s, MAX_CONNECT_S))
-        trust_env = not is_local(self.base_url)
-        hooks = {"response": [note_rehearsal_answer]}
-        return httpx2.Client(
-            timeout=timeout, verify=_tls(), follow_redirects=False, trust_env=trust_env, event_hooks=hooks
-        )
+        return http_client(self.base_url, self._services)
 
     def _silent(self, error: httpx2.RequestError, pays: bool) -> ManiTwinError:
         cause = self.said(str(error)) or type(error).__name__
@@ -250,8 +227,21 @@ class HttpService:
         return value
 
 
-def note_rehearsal_answer(response: httpx2.Response) -> None:
-    """Note an answer of a rehearsal server (``manitwin fake``) by its header: an event hook of HTTP clients."""
+def http_client(
+    base_url: str, services: ServicesConfig, on_request: Callable[[httpx2.Request], None] | None = None
+) -> httpx2.Client:
+    """Return a client that follows no redirect, leaves proxies out on this machine, and notes rehearsals."""
+    return httpx2.Client(
+        timeout=httpx2.Timeout(services.timeout_s, connect=min(services.timeout_s, MAX_CONNECT_S)),
+        verify=_tls(),
+        follow_redirects=False,
+        trust_env=not is_local(base_url),
+        event_hooks={"request": [on_request] if on_request else [], "response": [_note_rehearsal]},
+    )
+
+
+def _note_rehearsal(response: httpx2.Response) -> None:
+    """Note an answer of a rehearsal server (``manitwin fake``) by its header."""
     if REHEARSAL_MARK in response.headers:
         note_rehearsal()
 

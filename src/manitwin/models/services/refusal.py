@@ -1,13 +1,19 @@
-"""A service's refusals as errors of this package."""
+"""A service's refusals as errors of this package, and retries."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from email.utils import parsedate_to_datetime
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
+from manitwin.config import ServicesConfig
 from manitwin.errors import AccessDenied, BadReply, ManiTwinError, RateLimited, Rejected, Unavailable
+
+FIRST_WAIT_S = 1.0
+
+AnswerT = TypeVar("AnswerT")
 
 Kind = Literal["denied", "busy", "down", "gone", "input", "bad"]
 
@@ -30,6 +36,42 @@ class Refusal:
 
     message: str
     kind: Kind
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A request that came to nothing: whether it may be made again, and after how long where the server says so.
+
+    ``error`` is raised where it may not, or no tries are left; ``words`` are what the server said of a request that it could
+    not take.
+    """
+
+    error: ManiTwinError
+    again: bool
+    wait_s: float | None = None
+    words: str = ""
+
+
+def until_answered(
+    attempt: Callable[[], AnswerT | Failure], services: ServicesConfig, sleep: Callable[[float], None]
+) -> AnswerT:
+    """Return the answer of the first attempt that has one; raises the last failure's error.
+
+    There are ``services.retries`` retries, with pauses that double from 1 s or are what the server asks for; a server that
+    asks for more than ``services.longest_wait_s`` is not waited for.
+    """
+    pause = FIRST_WAIT_S
+    for left in range(services.retries, -1, -1):
+        outcome = attempt()
+        if not isinstance(outcome, Failure):
+            return outcome
+        wait = pause if outcome.wait_s is None else outcome.wait_s
+        too_long = outcome.wait_s is not None and wait > services.longest_wait_s
+        if not left or not outcome.again or too_long:
+            raise outcome.error
+        sleep(min(wait, services.longest_wait_s))
+        pause *= 2
+    raise AssertionError("the last try returns or raises")
 
 
 def refusal_by_status(status: int, body: Any) -> Refusal | None:

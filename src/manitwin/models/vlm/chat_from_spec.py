@@ -28,16 +28,12 @@ def openai_from_spec(argument: str, config: BuildConfig) -> ChatClient:
 
     Cached (``services.cache``) and recorded (``services.record``). Raises ConfigError without a model, a key or a price.
     """
-    model, url, key, key_name = _server("openai", argument, OPENAI_URL)
-    chat = OpenAiChat(model, url, key, config.vlm, config.services, key_name=key_name)
-    return _kept(chat, config)
+    return _served(OpenAiChat, argument, OPENAI_URL, config)
 
 
 def anthropic_from_spec(argument: str, config: BuildConfig) -> ChatClient:
     """Return the model of ``MODEL`` or ``MODEL@URL`` behind the Messages API; else as ``openai_from_spec``."""
-    model, url, key, key_name = _server("anthropic", argument, ANTHROPIC_URL)
-    chat = AnthropicMessages(model, url, key, config.vlm, config.services, key_name=key_name)
-    return _kept(chat, config)
+    return _served(AnthropicMessages, argument, ANTHROPIC_URL, config)
 
 
 def replay_from_spec(argument: str, config: BuildConfig) -> ChatClient:
@@ -47,20 +43,18 @@ def replay_from_spec(argument: str, config: BuildConfig) -> ChatClient:
     return Replay(Path(argument))
 
 
-def _server(name: str, argument: str, default_url: str) -> tuple[str, str, str | None, str]:
+def _served(
+    kind: type[OpenAiChat] | type[AnthropicMessages], argument: str, default_url: str, config: BuildConfig
+) -> ChatClient:
     model, url = split_url(argument)
     if not model:
         raise ConfigError(
-            f"{name} needs a model: {name}:MODEL, or {name}:MODEL@URL for another server than {default_url}"
+            f"{kind.name} needs a model: {kind.name}:MODEL, or {kind.name}:MODEL@URL for another server than {default_url}"
         )
     url = url or default_url
     key_name = KEY_OF_HOST.get(urlsplit(url).hostname or "", KEY_OF_OTHERS)
-    return model, url, key_from_environment((key_name,), url, f"{name}:{argument}"), key_name
-
-
-def _kept(chat: ChatClient, config: BuildConfig) -> ChatClient:
+    key = key_from_environment((key_name,), url, f"{kind.name}:{argument}")
+    chat: ChatClient = kind(model, url, key, config.vlm, config.services, key_name=key_name)
     if config.services.cache:
         chat = Cached(chat, default_folder())
-    if config.services.record is not None:
-        chat = Recorded(chat, config.services.record)
-    return chat
+    return chat if config.services.record is None else Recorded(chat, config.services.record)

@@ -5,25 +5,29 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import httpx2
 import openai
 
 from manitwin.config import ServicesConfig, VlmConfig
-from manitwin.errors import BadReply, ConfigError, ManiTwinError, RateLimited
-from manitwin.models.services.http import note_rehearsal_answer
-from manitwin.models.services.keys import is_local, redacted
-from manitwin.models.services.refusal import Refusal, error_for, refusal_by_status, retry_after_s
+from manitwin.errors import BadReply, ConfigError, RateLimited
+from manitwin.models.services.http import http_client
+from manitwin.models.services.keys import redacted
+from manitwin.models.services.refusal import (
+    Failure,
+    Refusal,
+    error_for,
+    refusal_by_status,
+    retry_after_s,
+    until_answered,
+)
 from manitwin.models.vlm.client import Completion
 from manitwin.models.vlm.openai_dialect import Dialect, request_body
 from manitwin.models.vlm.prices import estimated_usage, token_price
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
 
 OPENAI_URL = "https://api.openai.com/v1"
-FIRST_WAIT_S = 1.0
-MAX_CONNECT_S = 30.0
 # all that a request is sent with: the SDK would add what OPENAI_CUSTOM_HEADERS says, to whatever server, and even let that
 # replace the key; its x-stainless header tells itself that the plain response is wanted
 _HEADERS = frozenset(
@@ -34,19 +38,6 @@ _HEADERS_OF_OPENAI = _HEADERS | {"openai-organization", "openai-project"}
 # an account without credit: a 429 whose type, and mostly code, is the first one, as in
 # https://github.com/OpenHands/OpenHands/issues/998; the others are unverified
 OUT_OF_CREDIT = ("insufficient_quota", "billing_hard_limit_reached", "billing_not_active")
-
-
-@dataclass(frozen=True)
-class _Failure:
-    """A request that came to nothing, whether it may be made again, and after how long where the server says so.
-
-    ``words`` are what the server said of a request that it could not take.
-    """
-
-    error: ManiTwinError
-    again: bool
-    wait_s: float | None = None
-    words: str = ""
 
 
 class OpenAiChat:
@@ -92,27 +83,22 @@ class OpenAiChat:
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Answer a question, given the turns that followed it."""
-        pause, left = FIRST_WAIT_S, self._services.retries
-        while True:
-            outcome = self._once(question, turns)
-            if isinstance(outcome, Completion):
-                return outcome.paid(self.price, self._who)
-            narrower = self.dialect.without(outcome.words)
-            if narrower is not None:
+
+        def attempt() -> Completion | Failure:
+            while True:
+                outcome = self._once(question, turns)
+                narrower = self.dialect.without(outcome.words) if isinstance(outcome, Failure) else None
+                if narrower is None:
+                    return outcome
                 self.dialect = narrower
-                continue
-            wait = pause if outcome.wait_s is None else outcome.wait_s
-            too_long = outcome.wait_s is not None and wait > self._services.longest_wait_s
-            if not left or not outcome.again or too_long:
-                raise outcome.error
-            self._sleep(min(wait, self._services.longest_wait_s))
-            pause, left = pause * 2, left - 1
+
+        return until_answered(attempt, self._services, self._sleep).paid(self.price, self._who)
 
     @property
     def _who(self) -> str:
         return f"{self.model} at {self.base_url}"
 
-    def _once(self, question: Question, turns: tuple[Turn, ...]) -> Completion | _Failure:
+    def _once(self, question: Question, turns: tuple[Turn, ...]) -> Completion | Failure:
         # errors are made here and raised outside of the handlers: those of the SDK hold the request, and with it the key
         body = request_body(
             question,
@@ -130,10 +116,10 @@ class OpenAiChat:
         except openai.APIConnectionError as error:
             cause = redacted(str(error.__cause__ or error), self._key)
             refusal = Refusal(f"{self.base_url} does not answer ({cause or type(error.__cause__).__name__})", "down")
-            return _Failure(error_for(self._who, refusal, None, "", None), again=True)
+            return Failure(error_for(self._who, refusal, None, "", None), again=True)
         return completion(response.content, question, self._who, self._key, self._settings.max_tokens)
 
-    def _refused(self, response: httpx2.Response) -> _Failure:
+    def _refused(self, response: httpx2.Response) -> Failure:
         status = response.status_code
         try:
             body = response.json()
@@ -144,7 +130,7 @@ class OpenAiChat:
         remedy = f"set a valid key in {self._key_name}, and check the account's credit and its right to the model"
         words, refusal = refusal.message, Refusal(redacted(refusal.message, self._key), refusal.kind)
         error = error_for(self._who, refusal, status, remedy, retry_after_s(response.headers.get("Retry-After")))
-        return _Failure(
+        return Failure(
             error,
             again=refusal.kind in ("busy", "down"),
             wait_s=error.retry_after_s if isinstance(error, RateLimited) else None,
@@ -164,13 +150,7 @@ class OpenAiChat:
             if self._key:
                 request.headers["Authorization"] = f"Bearer {self._key}"
 
-        timeout = httpx2.Timeout(self._services.timeout_s, connect=min(self._services.timeout_s, MAX_CONNECT_S))
-        return httpx2.Client(
-            timeout=timeout,
-            follow_redirects=False,
-            trust_env=not is_local(self.base_url),
-            event_hooks={"request": [only_ours], "response": [note_rehearsal_answer]},
-        )
+        return http_client(self.base_url, self._services, only_ours)
 
 
 def openai_refusal(status: int, body: Any) -> Refusal | None:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import io
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Literal, TypeVar
 
+import numpy as np
 from PIL import Image, ImageDraw
 from pydantic import BaseModel, ValidationError
 
 from manitwin.errors import BadReply
+from manitwin.formats.image_file import png_of
 from manitwin.models.vlm.client import Forgetful
 from manitwin.models.vlm.protocol import ChatModel, Picture, Question, Turn
 from manitwin.models.vlm.strict_schema import strict_schema
@@ -23,7 +24,7 @@ MAX_COMPLAINTS = 12
 _THINKING = re.compile(r"<think>.*?</think>", re.DOTALL)
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
 _FENCED = re.compile(r"```[a-zA-Z]*\s*\n(.*?)```", re.DOTALL)
-PICTURE_PX = 256
+PROBE_PX = 256
 
 
 @dataclass(frozen=True)
@@ -167,11 +168,9 @@ class _Color(BaseModel):
 
 def probe_question() -> Question:
     """Return the question: the color of a disc on white."""
-    picture = Image.new("RGB", (PICTURE_PX, PICTURE_PX), "white")
+    picture = Image.new("RGB", (PROBE_PX, PROBE_PX), "white")
     ImageDraw.Draw(picture).ellipse((64, 64, 192, 192), fill=(220, 30, 30))
-    png = io.BytesIO()
-    picture.save(png, "PNG")
-    parts = (Picture(png.getvalue()), "Which color has the disc in this picture?")
+    parts = (Picture(png_of(np.asarray(picture))), "Which color has the disc in this picture?")
     return Question("probe", "You look at pictures and answer in JSON.", parts, strict_schema(_Color))
 
 

@@ -137,9 +137,7 @@ def _grasp_point(number: int, place: Elected, checks: PlaceChecks) -> GraspPoint
     leading, request = _leading(place), checks.request
     return GraspPoint(
         id=f"g{number}",
-        candidate=place.candidate,
-        position_m=request.positions_m[place.candidate].tolist(),
-        normal=request.normals[place.candidate].tolist(),
+        **request.place(place.candidate),
         type=leading.choice.type,
         scenario=leading.choice.scenario,
         confidence=round(place.confidence, 3),

@@ -10,9 +10,9 @@ import numpy as np
 from manitwin.config import PhysicalConfig
 from manitwin.errors import Rejected
 from manitwin.geometry.boxes import oriented_bounding_box
-from manitwin.models.annotators.physical_rules import is_outer_skin, median_thickness
 from manitwin.models.annotators.priors import HEAVIEST_CONTENTS_KG_M3, Interval, load_materials, lookup
 from manitwin.models.annotators.protocol import Subject
+from manitwin.models.annotators.rules import is_outer_skin, median_thickness
 from manitwin.models.annotators.vlm.physical import PhysicalAnswer
 
 PROPORTION_FACTOR, PROPORTION_SHARE = 1.5, 0.1

@@ -188,9 +188,7 @@ def functional_points(
         points.append(
             FunctionalPoint(
                 id=f"f{number}",
-                candidate=candidate,
-                position_m=request.positions_m[candidate].tolist(),
-                normal=request.normals[candidate].tolist(),
+                **request.place(candidate),
                 label=choice.label,
                 description=choice.description,
                 confidence=round(choice.confidence * (1.0 if wrong is None else CONTRADICTED), 3),

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import numpy as np
 import trimesh
 from PIL import Image
 
+from manitwin.formats.image_file import png_of
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.annotators.protocol import PointsRequest, Subject
 from manitwin.models.vlm.protocol import Picture
@@ -23,13 +23,6 @@ def read_picture(path: Path) -> np.ndarray:
         return np.asarray(image.convert("RGB"))
 
 
-def as_png(picture: np.ndarray) -> Picture:
-    """Encode ``(H, W, 3) uint8`` without loss; equal pictures give equal bytes."""
-    stream = io.BytesIO()
-    Image.fromarray(picture).save(stream, "PNG")
-    return Picture(stream.getvalue())
-
-
 def view_caption(number: int, count: int, camera: Camera) -> str:
     """Return 'View 3 of 8, azimuth 30, elevation 20' in whole degrees: from where the camera looks."""
     x, y, z = camera.camera_to_object[:3, 2]
@@ -41,7 +34,7 @@ def clean_views(subject: Subject) -> list[str | Picture]:
     """Return each view's caption and picture."""
     parts: list[str | Picture] = []
     for number, (path, camera) in enumerate(zip(subject.views, subject.cameras, strict=True), 1):
-        parts += [f"{view_caption(number, len(subject.views), camera)}:", as_png(read_picture(path))]
+        parts += [f"{view_caption(number, len(subject.views), camera)}:", Picture(png_of(read_picture(path)))]
     return parts
 
 
@@ -57,9 +50,12 @@ def marked_views(request: PointsRequest, numbers: np.ndarray) -> list[str | Pict
     views = zip(subject.views, subject.cameras, request.visible, strict=True)
     for number, (path, camera, seen) in enumerate(views, 1):
         caption, clean = view_caption(number, len(subject.views), camera), read_picture(path)
-        parts += [f"{caption}, clean:", as_png(clean)]
+        parts += [f"{caption}, clean:", Picture(png_of(clean))]
         if seen:
-            parts += [f"{caption}, with markers:", as_png(_marked(clean, request, numbers, camera, seen, caster))]
+            parts += [
+                f"{caption}, with markers:",
+                Picture(png_of(_marked(clean, request, numbers, camera, seen, caster))),
+            ]
         else:
             parts.append(f"{caption}: no marker can be seen from here.")
     return parts

@@ -10,9 +10,12 @@ import numpy as np
 from manitwin.errors import Rejected
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.lift.inflation import inflate
-from manitwin.models.generators.lift.posture import (
+from manitwin.models.generators.lift.primitives import DEPTH_SHARE, make_box, profile, revolve, trim_caps
+from manitwin.models.generators.lift.silhouette import CROP_SIDE_PX, Silhouette, analyse_silhouette
+from manitwin.models.generators.lift.surface import (
     TILTED_TIP_ANGLE_DEG,
     UPRIGHT_TIP_ANGLE_DEG,
+    LiftedSurface,
     assert_solid,
     laid,
     laid_round,
@@ -20,9 +23,6 @@ from manitwin.models.generators.lift.posture import (
     stood,
     tip_angle_deg,
 )
-from manitwin.models.generators.lift.primitives import DEPTH_SHARE, make_box, profile, revolve, trim_caps
-from manitwin.models.generators.lift.silhouette import CROP_SIDE_PX, Silhouette, analyse_silhouette
-from manitwin.models.generators.lift.surface import LiftedSurface
 from manitwin.models.generators.lift.texture import crop_object, paint_unseen
 
 Primitive = Literal["revolution", "box", "inflation"]

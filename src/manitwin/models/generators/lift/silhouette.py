@@ -33,7 +33,6 @@ class Silhouette:
     rectangle_iou: float
     corners: np.ndarray
     elongation: float
-    long_axis_tilt_deg: float
     typical_radius_px: float
     largest_radius_px: float
     holes: int
@@ -72,7 +71,6 @@ def analyse_silhouette(mask: np.ndarray) -> Silhouette:
         rectangle_iou=float((filled.astype(bool) & mask).sum() / (filled.astype(bool) | mask).sum()),
         corners=rectangle,
         elongation=max(elongation, float(sides.max() / max(sides.min(), 1.0))),
-        long_axis_tilt_deg=long_tilt,
         typical_radius_px=float(np.median(radius[ridge])) if ridge.any() else float(radius.max()),
         largest_radius_px=float(radius.max()),
         holes=len(holes),

@@ -12,9 +12,8 @@ import trimesh
 from handmade import cup, cylinder, subject
 from manitwin.formats.meshes.read import read_mesh
 from manitwin.geometry.repair.cascade import repair
-from manitwin.models.annotators.physical_rules import estimate_physical
 from manitwin.models.annotators.priors import load_priors, lookup
-from manitwin.models.annotators.rules import RulesAnnotator
+from manitwin.models.annotators.rules import RulesAnnotator, estimate_physical
 
 
 def mass(mesh: trimesh.Trimesh, name: str | None):
