@@ -66,9 +66,13 @@ def bar(tmp_path_factory: pytest.TempPathFactory) -> Draft:
     return run_all(draft, folder, *trial_stages(), RecordGraspsStage(SECOND, [(PANDA, "")]))
 
 
-def test_stages_are_stages() -> None:
-    for stage in [*trial_stages(), *trial_stages(PANDA, "-panda"), RecordGraspsStage(SECOND, [(PANDA, "")])]:
-        assert isinstance(stage, Stage)
+def test_stages_of_two_grippers_read_what_is_there_and_write_artifacts_of_their_own(tmp_path: Path) -> None:
+    there = box_draft(tmp_path, [0.04, 0.04, 0.25], BAR_POINTS).names()
+    both = [(PANDA, ""), (PANDA, "-other")]
+    for stage in [*trial_stages(), *trial_stages(PANDA, "-other"), RecordGraspsStage(SECOND, both)]:
+        assert {name for name in stage.reads if not name.endswith("?")} <= there
+        assert there.isdisjoint(stage.writes)
+        there |= set(stage.writes)
 
 
 def test_chosen_grasps_are_near_a_selected_point_and_named_after_the_nearest(bar: Draft) -> None:

@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from manitwin.config import GenerateConfig, MattingConfig
-from manitwin.engine.stage import Draft, Stage
+from manitwin.engine.stage import Draft
 from manitwin.errors import InputError, Unsupported
 from manitwin.formats.glb import read_glb
 from manitwin.models.generators.lift import LiftGenerator
@@ -27,7 +27,6 @@ def _draft(**item: str | None) -> Draft:
 
 def test_sample_photo_becomes_a_standing_bottle(tmp_path: Path) -> None:
     photo, generate = PhotoStage(MattingConfig()), GenerateStage(GenerateConfig(), LiftGenerator())
-    assert isinstance(photo, Stage) and isinstance(generate, Stage)
     draft = _draft(file=str(SAMPLE))
     draft.fields.update(photo.run(draft, tmp_path))
     draft.paths["photo.png"] = tmp_path / "photo.png"
