@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from manitwin.errors import Rejected
 from manitwin.models.matting.confidence import MatteScores, frame_cause, score
-from manitwin.models.matting.outline import dilated, soft_outline
+from manitwin.models.matting.outline import dilated, soft_outline, without_small_holes
 from manitwin.models.matting.segmentation import Segmentation, segment
 
 TRANSPARENT_SHARE = 0.02
@@ -104,7 +104,8 @@ def _given_matte(image: np.ndarray, name: str, min_area_share: float, second_obj
     if mask.mean() < min_area_share:
         raise Rejected("no_object", f"{name}: its alpha channel is empty; export it with the object opaque", "generate")
     _reject_several(name, mask, second_object_share)
-    closed = _largest(_closed(mask))
+    # specular pixels that a cut-out tool took for background are holes
+    closed = _largest(without_small_holes(mask))
     alpha = np.where(closed & ~mask, 255, np.where(dilated(closed, 2), image[..., 3], 0)).astype(np.uint8)
     # what a file keeps under transparent pixels is anything: the nearest opaque colour takes its place
     nearest = ndimage.distance_transform_edt(image[..., 3] < 250, return_distances=False, return_indices=True)
@@ -142,14 +143,6 @@ def _reject_several(name: str, mask: np.ndarray, second_object_share: float) -> 
 def _largest(mask: np.ndarray) -> np.ndarray:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     return labels == 1 + int(stats[1:, cv2.CC_STAT_AREA].argmax())
-
-
-def _closed(mask: np.ndarray) -> np.ndarray:
-    """Fill holes of less than 0.2 % of the object: specular pixels that a cut-out tool took for background."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
-    small = stats[:, cv2.CC_STAT_AREA] < 2e-3 * mask.sum()
-    small[0] = False
-    return mask | small[labels]
 
 
 def _findings(scores: MatteScores, found: Segmentation) -> list[str]:

@@ -30,6 +30,14 @@ def opened(mask: np.ndarray, radius: int) -> np.ndarray:
     return cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_OPEN, disk(radius)) > 0
 
 
+def without_small_holes(mask: np.ndarray) -> np.ndarray:
+    """Fill holes of less than 0.2 % of a mask."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats((~mask).astype(np.uint8), connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] < 2e-3 * mask.sum()
+    small[0] = False
+    return np.asarray(mask | small[labels])
+
+
 def gradient_magnitude(lab: np.ndarray, blur_px: float = 1.0) -> np.ndarray:
     """Return the colour gradient (H, W) in L*a*b* units per pixel."""
     smooth = cv2.GaussianBlur(lab, (0, 0), blur_px)

@@ -10,7 +10,15 @@ from scipy import ndimage
 
 from manitwin.models.matting.background import Background, model_background
 from manitwin.models.matting.hard_shadow import hard_shadow
-from manitwin.models.matting.outline import dilated, edge_threshold, edges, flood, gradient_magnitude, opened
+from manitwin.models.matting.outline import (
+    dilated,
+    edge_threshold,
+    edges,
+    flood,
+    gradient_magnitude,
+    opened,
+    without_small_holes,
+)
 from manitwin.models.matting.shadow import cast_shadow, gaps
 
 BALL_SHARE = 0.010  # of the longer side: gaps in an outline narrower than twice this do not let the flood in
@@ -114,7 +122,4 @@ def _without_specks(mask: np.ndarray) -> np.ndarray:
     if areas.max() == 0:
         return mask
     kept = (areas > max(5e-4 * mask.size, 0.02 * areas.max()))[labels]
-    holes_count, holes, hole_stats, _ = cv2.connectedComponentsWithStats((~kept).astype(np.uint8), connectivity=4)
-    small = hole_stats[:, cv2.CC_STAT_AREA] < 2e-3 * kept.sum()
-    small[0] = False
-    return kept | small[holes] if holes_count > 1 else kept
+    return without_small_holes(kept)

@@ -11,7 +11,7 @@ import base64
 import json
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 from manitwin.config import ServicesConfig, VlmConfig
@@ -19,9 +19,9 @@ from manitwin.errors import BadReply, ConfigError
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import bearer
 from manitwin.models.services.refusal import Refusal, refusal_by_status
-from manitwin.models.vlm.client import Completion
+from manitwin.models.vlm.client import Completion, ServedChat
 from manitwin.models.vlm.openai_dialect import instructions_with_schema, titled_schema
-from manitwin.models.vlm.prices import estimated_usage, token_price
+from manitwin.models.vlm.prices import estimated_usage
 from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn, Usage
 
 ANTHROPIC_URL = "https://api.anthropic.com"
@@ -38,7 +38,7 @@ def _key_headers(base_url: str, key: str | None) -> dict[str, str]:
     return own if base_url == ANTHROPIC_URL else own | bearer(key)
 
 
-class AnthropicMessages:
+class AnthropicMessages(ServedChat):
     """Ask one model at one server.
 
     Where the server refuses ``output_config`` the schema is told in words instead, and ``temperature`` is left out where it
@@ -62,9 +62,7 @@ class AnthropicMessages:
     ):
         if settings.temperature is not None and settings.temperature > 1:
             raise ConfigError(f"vlm.temperature is {settings.temperature}: anthropic takes 0 to 1")
-        self.model, self.base_url = model, base_url.removesuffix("/v1")
-        self.price = token_price(model, base_url, services)
-        self._settings, self._who = settings, f"{model} at {self.base_url}"
+        super().__init__(model, base_url.removesuffix("/v1"), settings, services, key_name)
         self._schema_taken, self._temperature_taken = True, settings.temperature is not None
         self._service = HttpService(
             self._who,
@@ -72,19 +70,10 @@ class AnthropicMessages:
             authorization={"anthropic-version": VERSION, **_key_headers(self.base_url, key)},
             services=services,
             key=key,
-            remedy=f"set a valid key in {key_name}, and check the account's credit and its right to the model",
+            remedy=self._remedy,
             refusal=anthropic_refusal,
             sleep=sleep,
         )
-
-    def __repr__(self) -> str:
-        return f"AnthropicMessages({self.model!r}, {self.base_url!r})"
-
-    @property
-    def decides(self) -> Mapping[str, str | float | None]:
-        """The server, the model and the settings that decide an answer besides the question."""
-        settings = {"max_tokens": self._settings.max_tokens, "temperature": self._settings.temperature}
-        return {"protocol": self.name, "server": self.base_url, "model": self.model, **settings}
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Answer a question, given the turns that followed it."""

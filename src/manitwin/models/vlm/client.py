@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from manitwin.config import ServicesConfig, VlmConfig
 from manitwin.engine.charges import charge
 from manitwin.errors import BadReply
-from manitwin.models.vlm.prices import TokenPrice
+from manitwin.models.vlm.prices import TokenPrice, token_price
 from manitwin.models.vlm.protocol import ChatModel, Question, Reply, Turn, Usage
 
 
@@ -24,6 +25,27 @@ class ChatClient(ChatModel, Protocol):
 
     @property
     def decides(self) -> Mapping[str, str | float | None]: ...
+
+
+class ServedChat:
+    """A chat model at one server; ``key_name`` is the variable of the environment that its key was in."""
+
+    name: str
+
+    def __init__(self, model: str, base_url: str, settings: VlmConfig, services: ServicesConfig, key_name: str):
+        self.model, self.base_url = model, base_url
+        self.price = token_price(model, base_url, services)
+        self._settings, self._services, self._who = settings, services, f"{model} at {base_url}"
+        self._remedy = f"set a valid key in {key_name}, and check the account's credit and its right to the model"
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.model!r}, {self.base_url!r})"
+
+    @property
+    def decides(self) -> Mapping[str, str | float | None]:
+        """The server, the model and the settings that decide an answer besides the question."""
+        settings = {"max_tokens": self._settings.max_tokens, "temperature": self._settings.temperature}
+        return {"protocol": self.name, "server": self.base_url, "model": self.model, **settings}
 
 
 class Around:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import httpx2
@@ -22,9 +22,9 @@ from manitwin.models.services.refusal import (
     retry_after_s,
     until_answered,
 )
-from manitwin.models.vlm.client import Completion
+from manitwin.models.vlm.client import Completion, ServedChat
 from manitwin.models.vlm.openai_dialect import Dialect, request_body
-from manitwin.models.vlm.prices import estimated_usage, token_price
+from manitwin.models.vlm.prices import estimated_usage
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage
 
 OPENAI_URL = "https://api.openai.com/v1"
@@ -40,7 +40,7 @@ _HEADERS_OF_OPENAI = _HEADERS | {"openai-organization", "openai-project"}
 OUT_OF_CREDIT = ("insufficient_quota", "billing_hard_limit_reached", "billing_not_active")
 
 
-class OpenAiChat:
+class OpenAiChat(ServedChat):
     """Ask one model at one server.
 
     A field that the server refuses is left out from then on (``dialect``). Raises AccessDenied; RateLimited after
@@ -64,22 +64,11 @@ class OpenAiChat:
     ):
         if key is not None and not (key.isascii() and key.isprintable() and " " not in key):
             raise ConfigError(f"{key_name} holds spaces or characters that no key has; copy it again")
-        self.model, self.base_url = model, base_url
-        self.price = token_price(model, base_url, services)
-        self._key, self._key_name = key, key_name
-        self._settings, self._services, self._sleep = settings, services, sleep
+        super().__init__(model, base_url, settings, services, key_name)
+        self._key, self._sleep = key, sleep
         # models that reason know the newer name only, servers of others may know the older one only
         order = 1 if base_url == OPENAI_URL else -1
         self.dialect = Dialect(length_fields=("max_completion_tokens", "max_tokens")[::order])
-
-    def __repr__(self) -> str:
-        return f"OpenAiChat({self.model!r}, {self.base_url!r})"
-
-    @property
-    def decides(self) -> Mapping[str, str | float | None]:
-        """The server, the model and the settings that decide an answer besides the question."""
-        settings = {"max_tokens": self._settings.max_tokens, "temperature": self._settings.temperature}
-        return {"protocol": self.name, "server": self.base_url, "model": self.model, **settings}
 
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Answer a question, given the turns that followed it."""
@@ -93,10 +82,6 @@ class OpenAiChat:
                 self.dialect = narrower
 
         return until_answered(attempt, self._services, self._sleep).paid(self.price, self._who)
-
-    @property
-    def _who(self) -> str:
-        return f"{self.model} at {self.base_url}"
 
     def _once(self, question: Question, turns: tuple[Turn, ...]) -> Completion | Failure:
         # errors are made here and raised outside of the handlers: those of the SDK hold the request, and with it the key
@@ -127,9 +112,8 @@ class OpenAiChat:
             body = None
         # a redirect is not followed: the key would go along
         refusal = openai_refusal(status, body) or Refusal("it redirects; give the new address after @", "bad")
-        remedy = f"set a valid key in {self._key_name}, and check the account's credit and its right to the model"
         words, refusal = refusal.message, Refusal(redacted(refusal.message, self._key), refusal.kind)
-        error = error_for(self._who, refusal, status, remedy, retry_after_s(response.headers.get("Retry-After")))
+        error = error_for(self._who, refusal, status, self._remedy, retry_after_s(response.headers.get("Retry-After")))
         return Failure(
             error,
             again=refusal.kind in ("busy", "down"),
