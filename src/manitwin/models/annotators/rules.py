@@ -28,7 +28,7 @@ _SIZE_EXPONENT = (
 )
 _SAME_SIZE_SPREAD = 0.6  # of the category's spread of mass that is left among things of one size
 _SKIN_FACTOR = 3.0  # a mesh this many times thicker than the wall of such a thing is a closed outer skin
-_LEAST_SKIN_M = 0.008  # thicker in the median than both walls of any thin-walled thing (5 mm at most on 25 meshes)
+_LEAST_SKIN_M = 0.008  # thicker in the median than both walls of any thin-walled thing (measured: 5 mm at most)
 _THICKNESS_SAMPLES = 800
 
 
