@@ -1,9 +1,10 @@
-"""Attempted episodes: the rows of the table of attempts, which batches write in parts and a run merges."""
+"""Attempted episodes: the rows of the table of attempts, which batches write in parts and a run merges; and their counts."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,40 @@ OUTCOMES = (
 that did not stand, ``no_room`` one that could not be set up; ``no_plan`` was never executed."""
 
 EXECUTION_FAILURES = ("misplaced", "toppled", "dropped", "not_lifted", "replan_failed")
+
+ATTEMPTS = "attempts.parquet"
+_TEXT, _REAL, _COUNT, _FLAG = pa.string(), pa.float64(), pa.int32(), pa.bool_()
+
+SCHEMA = pa.schema(
+    [
+        ("episode_id", _TEXT),
+        ("robot", _TEXT),
+        ("skill", _TEXT),
+        ("twin_id", _TEXT),
+        ("category", _TEXT),
+        ("scene_id", _TEXT),
+        ("seed", pa.int64()),
+        ("others", _COUNT),
+        ("outcome", _TEXT),
+        ("grasp_id", _TEXT),
+        ("grasp_type", _TEXT),
+        ("transferred", _FLAG),
+        ("grasps_tried", _COUNT),
+        ("plan_failures", _TEXT),
+        ("position_error_m", _REAL),
+        ("tilt_rad", _REAL),
+        ("yaw_error_rad", _REAL),
+        ("slip_m", _REAL),
+        ("length_s", _REAL),
+        ("instructions", pa.list_(_TEXT)),
+    ]
+)
+"""The columns of a batch: the fields of Attempt."""
+
+MERGED_SCHEMA = SCHEMA.append(pa.field("episode_index", pa.int64()))
+"""``episode_index`` is the number of a kept attempt's trajectory in the merged file, null for those that were not kept."""
+
+_ROW_GROUP = 1 << 16
 
 
 @dataclass(frozen=True)
@@ -71,41 +106,6 @@ def attempt_from(said: dict[str, Any]) -> Attempt:
         raise EpisodesError(
             f"an attempt with other fields than this version's ({error}); run the episodes again"
         ) from error
-
-
-ATTEMPTS = "attempts.parquet"
-_TEXT, _REAL, _COUNT, _FLAG = pa.string(), pa.float64(), pa.int32(), pa.bool_()
-
-SCHEMA = pa.schema(
-    [
-        ("episode_id", _TEXT),
-        ("robot", _TEXT),
-        ("skill", _TEXT),
-        ("twin_id", _TEXT),
-        ("category", _TEXT),
-        ("scene_id", _TEXT),
-        ("seed", pa.int64()),
-        ("others", _COUNT),
-        ("outcome", _TEXT),
-        ("grasp_id", _TEXT),
-        ("grasp_type", _TEXT),
-        ("transferred", _FLAG),
-        ("grasps_tried", _COUNT),
-        ("plan_failures", _TEXT),
-        ("position_error_m", _REAL),
-        ("tilt_rad", _REAL),
-        ("yaw_error_rad", _REAL),
-        ("slip_m", _REAL),
-        ("length_s", _REAL),
-        ("instructions", pa.list_(_TEXT)),
-    ]
-)
-"""The columns of a batch: the fields of Attempt."""
-
-MERGED_SCHEMA = SCHEMA.append(pa.field("episode_index", pa.int64()))
-"""``episode_index`` is the number of a kept attempt's trajectory in the merged file, null for those that were not kept."""
-
-_ROW_GROUP = 1 << 16
 
 
 def attempts_table(attempts: Iterable[Attempt]) -> pa.Table:
@@ -176,3 +176,50 @@ def _numbered(table: pa.Table, kept: int) -> tuple[pa.Table, int]:
         kept += outcome == "kept"
     rows = table.select(SCHEMA.names).cast(SCHEMA)
     return rows.append_column(MERGED_SCHEMA.field("episode_index"), pa.array(numbers, pa.int64())), kept
+
+
+@dataclass
+class Tally:
+    """Counts of attempts by how far they came."""
+
+    attempted: int = 0
+    executed: int = 0
+    succeeded: int = 0
+    kept: int = 0
+
+    def add(self, attempt: Attempt) -> None:
+        """Count one."""
+        self.attempted += 1
+        self.executed += attempt.planned
+        self.succeeded += attempt.succeeded
+        self.kept += attempt.outcome == "kept"
+
+
+@dataclass(frozen=True)
+class Success:
+    """Attempts in all, by category and by outcome, and the objects (id, category) that never succeeded."""
+
+    total: Tally = field(default_factory=Tally)
+    by_category: Mapping[str, Tally] = field(default_factory=dict)
+    outcomes: Mapping[str, int] = field(default_factory=dict)
+    never: tuple[tuple[str, str], ...] = ()
+
+
+def success_of(attempts: Iterable[Attempt]) -> Success:
+    """Count attempts."""
+    total, by_category, outcomes = Tally(), dict[str, Tally](), Counter[str]()
+    categories, successful = dict[str, str](), set[str]()
+    for attempt in attempts:
+        total.add(attempt)
+        outcomes[attempt.outcome] += 1
+        if attempt.twin_id:
+            by_category.setdefault(attempt.category, Tally()).add(attempt)
+            categories.setdefault(attempt.twin_id, attempt.category)
+            if attempt.succeeded:
+                successful.add(attempt.twin_id)
+    return Success(
+        total,
+        dict(sorted(by_category.items())),
+        dict(sorted(outcomes.items(), key=lambda item: (-item[1], item[0]))),
+        tuple(sorted((each, name) for each, name in categories.items() if each not in successful)),
+    )

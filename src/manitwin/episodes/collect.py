@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from manitwin.episodes.attempts import ATTEMPTS, merge_attempts, read_attempts
+from manitwin.episodes.attempts import ATTEMPTS, merge_attempts, read_attempts, success_of
 from manitwin.episodes.batch import BATCH_RECORD, BATCHES, REMEDY_OF_REPEATS
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
@@ -87,23 +86,22 @@ def collect(out: Path, formats: list[str]) -> Collected:
 
 
 def _collected(out: Path) -> Collected:
-    outcomes, by_twin = Counter[str](), dict[str, Counter[str]]()
-    planned = succeeded = 0
-    names = dict[str, str]()
-    for attempt in read_attempts(out / ATTEMPTS):
-        outcomes[attempt.outcome] += 1
-        planned, succeeded = planned + attempt.planned, succeeded + attempt.succeeded
-        by_twin.setdefault(attempt.twin_id, Counter())["succeeded" if attempt.succeeded else "failed"] += 1
-        names[attempt.twin_id] = attempt.category
-    attempted, kept = outcomes.total(), outcomes["kept"]
+    success = success_of(read_attempts(out / ATTEMPTS))
+    total, outcomes = success.total, dict(sorted(success.outcomes.items()))
+    failed = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.items() if outcome != "kept")
     lines = [
-        f"{attempted} attempted, {planned} planned and executed, {succeeded} succeeded"
-        f" ({succeeded / max(1, planned):.1%} of the executed), {kept} kept"
+        f"{total.attempted} attempted, {total.executed} planned and executed, {total.succeeded} succeeded"
+        f" ({total.succeeded / max(1, total.executed):.1%} of the executed), {total.kept} kept",
+        f"not kept: {failed or 'none'}",
     ]
-    failed = ", ".join(f"{count} {outcome}" for outcome, count in sorted(outcomes.items()) if outcome != "kept")
-    lines.append(f"not kept: {failed or 'none'}")
-    dead = sorted(twin_id for twin_id, counts in by_twin.items() if not counts["succeeded"])
-    if dead:
-        lines.append("no success with: " + ", ".join(f"{each} {names[each]}" for each in dead))
-    totals = AttemptTotals(attempted, planned, succeeded, kept, dict(sorted(outcomes.items())), dead)
+    if success.never:
+        lines.append("no success with: " + ", ".join(f"{twin_id} {category}" for twin_id, category in success.never))
+    totals = AttemptTotals(
+        total.attempted,
+        total.executed,
+        total.succeeded,
+        total.kept,
+        outcomes,
+        [twin_id for twin_id, _ in success.never],
+    )
     return Collected(lines, totals)

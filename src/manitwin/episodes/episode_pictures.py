@@ -46,6 +46,8 @@ from manitwin.twin.store import digests_below, sha256_of_json
 PICTURES_RECORD = "pictures.json"
 FILMS = "films/"
 
+PICTURES = "pictures"
+
 
 @dataclass(frozen=True)
 class BatchDrawing(Payload):
@@ -187,9 +189,6 @@ def read_pictures(folder: Path) -> PicturesRecord:
         return PicturesRecord(**json.loads(path.read_bytes()))
     except (OSError, ValueError) as error:
         raise EpisodesError(f"{path}: no record of pictures ({error}); run manitwin render again") from error
-
-
-PICTURES = "pictures"
 
 
 def draw_episodes(

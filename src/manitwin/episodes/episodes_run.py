@@ -31,6 +31,9 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import RUN, canonical_json, digests_below, sha256_of_json, write_bytes_atomically
 
+KIND = "trajectories"
+DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "run", "batch", "retire_failed_share"))
+
 
 @dataclass(frozen=True)
 class EpisodesRecipe(FolderRecipe[BatchRecord]):
@@ -90,10 +93,6 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
         """Return how a batch's record says that it ended."""
         detail = f"{record.kept} of {record.attempted} episodes kept, {record.planned} executed, {record.succeeded} succeeded"
         return Ending("accepted", record.revision, None, detail)
-
-
-KIND = "trajectories"
-DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "run", "batch", "retire_failed_share"))
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,14 @@ from manitwin.robots.urdf import UrdfTree
 from manitwin.scenes.furniture_pictures import add_furniture
 from manitwin.scenes.scene import Furniture, SurfaceBox
 
+TOLERANCE_M = 0.0004  # of simplified surfaces: a third of a pixel's width at 1 m in a picture of 640 pixels
+TABLE = Furniture(
+    kind="table",
+    support_height_m=0.0,
+    boxes=(SurfaceBox(name="table", center_m=(0.4, 0.0, -0.02), half_extents_m=(0.65, 0.7, 0.02), material="wood"),),
+)
+"""What an episode without a scene stands on."""
+
 
 @lru_cache(maxsize=4)
 def link_visuals(urdf: str) -> dict[str, tuple[trimesh.Trimesh, ...]]:
@@ -55,15 +63,6 @@ def link_poses(robot: Robot, joint_positions_rad: np.ndarray, gripper_opening_m:
     joints = dict(zip(robot.arm_joints, np.asarray(joint_positions_rad, float), strict=False))
     joints.update(dict.fromkeys(robot.finger_joints, float(gripper_opening_m) / 2))
     return poses_at(links_of_urdf(robot.urdf), joints)
-
-
-TOLERANCE_M = 0.0004  # of simplified surfaces: a third of a pixel's width at 1 m in a picture of 640 pixels
-TABLE = Furniture(
-    kind="table",
-    support_height_m=0.0,
-    boxes=(SurfaceBox(name="table", center_m=(0.4, 0.0, -0.02), half_extents_m=(0.65, 0.7, 0.02), material="wood"),),
-)
-"""What an episode without a scene stands on."""
 
 
 @lru_cache(maxsize=64)

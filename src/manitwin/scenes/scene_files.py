@@ -11,6 +11,9 @@ from manitwin.errors import UsageError
 from manitwin.scenes.scene import SCENE, SCENE_SCHEMA_VERSION, SceneRecord
 from manitwin.twin.store import canonical_json, write_bytes_atomically
 
+SCENES = "scenes"
+CONFIG = "config.json"
+
 
 def scene_bytes(record: SceneRecord) -> bytes:
     """Return the content of a scene file: canonical JSON."""
@@ -50,10 +53,6 @@ def parse_scene(content: bytes, path: str | Path = SCENE) -> SceneRecord:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise UsageError(f"{path}: {where}: {first['msg']}; sample the layout again") from error
-
-
-SCENES = "scenes"
-CONFIG = "config.json"
 
 
 def scene_name(scene_id: str) -> str:

@@ -17,6 +17,8 @@ ROTATION_SCALE_M = 0.3  # a turn of one radian counts as this far
 REACH_SLACK_M = 0.03
 SEED = 0
 
+SAME_SOLUTION_RAD = 0.05
+
 
 class KnownPoses:
     """Samples of an arm's configurations that are free of self-collision, half of them about home, with their poses."""
@@ -66,9 +68,6 @@ def _without_self_collision(body: KinematicBody, samples: np.ndarray) -> np.ndar
     data, geometry = body.model.createData(), body.geometry.createData()
     manager = broad_phase(body.model, body.geometry, geometry)
     return np.array([not pin.computeCollisions(body.model, data, manager, sample, True) for sample in samples])
-
-
-SAME_SOLUTION_RAD = 0.05
 
 
 class ArmSolutions:

@@ -17,6 +17,8 @@ from manitwin.episodes.planning.straight_lines import HALF_TURN, LineEnds
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.rigid_body import StaticBox
 
+TURNS = np.array([np.eye(4), HALF_TURN])
+
 
 class HandRoom:
     """The corners of a hand's shapes in the grasp frame: a hand one of whose corners is inside a box has no room there.
@@ -42,9 +44,6 @@ class HandRoom:
                 deep &= np.abs(along) < reach[axis]
             inside |= deep.any(1)
         return inside
-
-
-TURNS = np.array([np.eye(4), HALF_TURN])
 
 
 @dataclass(frozen=True)

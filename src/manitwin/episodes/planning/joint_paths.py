@@ -8,6 +8,11 @@ from typing import Protocol
 
 import numpy as np
 
+RESAMPLE_RAD = 0.05
+PASSES = 3
+LEAST_PIECES = 8
+SAME_RAD = 1e-4
+
 
 class JointPath(Protocol):
     """Joint positions over [0, 1], or their first or second derivative, as scipy's splines give them."""
@@ -46,12 +51,6 @@ def is_segment_free(start: np.ndarray, end: np.ndarray, is_free: Callable[[np.nd
 def bisection_places(count: int) -> tuple[float, ...]:
     """Return 1 / count, ..., 1 in the order of coarse steps before fine ones."""
     return tuple(k / count for k in sorted(range(1, count + 1), key=lambda k: (k < count, -(k & -k), k)))
-
-
-RESAMPLE_RAD = 0.05
-PASSES = 3
-LEAST_PIECES = 8
-SAME_RAD = 1e-4
 
 
 def shortcut(

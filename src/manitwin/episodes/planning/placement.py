@@ -17,6 +17,9 @@ from manitwin.geometry.rigid_body import RigidBody
 Placement = tuple[Motion | None, Motion, Motion]
 """Carry (None where the arm is above the goal already), lower and retreat."""
 
+DROP_M = 0.003  # so much higher an object may be let go
+SHARES = (0.5, 0.0)  # of the turn that are made up for, where all of it cannot be
+
 
 class PlacementPlanner:
     """Plans a placement backwards: first where the object is let go, then the way there."""
@@ -67,10 +70,6 @@ class PlacementPlanner:
         before = self._ends.before(self._arm.gripper_pose(at_goal))
         retreat = self._motions.line(world.arm, Phase.RETREAT, at_goal, before)
         return "retreat_blocked" if retreat is None else self._motions.timed(Phase.RETREAT, retreat)
-
-
-DROP_M = 0.003  # so much higher an object may be let go
-SHARES = (0.5, 0.0)  # of the turn that are made up for, where all of it cannot be
 
 
 def goals_after_slip(

@@ -11,6 +11,11 @@ import numpy as np
 
 from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 
+PlanFailure = Literal[
+    "outside_workspace", "no_inverse_kinematics", "approach_blocked", "lift_blocked", "place_unreachable", "lower_blocked",
+    "retreat_blocked", "no_path", "no_time_parameterization",
+]  # fmt: skip
+
 
 class Phase(IntEnum):
     """The phase of an episode; the numbers are part of the recorded format."""
@@ -56,12 +61,6 @@ class Motion:
     velocities_rad_s: np.ndarray
 
 
-PlanFailure = Literal[
-    "outside_workspace", "no_inverse_kinematics", "approach_blocked", "lift_blocked", "place_unreachable", "lower_blocked",
-    "retreat_blocked", "no_path", "no_time_parameterization",
-]  # fmt: skip
-
-
 @dataclass(frozen=True)
 class PickPlacePlan:
     """One grasp's motions: reach, approach, (close), lift, carry, lower, (open), retreat.
@@ -88,12 +87,9 @@ class PlanReport:
     failures: Counter[PlanFailure] = field(default_factory=Counter)
 
 
-STAGES: tuple[PlanFailure, ...] = get_args(PlanFailure)
-
-
 def later(first: PlanFailure, second: PlanFailure) -> PlanFailure:
     """Return the failure that came later on the way to a plan: the more telling one of two attempts."""
-    return max(first, second, key=STAGES.index)
+    return max(first, second, key=get_args(PlanFailure).index)
 
 
 @dataclass(frozen=True)

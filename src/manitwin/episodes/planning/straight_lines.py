@@ -18,6 +18,9 @@ OFF_LINE_M = 0.0005
 OFF_LINE_RAD = 0.002
 ITERATIONS = 20
 
+HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
+"""About the approach axis: the same grasp with its fingers exchanged."""
+
 
 def straight_line(arm: ArmKinematics, start: np.ndarray, end_to_world: np.ndarray) -> CubicSpline | None:
     """Return joint positions over [0, 1] that move the grasp frame straight to a pose ``(4, 4)``, or None.
@@ -57,10 +60,6 @@ def _stays_on_line(arm: ArmKinematics, configurations: np.ndarray, poses: np.nda
     off_m = np.linalg.norm(reached[:, :3, 3] - poses[:, :3, 3], axis=1)
     off_rad = np.linalg.norm(reached[:, :3, :3] - poses[:, :3, :3], axis=(1, 2)) / np.sqrt(2)
     return bool((off_m < OFF_LINE_M).all() and (off_rad < OFF_LINE_RAD).all())
-
-
-HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
-"""About the approach axis: the same grasp with its fingers exchanged."""
 
 
 class LineEnds:

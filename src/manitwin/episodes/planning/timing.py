@@ -11,6 +11,8 @@ ACCELERATING_SHARES = (0.5, 0.4, 0.3, 0.22, 0.15, 0.1, 0.06, 0.03)
 LOOKED_AT = 41
 BETWEEN_LOOKS = 0.01  # longer by this, for what lies between the places that are looked at
 
+LEAST_GRID = 41
+
 
 def trapezoid(share: float | np.ndarray, moments: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return place and speed on [0, 1] at moments of [0, 1], speeding up and slowing down for a ``share`` each."""
@@ -59,9 +61,6 @@ def _fastest(path: JointPath, velocity_limits: np.ndarray, acceleration_limits: 
     durations_s = np.maximum(fastest, np.sqrt(largest.max((1, 2)))) * (1 + BETWEEN_LOOKS)
     best = int(durations_s.argmin())
     return float(durations_s[best]), ACCELERATING_SHARES[best]
-
-
-LEAST_GRID = 41
 
 
 def time_optimal(

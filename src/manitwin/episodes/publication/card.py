@@ -3,65 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from manitwin.dataset.publish.card import size_category
 from manitwin.dataset.publish.card_statistics import licence_lines
 from manitwin.dataset.publish.licences import LICENSES_MD, hub_license, without_attribution
-from manitwin.episodes.attempts import Attempt
+from manitwin.episodes.attempts import Success, Tally
 from manitwin.episodes.publication.choose import TwinInEpisodes
 from manitwin.formats.markdown import markdown_escaped, table
-
-
-@dataclass
-class Tally:
-    """Counts of attempts by how far they came."""
-
-    attempted: int = 0
-    executed: int = 0
-    succeeded: int = 0
-    kept: int = 0
-
-    def add(self, attempt: Attempt) -> None:
-        """Count one."""
-        self.attempted += 1
-        self.executed += attempt.planned
-        self.succeeded += attempt.succeeded
-        self.kept += attempt.outcome == "kept"
-
-
-@dataclass(frozen=True)
-class Success:
-    """Attempts in all, by category and by outcome, and the objects (id, category) that never succeeded."""
-
-    total: Tally = field(default_factory=Tally)
-    by_category: Mapping[str, Tally] = field(default_factory=dict)
-    outcomes: Mapping[str, int] = field(default_factory=dict)
-    never: tuple[tuple[str, str], ...] = ()
-
-
-def success_of(attempts: Iterable[Attempt]) -> Success:
-    """Count attempts."""
-    total, by_category, outcomes = Tally(), dict[str, Tally](), Counter[str]()
-    categories, successful = dict[str, str](), set[str]()
-    for attempt in attempts:
-        total.add(attempt)
-        outcomes[attempt.outcome] += 1
-        if attempt.twin_id:
-            by_category.setdefault(attempt.category, Tally()).add(attempt)
-            categories.setdefault(attempt.twin_id, attempt.category)
-            if attempt.succeeded:
-                successful.add(attempt.twin_id)
-    return Success(
-        total,
-        dict(sorted(by_category.items())),
-        dict(sorted(outcomes.items(), key=lambda item: (-item[1], item[0]))),
-        tuple(sorted((each, name) for each, name in categories.items() if each not in successful)),
-    )
-
 
 TAGS = ("LeRobot", "robotics", "manipulation", "pick-and-place", "simulation", "synthetic")
 ATTEMPTS_FILE, TWINS_FILE = "attempts.parquet", "twins.parquet"

@@ -17,7 +17,7 @@ import pyarrow.parquet as pq
 from manitwin.dataset.publish.licences import LICENSES_MD, licenses_page, without_attribution
 from manitwin.dataset.publish.privacy import check_words, places_of
 from manitwin.dataset.publish.publication import EPISODES, Publication
-from manitwin.episodes.attempts import ATTEMPTS, Attempt, merge_attempts, read_attempts, write_attempts
+from manitwin.episodes.attempts import ATTEMPTS, Attempt, merge_attempts, read_attempts, success_of, write_attempts
 from manitwin.episodes.collect import batch_folders, stored_episodes
 from manitwin.episodes.episode_pictures import PICTURES, batch_name, read_pictures
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
@@ -29,7 +29,6 @@ from manitwin.episodes.publication.card import (
     TWINS_FILE,
     EpisodesCard,
     episodes_card,
-    success_of,
 )
 from manitwin.episodes.publication.choose import Chosen, choose_episodes
 from manitwin.episodes.stored_episode import StoredEpisode
@@ -39,6 +38,15 @@ from manitwin.formats.installation import installed_version
 from manitwin.pipeline.dataset_run import CONFIG
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
+
+README = "README.md"
+TWINS_SCHEMA = pa.schema(
+    [
+        *((name, pa.string()) for name in ("twin_id", "category", "license", "attribution", "source_sha256")),
+        ("revisions", pa.list_(pa.string())),
+        ("episodes", pa.list_(pa.int64())),
+    ]
+)
 
 
 def cameras_of(episodes: Path) -> tuple[str, ...]:
@@ -97,16 +105,6 @@ def _decoded(film: Path) -> Iterator[np.ndarray]:
             yield cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
     finally:
         capture.release()
-
-
-README = "README.md"
-TWINS_SCHEMA = pa.schema(
-    [
-        *((name, pa.string()) for name in ("twin_id", "category", "license", "attribution", "source_sha256")),
-        ("revisions", pa.list_(pa.string())),
-        ("episodes", pa.list_(pa.int64())),
-    ]
-)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,16 @@ from manitwin.twin.store import canonical_json, write_bytes_atomically
 _WIDEST = 110
 _BAR = 40
 
+FOLDER, PAGE, NUMBERS, FIGURES = "statistics", "report.html", "statistics.json", "figures"
+LENGTHS_PICTURE = "lengths.png"
+SCHEMA_VERSION = 1
+EPISODE_FILES = "batches/*/*/episodes.h5"
+_MERGED = "maniskill/trajectory.h5"
+_PRINTED = (
+    *("funnel", "outcomes", "plan_failures", "by_robot", "by_category", "never_kept", "by_grasp_type", "by_others"),
+    *("placement", "joints", "grasps", "beside_the_paper"),
+)
+
 
 class EpisodePage(Page):
     """The page of a folder of episodes: its last section says where these numbers come from."""
@@ -67,17 +77,6 @@ def _cell(column: Column, row: Row) -> str:
     html = written(column, row)
     plain = unescape(html.replace('<span class="interval">', "").replace("</span>", ""))
     return plain if len(plain) <= _WIDEST else plain[: _WIDEST - 1] + "…"
-
-
-FOLDER, PAGE, NUMBERS, FIGURES = "statistics", "report.html", "statistics.json", "figures"
-LENGTHS_PICTURE = "lengths.png"
-SCHEMA_VERSION = 1
-EPISODE_FILES = "batches/*/*/episodes.h5"
-_MERGED = "maniskill/trajectory.h5"
-_PRINTED = (
-    *("funnel", "outcomes", "plan_failures", "by_robot", "by_category", "never_kept", "by_grasp_type", "by_others"),
-    *("placement", "joints", "grasps", "beside_the_paper"),
-)
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,9 @@ from manitwin.twin.store import sha256_of_json
 
 PICTURES = "pictures/"
 
+LAYOUT_RECORD = "layout.json"
+LAYOUT_SCHEMA_VERSION = 1
+
 
 @dataclass(frozen=True)
 class LayoutNumber(Payload):
@@ -90,10 +93,6 @@ class ScenePicturesStage:
         scene = read_scene(draft.path(SCENE))
         write_previews(scene, self._source.folder, folder / PICTURES, size_px=self._px)
         return {}
-
-
-LAYOUT_RECORD = "layout.json"
-LAYOUT_SCHEMA_VERSION = 1
 
 
 class LayoutRecord(FolderRecord):

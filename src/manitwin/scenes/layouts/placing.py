@@ -19,6 +19,8 @@ from manitwin.scenes.settings import LayoutSettings
 
 GROWTH = 1.25  # of a patch's radius when there is no room left in it
 
+GROW_AFTER = 20  # places tried in vain in one patch
+
 
 @dataclass(frozen=True)
 class Clutter:
@@ -104,9 +106,6 @@ def workspace_of(settings: LayoutSettings) -> Workspace | None:
     from manitwin.robots.load import load_robot
 
     return load_robot(settings.robot).workspace
-
-
-GROW_AFTER = 20  # places tried in vain in one patch
 
 
 class Obstacles:

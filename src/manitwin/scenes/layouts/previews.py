@@ -32,6 +32,11 @@ WEBP_QUALITY = 90
 DEPTH_UNIT_M = 0.001
 """Depth is written in whole millimetres, as the cameras that it stands for write it: up to 65 m in 16 bits."""
 
+SCENES_SHOWN = 48
+CAMERA = "oblique"
+TILE_PX, MOST_COLUMNS, CAPTION_PX, GAP_PX = 256, 8, 18, 4
+SHEET_QUALITY = 85
+
 
 def scene_pictures(
     record: SceneRecord, twin_folder: Callable[[str], Path], *, width_px: int, height_px: int
@@ -107,12 +112,6 @@ def _write_frame(frame: SceneFrame, folder: Path, name: str, ids_by_name: Mappin
     depth_picture(frame.depth_m, frame.ids).save(depth_colors)
     ids_picture(frame.ids, ids_by_name).save(ids_colors)
     return [rgb, depth, normals, ids, depth_colors, ids_colors]
-
-
-SCENES_SHOWN = 48
-CAMERA = "oblique"
-TILE_PX, MOST_COLUMNS, CAPTION_PX, GAP_PX = 256, 8, 18, 4
-SHEET_QUALITY = 85
 
 
 def write_contact_sheet(dataset: str | Path, out: str | Path, *, most: int = SCENES_SHOWN) -> int:

@@ -19,6 +19,10 @@ _ON_TABLE = SupportRegion(name="table", center_m=(0.62, 0.0), half_extents_m=(0.
 _TRAY_HALF_M, _TRAY_FLOOR_M, _RIM_M, _RIM_WALL_M = (0.22, 0.32), 0.01, 0.03, 0.01
 _SHELF_HALF_M, _SHELF_RISE_M, _SHELF_BOARDS = (0.17, 0.5), 0.34, 2
 
+FOV_Y_RAD = 0.7
+LEAST_REACH_M = 0.2
+"""A single dice is not all of a picture."""
+
 
 def make_furniture(kind: str, rng: np.random.Generator) -> Furniture:
     """Return a table with its top at z = 0, or that with a tray or a shelf on it; materials and places are drawn."""
@@ -89,11 +93,6 @@ def _material(rng: np.random.Generator) -> str:
 
 def _rounded(value: float) -> float:
     return round(float(value), 4)
-
-
-FOV_Y_RAD = 0.7
-LEAST_REACH_M = 0.2
-"""A single dice is not all of a picture."""
 
 
 def make_lights(rng: np.random.Generator) -> tuple[tuple[float, float, float], tuple[Light, ...]]:
