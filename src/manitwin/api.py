@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
 
     from manitwin.assets.asset import Format
     from manitwin.assets.importers.importer import Imported
-    from manitwin.config import BuildConfig, RunConfig
+    from manitwin.config import BuildConfig
     from manitwin.dataset.index.rebuild import Rebuilt
     from manitwin.dataset.statistics.report import WrittenReport
     from manitwin.engine.events import OnStage
@@ -263,11 +263,9 @@ def _settings(kind: type[Settings], config: Settings | str | Path | None, jobs: 
     settings = (
         config if isinstance(config, kind) else kind() if config is None else load_config(Path(str(config)), kind)
     )
-    return settings if jobs is None else settings.model_copy(update={"run": _with_slots(settings.run, jobs)})
-
-
-def _with_slots(run: RunConfig, jobs: int) -> RunConfig:
-    return run.model_copy(update={"cpu": jobs})
+    if jobs is None:
+        return settings
+    return settings.model_copy(update={"run": settings.run.model_copy(update={"cpu": jobs})})
 
 
 def make_layouts(

@@ -1,4 +1,4 @@
-"""What a backend of your own is written against: five protocols, what they are asked and what they answer.
+"""The protocols that a backend of your own follows: five of them, with what each is asked and what it answers.
 
 Raise ``BackendError`` or one of its kinds where the backend fails (the item stays resumable), ``Rejected`` where the input
 is at fault.
