@@ -23,7 +23,7 @@ _NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' is not there")
 
 @dataclass
 class AssetFiles:
-    """What an asset's files name, looked up below ``root`` and nowhere else, links resolved.
+    """The files that an asset names, looked up below ``root`` and nowhere else, links resolved.
 
     ``used`` are the files that were found, ``missing`` the names that were not, ``remarks`` one line each.
     """

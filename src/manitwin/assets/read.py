@@ -1,4 +1,4 @@
-"""Which tool's asset lies at a path: by what is there, not by what it is called."""
+"""Find and read assets of any tool; a format is told by content, not by names."""
 
 from __future__ import annotations
 

@@ -50,6 +50,22 @@ def read_glb(path: Path, *, limits: MeshLimits | None = None) -> list[trimesh.Tr
     return [bake_transform(_without_seam_faces(part), GLTF_TO_OBJECT) for part in parts]
 
 
+def pack_glb(tree: dict[str, Any], binary: bytes) -> bytes:
+    """Return a GLB container of a document and its one buffer (glTF 2.0, section 4)."""
+    text = json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
+    if binary:
+        chunks += struct.pack("<II", len(binary), 0x004E4942) + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def unpack_glb(glb: bytes) -> tuple[dict[str, Any], bytes]:
+    """Return the document and the buffer of a GLB that ``pack_glb`` has made."""
+    (length,) = struct.unpack_from("<I", glb, 12)
+    return json.loads(glb[20 : 20 + length]), glb[28 + length :]
+
+
 def _without_seam_faces(part: trimesh.Trimesh) -> trimesh.Trimesh:
     keep = has_three_places(np.asarray(part.vertices), np.asarray(part.faces))
     if keep.all():
@@ -106,13 +122,7 @@ class _Document:
         }
         if self._length:
             tree["buffers"] = [{"byteLength": self._length}]
-        text = json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
-        text += b" " * (-len(text) % 4)
-        binary = b"".join(self._chunks)
-        chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
-        if binary:
-            chunks += struct.pack("<II", len(binary), 0x004E4942) + binary
-        return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+        return pack_glb(tree, b"".join(self._chunks))
 
     def _append(self, table: str, entry: dict[str, Any]) -> int:
         entries = self._tables.setdefault(table, [])

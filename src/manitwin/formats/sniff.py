@@ -1,4 +1,4 @@
-"""What a file really is, by its content: names lie."""
+"""Tell a file's format by its content, not by its name."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ NOT_READ = {
 
 @dataclass(frozen=True)
 class Sniffed:
-    """What a file is: its kind, and its format by content (of IMAGE_FORMATS or MESH_FORMATS, or ``heif``)."""
+    """A file's kind, and its format by content (of IMAGE_FORMATS or MESH_FORMATS, or ``heif``)."""
 
     kind: Literal["image", "mesh"]
     format: str

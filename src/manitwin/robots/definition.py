@@ -20,6 +20,7 @@ from pydantic import BaseModel, Field, ValidationError, field_validator
 from manitwin.errors import ConfigError, Unavailable, UsageError, choose_from
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.robots.grippers.box import STRICT
+from manitwin.robots.robot import Workspace
 
 UNIT_TOLERANCE = 1e-6
 PACKAGE, FILE = "package://", "file://"
@@ -47,7 +48,7 @@ class PoseField(BaseModel):
 
 
 class UrdfField(BaseModel):
-    """Where a URDF is: below the TOML file's folder, or in an installed distribution that an extra of this package brings.
+    """The location of a URDF: below the TOML file's folder, or in an installed distribution that an extra of this package brings.
 
     ``package://name/x`` is ``package_folder/name/x``; that folder is given as ``file`` is.
     """
@@ -97,15 +98,6 @@ class GeneratedHand(BaseModel):
     mass_kg: float = Field(gt=0)
 
 
-class WorkspaceField(BaseModel):
-    """Where an object on the table can be reached from above."""
-
-    model_config = STRICT
-    min_radius_m: float = Field(ge=0)
-    max_radius_m: float = Field(gt=0)
-    half_angle_rad: float = Field(gt=0, le=float(np.pi))
-
-
 class RobotDefinition(BaseModel):
     """The keys of a robot's file."""
 
@@ -121,7 +113,7 @@ class RobotDefinition(BaseModel):
     fixed_joints: dict[str, float] = {}
     urdf: UrdfField
     hand: Annotated[OwnHand | MergedHand | GeneratedHand, Field(discriminator="kind")]
-    workspace: WorkspaceField
+    workspace: Workspace
 
 
 def shipped_robots() -> list[str]:

@@ -1,4 +1,4 @@
-"""Pairs of links that need not be tested for collision with each other: an SRDF's, or found by trying.
+"""Pairs of links that need not be tested for collision with each other: an SRDF's, or found by random sampling.
 
 The criteria are those of MoveIt's setup assistant (Coleman et al. 2014): adjacent links, links in contact in the default
 state, and links in contact always (there 95 % of random states).
@@ -43,7 +43,7 @@ def _pair(first: str, second: str) -> tuple[str, str]:
 
 
 def _adjacent(tree: UrdfTree) -> set[tuple[str, str]]:
-    """Links that a joint holds together; a link without shapes stands for what hangs from it by a fixed joint."""
+    """Return links that a joint holds together; a link without shapes stands for what hangs from it by a fixed joint."""
     return {
         _pair(first, second)
         for joint in tree.joints.values()
@@ -66,7 +66,7 @@ def _solid(tree: UrdfTree, link: str, up: bool) -> Iterable[str]:
 
 
 def _within_hand(tree: UrdfTree, finger_joints: tuple[str, str]) -> set[tuple[str, str]]:
-    """The hand's own links: its fingers meet when it is closed."""
+    """Return the hand's own links: its fingers meet when it is closed."""
     hand = tree.below(parent_of(tree.joint(finger_joints[0])))
     return {_pair(first, second) for first, second in combinations(hand, 2)}
 
@@ -83,7 +83,7 @@ def _of_srdf(path: Path, tree: UrdfTree) -> set[tuple[str, str]]:
 
 
 def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, str]]:
-    """Pairs in contact at home, or in most of many random states, of the links' convex hulls."""
+    """Return pairs in contact at home, or in most of many random states, of the links' convex hulls."""
     try:
         import coal
         import pinocchio as pin

@@ -35,7 +35,7 @@ from manitwin.robots.disabled_pairs import disabled_pairs
 from manitwin.robots.grippers.gripper import load_gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.links import links_of_urdf, poses_at
-from manitwin.robots.robot import Robot, Workspace
+from manitwin.robots.robot import Robot
 from manitwin.robots.urdf import UrdfTree, child_of, parent_of, read_urdf
 
 __all__ = ["load_robot", "shipped_robots"]
@@ -48,7 +48,7 @@ TIP_TOLERANCE_M = (
 
 @dataclass(frozen=True)
 class _Hand:
-    """Where the hand is in the whole tree."""
+    """The hand's place in the whole tree."""
 
     tip_link: str
     finger_joints: tuple[str, str]
@@ -102,7 +102,7 @@ def _load(path: Path) -> Robot:
         home_rad=np.array(definition.home_rad),
         velocity_limits_rad_s=definition.velocity_fraction * limits_of(tree, definition.arm_joints, "velocity"),
         acceleration_limits_rad_s2=np.full(len(definition.arm_joints), definition.acceleration_rad_s2),
-        workspace=Workspace(**definition.workspace.model_dump()),
+        workspace=definition.workspace,
     )
     _check_hand(robot)
     return robot

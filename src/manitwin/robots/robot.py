@@ -5,20 +5,25 @@ World frame: the arm's base link at the origin, +Z up, +X forward; the table's t
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field
 
+from manitwin.robots.grippers.box import STRICT
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """Where an object on the table can be reached from above: an annular sector about the base's axis, +X in its middle."""
+    """The part of the table that is reached from above: an annular sector about the base's axis, +X in its middle."""
 
-    min_radius_m: float
-    max_radius_m: float
-    half_angle_rad: float
+    __pydantic_config__ = STRICT
+    min_radius_m: Annotated[float, Field(ge=0)]
+    max_radius_m: Annotated[float, Field(gt=0)]
+    half_angle_rad: Annotated[float, Field(gt=0, le=math.pi)]
 
 
 @dataclass(frozen=True)

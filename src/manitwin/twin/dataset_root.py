@@ -1,4 +1,4 @@
-"""Where a data set lives: a local folder, or any URL that fsspec reads and writes (``s3://``, ``gs://``, ``memory://``).
+"""The root of a data set: a local folder, or any URL that fsspec reads and writes (``s3://``, ``gs://``, ``memory://``).
 
 DATASET/
   config.json                 what was asked for: the whole configuration

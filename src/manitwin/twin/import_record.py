@@ -70,12 +70,12 @@ class ImportRecord(Record):
 
     @property
     def source(self) -> str:
-        """Who says so, as an Estimate's source."""
+        """The source, as an Estimate names it."""
         return f"imported:{self.format}"
 
     @property
     def called(self) -> str:
-        """What the thing is called: the key to the priors."""
+        """The object's name: the key to the priors."""
         return self.category or self.name
 
     def moved(self, transform: np.ndarray) -> ImportRecord:

@@ -77,7 +77,7 @@ class Check(Record):
 
 
 class Rejection(Record):
-    """Why there is no twin of this input."""
+    """The reason for which there is no twin of this input."""
 
     stage: str
     reason: str
@@ -91,7 +91,7 @@ class Rejection(Record):
 
 
 class Source(Record):
-    """Where the twin came from."""
+    """The input that the twin was made of."""
 
     kind: Literal["image", "text", "mesh"]
     file: str
@@ -102,7 +102,7 @@ class Source(Record):
 
 
 class StageProvenance(Record):
-    """Which code and which backend did a stage; ``rehearsal``: a rehearsal server (``manitwin fake``) answered in its place."""
+    """The code and the backend that did a stage; ``rehearsal``: a rehearsal server (``manitwin fake``) answered in its place."""
 
     version: str
     backend: str
@@ -111,7 +111,7 @@ class StageProvenance(Record):
 
 
 class Provenance(Record):
-    """What made the twin."""
+    """The version, configuration, seed and stages that made the twin."""
 
     manitwin_version: str
     config_sha256: str
@@ -246,7 +246,7 @@ class Trial(Record):
 
 
 class SecondOpinion(Record):
-    """How far a second engine agrees: over grasps that held, some that failed, and jittered controls of those that held.
+    """The agreement of a second engine: over grasps that held, some that failed, and jittered controls of those that held.
 
     Kappa is Cohen's over the jittered alone: among grasps that nearly all hold, agreement says little.
     """
@@ -264,7 +264,7 @@ class SecondOpinion(Record):
 
 
 class RobustnessSummary(Record):
-    """What the held grasps were put through again, and how many survive.
+    """The perturbed trials of the held grasps, and how many survive.
 
     ``median`` is that of the grasps' shares; ``robust`` counts those that rather hold in ``robust_share`` of the cases than
     in ``fragile_share`` (the sequential test's verdict).
@@ -292,7 +292,7 @@ class FailureTable(Record):
 
 
 class GraspSummary(Record):
-    """What became of the grasps of one gripper."""
+    """The outcomes of the grasps of one gripper."""
 
     gripper: str
     gripper_sha256: str
@@ -317,7 +317,7 @@ class GraspSummary(Record):
 
 
 class OtherGripper(Record):
-    """What became of the grasps of another gripper: a summary, or why there is none; and what it can hold of the first's.
+    """The outcomes of the grasps of another gripper: a summary, or the reason for none; and what it can hold of the first's.
 
     ``transferred`` counts the grasp points by which the first gripper holds the object and this one does too, of
     ``transferable``.

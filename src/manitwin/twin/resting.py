@@ -1,4 +1,4 @@
-"""How an object rests on a plane: upright, upside down, or lying on one of its sides."""
+"""The ways in which an object rests on a plane: upright, upside down, or lying on one of its sides."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a gripper's fingers would close: what is between them, and how far they must open."""
+"""Two fingers closed on an object along lines: the matter between them, and the least opening."""
 
 from __future__ import annotations
 

@@ -175,12 +175,12 @@ class MeasuredAsset:
 
     @cached_property
     def prior(self) -> Prior | None:
-        """What is usually true of things of this category, or of what the asset is named; None where unknown."""
+        """The prior of the asset's category, or of its name; None where unknown."""
         return lookup(self.asset.category) or lookup(self._name_in_words)
 
     @cached_property
     def material_words(self) -> str:
-        """What is said of the material, in lower case; the asset's name where nothing is."""
+        """The material as declared, in lower case; the asset's name where none is."""
         return (self.asset.contact.material or self._name_in_words).lower()
 
     @property
@@ -191,7 +191,7 @@ class MeasuredAsset:
 
     @cached_property
     def record(self) -> TwinRecord | None:
-        """What a twin says of itself; None of other assets."""
+        """The record of a twin; None for other assets."""
         if self.asset.format != "twin":
             return None
         path = self.asset.path

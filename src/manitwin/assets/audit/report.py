@@ -7,14 +7,14 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 from urllib.parse import quote
 
 from manitwin.assets.audit.finding import Finding, Rule
 from manitwin.assets.audit.run import Audited
 from manitwin.formats.installation import installed_version
+from manitwin.formats.markdown import one_line
 
-ReportFormat = Literal["text", "json", "sarif"]
 PAGE = "docs/audit.md"
 SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
 
@@ -31,7 +31,7 @@ def text_of(each: Audited) -> str:
         return ""
     lines = [f"{each.asset}{f' ({each.format})' if each.format else ''}"]
     lines += [f"  fixed           {said}" for said in each.fixed]
-    lines += [f"  {finding.code} {finding.severity:<8} {_one_line(finding.message)}" for finding in each.findings]
+    lines += [f"  {finding.code} {finding.severity:<8} {one_line(finding.message)}" for finding in each.findings]
     return "\n".join(lines)
 
 
@@ -71,7 +71,7 @@ def _finding_json(finding: Finding) -> dict[str, Any]:
     return {
         "code": finding.code,
         "severity": finding.severity,
-        "message": _one_line(finding.message),
+        "message": one_line(finding.message),
         "file": None if finding.file is None else str(finding.file),
         "values": _plain(finding.values),
     }
@@ -123,7 +123,7 @@ def _result_sarif(finding: Finding, rule_index: int) -> dict[str, Any]:
         "ruleId": finding.code,
         "ruleIndex": rule_index,
         "level": finding.severity,
-        "message": {"text": _one_line(finding.message)},
+        "message": {"text": one_line(finding.message)},
         "locations": [{"physicalLocation": place, "logicalLocations": [{"fullyQualifiedName": finding.asset}]}],
         "properties": {"values": _plain(finding.values)},
     }
@@ -132,10 +132,6 @@ def _result_sarif(finding: Finding, rule_index: int) -> dict[str, Any]:
 def _uri(path: Path) -> str:
     """Return a path as a URI: relative as it was given, or absolute with its scheme."""
     return path.as_uri() if path.is_absolute() else quote(path.as_posix())
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
 
 
 def _plain(value: Any) -> Any:

@@ -35,7 +35,7 @@ ALWAYS = frozenset({"FIL001", "FIL005", "FIL006"})
 
 @dataclass(frozen=True)
 class Audited:
-    """What was found of one asset; ``format`` is None where it could not be read. ``fixed`` says what was rewritten."""
+    """The findings of one asset; ``format`` is None where it could not be read. ``fixed`` says what was rewritten."""
 
     asset: str
     format: str | None

@@ -29,7 +29,7 @@ DIGEST_DIGITS = 8
 
 @dataclass(frozen=True)
 class Imported:
-    """What became of one asset: the folder and its record, or the one line that says why there is none.
+    """The outcome for one asset: the folder and its record, or the one line that says why there is none.
 
     ``there_already``: the folder holds this very asset from before and was left as it is.
     """

@@ -1,4 +1,4 @@
-"""What an asset gives, in the object frame of twins, and in words what it does not."""
+"""The import record of an asset: what it declares in the object frame of twins, and in words what it does not."""
 
 from __future__ import annotations
 

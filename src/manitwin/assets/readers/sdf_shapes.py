@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import AssetFiles, joined
-from manitwin.assets.readers.urdf_shapes import plain_material
+from manitwin.assets.readers.urdf_shapes import mesh_parts, plain_material
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part
@@ -21,7 +22,6 @@ from manitwin.formats.xml_file import number, numbers, text_of
 from manitwin.geometry.poses import transform
 
 MODEL_FRAME = "__model__"
-_BARE_MESHES = (".stl",)  # a mesh that has a colour of its own keeps it
 _SCHEMES = ("model://", "package://")
 
 
@@ -148,28 +148,25 @@ class SdfShapes:
         path = self._files.find(uri, self._candidates(uri))
         if path is None:
             return []
-        mesh = self._files.mesh(path)
-        parts = self._submesh(shape, mesh, path)
-        if mesh.format == "dae" and mesh.up == "y":
-            # as for URDF: simulators disagree on turning it
-            self._files.remark(f"{path.name}: its COLLADA says that Y is up; it was not turned")
-        unit_m = mesh.unit_m if mesh.format == "dae" and mesh.unit_m is not None else 1.0
         scale = text_of(shape, "scale")
-        factors = np.ones(3) if scale is None else numbers(scale, 3, f"{what} scale")
-        parts = [bake_transform(part, np.diag([*(factors * unit_m), 1.0])) for part in parts]
-        if color is None or path.suffix.lower() not in _BARE_MESHES:
-            return parts
-        return [make_part(p.vertices, p.faces, material=plain_material(color), name=p.metadata["name"]) for p in parts]
+        return mesh_parts(
+            self._files,
+            path,
+            self._submesh(shape, self._files.mesh(path), path),
+            color=color,
+            turned_note="it was not turned",  # as for URDF: simulators disagree
+            scale=None if scale is None else numbers(scale, 3, f"{what} scale"),
+        )
 
-    def _submesh(self, shape: etree._Element, mesh: MeshFile, path: Path) -> list[trimesh.Trimesh]:
+    def _submesh(self, shape: etree._Element, mesh: MeshFile, path: Path) -> MeshFile:
         name = text_of(shape, "submesh/name")
         if name is None:
-            return mesh.parts
+            return mesh
         chosen = [part for part in mesh.parts if part.metadata["name"] == name]
         if not chosen or (text_of(shape, "submesh/center") or "").lower() in ("true", "1"):
             self._files.remark(f"{path.name}: submesh {name[:60]!r} could not be taken alone; the whole mesh was read")
-            return mesh.parts
-        return chosen
+            return mesh
+        return replace(mesh, parts=chosen)
 
     def _candidates(self, uri: str) -> Iterator[Path]:
         clean = uri.replace("\\", "/").removeprefix("file://")

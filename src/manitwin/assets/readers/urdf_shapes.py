@@ -12,6 +12,7 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part, pbr_material, srgb_to_linear
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
@@ -65,15 +66,8 @@ class LinkShapes:
         path = self._files.find(name, self._candidates(name))
         if path is None:
             return []
-        mesh = self._files.mesh(path)
-        if mesh.format == "dae" and mesh.up == "y":
-            # RViz and Gazebo Classic disagree here; ROS documents URDF meshes as taken along the link's axes
-            self._files.remark(f"{path.name}: its COLLADA says that Y is up; it was not turned, as ROS does not")
-        unit_m = mesh.unit_m if mesh.format == "dae" and mesh.unit_m is not None else 1.0
-        parts = [bake_transform(part, np.diag([unit_m, unit_m, unit_m, 1.0])) for part in mesh.parts]
-        if color is None or path.suffix.lower() not in _BARE_MESHES:
-            return parts
-        return [make_part(p.vertices, p.faces, material=plain_material(color), name=p.metadata["name"]) for p in parts]
+        note = "it was not turned, as ROS does not"  # RViz and Gazebo Classic disagree; ROS takes meshes along the link's axes
+        return mesh_parts(self._files, path, self._files.mesh(path), color=color, turned_note=note)
 
     def _candidates(self, name: str) -> Iterator[Path]:
         clean = name.replace("\\", "/").removeprefix("file://")
@@ -120,6 +114,29 @@ def _primitive(shape: etree._Element) -> trimesh.Trimesh:
         return primitives.sphere(float(shape.get("radius")))
     build = primitives.cylinder if shape.tag == "cylinder" else primitives.capsule
     return build(float(shape.get("radius")), float(shape.get("length")))
+
+
+def mesh_parts(
+    files: AssetFiles,
+    path: Path,
+    mesh: MeshFile,
+    *,
+    color: np.ndarray | None,
+    turned_note: str,
+    scale: np.ndarray | None = None,
+) -> list[trimesh.Trimesh]:
+    """Return the parts of a mesh file that a description names, in metres and scaled by ``(3,)``.
+
+    COLLADA's unit counts and its up axis does not, which ``turned_note`` says. A file without colours takes ``color``.
+    """
+    if mesh.format == "dae" and mesh.up == "y":
+        files.remark(f"{path.name}: its COLLADA says that Y is up; {turned_note}")
+    unit_m = mesh.unit_m if mesh.format == "dae" and mesh.unit_m is not None else 1.0
+    factors = np.ones(3) if scale is None else scale
+    parts = [bake_transform(part, np.diag([*(factors * unit_m), 1.0])) for part in mesh.parts]
+    if color is None or path.suffix.lower() not in _BARE_MESHES:
+        return parts
+    return [make_part(p.vertices, p.faces, material=plain_material(color), name=p.metadata["name"]) for p in parts]
 
 
 def plain_material(rgba: np.ndarray | None) -> trimesh.visual.material.PBRMaterial:

@@ -1,4 +1,4 @@
-"""A USD stage of a stranger's, composed of the layers in its own folder and of nothing else."""
+"""A USD stage composed of the layers in its own folder and of nothing else, for files from untrusted sources."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MAX_DEPTH = 300
 
 @dataclass(frozen=True)
 class Place:
-    """Where a layer or a texture is: a file, and a member of it where the file is a package."""
+    """The location of a layer or texture: a file, and a member of it where the file is a package."""
 
     file: Path
     member: str | None = None

@@ -18,8 +18,8 @@ from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, decode_texture, make_part, pbr_material
 from manitwin.formats.meshes.triangles import triangle_fans
-from manitwin.formats.meshes.usdz import mesh_parts
-from manitwin.formats.meshes.usdz_package import PreviewSurfaces
+from manitwin.formats.meshes.usdz import mesh_parts, mesh_polygons
+from manitwin.formats.meshes.usdz_package import PreviewSurfaces, texture_of
 
 _MAX_SIZE_M = 1e6  # what is larger is no object, and its products overflow single precision
 _ALONG = {
@@ -174,19 +174,11 @@ def _nearest_with(prim: Usd.Prim, api: type) -> Usd.Prim | None:
 
 def _bare_mesh(mesh: UsdGeom.Mesh, source: MeshSource) -> trimesh.Trimesh:
     """Return a mesh prim's points and polygons, cut into triangles, and nothing else."""
-    when = Usd.TimeCode.EarliestTime()
-    values = [
-        attr.Get(when)
-        for attr in (mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
-    ]
-    if any(value is None for value in values):
+    polygons = mesh_polygons(mesh, source)
+    if polygons is None:
         return _grey(trimesh.Trimesh(), mesh.GetPrim())
-    points, sizes, indices = np.asarray(values[0], float).reshape(-1, 3), np.asarray(values[1]), np.asarray(values[2])
-    if len(sizes) and (
-        sizes.min() < 0 or sizes.sum() != len(indices) or indices.min() < 0 or indices.max() >= len(points)
-    ):
-        raise source.unreadable(f"the faces of {mesh.GetPath()} do not match its points", "export it again")
-    corners, _ = triangle_fans(sizes.astype(np.int64))
+    points, sizes, indices = polygons
+    corners, _ = triangle_fans(sizes)
     faces = indices[corners.reshape(-1)].reshape(-1, 3)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         faces = faces[:, ::-1]
@@ -206,17 +198,15 @@ class LayeredSurfaces(PreviewSurfaces):
         self._materials = {}
         self._images: dict[str, Image.Image | None] = {}
 
-    def _texture(self, reader: UsdShade.Shader, stage: Usd.Stage) -> Image.Image | None:
-        socket = reader.GetInput("file")
-        attributes = socket.GetValueProducingAttributes() if socket else []
-        asset = attributes[0].Get() if attributes else None
-        if asset is None or not asset.path:
+    def _texture(self, reader: UsdShade.Shader) -> Image.Image | None:
+        named = texture_of(reader)
+        if named is None:
             return None
-        layer = attributes[0].GetPropertyStack(Usd.TimeCode.Default())[0].layer
-        key = f"{layer.identifier}:{asset.path}"
+        layer, path = named
+        key = f"{layer.identifier}:{path}"
         if key not in self._images:
-            data = self._layers.texture(layer, asset.path)
-            self._images[key] = None if data is None else decode_texture(data, asset.path, self._source)
+            data = self._layers.texture(layer, path)
+            self._images[key] = None if data is None else decode_texture(data, path, self._source)
         return self._images[key]
 
 

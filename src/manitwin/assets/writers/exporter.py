@@ -1,4 +1,4 @@
-"""What exporters are given of a twin: everything in memory, so that each is a pure function."""
+"""The interface of exporters: pure functions from a twin in memory to files in memory."""
 
 from __future__ import annotations
 

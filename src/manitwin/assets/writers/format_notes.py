@@ -1,4 +1,4 @@
-"""What each format says of a twin, where, and how its files are loaded: the facts for the README of an export."""
+"""Facts on each format for the README of an export: what it says of a twin, where, and how its files are loaded."""
 
 from __future__ import annotations
 

@@ -6,15 +6,11 @@ applications (section 3.3), and ``asset.copyright`` is its own field for the lic
 
 from __future__ import annotations
 
-import json
-import struct
-from typing import Any
-
 from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.licenses import license_of
 from manitwin.assets.writers.mass_properties import physics_of
 from manitwin.assets.writers.mesh_files import hulls_of
-from manitwin.formats.glb import write_glb
+from manitwin.formats.glb import pack_glb, unpack_glb, write_glb
 from manitwin.formats.markdown import one_line
 from manitwin.formats.meshes.textures import make_part, pbr_material
 
@@ -22,8 +18,6 @@ FRAME = (
     "numbers here: right-handed, +Z up, origin at the bottom centre, quaternions wxyz; "
     "(x, y, z) of it is (x, z, -y) of this file's meshes"
 )
-_HEADER = struct.Struct("<4sII")
-_CHUNK = struct.Struct("<II")
 
 
 def export(twin: TwinContent) -> Exported:
@@ -38,24 +32,13 @@ def export(twin: TwinContent) -> Exported:
         "copyright": f"{license_of(twin.record)}{', ' if credit else ''}{credit}",
         "extras": {"manitwin_physics": {**physics_of(twin), "frame": FRAME}},
     }
+    tree, binary = unpack_glb(write_glb(hulls))
+    tree["asset"] |= asset
     return Exported(
-        files={"visual.glb": twin.visual_glb, "collision.glb": with_asset(write_glb(hulls), asset)},
+        files={"visual.glb": twin.visual_glb, "collision.glb": pack_glb(tree, binary)},
         main="visual.glb",
         cannot_say=(
             "mass, centre of mass, inertia and friction: glTF has none; collision.glb has them in asset.extras.",
             "which meshes collide, and that they are convex: every mesh of collision.glb is one convex hull.",
         ),
     )
-
-
-def with_asset(glb: bytes, fields: dict[str, Any]) -> bytes:
-    """Return a GLB with ``fields`` added to the ``asset`` of its document (glTF 2.0, section 4.4: the JSON chunk is first)."""
-    length, kind = _CHUNK.unpack_from(glb, _HEADER.size)
-    start = _HEADER.size + _CHUNK.size
-    tree = json.loads(glb[start : start + length])
-    tree["asset"] |= fields
-    text = json.dumps(tree, sort_keys=True, separators=(",", ":"), allow_nan=False).encode()
-    text += b" " * (-len(text) % 4)
-    rest = glb[start + length :]
-    total = _HEADER.size + _CHUNK.size + len(text) + len(rest)
-    return _HEADER.pack(b"glTF", 2, total) + _CHUNK.pack(len(text), kind) + text + rest

@@ -12,12 +12,12 @@ from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.twin.grasp_table import JITTERED, JOINTS
 
-CONTROLS = (":unfiltered", ":jittered")
+CONTROLS = (":unfiltered", JITTERED)
 """How the proposers of grasps end that count in no summary: a sample without filters, and held ones jittered on purpose."""
 
 
-GRASP_JOINTS = "grasp_joints_rad"  # null in the table but for hands with more joints
 _HALF = 0.5**0.5
 
 
@@ -67,7 +67,7 @@ def parallel_grippers_of(twin: TwinContent) -> list[str]:
     table = twin.grasps
     others = {
         name
-        for name, width_m, joints in zip(table["gripper"], table["width_m"], table[GRASP_JOINTS], strict=True)
+        for name, width_m, joints in zip(table["gripper"], table["width_m"], table[JOINTS[-1]], strict=True)
         if joints is not None or not width_m
     }
     return [name for name in grippers_of(twin) if name not in others]

@@ -1,4 +1,4 @@
-"""Which twins may go out, and what goes with them: licence, source and whom to credit."""
+"""Licences of exports: the check against an allowed list, and the texts of licence, source and attribution."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ PHYSICS_FILE = "physics.json"
 
 
 @dataclass(frozen=True)
-class MassProperties:
+class TwinInertial:
     """Mass, ``center_of_mass_m (3,)`` and ``inertia_kg_m2 (3, 3)`` about it along the axes of the object frame.
 
     The same tensor as ``principal_moments_kg_m2 (3,)`` along axes that ``principal_axes_wxyz`` turns into the object's.
@@ -35,7 +35,7 @@ class MassProperties:
     principal_axes_wxyz: np.ndarray
 
 
-def inertial_of(twin: TwinContent) -> MassProperties:
+def inertial_of(twin: TwinContent) -> TwinInertial:
     """Return a twin's mass properties.
 
     Raises ExportError for a mass that is not positive, and for a tensor that is not symmetric, not positive definite or
@@ -59,7 +59,7 @@ def inertial_of(twin: TwinContent) -> MassProperties:
     if slack < TRIANGLE_TOLERANCE * most:  # MuJoCo allows for no rounding of A + B >= C
         extra = TRIANGLE_TOLERANCE * most - slack
         tensor, moments = tensor + extra * np.eye(3), moments + extra
-    return MassProperties(mass_kg, np.array(physical.center_of_mass_m), tensor, moments, axes_wxyz)
+    return TwinInertial(mass_kg, np.array(physical.center_of_mass_m), tensor, moments, axes_wxyz)
 
 
 def principal_axes(inertia_kg_m2: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -12,7 +12,7 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.licenses import UNKNOWN, license_of, provenance_lines
-from manitwin.assets.writers.mass_properties import PHYSICS_FILE, MassProperties, inertial_of, physics_file
+from manitwin.assets.writers.mass_properties import PHYSICS_FILE, TwinInertial, inertial_of, physics_file
 from manitwin.assets.writers.mesh_files import hull_files, lost_maps, visual_parts
 from manitwin.formats.markdown import one_line
 from manitwin.formats.xml_file import add, document, new_element, number_text
@@ -58,7 +58,7 @@ def export(twin: TwinContent) -> Exported:
     )
 
 
-def _add_inertial(link: etree._Element, inertial: MassProperties) -> None:
+def _add_inertial(link: etree._Element, inertial: TwinInertial) -> None:
     element = add(link, "inertial")
     add(element, "pose", f"{number_text(*inertial.center_of_mass_m)} 0 0 0")
     add(element, "mass", number_text(inertial.mass_kg))

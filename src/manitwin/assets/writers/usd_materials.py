@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import struct
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from PIL import Image
 from pxr import Gf, Sdf, Tf, Usd, UsdShade
 from trimesh.visual.material import PBRMaterial
 
+from manitwin.formats.glb import unpack_glb
 from manitwin.formats.meshes.textures import TEXTURE_FORMATS
 
 _Types = Sdf.ValueTypeNames
@@ -141,11 +141,9 @@ class GlbImages:
     """Encoded images by what they show."""
 
     def __init__(self, glb: bytes):
-        """Read a GLB that ``files.glb.write_glb`` has made."""
+        """Read a GLB that ``formats.glb.write_glb`` has made."""
         self._encoded: dict[str, bytes] = {}
-        (length,) = struct.unpack_from("<I", glb, 12)
-        document = json.loads(glb[20 : 20 + length])
-        binary = glb[28 + length :]
+        document, binary = unpack_glb(glb)
         for image in document.get("images", []):
             view = document["bufferViews"][image["bufferView"]]
             data = binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]

@@ -38,7 +38,7 @@ _REMEDY = "download or export it again"
 
 @dataclass(frozen=True)
 class MeshFile:
-    """What a mesh file holds.
+    """The content of a mesh file.
 
     ``parts`` are trimesh meshes with TextureVisuals and PBRMaterial, in the file's own unit and axes, scene transforms
     baked. ``unit_m`` is the length of that unit in metres and ``up`` the file's up axis ('x' | 'y' | 'z'), None where

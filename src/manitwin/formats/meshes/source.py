@@ -11,7 +11,7 @@ from manitwin.formats.source_files import inside_folder, spellings
 
 @dataclass(frozen=True)
 class MeshLimits:
-    """What a mesh file may ask for before it is refused: bytes (with all files it names), triangles, texture pixels.
+    """The limits beyond which a mesh file is refused: bytes (with all files it names), triangles, texture pixels.
 
     ``decode_textures`` false: of textures only the size is looked at, and their pixels are decoded by whoever wants them.
     """

@@ -79,18 +79,10 @@ def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[t
 
 def mesh_parts(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, source: MeshSource) -> list[trimesh.Trimesh]:
     """Return a mesh prim as one part a material subset."""
-    points = _value(mesh.GetPointsAttr())
-    sizes = _value(mesh.GetFaceVertexCountsAttr())
-    indices = _value(mesh.GetFaceVertexIndicesAttr())
-    if points is None or sizes is None or indices is None or len(sizes) == 0:
+    polygons = mesh_polygons(mesh, source)
+    if polygons is None or len(polygons[1]) == 0:
         return []
-    points, sizes, indices = np.asarray(points, np.float64), np.asarray(sizes, np.int64), np.asarray(indices, np.int64)
-    if (
-        sizes.min() < 0
-        or sizes.sum() != len(indices)
-        or (len(indices) and (indices.min() < 0 or indices.max() >= len(points)))
-    ):
-        raise source.unreadable(f"the faces of {mesh.GetPath()} do not match its points", "export it again")
+    points, sizes, indices = polygons
     for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr()):
         if attribute.ValueMightBeTimeVarying():
             source.find("the file is animated; its first frame was taken")
@@ -118,6 +110,22 @@ def mesh_parts(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, source: MeshSource
             part = color_by_corner(part, colors[flat].reshape(-1, 3, 3), source)
         parts.append(part)
     return parts
+
+
+def mesh_polygons(mesh: UsdGeom.Mesh, source: MeshSource) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Return a mesh prim's points ``(V, 3)``, the sizes of its polygons and the points at their corners; None without any.
+
+    Raises InputError ``unreadable`` where they do not belong together.
+    """
+    attributes = (mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr())
+    points, sizes, indices = (_value(attribute) for attribute in attributes)
+    if points is None or sizes is None or indices is None:
+        return None
+    points, sizes, indices = np.asarray(points, np.float64), np.asarray(sizes, np.int64), np.asarray(indices, np.int64)
+    matching = (sizes >= 0).all() and sizes.sum() == len(indices)
+    if not matching or (indices < 0).any() or (indices >= len(points)).any():
+        raise source.unreadable(f"the faces of {mesh.GetPath()} do not match its points", "export it again")
+    return points.reshape(-1, 3), sizes, indices
 
 
 def _subsets(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, count: int) -> list[tuple[PBRMaterial, np.ndarray]]:

@@ -179,7 +179,7 @@ class PreviewSurfaces:
         producer = UsdShade.Shader(attributes[0].GetPrim()) if attributes else None
         if producer and producer.GetIdAttr().Get() == "UsdUVTexture":
             output = attributes[0].GetName().split(":")[-1]
-            image = self._texture(producer, attributes[0].GetStage())
+            image = self._texture(producer)
             if image is not None and channel != "rgb":
                 bands = image.split()
                 return default, bands["rgba".index(output)] if output in "rgba" and "rgba".index(output) < len(
@@ -189,22 +189,28 @@ class PreviewSurfaces:
         value = attributes[0].Get() if attributes else socket.Get()
         return (default if value is None else value), None
 
-    def _texture(self, reader: UsdShade.Shader, stage: Usd.Stage) -> Image.Image | None:
-        socket = reader.GetInput("file")
-        attributes = socket.GetValueProducingAttributes() if socket else []
-        asset = attributes[0].Get() if attributes else None
-        if asset is None or not asset.path:
+    def _texture(self, reader: UsdShade.Shader) -> Image.Image | None:
+        named = texture_of(reader)
+        if named is None:
             return None
         # the path counts from the layer that wrote it; in a package that is the member's own folder
-        layer = attributes[0].GetPropertyStack(Usd.TimeCode.Default())[0].layer.identifier
+        layer, path = named[0].identifier, named[1]
         inner = layer[layer.rfind("[") + 1 : -1] if layer.endswith("]") else (self._archive.root or "")
-        name = (
-            asset.path if asset.path.startswith(("/", "\\")) else posixpath.join(posixpath.dirname(inner), asset.path)
-        )
+        name = path if path.startswith(("/", "\\")) else posixpath.join(posixpath.dirname(inner), path)
         if name not in self._images:
             data = self._archive.read(name, "texture")
-            self._images[name] = None if data is None else decode_texture(data, asset.path, self._source)
+            self._images[name] = None if data is None else decode_texture(data, path, self._source)
         return self._images[name]
+
+
+def texture_of(reader: UsdShade.Shader) -> tuple[Sdf.Layer, str] | None:
+    """Return the file that a texture reader names, and the layer that names it; None where it names none."""
+    socket = reader.GetInput("file")
+    attributes = socket.GetValueProducingAttributes() if socket else []
+    asset = attributes[0].Get() if attributes else None
+    if asset is None or not asset.path:
+        return None
+    return attributes[0].GetPropertyStack(Usd.TimeCode.Default())[0].layer, asset.path
 
 
 def _packed(

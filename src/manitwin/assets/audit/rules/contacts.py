@@ -41,7 +41,7 @@ class Contacts:
 
 @cache
 def default_gripper() -> Gripper:
-    """The gripper that contact frames are held against where they name none: the paper's."""
+    """Return the gripper that contact frames are held against where they name none: the paper's."""
     return load_gripper("panda")
 
 

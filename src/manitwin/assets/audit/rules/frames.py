@@ -34,7 +34,7 @@ class Frames:
 
     @property
     def sound(self) -> np.ndarray:
-        """Which are rigid transforms."""
+        """The frames that are rigid transforms."""
         return self.finite & ~self.left_handed & (self.off <= NOT_ORTHONORMAL)
 
 
