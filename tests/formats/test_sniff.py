@@ -12,6 +12,7 @@ from PIL import Image
 
 from manitwin.errors import InputError
 from manitwin.formats.sniff import Sniffed, sniff
+from manitwin.pipeline.left_alone import why_no_input
 
 
 @pytest.mark.parametrize(
@@ -78,3 +79,19 @@ def test_bad_shared_inputs_are_refused(shared_data: Path, name: str, reason: str
         sniff(shared_data / "bad" / name)
     assert caught.value.reason == reason
     assert caught.value.detail.startswith(name) and "\n" not in caught.value.detail
+
+
+@pytest.mark.parametrize("content", [b"", b"ISO-10303-21;\nHEADER;", b"PK\3\4" + bytes(60)])
+@pytest.mark.parametrize("name", ["thing.step", "a.zip", "robot.URDF", "clip.mp4"])
+def test_single_file_is_refused_with_the_reason_of_a_folder(tmp_path: Path, name: str, content: bytes) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError) as refused:
+        sniff(path)
+    assert refused.value.reason == "wrong_type" and str(refused.value).endswith(f"{name}: {why_no_input(path)}")
+
+
+def test_image_under_such_a_name_is_an_image(tmp_path: Path) -> None:
+    path = tmp_path / "photo.zip"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(64))
+    assert sniff(path).format == "png"
