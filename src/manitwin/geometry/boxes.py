@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from itertools import permutations
+from itertools import permutations, product
 
 import cv2
 import numpy as np
 from scipy.spatial import ConvexHull
 
 from manitwin.geometry.poses import transform
+
+
+def box_corners(half_extents_m: np.ndarray, box_to_frame: np.ndarray) -> np.ndarray:
+    """Return the eight corners ``(8, 3)`` of a box at a pose ``(4, 4)``."""
+    signs = np.array(list(product((-1.0, 1.0), repeat=3)))
+    return (signs * half_extents_m) @ box_to_frame[:3, :3].T + box_to_frame[:3, 3]
 
 
 def oriented_bounding_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

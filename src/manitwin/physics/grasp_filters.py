@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.physics.grasp_selection import Merits
 from manitwin.robots.grippers.hand_clearance import HandCollision
@@ -32,7 +33,6 @@ SUPPORT_CLEARANCE_M = 0.002
 """Between the open hand and the plane."""
 MIN_DESCENT = 0.5
 """The least cosine between the approach and straight down at which a hand is raised along it."""
-CORNERS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], float)
 
 
 @dataclass(frozen=True)
@@ -140,12 +140,7 @@ def pad_merits(contacts: PadContacts, torque_ratio: np.ndarray) -> Merits:
 
 def lowest_points_m(gripper: ParallelGripper, gripper_to_object: np.ndarray, object_to_plane: np.ndarray) -> np.ndarray:
     """Return the least height ``(N,)`` of the wide open hand above the plane z = 0, for each pose ``(N, 4, 4)``."""
-    corners = np.concatenate(
-        [
-            (CORNERS * half_extents_m) @ box_to_gripper[:3, :3].T + box_to_gripper[:3, 3]
-            for box_to_gripper, half_extents_m in gripper.boxes(gripper.opening_m)
-        ]
-    )
+    corners = np.concatenate([box_corners(half_m, pose) for pose, half_m in gripper.boxes(gripper.opening_m)])
     upwards = object_to_plane[2, :3]
     along = np.einsum("i,nij->nj", upwards, gripper_to_object[:, :3, :3])
     origins = gripper_to_object[:, :3, 3] @ upwards + object_to_plane[2, 3]

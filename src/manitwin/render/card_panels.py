@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import trimesh
 
+from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.hulls.reduction import convex_corners, hull_mesh
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling
@@ -189,7 +190,7 @@ def gripper_fork(boxes: Boxes, rod_m: float) -> trimesh.Trimesh:
     sides: dict[int, list[np.ndarray]] = {1: [], -1: []}
     front = 0.0
     for box_to_gripper, half in boxes:
-        corners = _corners(box_to_gripper, half)
+        corners = box_corners(half, box_to_gripper)
         if abs(box_to_gripper[0, 3]) < 1e-9:
             front = max(front, float(corners[:, 2].max()))
         else:
@@ -218,8 +219,3 @@ def _rod(start: Sequence[float], end: Sequence[float], thickness: float) -> trim
     """Return a square rod along an axis of the frame, closed around both ends."""
     low, high = np.minimum(start, end) - thickness / 2, np.maximum(start, end) + thickness / 2
     return trimesh.Trimesh(low + _UNIT_BOX[0] * (high - low), _UNIT_BOX[1], process=False)
-
-
-def _corners(box_to_gripper: np.ndarray, half: np.ndarray) -> np.ndarray:
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
-    return (signs * half) @ box_to_gripper[:3, :3].T + box_to_gripper[:3, 3]

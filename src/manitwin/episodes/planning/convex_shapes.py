@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from manitwin.episodes.planning.libraries import coal
+from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.rigid_body import RigidBody
 
 KEPT_BODIES = 256
@@ -30,8 +31,7 @@ def convex_hull(points: np.ndarray) -> Any:
 def corners_of(shape: Any) -> np.ndarray | None:
     """Return the corners ``(N, 3)`` of one of pinocchio's shapes in the frame of its joint; None for what has none."""
     if isinstance(shape.geometry, coal.Box):
-        signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
-        local = signs * shape.geometry.halfSide
+        local = box_corners(shape.geometry.halfSide, np.eye(4))
     elif isinstance(shape.geometry, coal.ConvexBase):
         local = np.array([shape.geometry.point(i) for i in range(shape.geometry.num_points)])
     else:

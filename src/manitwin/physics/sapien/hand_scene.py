@@ -18,7 +18,7 @@ import sapien
 from sapien import physx
 
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.sapien.body import dynamic_component
+from manitwin.physics.sapien.body import entity_at, graspable_component
 from manitwin.physics.sapien.scene import scene_config
 from manitwin.physics.sapien.shapes import HullShapes
 from manitwin.physics.trial import TrialSettings
@@ -26,9 +26,6 @@ from manitwin.physics.trial_phases import HandContacts
 
 NO_SPIN = np.zeros(3, np.float32)
 LOAD_RATE_PER_S = 0.01  # drag of the load's drive per mass: 1e-4 of the weight at 0.1 m/s in the hand
-# At 1 m/s the solver cannot push a thing of 10 g off fingers that close with 50 N: 7 of 20 grasps of a sponge sank in or
-# were lost, of which none is at 5 or 100 m/s; of four that were tried at 1/960 s and 40 iterations, all four hold.
-MAX_DEPENETRATION_M_S = 5.0
 
 
 class SapienHand(Protocol):
@@ -60,10 +57,14 @@ class HandScene:
             self.system = physx.PhysxCpuSystem()
         self.scene = scene = sapien.Scene([self.system])  # kept: bodies go with their scene
         self.system.timestep = settings.timestep_s
-        self.object = _object(body, shapes, settings)
-        self.entity = sapien.Entity()
-        self.entity.add_component(self.object)
-        self.entity.pose = sapien.Pose(object_to_hand)
+        self.object = graspable_component(
+            body,
+            shapes,
+            contact_offset_m=settings.contact_offset_m,
+            solver_iterations=settings.solver_iterations,
+        )
+        self.object.set_sleep_threshold(0.0)  # at rest in the hand is not at rest
+        self.entity = entity_at(self.object, sapien.Pose(object_to_hand))
         self.load = _load(self.object)
         self.entity.add_component(self.load)
         scene.add_entity(self.entity)
@@ -110,17 +111,6 @@ class HandScene:
         pose = self.object.entity_pose.to_transformation_matrix().astype(float)
         self.looks.append(pose)
         return pose
-
-
-def _object(body: RigidBody, shapes: HullShapes, settings: TrialSettings) -> physx.PhysxRigidDynamicComponent:
-    component = dynamic_component(body, shapes, contact_offset_m=settings.contact_offset_m, soft_pad=True)
-    component.set_sleep_threshold(0.0)  # at rest in the hand is not at rest
-    component.solver_position_iterations = settings.solver_iterations
-    component.solver_velocity_iterations = 1
-    component.max_depenetration_velocity = MAX_DEPENETRATION_M_S
-    component.set_linear_damping(0.0)
-    component.set_angular_damping(0.05)
-    return component
 
 
 def _load(target: physx.PhysxRigidDynamicComponent) -> physx.PhysxDriveComponent:

@@ -81,8 +81,12 @@ class RestWatch:
 
 @dataclass(frozen=True)
 class Rest:
-    """The end of settling: ``at_rest (N,)``, ``lost (N,)`` where a body went so far that the rest was not waited for."""
+    """Bodies after settling: ``object_to_world (N, 4, 4)``, ``at_rest (N,)``, and the steps that it took.
 
+    ``lost (N,)`` went so far that the rest was not waited for.
+    """
+
+    object_to_world: np.ndarray
     at_rest: np.ndarray
     lost: np.ndarray
     steps: int
@@ -114,7 +118,7 @@ def settle(
             lost = np.linalg.norm((now - watch.start)[:, :3, 3], axis=1) > limits_m
             if (done >= least and watch.all_rest) or lost.any():
                 break
-    return Rest(watch.looks > 0, lost, done)
+    return Rest(poses_of(bodies), watch.looks > 0, lost, done)
 
 
 @dataclass(frozen=True)
@@ -156,28 +160,22 @@ def settle_on_plane(
             for pose, offset, own in zip(object_to_plane, offsets, shapes, strict=True)
         ]
         rest = settle(scene.physx_system, bodies, timestep_s=TIMESTEP_S, seconds=seconds)
-        ends = poses_of(bodies)
-    ends[:, :2, 3] -= np.array(offsets)[:, :2]
+    rest.object_to_world[:, :2, 3] -= np.array(offsets)[:, :2]
     return [
         Settled.of(body, pose, end, bool(at_rest))
-        for pose, end, at_rest in zip(object_to_plane, ends, rest.at_rest, strict=True)
+        for pose, end, at_rest in zip(object_to_plane, rest.object_to_world, rest.at_rest, strict=True)
     ]
 
 
 @dataclass(frozen=True)
-class SettledScene:
+class SettledScene(Rest):
     """A scene after its objects came to rest.
 
-    ``object_to_world (N, 4, 4)``, ``at_rest (N,)``; ``lost (N,)`` went so far that the rest was not waited for. ``touching``
-    are pairs of names (objects and boxes) that press on each other, the earlier added first, with the deepest overlap (m, 0
-    where none) that the solver has left between them.
+    ``touching`` are pairs of names (objects and boxes) that press on each other, the earlier added first, with the deepest
+    overlap (m, 0 where none) that the solver has left between them.
     """
 
-    object_to_world: np.ndarray
-    at_rest: np.ndarray
-    lost: np.ndarray
     touching: dict[tuple[str, str], float]
-    steps: int
 
     def neighbours(self, name: str) -> set[str]:
         """Return what touches an object."""
@@ -218,7 +216,7 @@ def settle_scene(
             at_least_s=at_least_s,
             give_up_m=give_up_m,
         )
-        return SettledScene(poses_of(bodies), rest.at_rest, rest.lost, _touching(scene, names), rest.steps)
+        return SettledScene(**vars(rest), touching=_touching(scene, names))
 
 
 def _release(

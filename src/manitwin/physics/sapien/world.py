@@ -15,9 +15,8 @@ import sapien
 from sapien import physx
 
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, StaticBox
-from manitwin.physics.sapien.body import dynamic_component, entity_at, static_box, static_plane
+from manitwin.physics.sapien.body import entity_at, graspable_component, static_box, static_plane
 from manitwin.physics.sapien.contacts import ContactReader, Role
-from manitwin.physics.sapien.hand_scene import MAX_DEPENETRATION_M_S
 from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.scene import system_with_gravity
 from manitwin.physics.sapien.settle import Rest, RestLimits, RestWatch, settle
@@ -27,7 +26,6 @@ from manitwin.robots.robot import Robot
 # Where it waits for rest, a world believes velocities, and twice as high ones: they only end the waiting, and poses tell whether
 # a start or a placement stays. By the way between looks, 50 of 50 episodes end the same, up to 0.25 s sooner or later.
 RESTS = RestLimits(speed_m_s=2e-3, turn_rad_s=2e-2, looks=2, by_velocity=True)
-ANGULAR_DAMPING_PER_S = 0.05
 LEAST_TABLE_M = 0.3
 
 
@@ -116,12 +114,12 @@ class RobotWorld:
         return entity.find_component_by_type(physx.PhysxRigidStaticComponent)
 
     def _add_object(self, placed: PlacedObject, shapes: HullShapes) -> physx.PhysxRigidDynamicComponent:
-        component = dynamic_component(placed.body, shapes, contact_offset_m=self._contact_offset_m, soft_pad=True)
-        component.solver_position_iterations = self._iterations
-        component.solver_velocity_iterations = 1
-        component.max_depenetration_velocity = MAX_DEPENETRATION_M_S
-        component.set_linear_damping(0.0)
-        component.set_angular_damping(ANGULAR_DAMPING_PER_S)
+        component = graspable_component(
+            placed.body,
+            shapes,
+            contact_offset_m=self._contact_offset_m,
+            solver_iterations=self._iterations,
+        )
         self._scene.add_entity(entity_at(component, sapien.Pose(placed.object_to_world)))
         return component
 

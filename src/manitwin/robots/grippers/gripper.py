@@ -90,15 +90,16 @@ def of_kind(gripper: Gripper, kind: type[Kind]) -> Kind:
 Loader = Callable[[dict[str, Any], Path], Gripper]
 
 
-def _parallel(data: dict[str, Any], folder: Path) -> Gripper:
-    return TypeAdapter(ParallelGripper).validate_python(data)
+def _described_by(kind: type[ParallelGripper] | type[SuctionGripper]) -> Loader:
+    """Return the loader of a kind that its file describes wholly."""
+    return lambda data, folder: TypeAdapter(kind).validate_python(data)
 
 
-def _suction(data: dict[str, Any], folder: Path) -> Gripper:
-    return TypeAdapter(SuctionGripper).validate_python(data)
-
-
-KINDS: dict[str, Loader] = {"parallel": _parallel, "suction": _suction, "multi_finger": load_multi_finger}
+KINDS: dict[str, Loader] = {
+    "parallel": _described_by(ParallelGripper),
+    "suction": _described_by(SuctionGripper),
+    "multi_finger": load_multi_finger,
+}
 """How each kind is made of its file's content and folder."""
 
 
