@@ -10,7 +10,7 @@ from typing import Any, Generic, Self, TypeVar
 
 @dataclass(frozen=True)
 class Payload(ABC):
-    """What a task asks for: a frozen dataclass of JSON values, so that it is hashable, picklable and kept in a ledger."""
+    """The content of a task: a frozen dataclass of JSON values, so that it is hashable, picklable and kept in a ledger."""
 
     @property
     @abstractmethod

@@ -11,8 +11,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from manitwin.episodes.beside import file_beside
 from manitwin.errors import EpisodesError
+from manitwin.twin.store import file_beside
 
 OUTCOMES = (
     "kept", "unplanned_contact", "disturbed", "misplaced", "toppled", "dropped", "not_lifted", "replan_failed", "unsettled",

@@ -18,7 +18,6 @@ import h5py
 import numpy as np
 
 from manitwin.episodes.attempts import attempt_from
-from manitwin.episodes.beside import file_beside
 from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta
 from manitwin.episodes.stored_episode import (
     RecordedObject,
@@ -27,6 +26,7 @@ from manitwin.episodes.stored_episode import (
     to_json,
 )
 from manitwin.errors import EpisodesError
+from manitwin.twin.store import file_beside
 
 LIBVER = ("v110", "v110")
 """Small groups and single chunks take no index: a fifth less than the oldest format (measured, 29 arrays an episode)."""

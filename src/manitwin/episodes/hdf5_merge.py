@@ -11,10 +11,10 @@ from typing import Any, TextIO
 import h5py
 
 from manitwin.episodes.attempts import attempt_from
-from manitwin.episodes.beside import file_beside
 from manitwin.episodes.hdf5_file import LIBVER, EpisodeFile
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.errors import EpisodesError
+from manitwin.twin.store import file_beside
 
 TRAJECTORIES, METADATA = "trajectory.h5", "trajectory.json"
 

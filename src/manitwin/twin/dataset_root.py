@@ -10,7 +10,6 @@ DATASET/
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
@@ -19,7 +18,7 @@ from fsspec.core import url_to_fs
 from fsspec.implementations.local import LocalFileSystem
 
 from manitwin.errors import UsageError
-from manitwin.twin.store import RECORD, replace_folder, write_bytes_atomically
+from manitwin.twin.store import RECORD, file_beside, replace_folder, write_bytes_atomically
 
 TWINS = "twins"
 
@@ -79,9 +78,8 @@ class DatasetRoot:
         if self.local is not None:
             place = Path(self.full(name))
             place.parent.mkdir(parents=True, exist_ok=True)
-            beside = place.with_name(f".{place.name}.{os.getpid()}")
-            shutil.copyfile(source, beside)
-            os.replace(beside, place)
+            with file_beside(place) as beside:
+                shutil.copyfile(source, beside)
         else:
             self.fs.put_file(str(source), self.full(name))
 

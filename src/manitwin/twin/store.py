@@ -6,6 +6,8 @@ import hashlib
 import json
 import os
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -48,15 +50,35 @@ def sha256_of_artifact(path: Path) -> str:
 
 def write_bytes_atomically(path: Path, content: bytes) -> None:
     """Write a file beside its place and rename it there, so that nobody ever reads half of it."""
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
+    with file_beside(path) as beside:
+        beside.write_bytes(content)
+
+
+@contextmanager
+def file_beside(place: Path) -> Iterator[Path]:
+    """Give a path in the same folder; what is written there takes its place when the block ends well, else it is removed."""
+    place.parent.mkdir(parents=True, exist_ok=True)
+    beside = place.with_name(f".{place.name}.{os.getpid()}")
     try:
-        with beside.open("wb") as stream:
-            stream.write(content)
-            stream.flush()
+        yield beside
+        with beside.open("rb") as stream:
             os.fsync(stream.fileno())
-        os.replace(beside, path)
+        os.replace(beside, place)
     finally:
         beside.unlink(missing_ok=True)
+
+
+@contextmanager
+def folder_beside(place: Path) -> Iterator[Path]:
+    """Give an empty folder beside a place; it takes that place when the block ends well, else it is removed."""
+    beside = place.with_name(f".{place.name}.{os.getpid()}")
+    shutil.rmtree(beside, ignore_errors=True)
+    beside.mkdir(parents=True)
+    try:
+        yield beside
+        replace_folder(beside, place)
+    finally:
+        shutil.rmtree(beside, ignore_errors=True)
 
 
 def replace_folder(new: Path, place: Path) -> None:

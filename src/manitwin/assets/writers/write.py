@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path, PurePosixPath
@@ -16,7 +14,7 @@ from manitwin.assets.writers.registry import exporter
 from manitwin.errors import ExportError
 from manitwin.formats.markdown import markdown_escaped
 from manitwin.twin.record import Estimate
-from manitwin.twin.store import replace_folder
+from manitwin.twin.store import folder_beside
 
 MAX_NAME = 255
 """The bytes that a file name may have on ext4, APFS and NTFS alike."""
@@ -50,18 +48,14 @@ def write_exported(exported: Exported, folder: Path) -> Path:
         raise ExportError(f"{folder}: the file to open, {exported.main!r}, is not among those written")
     if len({name.casefold() for name in names}) < len(names):
         raise ExportError(f"{folder}: two file names differ in case only; not every file system keeps both")
-    fresh = folder.with_name(f".{folder.name}.{os.getpid()}")
     try:
-        shutil.rmtree(fresh, ignore_errors=True)
-        for name, data in sorted(exported.files.items()):
-            place = fresh / names[name]
-            place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_bytes(data)
-        replace_folder(fresh, folder)
+        with folder_beside(folder) as fresh:
+            for name, data in sorted(exported.files.items()):
+                place = fresh / names[name]
+                place.parent.mkdir(parents=True, exist_ok=True)
+                place.write_bytes(data)
     except OSError as error:
         raise ExportError(f"{folder}: not written ({error}); mend that and export again") from error
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
     return folder / names[exported.main]
 
 

@@ -13,7 +13,6 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from manitwin.episodes.beside import folder_beside
 from manitwin.episodes.lerobot.episode_rows import EpisodeRows
 from manitwin.episodes.lerobot.feature_statistics import Pooled, episode_statistics, quantiles_of_files
 from manitwin.episodes.lerobot.frame_features import Feature, features_of, frames_of, schema_of, table_of
@@ -34,6 +33,7 @@ from manitwin.episodes.lerobot.videos import CameraVideos, VideoColumns
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.errors import EpisodesError
+from manitwin.twin.store import folder_beside
 
 
 @dataclass(frozen=True)
