@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -137,10 +137,10 @@ class EpisodeFilmsStage:
 class PicturesRecipe(FolderRecipe[PicturesRecord]):
     """Films of the batches of ``episodes``, of twins in ``dataset``, with a robot by name or file."""
 
-    payload: ClassVar[type[BatchDrawing]] = BatchDrawing
-    record: ClassVar[str] = PICTURES_RECORD
-    record_type: ClassVar[type[PicturesRecord]] = PicturesRecord
-    can_reject: ClassVar[bool] = False
+    payload = BatchDrawing
+    record = PICTURES_RECORD
+    record_type = PicturesRecord
+    can_reject = False
 
     config: PicturesConfig
     episodes: str

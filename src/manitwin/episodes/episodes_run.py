@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
 
 from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.folder_recipe import FolderRecipe
@@ -39,10 +38,10 @@ DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "run", "batch", "retire_fail
 class EpisodesRecipe(FolderRecipe[BatchRecord]):
     """Batches of episodes. ``dataset`` and ``scenes`` are where twins and scenes are read from (no scenes: None)."""
 
-    payload: ClassVar[type[Batch]] = Batch
-    record: ClassVar[str] = BATCH_RECORD
-    record_type: ClassVar[type[BatchRecord]] = BatchRecord
-    can_reject: ClassVar[bool] = False
+    payload = Batch
+    record = BATCH_RECORD
+    record_type = BatchRecord
+    can_reject = False
 
     config: TrajectoriesConfig
     dataset: str

@@ -6,7 +6,7 @@ import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar, Literal, cast
+from typing import Literal, cast
 
 from manitwin.config import BuildConfig
 from manitwin.engine.folder_recipe import FolderRecipe
@@ -172,8 +172,8 @@ def _decided_by(stage: Stage | StageProvenance) -> tuple[str, str, str | None]:
 class TwinRecipe(FolderRecipe[TwinRecord]):
     """What the engine makes of an item: a twin. ``tables`` are kept of the twins while a run goes on."""
 
-    payload: ClassVar[type[Item]] = Item
-    record: ClassVar[str] = RECORD
+    payload = Item
+    record = RECORD
 
     config: BuildConfig
     tables: Tables | None = None

@@ -24,7 +24,7 @@ import signal
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, NoReturn
+from typing import Any, NoReturn
 
 from pydantic import BaseModel
 
@@ -119,8 +119,8 @@ class RehearsalRecipe(FolderRecipe[TwinRecord]):
     ``usd`` is what those are expected to cost that do not run on cores.
     """
 
-    payload: ClassVar[type[Item]] = Item
-    record: ClassVar[str] = RECORD
+    payload = Item
+    record = RECORD
 
     plan: tuple[tuple[str, Resource], ...] = (("a", "cpu"), ("b", "cpu"), ("c", "cpu"))
     versions: tuple[tuple[str, str], ...] = ()

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from pydantic import BaseModel
 
@@ -108,9 +108,9 @@ class LayoutRecord(FolderRecord):
 class LayoutsRecipe(FolderRecipe[LayoutRecord]):
     """Layouts of the twins of ``dataset``, one for each number."""
 
-    payload: ClassVar[type[LayoutNumber]] = LayoutNumber
-    record: ClassVar[str] = LAYOUT_RECORD
-    record_type: ClassVar[type[LayoutRecord]] = LayoutRecord
+    payload = LayoutNumber
+    record = LAYOUT_RECORD
+    record_type = LayoutRecord
 
     config: LayoutsConfig
     dataset: str
