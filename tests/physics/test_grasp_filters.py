@@ -1,4 +1,4 @@
-"""The filters on a box, and the choice among grasps whose merits are known."""
+"""The pads' contacts, the filters and the clearance of a support in closed form, and the choice among grasps of known merits."""
 
 from __future__ import annotations
 
@@ -8,12 +8,65 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from manitwin.geometry.grasp_diversity import approach_octants
-from manitwin.geometry.poses import transform
-from manitwin.physics.grasp_filters import GraspFilter, PadContacts, pad_merits, torque_ratio
+from manitwin.geometry.poses import rotation_between, transform, transform_points
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.physics.grasp_filters import (
+    ACROSS,
+    ALONG,
+    SUPPORT_CLEARANCE_M,
+    GraspFilter,
+    PadContacts,
+    lowest_points_m,
+    pad_contacts,
+    pad_merits,
+    raised,
+    torque_ratio,
+)
 from manitwin.physics.grasp_selection import select_likely
-from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.robots.grippers.gripper import load_gripper, of_kind
+from manitwin.robots.grippers.parallel import ParallelGripper
 
-PANDA = load_gripper("panda")
+PANDA = of_kind(load_gripper("panda"), ParallelGripper)
+FROM_ABOVE = np.diag([1.0, -1.0, -1.0])
+REACH_M = 0.1129  # the far end of the fingers in panda.toml
+DOWN = rotation_between(np.array([0.0, 0, 1]), np.array([0.0, 0, -1]))
+
+
+def contacts_at(tip_m: list[float], extents_m: list[float], center_of_mass_m: list[float]) -> PadContacts:
+    pose = transform(FROM_ABOVE, np.add(tip_m, [0, 0, PANDA.tip_depth_m]))
+    caster = RayCaster(trimesh.creation.box(extents_m))
+    return pad_contacts(PANDA, pose[None], caster, np.array(center_of_mass_m))
+
+
+def test_pads_on_a_box_touch_with_all_cells_as_far_apart_as_it_is_wide() -> None:
+    contacts = contacts_at([0, 0, 0], [0.04, 0.06, 0.05], [0, 0, 0])
+    assert contacts.width_m[0] == pytest.approx(0.04, abs=1e-6)
+    assert contacts.cells[0] == ACROSS * ALONG
+    assert contacts.offset_m[0] == pytest.approx(0, abs=1e-9)
+    assert contacts.alignment[0] == pytest.approx(1)
+
+
+def test_lever_is_the_distance_of_the_center_of_mass_from_the_closing_line() -> None:
+    assert contacts_at([0, 0, 0], [0.04, 0.06, 0.05], [0.01, 0.03, -0.04]).lever_m[0] == pytest.approx(0.05)
+
+
+def test_pads_at_the_edge_touch_with_fewer_cells() -> None:
+    # the middle row of rays and one beside it, of three, lie over the box
+    contacts = contacts_at([0, 0.028, 0], [0.04, 0.06, 0.05], [0, 0, 0])
+    assert contacts.cells[0] == 2 * ALONG
+
+
+def test_pads_in_the_air_have_no_width() -> None:
+    contacts = contacts_at([0, 0, 0.1], [0.04, 0.06, 0.05], [0, 0, 0])
+    assert np.isinf(contacts.width_m[0])
+    assert contacts.cells[0] == 0
+
+
+def test_slanted_faces_are_told_by_their_alignment() -> None:
+    wedge = trimesh.creation.cone(radius=0.03, height=0.03, sections=256)  # 45 degrees all around
+    pose = transform(FROM_ABOVE, [0, 0, 0.012 + PANDA.tip_depth_m])
+    contacts = pad_contacts(PANDA, pose[None], RayCaster(wedge), np.zeros(3))
+    assert contacts.alignment[0] == pytest.approx(np.sqrt(0.5), abs=0.05)
 
 
 def test_filter_keeps_the_grasp_on_the_faces_and_drops_air_edges_and_collisions() -> None:
@@ -78,3 +131,39 @@ def test_selection_points_into_four_octants_where_there_are_four() -> None:
     chosen = select_likely(poses, np.full(400, 0.1), pad_merits(contacts(lever, np.full(400, 6)), lever / 0.1), 60)
     assert len(np.unique(octants[chosen])) == 4
     assert (octants[chosen] == octants[0]).sum() >= 30
+
+
+def at_tip_height(height_m: float, rotation: np.ndarray = DOWN) -> np.ndarray:
+    """A hand whose fingertips' centre is above the origin."""
+    return transform(rotation, np.array([0, 0, height_m]) - PANDA.tip_depth_m * rotation[:, 2])
+
+
+def test_a_hand_that_points_down_reaches_to_the_ends_of_its_pads() -> None:
+    poses = np.array([at_tip_height(0.1), at_tip_height(0.0)])
+    assert lowest_points_m(PANDA, poses, np.eye(4)) == pytest.approx(np.array([0.1, 0.0]) + PANDA.tip_depth_m - REACH_M)
+
+
+def test_the_plane_may_be_anywhere_in_the_objects_frame() -> None:
+    object_to_plane = transform(
+        rotation_between(np.array([1.0, 0, 0]), np.array([0.0, 0, 1])), np.array([0.2, 0.1, 0.05])
+    )
+    pose = np.linalg.inv(object_to_plane) @ at_tip_height(0.02)
+    assert lowest_points_m(PANDA, pose[None], object_to_plane)[0] == pytest.approx(0.02 + PANDA.tip_depth_m - REACH_M)
+
+
+def test_a_low_hand_is_drawn_back_along_its_approach_until_it_is_clear() -> None:
+    tilted = rotation_between(np.array([0.0, 0, 1]), np.array([0.0, 0.5, -1]) / np.hypot(0.5, 1))
+    poses = np.array([at_tip_height(0.004), at_tip_height(0.004, tilted), at_tip_height(0.05)])
+    back, index = raised(PANDA, poses, np.eye(4))
+    assert index.tolist() == [0, 1]
+    assert (lowest_points_m(PANDA, back, np.eye(4)) >= SUPPORT_CLEARANCE_M - 1e-9).all()
+    moves = back[:, :3, 3] - poses[index, :3, 3]
+    assert np.allclose(np.cross(moves, back[:, :3, 2]), 0)
+    tips = [transform_points(pose, np.array([[0, 0, PANDA.tip_depth_m]]))[0, 2] for pose in back]
+    assert tips[0] == pytest.approx(SUPPORT_CLEARANCE_M + REACH_M - PANDA.tip_depth_m)
+
+
+def test_what_would_leave_nothing_between_the_pads_or_comes_from_the_side_is_left_out() -> None:
+    sideways = rotation_between(np.array([0.0, 0, 1]), np.array([1.0, 0, 0]))
+    poses = np.array([at_tip_height(-0.02), at_tip_height(0.004, sideways)])
+    assert len(raised(PANDA, poses, np.eye(4))[1]) == 0

@@ -14,6 +14,7 @@ import numpy as np
 from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.physics.grasp_selection import Merits
+from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.parallel import ParallelGripper
 
@@ -128,7 +129,7 @@ class GraspFilter:
 
 def torque_ratio(lever_m: np.ndarray, *, mass_kg: float, force_n: float, friction: float) -> np.ndarray:
     """Return the torque that weight and slides need about the pads, over what friction can hold."""
-    needed = mass_kg * (9.81 + PEAK_SLIDE_ACCELERATION_M_S2) * lever_m
+    needed = mass_kg * (GRAVITY_M_S2 + PEAK_SLIDE_ACCELERATION_M_S2) * lever_m
     return needed / (2 * friction * force_n * PAD_ARM_M)
 
 

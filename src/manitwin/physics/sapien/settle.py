@@ -21,7 +21,7 @@ from manitwin.physics.sapien.body import (
     static_plane,
 )
 from manitwin.physics.sapien.scene import scene_with_gravity
-from manitwin.physics.sapien.shapes import COOKED, HullShapes, convex_shape, set_contact
+from manitwin.physics.sapien.shapes import COOKED, HullShapes, convex_shape, hull_shapes, set_contact
 
 TIMESTEP_S = 1 / 240
 TOUCHING_M = 5e-4  # solvers leave a gap of some tenths of a millimetre where there is weight on it
@@ -33,7 +33,7 @@ class RestLimits:
     """The limits of rest: slower than both speeds, for so many looks in a row.
 
     Its speeds are those between two looks: at rest on many hulls, its velocity of one step is noise. ``by_velocity`` takes the
-    velocities of the last step all the same, which are the sooner to be small.
+    velocities after the last step instead.
     """
 
     speed_m_s: float = 1e-3
@@ -154,12 +154,11 @@ def settle_on_plane(
     reach = max(float(np.linalg.norm(hull - body.center_of_mass_m, axis=1).max()) for hull in body.hulls)
     spacing = 8 * reach + 1.0
     offsets = [np.array([spacing * i, 0.0, drop_m]) for i in range(len(object_to_plane))]
-    with COOKED.lent([body.hulls] * len(offsets)) as shapes:
-        bodies = [
-            _release(scene, body, own, pose[:3, 3] + offset, pose[:3, :3], may_sleep=True)
-            for pose, offset, own in zip(object_to_plane, offsets, shapes, strict=True)
-        ]
-        rest = settle(scene.physx_system, bodies, timestep_s=TIMESTEP_S, seconds=seconds)
+    bodies = [
+        _release(scene, body, hull_shapes(body.hulls), pose[:3, 3] + offset, pose[:3, :3], may_sleep=True)
+        for pose, offset in zip(object_to_plane, offsets, strict=True)
+    ]
+    rest = settle(scene.physx_system, bodies, timestep_s=TIMESTEP_S, seconds=seconds)
     rest.object_to_world[:, :2, 3] -= np.array(offsets)[:, :2]
     return [
         Settled.of(body, pose, end, bool(at_rest))

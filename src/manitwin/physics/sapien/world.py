@@ -23,8 +23,8 @@ from manitwin.physics.sapien.settle import Rest, RestLimits, RestWatch, settle
 from manitwin.physics.sapien.shapes import COOKED, HullShapes
 from manitwin.robots.robot import Robot
 
-# Where it waits for rest, a world believes velocities, and twice as high ones: they only end the waiting, and poses tell whether
-# a start or a placement stays. By the way between looks, 50 of 50 episodes end the same, up to 0.25 s sooner or later.
+# Velocities, and twice as high ones as elsewhere, end the waiting here; whether a start or a placement stays is judged by poses.
+# Judged by the way between looks, 50 of 50 episodes had the same outcome, and rested up to 0.25 s sooner or later.
 RESTS = RestLimits(speed_m_s=2e-3, turn_rad_s=2e-2, looks=2, by_velocity=True)
 LEAST_TABLE_M = 0.3
 
@@ -100,7 +100,7 @@ class RobotWorld:
         return settle(self._system, self.bodies, timestep_s=self._timestep_s, seconds=seconds, limits=RESTS)
 
     def rest_watch(self, looks: int) -> RestWatch:
-        """Return what tells when all objects have been at rest for so many looks, for one who steps the world himself."""
+        """Return a watch for the rest of all objects over so many looks, for a caller that steps the world itself."""
         return RestWatch(self.bodies, replace(RESTS, looks=looks))
 
     def _add_box(self, box: StaticBox, friction: float) -> physx.PhysxRigidStaticComponent:

@@ -13,6 +13,7 @@ from manitwin.assets.writers.exporter import Exported, TwinContent
 from manitwin.assets.writers.usd_stage import CANNOT_SAY
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION
+from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.scenes.layouts.surroundings import camera_axes
 from manitwin.scenes.loaded_scene import Scene
 from manitwin.scenes.sapien_scene import PLAIN_COLORS
@@ -21,7 +22,6 @@ from manitwin.scenes.scene import SceneCamera, SurfaceBox
 MAIN = "scene.usda"
 TWINS = "twins"
 APERTURE_MM = 24.0  # vertical, of a full-frame camera: with the focal length it gives the angle of view
-GRAVITY_M_S2 = 9.81
 
 
 def export_usd(scene: Scene) -> Exported:
