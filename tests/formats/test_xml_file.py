@@ -39,6 +39,11 @@ def test_a_document_type_is_refused_before_an_entity_is_put_in(text: str, encodi
         parse_xml(declared.encode(encoding), "a", "x.urdf", max_bytes=None)
 
 
+def test_a_document_type_in_an_encoding_that_few_know_is_refused_too() -> None:
+    with pytest.raises(AssetError, match=r"x\.dae: its XML"):
+        parse_xml(f'<?xml version="1.0" encoding="IBM037"?>{BOMB}'.encode("cp037"), "a", "x.dae", max_bytes=None)
+
+
 def test_includes_and_unknown_entities_open_nothing() -> None:
     include = '<xi:include xmlns:xi="http://www.w3.org/2001/XInclude" href="/etc/hostname" parse="text"/>'
     root = parse_xml(f"<a>{include}</a>", "a", "x")

@@ -121,6 +121,7 @@ SPOILT = [
     (("<geometry>" + SPHERE + "</geometry>", ""), "link 'upper' collision 0 has nothing as its <geometry>; give it one of", ALL),
     ((SPHERE, ""), "link 'upper' collision 0 has nothing as its <geometry>; give it one of", ALL),
     ((SPHERE, SPHERE * 2), "link 'upper' collision 0 has <sphere>, <sphere> as its <geometry>; give it one of", ALL),
+    (("<geometry>" + SPHERE, "<geometry/><geometry>" + SPHERE), "'upper' collision 0 has <sphere> as its <geometry>; give", ALL),
     ((SPHERE, "<cone/>"), "link 'upper' collision 0 has <cone> as its <geometry>; give it one of", ALL),
     ((SPHERE, "<sphere/>"), "<sphere> of link 'upper' collision 0 lacks radius; give it", ALL),
     ((SPHERE, '<sphere radius="round"/>'), "<sphere radius='round'>, which wants 1 usable number; mend", ALL),

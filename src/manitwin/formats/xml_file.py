@@ -59,16 +59,17 @@ def parse_xml(
     data = data.encode() if isinstance(data, str) else data
     if max_bytes is not None and len(data) > max_bytes:
         raise refusal(f"{name}: more than {max_bytes >> 20} MiB of XML; it is no single object")
+    declares_type = _declares_document_type(data)
+    if declares_type:
+        raise refusal(f"{name}: its XML declares a document type, which is not read; remove it")
     parser = etree.XMLParser(
         resolve_entities=False,
         no_network=True,
         load_dtd=False,
         remove_comments=not comments,
-        huge_tree=max_bytes is None,
+        huge_tree=max_bytes is None and declares_type is False,  # it also lifts libxml2's limit on expanding entities
     )
     try:
-        if _declares_document_type(data):
-            raise refusal(f"{name}: its XML declares a document type, which is not read; remove it")
         root = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
         raise refusal(f"{name}: its XML is broken ({' '.join(str(error).split())[:120]}); mend it") from error
@@ -83,8 +84,8 @@ class _Found(Exception):
     """Ends expat's parsing."""
 
 
-def _declares_document_type(data: bytes) -> bool:
-    """Look for a document type above the root element, before any entity in it could be put in."""
+def _declares_document_type(data: bytes) -> bool | None:
+    """Look for a document type above the root element, before any entity in it could be put in; None: not to be told."""
     parser = expat.ParserCreate()
     found: list[bool] = []
 
@@ -99,8 +100,8 @@ def _declares_document_type(data: bytes) -> bool:
     except _Found:
         return found[0]
     except (expat.ExpatError, ValueError, LookupError):  # broken, or an encoding that it does not know: lxml says so
-        return False
-    return False
+        return None
+    return None
 
 
 def number(text: str | None, what: str) -> float:

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from manitwin.formats.xml_file import read_xml
 from manitwin.geometry.poses import inverse, rotation_between, transform, transform_points
 from manitwin.geometry.rigid_body import principal_frame
-from manitwin.robots.urdf import UrdfTree, geometry_of, inertial_of, origin_of, parent_of, values_of
+from manitwin.robots.urdf import UrdfTree, child_of, geometry_of, inertial_of, origin_of, parent_of, values_of
 
 MESH_SUFFIXES = (".stl", ".obj", ".dae", ".ply", ".glb", ".gltf")
 
@@ -69,15 +69,19 @@ def links_of(tree: UrdfTree, find_mesh: Callable[[str], Path]) -> tuple[Link, ..
 
     Visuals are left. Raises the tree's error where a joint has no limits, or a mesh no hull.
     """
-    holders = {joint.find("child").get("link"): name for name, joint in tree.joints.items()}
-    order = tree.below(tree.roots()[0])
-    return tuple(_link(tree, find_mesh, name, holders.get(name), order) for name in order)
+    holders = {child_of(joint): joint for joint in tree.joints.values()}
+    links, order = tree.links, tree.below(*tree.roots())
+    return tuple(_link(tree, find_mesh, links[name], holders.get(name), order) for name in order)
 
 
 def _link(
-    tree: UrdfTree, find_mesh: Callable[[str], Path], name: str, holder: str | None, order: tuple[str, ...]
+    tree: UrdfTree,
+    find_mesh: Callable[[str], Path],
+    element: etree._Element,
+    joint: etree._Element | None,
+    order: tuple[str, ...],
 ) -> Link:
-    element = tree.links[name]
+    name = element.get("name")
     shapes = tuple(
         _shape(tree, find_mesh, collision, f"link {name!r} collision {index}")
         for index, collision in enumerate(element.findall("collision"))
@@ -85,9 +89,9 @@ def _link(
     mass_kg, center_m, inertia = _mass_properties(element)
     moments, axes = principal_frame(inertia)
     common = (mass_kg, center_m, moments, axes, shapes)
-    if holder is None:
+    if joint is None:
         return Link(name, -1, "", "fixed", np.eye(4), np.eye(4), (0.0, 0.0), *common)
-    joint = tree.joints[holder]
+    holder = joint.get("name")
     limits, axis = (-np.inf, np.inf), joint.find("axis")
     if joint.get("type") in ("revolute", "prismatic"):
         limit = joint.find("limit")

@@ -6,6 +6,7 @@ Source: the URDF specification (http://wiki.ros.org/urdf/XML).
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -77,9 +78,10 @@ class UrdfTree:
     error: type[ManiTwinError] = ConfigError
 
     @classmethod
-    def of_text(cls, urdf: str, name: str = "robot") -> UrdfTree:
+    def of_text(cls, urdf: str) -> UrdfTree:
         """Return the tree of a text that ``text`` has given."""
-        return cls(name, parse_xml(urdf, "robot", name, refusal=ConfigError, comments=False))
+        element = parse_xml(urdf, "robot", "robot", refusal=ConfigError, comments=False)
+        return cls(f"robot {element.get('name')}", element)
 
     @property
     def links(self) -> dict[str, etree._Element]:
@@ -113,13 +115,14 @@ class UrdfTree:
         held = {child_of(joint) for joint in self.joints.values()}
         return [name for name in self.links if name not in held]
 
-    def below(self, link: str) -> tuple[str, ...]:
-        """Return a link and all that hang from it, parents first; raises the tree's error where the link is not there."""
-        self.link(link)
+    def below(self, *links: str) -> tuple[str, ...]:
+        """Return links and all that hang from them, parents first; raises the tree's error where one is not there."""
+        for name in set(links) - set(self.links):
+            self.link(name)
         children: dict[str, list[str]] = {}
         for joint in self.joints.values():
             children.setdefault(parent_of(joint), []).append(child_of(joint))
-        order = [link]
+        order = list(links)
         for name in order:
             order += children.get(name, [])
         return tuple(order)
@@ -187,7 +190,7 @@ def set_origin(element: etree._Element, pose: np.ndarray) -> None:
 
 def geometry_of(shape: etree._Element) -> etree._Element:
     """Return the one geometry of a checked visual or collision element."""
-    return next(shape.find("geometry").iterchildren(tag="*"))
+    return next(shape.iterfind("geometry/*"))
 
 
 def inertial_of(link: etree._Element) -> tuple[float | None, np.ndarray, np.ndarray | None] | None:
@@ -233,43 +236,40 @@ def read_urdf(path: Path, rules: UrdfRules = ROBOT, name: str | None = None) -> 
 
 
 def _check_tree(tree: UrdfTree, rules: UrdfRules) -> None:
-    """Check that links and joints have names of their own, and that no link is held twice, or by itself."""
-    if not tree.links:
+    """Check that links and joints have names of their own, and that the links form a tree."""
+    if tree.element.find("link") is None:
         raise tree.refuse("", "it has no <link>", "give a URDF with one")
-    for tag, found in (("link", tree.links), ("joint", tree.joints)):
-        names = [element.get("name") for element in tree.element.findall(tag)]
-        if not all(names):
-            raise tree.refuse(f"a <{tag}>", "has no name", "give it one")
-        for each in found:
-            if names.count(each) > 1:
-                raise tree.refuse(f"{tag} {each!r}", f"is there {names.count(each)} times", "give each its own name")
-    holders: dict[str, str] = {}
+    for tag in ("link", "joint"):
+        names = Counter(element.get("name") for element in tree.element.findall(tag))
+        for name, count in names.items():
+            if not name:
+                raise tree.refuse(f"a <{tag}>", "has no name", "give it one")
+            if count > 1:
+                raise tree.refuse(f"{tag} {name!r}", f"is there {count} times", "give each its own name")
+    links, holders = tree.links, dict[str, str]()
     for name, joint in tree.joints.items():
         for end in ("parent", "child"):
-            named = joint.find(end)
-            if named is None or not named.get("link"):
-                raise tree.refuse(f"joint {name!r}", f"has no {end} link", f"name one of {', '.join(tree.links)}")
-            if named.get("link") not in tree.links:
-                unknown = choose_from("link", named.get("link"), tree.links)
+            link = joint.find(end)
+            if link is None or not link.get("link"):
+                raise tree.refuse(f"joint {name!r}", f"has no {end} link", f"name one of {', '.join(links)}")
+            if link.get("link") not in links:
+                unknown = choose_from("link", link.get("link"), links)
                 raise tree.error(f"{tree.name}: the {end} of joint {name!r} is an {unknown}")
         if joint.get("type") not in rules.joint_types:
             kinds = ", ".join(rules.joint_types)
             raise tree.refuse(f"joint {name!r}", f"is of the type {joint.get('type')!r}", f"valid are {kinds}")
-        child = child_of(joint)
-        if child in holders:
-            two = f"hangs from two joints, {holders[child]!r} and {name!r}"
-            raise tree.refuse(f"link {child!r}", two, "the links must form a tree: remove one")
-        holders[child] = name
+        other = holders.setdefault(child_of(joint), name)
+        if other != name:
+            two = f"hangs from two joints, {other!r} and {name!r}"
+            raise tree.refuse(f"link {child_of(joint)!r}", two, "the links must form a tree: remove one")
     roots = tree.roots()
-    reached = {name for root in roots for name in tree.below(root)}
-    if circle := [name for name in tree.links if name not in reached]:
-        raise tree.refuse(
-            f"the joints of {', '.join(circle)}", "go in a circle", "the links must form a tree: remove one"
-        )
+    reached = set(tree.below(*roots))
+    if circle := [name for name in links if name not in reached]:
+        remedy = "the links must form a tree: remove one"
+        raise tree.refuse(f"the joints of {', '.join(circle)}", "go in a circle", remedy)
     if rules.simulated and len(roots) > 1:
-        raise tree.refuse(
-            f"the links {', '.join(roots)}", "all have no parent", "the links must form a tree with one root: join them"
-        )
+        remedy = "the links must form a tree with one root: join them"
+        raise tree.refuse(f"the links {', '.join(roots)}", "all have no parent", remedy)
 
 
 def _check_link(tree: UrdfTree, rules: UrdfRules, where: str, link: etree._Element) -> None:
@@ -279,7 +279,8 @@ def _check_link(tree: UrdfTree, rules: UrdfRules, where: str, link: etree._Eleme
             at = f"{where} {tag} {index}"
             _check_attributes(tree, rules, at, shape, ("origin", "material/color"))
             geometries = list(shape.iterfind("geometry/*"))
-            if len(geometries) != 1 or geometries[0].tag not in rules.geometries:
+            one = len(geometries) == 1 == len(shape.findall("geometry"))
+            if not one or geometries[0].tag not in rules.geometries:
                 named = ", ".join(f"<{geometry.tag}>" for geometry in geometries) or "nothing"
                 valid = f"give it one of {', '.join(rules.geometries)}"
                 raise tree.refuse(at, f"has {named[:80]} as its <geometry>", valid)
