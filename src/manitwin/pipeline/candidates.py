@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -25,6 +26,7 @@ ON_SURFACE_M = 0.001  # a candidate is on the surface that is seen, to a millime
 ON_SURFACE_SHARE = 0.01  # and of small objects to this share of the longest side
 
 
+@dataclass(frozen=True)
 class CandidatesStage:
     """Sample the surface, keep 42 far-apart points and mark them on the views (paper, "Candidate Point Sampling").
 
@@ -33,16 +35,15 @@ class CandidatesStage:
     ``candidates``) that are drawn on it. The number on a picture is the id.
     """
 
+    settings: CandidatesConfig
+
     name: ClassVar[str] = "candidates"
     version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz", "visual.glb", "views/", "cameras", "physical")
     writes: ClassVar[tuple[str, ...]] = ("marked/", "candidates", "visible_candidates")
     needs: ClassVar[Resource] = "cpu"
-    backend = "builtin"
-    model: str | None = None
-
-    def __init__(self, settings: CandidatesConfig):
-        self.settings = settings
+    backend: ClassVar[str] = "builtin"
+    model: ClassVar[str | None] = None
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Choose and mark the candidates; raises Rejected where the solid does not follow the surface that is seen."""

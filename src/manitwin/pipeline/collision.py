@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -20,6 +21,7 @@ from manitwin.pipeline.object_state import load_solid
 HULLS = "hulls.npz"
 
 
+@dataclass(frozen=True)
 class CollisionStage:
     """Decompose the solid into convex hulls that keep its opening open.
 
@@ -27,17 +29,15 @@ class CollisionStage:
     opening, else whether the hulls keep ``least_cavity_kept`` of it and a ball dropped in stays inside.
     """
 
+    settings: CollisionConfig
+
     name: ClassVar[str] = "collision"
     version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz",)
     writes: ClassVar[tuple[str, ...]] = (HULLS, "collision")
     needs: ClassVar[Resource] = "cpu"
-    backend = "builtin"
-    model: str | None = None
-
-    def __init__(self, settings: CollisionConfig):
-        """Take the settings."""
-        self.settings = settings
+    backend: ClassVar[str] = "builtin"
+    model: ClassVar[str | None] = None
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Write ``hulls.npz`` (``hull_00`` .. ``(V, 3)`` m) and return the field; raises Rejected for flat meshes."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -9,7 +10,7 @@ import numpy as np
 import pyarrow.parquet
 from PIL import Image
 
-from manitwin.config import NO_SETTINGS, Resource
+from manitwin.config import NO_SETTINGS, Resource, Section
 from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.grasp_diversity import farthest_grasps
@@ -22,37 +23,23 @@ from manitwin.render.card_panels import CardGrasp, CardPoint
 from manitwin.robots.grippers.gripper import Gripper
 
 
+@dataclass(frozen=True)
 class FinishStage:
     """Draw ``card.png`` and return the field ``quality``."""
+
+    gripper: Gripper
 
     name: ClassVar[str] = "finish"
     version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = (
-        "visual.glb",
-        "solid.npz",
-        "hulls.npz",
-        "grasps.parquet",
-        "photo.png?",
-        "matte?",
-        "generation?",
-        "geometry",
-        "gate",
-        "physical",
-        "collision",
-        "language",
-        "points",
-        "grasps",
-        "placements",
-    )
+        "visual.glb", "solid.npz", "hulls.npz", "grasps.parquet", "photo.png?", "matte?", "generation?", "geometry",
+        "gate", "physical", "collision", "language", "points", "grasps", "placements",
+    )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = ("card.png", "quality")
     needs: ClassVar[Resource] = "cpu"
-    backend: str = "builtin"
-    model: str | None = None
-
-    settings = NO_SETTINGS
-
-    def __init__(self, gripper: Gripper):
-        self.gripper = gripper
+    backend: ClassVar[str] = "builtin"
+    model: ClassVar[str | None] = None
+    settings: ClassVar[Section] = NO_SETTINGS
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Draw the card of an accepted twin."""

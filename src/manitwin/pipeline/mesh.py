@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -26,19 +27,19 @@ _GENERATED = "generated.glb"
 _TURNED_DEG = 10.0  # less is a scan that stands a little off its base, not another pose
 
 
+@dataclass(frozen=True)
 class MeshStage:
     """Read, repair, scale and orient the mesh (the paper's "standardization": watertight, metres, canonical pose)."""
+
+    settings: MeshConfig
 
     name: ClassVar[str] = "mesh"
     version: ClassVar[str] = "1"
     reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?")
     writes: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry")
     needs: ClassVar[Resource] = "cpu"
-    backend: str = "builtin"
-    model: str | None = None
-
-    def __init__(self, settings: MeshConfig):
-        self.settings = settings
+    backend: ClassVar[str] = "builtin"
+    model: ClassVar[str | None] = None
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Write ``canonical.glb`` and ``canonical.npz`` (vertices (V, 3) m, faces (F, 3)); return ``geometry``.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -16,19 +17,19 @@ from manitwin.models.matting import matte_photo
 from manitwin.pipeline.item import Item
 
 
+@dataclass(frozen=True)
 class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
+
+    settings: MattingConfig
 
     name: ClassVar[str] = "photo"
     version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
-    backend: str = "classical"
-    model: str | None = None
-
-    def __init__(self, settings: MattingConfig):
-        self.settings = settings
+    backend: ClassVar[str] = "classical"
+    model: ClassVar[str | None] = None
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""

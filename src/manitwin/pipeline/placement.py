@@ -49,23 +49,22 @@ class _Rest:
         return self.rotation[2]
 
 
+@dataclass(frozen=True)
 class PlacementStage:
     """Find stable poses and prove them in simulation.
 
     Field ``placements``: a list of twin.Placement, those that stayed first, most likely first.
     """
 
+    settings: PlacementConfig
+
     name: ClassVar[str] = "placement"
     version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = ("hulls.npz", "solid.npz", "physical")
     writes: ClassVar[tuple[str, ...]] = ("placements",)
     needs: ClassVar[Resource] = "cpu"
-    backend = "sapien, mujoco"
-    model: str | None = None
-
-    def __init__(self, settings: PlacementConfig):
-        """Take the settings."""
-        self.settings = settings
+    backend: ClassVar[str] = "sapien, mujoco"
+    model: ClassVar[str | None] = None
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return the field ``placements``; raises Rejected where the object stays in no pose."""

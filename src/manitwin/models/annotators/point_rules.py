@@ -171,7 +171,7 @@ class PointSelection:
         )
 
     def _confidence(self, score: float) -> float:
-        """A rule is never sure: at most 0.9, and 0.5 where nobody said what the thing is."""
+        """Return a confidence: a rule is never sure, so at most 0.9, and 0.5 where nobody said what the thing is."""
         return round((0.3 + 0.6 * score) * (1.0 if self.named else 0.55), 3)
 
     def _rationale(self, feature: Feature, i: int) -> str:

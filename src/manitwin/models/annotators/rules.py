@@ -105,7 +105,7 @@ def _mass(prior: Prior, longest_m: float, volume_m3: float) -> Estimate:
 
 
 def _unknown_mass(prior: Prior, volume_m3: float) -> Estimate:
-    """Any usual bulk density times the volume: all that can be said of a thing that nobody has named."""
+    """Return any usual bulk density times the volume: all that can be said of a thing that nobody has named."""
     assert prior.bulk_density_kg_m3 is not None
     return _scaled(prior.bulk_density_kg_m3, volume_m3).estimate(prior.source)
 

@@ -164,7 +164,7 @@ def _points(schema_name: str, schema: dict[str, Any], text: str, prior: Prior) -
 
 
 def _functional(listed: dict[str, tuple[int, int]], prior: Prior) -> list[dict[str, Any]]:
-    """The highest and the lowest place."""
+    """Return the highest and the lowest place."""
     order = sorted(listed, key=lambda number: (listed[number][0], int(number)))
     places = ((order[-1], "upper end", "what one reaches first"), (order[0], "underside", "what it rests on"))
     return [
@@ -180,7 +180,7 @@ def _functional(listed: dict[str, tuple[int, int]], prior: Prior) -> list[dict[s
 
 
 def _grasps(listed: dict[str, tuple[int, int]], prior: Prior, text: str) -> list[dict[str, Any]]:
-    """The place nearest to the center of gravity, and the nearest at another height."""
+    """Return the place nearest to the center of gravity, and the nearest at another height."""
     order = sorted(listed, key=lambda number: (*listed[number], int(number)))
     heights = [height for _, height in listed.values()]
     apart = 0.2 * (max(heights) - min(heights))

@@ -21,7 +21,7 @@ from manitwin.errors import BadReply, ConfigError, ManiTwinError, RateLimited
 from manitwin.models.services.download import MAX_FILE_BYTES, download_file
 from manitwin.models.services.keys import is_local, redacted
 from manitwin.models.services.refusal import (
-    Failure,
+    FailedRequest,
     Gone,
     Refusal,
     Unanswered,
@@ -169,38 +169,40 @@ class HttpService:
             )
         return url
 
-    def _once(self, method: str, url: str, content: dict[str, Any], pays: bool, max_bytes: int) -> bytes | Failure:
+    def _once(
+        self, method: str, url: str, content: dict[str, Any], pays: bool, max_bytes: int
+    ) -> bytes | FailedRequest:
         headers = {**self._authorization, "Accept": "application/json, */*"}
         try:
             with self._stream(method, url, headers, content) as response:
                 status, after = response.status_code, retry_after_s(response.headers.get("Retry-After"))
                 data = _bounded(response.iter_bytes(), max_bytes)
         except _NOT_SENT as error:
-            return Failure(self._silent(error, False), again=True)
+            return FailedRequest(self._silent(error, False), again=True)
         except httpx2.RequestError as error:  # timeouts, connections cut, broken HTTP
-            return Failure(self._silent(error, pays), again=not pays)
+            return FailedRequest(self._silent(error, pays), again=not pays)
         if data is None:
-            return Failure(self.unreadable(f"end within {max_bytes} bytes", pays), again=False)
+            return FailedRequest(self.unreadable(f"end within {max_bytes} bytes", pays), again=False)
         return self._judged(status, data, after, pays)
 
-    def _judged(self, status: int, data: bytes, after: float | None, pays: bool) -> bytes | Failure:
+    def _judged(self, status: int, data: bytes, after: float | None, pays: bool) -> bytes | FailedRequest:
         if 300 <= status < 400:
             error: ManiTwinError = BadReply(f"{self.name}: {self.base_url} redirects; give the new address after @")
-            return Failure(error, again=False)
+            return FailedRequest(error, again=False)
         refusal = self._refusal(status, _parsed(data))
         if refusal is None:
             return data
         error = error_for(self.name, Refusal(self.said(refusal.message), refusal.kind), status, self._remedy, after)
         if pays and status in _ANSWER_LOST:
-            return Failure(Unanswered(f"{error}; whether it took the job is not known"), again=False)
+            return FailedRequest(Unanswered(f"{error}; whether it took the job is not known"), again=False)
         retryable = refusal.kind == "busy" or (refusal.kind == "down" and (not pays or status in _NOT_TAKEN))
-        return Failure(error, again=retryable, wait_s=after if isinstance(error, RateLimited) else None)
+        return FailedRequest(error, again=retryable, wait_s=after if isinstance(error, RateLimited) else None)
 
-    def _file(self, url: str, to: Path, max_bytes: int) -> bytes | Failure:
+    def _file(self, url: str, to: Path, max_bytes: int) -> bytes | FailedRequest:
         schemes = {"https", urlsplit(self.base_url).scheme}
         with self._client() as client:
             error, again = download_file(client, url, to, name=self.name, max_bytes=max_bytes, schemes=schemes)
-        return b"" if error is None else Failure(error, again)
+        return b"" if error is None else FailedRequest(error, again)
 
     @contextmanager
     def _stream(

@@ -39,7 +39,7 @@ class Refusal:
 
 
 @dataclass(frozen=True)
-class Failure:
+class FailedRequest:
     """A request that came to nothing: whether it may be made again, and after how long where the server says so.
 
     ``error`` is raised where it may not, or no tries are left; ``words`` are what the server said of a request that it could
@@ -53,7 +53,7 @@ class Failure:
 
 
 def until_answered(
-    attempt: Callable[[], AnswerT | Failure], services: ServicesConfig, sleep: Callable[[float], None]
+    attempt: Callable[[], AnswerT | FailedRequest], services: ServicesConfig, sleep: Callable[[float], None]
 ) -> AnswerT:
     """Return the answer of the first attempt that has one; raises the last failure's error.
 
@@ -63,7 +63,7 @@ def until_answered(
     pause = FIRST_WAIT_S
     for left in range(services.retries, -1, -1):
         outcome = attempt()
-        if not isinstance(outcome, Failure):
+        if not isinstance(outcome, FailedRequest):
             return outcome
         wait = pause if outcome.wait_s is None else outcome.wait_s
         too_long = outcome.wait_s is not None and wait > services.longest_wait_s

@@ -15,7 +15,7 @@ from manitwin.errors import BadReply, ConfigError, RateLimited
 from manitwin.models.services.http import http_client
 from manitwin.models.services.keys import redacted
 from manitwin.models.services.refusal import (
-    Failure,
+    FailedRequest,
     Refusal,
     error_for,
     refusal_by_status,
@@ -73,17 +73,17 @@ class OpenAiChat(ServedChat):
     def ask(self, question: Question, turns: tuple[Turn, ...] = ()) -> Reply:
         """Answer a question, given the turns that followed it."""
 
-        def attempt() -> Completion | Failure:
+        def attempt() -> Completion | FailedRequest:
             while True:
                 outcome = self._once(question, turns)
-                narrower = self.dialect.without(outcome.words) if isinstance(outcome, Failure) else None
+                narrower = self.dialect.without(outcome.words) if isinstance(outcome, FailedRequest) else None
                 if narrower is None:
                     return outcome
                 self.dialect = narrower
 
         return until_answered(attempt, self._services, self._sleep).paid(self.price, self._who)
 
-    def _once(self, question: Question, turns: tuple[Turn, ...]) -> Completion | Failure:
+    def _once(self, question: Question, turns: tuple[Turn, ...]) -> Completion | FailedRequest:
         # errors are made here and raised outside of the handlers: those of the SDK hold the request, and with it the key
         body = request_body(
             question,
@@ -101,10 +101,10 @@ class OpenAiChat(ServedChat):
         except openai.APIConnectionError as error:
             cause = redacted(str(error.__cause__ or error), self._key)
             refusal = Refusal(f"{self.base_url} does not answer ({cause or type(error.__cause__).__name__})", "down")
-            return Failure(error_for(self._who, refusal, None, "", None), again=True)
+            return FailedRequest(error_for(self._who, refusal, None, "", None), again=True)
         return completion(response.content, question, self._who, self._key, self._settings.max_tokens)
 
-    def _refused(self, response: httpx2.Response) -> Failure:
+    def _refused(self, response: httpx2.Response) -> FailedRequest:
         status = response.status_code
         try:
             body = response.json()
@@ -114,7 +114,7 @@ class OpenAiChat(ServedChat):
         refusal = openai_refusal(status, body) or Refusal("it redirects; give the new address after @", "bad")
         words, refusal = refusal.message, Refusal(redacted(refusal.message, self._key), refusal.kind)
         error = error_for(self._who, refusal, status, self._remedy, retry_after_s(response.headers.get("Retry-After")))
-        return Failure(
+        return FailedRequest(
             error,
             again=refusal.kind in ("busy", "down"),
             wait_s=error.retry_after_s if isinstance(error, RateLimited) else None,
