@@ -25,7 +25,7 @@ WRONG_VALUES = (
     "build nothing_here.png -o out",
     "build . -o out --units inch",
     "build . -o out --vlm nobody",
-    "run -o out --executor cloud",
+    "build -o out --executor cloud",
     "layout . -o out --robot nobody",
     "trajectories . -o out --format csv",
     "render . --cameras behind",

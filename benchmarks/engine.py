@@ -9,7 +9,9 @@ are jobs), and the driver's memory over the run, which ``--curve`` writes as ite
 from __future__ import annotations
 
 import argparse
+import os
 import resource
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -21,7 +23,11 @@ from manitwin.engine.executors.local import LocalExecutor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.rehearsal import RehearsalRecipe
+
+TESTS = str(Path(__file__).resolve().parent.parent / "tests")
+sys.path.insert(0, TESTS)
+os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (TESTS, os.environ.get("PYTHONPATH"))))  # for Ray's workers
+from rehearsal_recipe import RehearsalRecipe  # noqa: E402
 
 EVERY = 500
 

@@ -50,7 +50,7 @@ def main() -> None:
     parser.add_argument("--reference", type=int, default=0)
     parser.add_argument("--processes", type=int, default=0)
     arguments = parser.parse_args()
-    folders = sorted(path.parent for path in arguments.twins.glob("*/grasps.parquet"))
+    folders = sorted(path.parent for path in arguments.twins.glob("twins/*/*/grasps.parquet"))
     _one((folders[0], 2))  # imports and first uses are not what is measured
     rows = [_measure(folder, arguments.grasps) for folder in folders]
     for name in ("cpu_s", "around_s", "of_steps", "of_plain"):

@@ -66,7 +66,7 @@ def risen_m(model: mujoco.MjModel, opening_m: float) -> float:
 
 def main(twins: Path) -> None:
     """Try the first grasps of the first twin; says how many hold."""
-    twin = manitwin.load(next(twins.glob("*/twin.json")).parent)
+    twin = manitwin.Dataset(twins)[0]
     grasps = twin.grasps()
     opening_m = 0.08
     with tempfile.TemporaryDirectory() as folder:

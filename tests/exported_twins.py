@@ -17,10 +17,10 @@ from manitwin.assets.writers.exporter import TwinContent
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.hulls.reduction import hull_to_obj
-from manitwin.pipeline.rehearsal_cube import CUBE
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import seal
 from record_overlay import overlaid
+from rehearsal_cube import CUBE
 from twin_folders import grasp_table
 
 TWIN_ID = "5eed5eed5eed5eed"

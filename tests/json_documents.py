@@ -10,6 +10,7 @@ from typing import Any
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "json.md"
 SHARED = ("causes[]", "remarks[]", "folders[]")
 """What the other sections have as that of build has it."""
+RUN = {"out", "counts", "left_waiting", "stopped", "exit_status", *SHARED}
 
 
 def check_keys(document: dict[str, Any], section: str) -> None:
@@ -28,7 +29,9 @@ def documented(section: str) -> set[str]:
     page = PAGE.read_text()
     found = re.search(rf"^## `manitwin {re.escape(section)} --json`\n(.*?)(?=^## |\Z)", page, re.M | re.S)
     assert found is not None, section
-    keys: set[str] = documented("run") if found[1].strip().startswith("What `run` says") else set()
+    keys: set[str] = (
+        {key for key in documented("layout") if key.split(".")[0] in RUN} if "What `layout` says" in found[1] else set()
+    )
     for first, second in re.findall(r"^\| (`.*?) \| (.*?) ?\|$", found[1], re.M):
         own = re.findall(r"`([^`]+)`", first)
         keys |= {*own, *(key for key in re.findall(r"`([a-z_.{}\[\]]+)`", second) if key.startswith(within(own)))}

@@ -12,10 +12,10 @@ from manitwin.assets.writers.exporter import TwinContent, export_name
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.pipeline.rehearsal_cube import CUBE
 from manitwin.twin.grasp_table import SCHEMA
 from manitwin.twin.record import TwinRecord
 from record_overlay import overlaid
+from rehearsal_cube import CUBE
 from rigid_boxes import above
 
 FROM_ABOVE_ALONG_Y = np.column_stack([[0.0, 1, 0], [1.0, 0, 0], [0.0, 0, -1]])

@@ -14,7 +14,8 @@ from PIL import Image, ImageOps
 
 import manitwin
 import manitwin.config
-from manitwin.pipeline.build_item import ItemResult
+from manitwin.pipeline.build_report import ItemResult
+from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.record import TwinRecord
 
 pytestmark = pytest.mark.shared_data
@@ -64,7 +65,7 @@ def results(shared_data: Path, tmp_path_factory: pytest.TempPathFactory) -> dict
     manifest.write_text("file,name\n" + "".join(f"{file},{name}\n" for file, name in rows))
     report = manitwin.build(manifest, folder / "out", config=FEW_GRASPS, quick=True)
     assert report.count("unfinished") == 0, [r.detail for r in report.results if r.status == "unfinished"]
-    left = {p.name for p in (folder / "out").iterdir()} - {".work"}
+    left = {p.name for p in (folder / "out").glob("twins/*/*")}
     assert left == {r.twin_id for r in report.results}, "every input ends in a folder, and nothing else is there"
     return {Path(r.item.file or "").name: r for r in report.results}
 
@@ -122,7 +123,7 @@ def test_exif_rotation_gives_the_twin_of_the_upright_photo(results: dict[str, It
 def mean_lab(result: ItemResult) -> np.ndarray:
     """The mean CIE Lab colour of the matted photo."""
     assert result.folder is not None
-    (photo,) = (result.folder.parent / ".work" / result.twin_id / "photo").glob("*/photo.png")
+    (photo,) = (result.folder.parents[2] / ".work" / result.twin_id / "photo").glob("*/photo.png")
     rgba = np.asarray(Image.open(photo))
     lab = cv2.cvtColor(np.ascontiguousarray(rgba[..., :3], np.float32) / 255, cv2.COLOR_RGB2LAB)
     return lab[rgba[..., 3] > 127].mean(0)
@@ -168,7 +169,8 @@ def test_source_is_kept_byte_for_byte(results: dict[str, ItemResult], shared_dat
 def test_a_rejected_input_is_not_tried_again(results: dict[str, ItemResult], shared_data: Path, tmp_path: Path) -> None:
     folder = results["one_pixel.png"].folder
     assert folder is not None
-    shutil.copytree(folder, tmp_path / folder.name)
+    place = tmp_path / twin_name(folder.name)
+    shutil.copytree(folder, place)
     report = manitwin.build(shared_data / "bad" / "one_pixel.png", tmp_path, config=FEW_GRASPS, quick=True)
     assert [r.reused for r in report.results] == [True]
-    assert json.loads((tmp_path / folder.name / "twin.json").read_text())["status"] == "rejected"
+    assert json.loads((place / "twin.json").read_text())["status"] == "rejected"

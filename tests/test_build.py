@@ -86,7 +86,7 @@ def _said(kind: str) -> dict[str, str]:
 
 
 def test_finished_twins_are_not_built_again(samples: dict[str, Twin]) -> None:
-    out = samples["mesh"].folder.parent
+    out = samples["mesh"].folder.parents[2]
     started = time.process_time()
     report = manitwin.build(SAMPLES / "samples.csv", out, config=QUICK)
     assert all(result.reused for result in report.results)
@@ -95,7 +95,7 @@ def test_finished_twins_are_not_built_again(samples: dict[str, Twin]) -> None:
 
 def test_changed_setting_runs_its_stage_and_what_follows_only(samples: dict[str, Twin], tmp_path: Path) -> None:
     out = tmp_path / "out"
-    shutil.copytree(samples["mesh"].folder.parent, out)
+    shutil.copytree(samples["mesh"].folder.parents[2], out)
     config = QUICK.model_copy(update={"placement": QUICK.placement.model_copy(update={"max_placements": 1})})
     report = manitwin.build(SAMPLES / "mug.glb", out, name="mug", config=config, **_said("mesh"))
     assert report.results[0].status == "accepted"
@@ -151,7 +151,7 @@ def thorough(samples: dict[str, Twin], tmp_path_factory: pytest.TempPathFactory)
     """The sample mug with both engines, robustness and a second gripper, from the stages that the quick one has run."""
     out = tmp_path_factory.mktemp("thorough")
     work = Path(".work") / samples["mesh"].record.twin_id
-    shutil.copytree(samples["mesh"].folder.parent / work, out / work)
+    shutil.copytree(samples["mesh"].folder.parents[2] / work, out / work)
     grippers = ("panda", "wsg50_110")
     report = manitwin.build(SAMPLES / "mug.glb", out, name="mug", config=THOROUGH, grippers=grippers, **_said("mesh"))
     assert report.exit_code == 0, [r.detail for r in report.results]
@@ -197,7 +197,7 @@ def test_thorough_grasps_are_ranked_and_controls_are_left_out(thorough: Twin) ->
 
 def test_require_agreement_verifies_only_what_both_engines_hold(thorough: Twin, tmp_path: Path) -> None:
     work = Path(".work") / thorough.record.twin_id
-    shutil.copytree(thorough.folder.parent / work, tmp_path / work)
+    shutil.copytree(thorough.folder.parents[2] / work, tmp_path / work)
     report = manitwin.build(
         SAMPLES / "mug.glb", tmp_path, name="mug", config=THOROUGH, require_agreement=True, **_said("mesh")
     )
@@ -245,13 +245,13 @@ def test_killed_build_leaves_no_half_twin_and_goes_on(tmp_path: Path) -> None:
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
-    assert not [p for p in out.iterdir() if p.name != ".work"]
+    assert not (out / "twins").exists()
     kept = {p: p.stat().st_mtime_ns for p in out.glob(".work/*/*/*/result.json")}
     assert kept
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert {p: p.stat().st_mtime_ns for p in kept} == kept, "finished stages are not run again"
-    (folder,) = [p for p in out.iterdir() if p.name != ".work"]
+    (folder,) = out.glob("twins/*/*")
     assert json.loads((folder / "twin.json").read_text())["status"] == "accepted"
 
 

@@ -36,7 +36,7 @@ def test_grippers_second_opinion_and_robustness_are_settings(tmp_path: Path) -> 
         ("sead = 1", "did you mean 'seed'"),
         ("[candidates]\ncuont = 1", "candidates.cuont: unknown setting 'cuont'; did you mean 'count'"),
         ("seed = 'x'", "seed: "),
-        ("item_timeout_s = -1", "item_timeout_s: "),
+        ("[run]\nstage_timeout_s = -1", "run.stage_timeout_s: "),
         ("seed = ", "not TOML"),
         ("gripper = 'panda'", "did you mean 'grippers'"),
         ("grippers = []", "grippers: "),

@@ -21,11 +21,10 @@ import pytest
 from PIL import Image
 from rich.console import Console
 
+import manitwin
 from manitwin import load
-from manitwin.api import with_flags
 from manitwin.cli.summary import print_summary
 from manitwin.config import BuildConfig
-from manitwin.dataset.index.parts import IndexTables
 from manitwin.models.fakes.anthropic_messages import FakeAnthropic
 from manitwin.models.fakes.catalog import serving
 from manitwin.models.fakes.faults import ALWAYS, Faults
@@ -33,7 +32,7 @@ from manitwin.models.fakes.grasp_servers import FakeGraspGen
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.rodin import FakeRodin
 from manitwin.models.fakes.server import FakeServer
-from manitwin.pipeline.dataset_run import RunReport, run
+from manitwin.pipeline.settings import Flags, with_flags
 from manitwin.render.card import RED
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RUN
@@ -127,25 +126,18 @@ def keys_and_homes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[
         assert not [path for path in files if key.encode() in path.read_bytes()]
 
 
-def run_here(folder: Path, served: Servers, *texts: str, **services: Any) -> RunReport:
+def run_here(folder: Path, served: Servers, *texts: str, **services: Any) -> manitwin.BuildReport:
     """Work through a data set in this process, by the very driver and worker of a run."""
-    flags = dict(zip(("vlm", "generator", "grasper"), served.flags[1::2], strict=True))
-    settings = with_flags(BuildConfig.model_validate(tomllib.loads(SETTINGS)), **flags)
+    vlm, generator, grasper = served.flags[1::2]
+    flags: Flags = {"vlm": vlm, "generator": generator, "grasper": grasper}
+    settings = with_flags(BuildConfig.model_validate(tomllib.loads(SETTINGS)), flags)
     update = {
         # no server is silent in these runs: only a loaded machine would answer late
         "services": settings.services.model_copy(update={"timeout_s": 60.0, **services}),
         "run": settings.run.model_copy(update={"patience_s": 0}),
     }
     settings = settings.model_copy(update=update)
-    return run(
-        [],
-        str(folder / "data"),
-        tables=IndexTables(),
-        config=settings,
-        texts=texts,
-        defaults={"name": "bottle"},
-        executor="inline",
-    )
+    return manitwin.build([], folder / "data", config=settings, texts=texts, name="bottle", executor="inline")
 
 
 def twins(folder: Path) -> list[Path]:
@@ -216,7 +208,7 @@ def test_a_model_that_is_down_leaves_the_twin_waiting_and_nothing_is_paid_twice(
     down = Faults({"server_error": ALWAYS})
     with servers(vlm=down) as served:
         report = run_here(tmp_path, served, "a bottle", retries=1)
-        assert (report.exit_code, report.left) == (4, 1)
+        assert (report.exit_code, report.run.left) == (4, 1)
         assert twins(tmp_path) == [] and served.jobs() == 1
         down.stop("server_error")
         report = run_here(tmp_path, served)
@@ -237,7 +229,7 @@ def test_a_build_killed_at_the_generator_finds_its_job_again(tmp_path: Path) -> 
         slow.stop("job_never_ends")
         status, said = finished(tmp_path, *arguments)
         assert (status, served.jobs()) == (0, 1), said
-    (twin,) = (path.parent for path in (tmp_path / "made").glob("*/twin.json"))
+    (twin,) = (path.parent for path in (tmp_path / "made").glob("twins/*/*/twin.json"))
     assert cost_usd(twin, "generate") == pytest.approx(USD_PER_JOB), "paid before the crash, and part of its cost"
     assert load(twin).record.provenance.stages["generate"].rehearsal, "also a job that an earlier process submitted"
 
@@ -246,8 +238,8 @@ def test_a_build_killed_at_the_generator_finds_its_job_again(tmp_path: Path) -> 
 def test_a_refused_key_stops_the_run_with_its_reason(tmp_path: Path, fault: str) -> None:
     with servers(generator=Faults({fault: ALWAYS})) as served:
         report = run_here(tmp_path, served, "a bottle")
-    assert report.exit_code == 4 and report.stopped is not None and "RODIN_API_KEY" in report.stopped
-    assert not any(key in report.stopped for key in KEYS.values()) and twins(tmp_path) == []
+    assert report.exit_code == 4 and report.run.stopped is not None and "RODIN_API_KEY" in report.run.stopped
+    assert not any(key in report.run.stopped for key in KEYS.values()) and twins(tmp_path) == []
 
 
 @pytest.mark.parametrize("fault", ["refusal", "cut_answer", "wrong_schema", "implausible"])
@@ -255,9 +247,9 @@ def test_an_answer_that_cannot_be_used_is_never_accepted(tmp_path: Path, fault: 
     with servers(vlm=Faults({fault: ALWAYS})) as served:
         report = run_here(tmp_path, served, "a bottle", retries=0)
         assert served.jobs() == 1, "the mesh is there, and not asked for again"
-    assert report.counts.get("accepted", 0) == 0
+    assert report.run.counts.get("accepted", 0) == 0
     ended = {"implausible": "rejected"}.get(fault, "failed")
-    assert report.counts.get(ended) == 1
+    assert report.run.counts.get(ended) == 1
     for twin in twins(tmp_path):
         record = load(twin).record
         assert {"generate", "gate", "physical"} <= set(record.provenance.rehearsed)
@@ -293,7 +285,7 @@ def test_anthropics_protocol_serves_as_well(tmp_path: Path) -> None:
 def test_the_limit_of_money_leaves_what_would_cost_more(tmp_path: Path) -> None:
     with servers() as served:
         report = run_here(tmp_path, served, "a bottle", "a jar", max_cost_usd=0.9)
-        assert report.exit_code == 4 and report.stopped is not None and "at most 0.9 USD" in report.stopped
+        assert report.exit_code == 4 and report.run.stopped is not None and "at most 0.9 USD" in report.run.stopped
         assert served.jobs() == 1
 
 
@@ -314,12 +306,12 @@ def test_every_generator_and_grasper_ends_in_a_twin_while_it_fails(
                 monkeypatch.setenv(server.key_variable, server.key)
         spec = jobs.spec.replace("fal@", "fal:fal-ai/hyper3d/rodin@")  # of fal's, one that takes a text too
         settings = with_flags(
-            BuildConfig.model_validate(tomllib.loads(SETTINGS)), vlm=chat.spec, generator=spec, grasper=grasps.spec
+            BuildConfig.model_validate(tomllib.loads(SETTINGS)),
+            {"vlm": chat.spec, "generator": spec, "grasper": grasps.spec},
         )
-        report = run(
-            [SAMPLE], str(tmp_path / "data"), tables=IndexTables(), config=settings,
-            texts=[] if name == "hunyuan3d" else ["a bottle"],
-            defaults={"name": "bottle"}, executor="inline",
+        report = manitwin.build(
+            [SAMPLE], tmp_path / "data", config=settings, texts=[] if name == "hunyuan3d" else ["a bottle"], name="bottle",
+            executor="inline",
         )  # fmt: skip
     assert report.exit_code == 0, report
     for twin in twins(tmp_path):

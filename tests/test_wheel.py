@@ -105,7 +105,7 @@ def test_wheel_builds_twins_in_a_fresh_environment_elsewhere(wheel: Path, tmp_pa
     assert version == manitwin.__version__ and Path(file).is_relative_to(tmp_path / "fresh")
     command = [str(python.parent / "manitwin"), "build", "samples.csv", "-o", "twins", "--quick", "--jobs", "1"]
     said = _run(command, elsewhere, environment)
-    twins = sorted((elsewhere / "twins").glob("*/twin.json"))
+    twins = sorted((elsewhere / "twins").glob("twins/*/*/twin.json"))
     assert len(twins) == 2, said
     for record in twins:
         twin = manitwin.load(record.parent, verify=True)

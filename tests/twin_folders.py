@@ -13,13 +13,13 @@ import pyarrow.parquet as pq
 import trimesh
 
 from handmade import visual
-from manitwin.engine.stage_order import STAGE_ORDER
 from manitwin.formats.glb import write_glb
-from manitwin.pipeline.rehearsal_cube import CUBE
+from manitwin.pipeline.stage_order import STAGE_ORDER
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.grasp_table import SCHEMA
 from manitwin.twin.store import seal
 from record_overlay import overlaid
+from rehearsal_cube import CUBE
 
 OUTCOMES = ("held", "held", "slips", "drops")
 

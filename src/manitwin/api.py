@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, TypeVar, Unpack
 
 from manitwin.errors import UsageError
 
@@ -18,43 +18,16 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.config import BuildConfig
     from manitwin.dataset.index.rebuild import Rebuilt
     from manitwin.dataset.statistics.report import WrittenReport
-    from manitwin.engine.events import OnStage
+    from manitwin.engine.drive import ExecutorName, RunReport
+    from manitwin.engine.events import ItemEnded, OnStage
     from manitwin.episodes.collect import AttemptTotals
     from manitwin.episodes.retirement import Retirement
     from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
-    from manitwin.pipeline.build_item import ItemResult
-    from manitwin.pipeline.dataset_run import ExecutorName, RunReport
-    from manitwin.pipeline.folder_listing import FolderListing
-    from manitwin.pipeline.item import Item
-    from manitwin.pipeline.manifest import Notes
+    from manitwin.pipeline.build_report import BuildReport, ItemResult
+    from manitwin.pipeline.settings import Flags
     from manitwin.scenes.loaded_scene import Scene
     from manitwin.scenes.settings import LayoutsConfig
     from manitwin.twin.loaded_twin import Twin
-    from manitwin.twin.record import TwinRecord
-
-
-@dataclass(frozen=True)
-class BuildReport:
-    """What became of every item of a build, in the order in which they ended, and of every file of a folder given to it."""
-
-    results: list[ItemResult]
-    remarks: list[str] = field(default_factory=list)
-    folders: list[FolderListing] = field(default_factory=list)
-
-    def count(self, status: str) -> int:
-        """Return how many items ended as 'accepted', 'rejected' or 'unfinished'."""
-        return sum(result.status == status for result in self.results)
-
-    def records(self) -> Iterator[TwinRecord]:
-        """Read the records of the accepted twins, one after the other."""
-        from manitwin.twin.store import read_record
-
-        return (read_record(r.folder) for r in self.results if r.status == "accepted" and r.folder is not None)
-
-    @property
-    def exit_code(self) -> int:
-        """0 all accepted, 3 some rejected, 4 some unfinished and resumable."""
-        return 4 if self.count("unfinished") else 3 if self.count("rejected") else 0
 
 
 def build(
@@ -69,137 +42,63 @@ def build(
     attribution: str | None = None,
     strict: bool = False,
     jobs: int | None = None,
-    seed: int | None = None,
     config: BuildConfig | str | Path | None = None,
-    grippers: Iterable[str] | None = None,
-    vlm: str | None = None,
-    generator: str | None = None,
-    grasper: str | None = None,
-    max_cost_usd: float | None = None,
-    record: str | Path | None = None,
-    require_agreement: bool = False,
-    quick: bool = False,
+    executor: ExecutorName = "local",
+    address: str | None = None,
     on_estimate: Callable[[dict[str, float]], None] = lambda usd_by_kind: None,
-    on_start: Callable[[int], None] = lambda total: None,
+    on_start: Callable[[int, int], None] = lambda items, opened: None,
     on_stage: OnStage = lambda event: None,
     on_result: Callable[[ItemResult], None] = lambda result: None,
+    **flags: Unpack[Flags],
 ) -> BuildReport:
-    """Build twins from images, meshes, folders, manifests and ``texts`` into the folder ``out``.
+    """Build twins from images, meshes, folders, manifests and ``texts`` into the data set ``out``, a folder or a URL.
 
-    ``units`` m|cm|mm|auto and ``up`` y|z|auto hold for all inputs whose manifest row does not say otherwise; with
-    ``strict`` a manifest's column that nobody knows is an error. A finished twin of the same configuration and seed is not
-    built again. ``grippers``: names or .toml files, the first one's grasps are the
-    twin's own. ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services have charged
-    ``max_cost_usd``, items that would cost more are left unfinished. ``record`` is a file that a VLM's answers are added to.
-    ``require_agreement`` verifies only what a second engine holds too; ``quick`` leaves out second engine and robustness.
-    Raises UsageError for wrong arguments; what happens to one item is in the report and never raised.
+    Without inputs a build goes on with what is there. What was built under the same configuration and seed is not built again;
+    under another one, the inputs that are given are (where none is given, all that are there), from the first stage that
+    it changes.
+
+    ``name``, ``units`` m|cm|mm|auto, ``up`` y|z|auto, ``license`` and ``attribution`` hold for all inputs whose manifest row
+    does not say otherwise; with ``strict`` a manifest's column that nobody knows is an error. ``config`` None: what the data set
+    was built with, else the defaults. ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first
+    one's grasps are the twin's own; ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
+    have charged ``max_cost_usd``, items that would cost more are left unfinished; ``record`` is a file that a VLM's answers are
+    added to; ``require_agreement`` verifies only what a second engine holds too; ``quick`` leaves out second engine and
+    robustness. ``executor`` is local (``jobs`` processes), ray (a cluster at ``address``), or inline, in this process.
+
+    Raises UsageError for wrong arguments, and where another build is at work there; what happens to one item is in the report
+    and never raised.
     """
-    if jobs is not None and jobs < 1:
-        raise UsageError(f"jobs is {jobs}; give 1 or more")
+    from manitwin.pipeline.settings import request_build
+
+    defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
     request = request_build(
-        inputs,
-        out,
-        texts,
-        config,
-        defaults={
-            "name": name, "units": units, "up": up, "license": license, "attribution": attribution, "strict": strict,
-        },
-        flags={
-            "seed": seed, "grippers": grippers, "vlm": vlm, "generator": generator, "grasper": grasper,
-            "max_cost_usd": max_cost_usd, "record": record, "require_agreement": require_agreement, "quick": quick,
-        },
-    )  # fmt: skip
-    from manitwin.pipeline.recipe import estimate_usd, log_choices
-    from manitwin.pipeline.whole_items import build_all
+        inputs, out, texts=texts, strict=strict, jobs=jobs, config=config, defaults=defaults, flags=flags
+    )
+    from manitwin.dataset.index.parts import IndexTables
+    from manitwin.engine.drive import drive
+    from manitwin.pipeline.build_report import BuildReport, ItemResult
+    from manitwin.pipeline.recipe import TwinRecipe, estimate_usd, log_choices
 
-    settings, items, place = request.settings, request.items, request.place
+    settings, root = request.settings, request.root
+    there: dict[int, bool] = {}
     log_choices(settings)
-    place.mkdir(parents=True, exist_ok=True)
-    on_estimate(estimate_usd(settings))
-    on_start(len(items))
-    results: list[ItemResult] = []
-    for result in build_all(items, place.resolve(), settings, jobs=jobs or os.cpu_count() or 1, on_stage=on_stage):
-        results.append(result)
-        on_result(result)
-    return BuildReport(results, request.notes.remarks, request.notes.folders)
 
+    def started(items: int, opened: int) -> None:
+        on_estimate(estimate_usd(settings))
+        on_start(items, opened)
 
-@dataclass(frozen=True)
-class BuildRequest:
-    """What ``build`` is asked for, checked: nothing is written yet."""
+    def ended(event: ItemEnded) -> None:
+        there[event.task.number] = event.found
+        on_result(ItemResult.of(event.row(), root, event.found))
 
-    settings: BuildConfig
-    items: list[Item]
-    notes: Notes
-    place: Path
-
-
-def request_build(
-    inputs: str | Path | Iterable[str | Path],
-    out: str | Path,
-    texts: Iterable[str],
-    config: BuildConfig | str | Path | None,
-    *,
-    defaults: Mapping[str, Any],
-    flags: Mapping[str, Any],
-) -> BuildRequest:
-    """Read what ``build`` is asked for; ``defaults`` are its arguments of ``collect_items``, ``flags`` those of ``with_flags``.
-
-    Raises UsageError for wrong arguments.
-    """
-    from manitwin.config import BuildConfig, load_config
-    from manitwin.formats.output_folder import require_writable_folder
-    from manitwin.pipeline.generator_input import refusal
-    from manitwin.pipeline.manifest import collect_items
-
-    settings = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else BuildConfig()
-    settings = with_flags(settings, **flags)
-    given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
-    items, notes = collect_items(given, texts, refusal=refusal(settings), **defaults)
-    if not items:
-        raise UsageError("nothing to build; give images, meshes, folders, manifests or texts")
-    place = Path(out)
-    require_writable_folder(place, "twins")
-    # this takes two CPU-seconds to import: what was given wrongly is said before
-    from manitwin.pipeline.recipe import check_names
-
-    check_names(settings)
-    return BuildRequest(settings, items, notes, place)
-
-
-def with_flags(
-    settings: BuildConfig,
-    *,
-    seed: int | None = None,
-    grippers: Iterable[str] | None = None,
-    vlm: str | None = None,
-    generator: str | None = None,
-    grasper: str | None = None,
-    max_cost_usd: float | None = None,
-    record: str | Path | None = None,
-    require_agreement: bool = False,
-    quick: bool = False,
-) -> BuildConfig:
-    """Return the settings with what a command line says on top; raises UsageError where two of it contradict each other."""
-    if quick and require_agreement:
-        raise UsageError("quick leaves the second engine out, and require-agreement asks for it; give one of them")
-    said = {"seed": seed, "annotator": vlm, "generator": generator, "grasper": grasper}
-    update: dict[str, Any] = {name: value for name, value in said.items() if value is not None}
-    if max_cost_usd is not None and max_cost_usd <= 0:
-        raise UsageError(f"max_cost_usd is {max_cost_usd:g}; give more than 0")
-    services = {"max_cost_usd": max_cost_usd, "record": None if record is None else Path(record).absolute()}
-    said_of_services = {name: value for name, value in services.items() if value is not None}
-    update["services"] = settings.services.model_copy(update=said_of_services)
-    if grippers is not None:
-        update["grippers"] = tuple(grippers)
-    if require_agreement:
-        update["second_opinion"] = settings.second_opinion.model_copy(
-            update={"enabled": True, "require_agreement": True}
-        )
-    if quick:
-        update["second_opinion"] = settings.second_opinion.model_copy(update={"enabled": False})
-        update["robustness"] = settings.robustness.model_copy(update={"enabled": False})
-    return settings.model_copy(update=update)
+    run = drive(
+        TwinRecipe(settings, IndexTables()), request.items, root, settings.run,
+        configuration=settings.model_dump(mode="json"), executor=executor, address=address,
+        max_cost_usd=settings.services.max_cost_usd, remarks=request.notes.remarks, on_start=started, on_stage=on_stage,
+        on_ended=ended,
+    )  # fmt: skip
+    found = frozenset(number for number, was_there in there.items() if was_there)
+    return BuildReport(str(out), run, request.notes.folders, frozenset(there), found)
 
 
 def load(folder: str | Path, verify: bool = False) -> Twin:
@@ -410,12 +309,9 @@ def write_index(dataset: str | Path, *, jobs: int | None = None) -> Rebuilt:
     Raises UsageError where there is no data set, TwinError where a process dies: nothing has changed then.
     """
     from manitwin.dataset.index.rebuild import rebuild
-    from manitwin.twin.dataset_root import TWINS, DatasetRoot
+    from manitwin.twin.dataset_root import DatasetRoot
 
-    root = DatasetRoot(dataset)
-    if not root.exists(TWINS):
-        raise UsageError(f"{dataset}: no data set ({TWINS}/ is missing); give the folder or URL of one")
-    return rebuild(root, jobs=jobs or os.cpu_count() or 1)
+    return rebuild(DatasetRoot(dataset), jobs=jobs or os.cpu_count() or 1)
 
 
 def write_statistics(dataset: str | Path, out: str | Path | None = None) -> WrittenReport:

@@ -272,7 +272,6 @@ class BuildConfig(Section):
     simulator: str = "sapien"
     second_simulator: str = "mujoco"
     grippers: tuple[str, ...] = Field(default=("panda",), min_length=1)
-    item_timeout_s: float = Field(default=1800.0, gt=0)
     matting: MattingConfig = MattingConfig()
     generate: GenerateConfig = GenerateConfig()
     vlm: VlmConfig = VlmConfig()

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from exported_twins import content
+from input_items import collect_items
 from manitwin.assets.audit.run import audit_assets
 from manitwin.assets.importers.importer import import_assets
 from manitwin.assets.read import read_asset
 from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.registry import exporter
 from manitwin.assets.writers.write import export_twin as write_export
-from manitwin.pipeline.manifest import collect_items
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
 from twin_folders import box, write_accepted

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import manitwin.cli.main as cli
+from manitwin.cli.progress import WatchedRun
 from manitwin.cli.reporting import reported
-from manitwin.cli.watched_run import WatchedRun
 
 NAME, FOLDER, MODE = sys.argv[1], Path(sys.argv[2]), sys.argv[3]
 
@@ -45,10 +45,11 @@ class InterruptsWhenTakenDown:
 
 def rehearse() -> None:
     from manitwin.config import RunConfig
-    from manitwin.pipeline.dataset_run import drive, local_log
+    from manitwin.engine.drive import drive
+    from manitwin.engine.ledger.location import local_log
     from manitwin.pipeline.item import Item
-    from manitwin.pipeline.rehearsal import RehearsalRecipe
     from manitwin.twin.dataset_root import DatasetRoot
+    from rehearsal_recipe import RehearsalRecipe
 
     root = DatasetRoot(FOLDER / "data")
     recipe = RehearsalRecipe(log=FOLDER / "started")  # which a worker writes as it begins a stage

@@ -9,12 +9,8 @@ from pathlib import Path
 import pytest
 
 import manitwin
-from manitwin.api import BuildReport
 from manitwin.cli.causes import REMEDIES, cause_lines, group_causes
-from manitwin.cli.why import causes_of_build
-from manitwin.engine.ledger.unaccepted import Unaccepted
-from manitwin.pipeline.build_item import ItemResult
-from manitwin.pipeline.item import Item
+from manitwin.engine.ledger.progress import Unaccepted
 from manitwin.twin.record import REJECTION_REASONS
 
 
@@ -85,19 +81,6 @@ def test_a_remedy_is_said_once() -> None:
     assert (cause.message, cause.remedy) == ("a.png: the file has zero bytes", REMEDIES["empty"])
 
 
-def test_a_build_tells_a_remedy_of_our_own_errors_and_none_of_a_defect() -> None:
-    mug = Item(file="/photos/mug.png")
-    results = [
-        ItemResult(mug, "1", "unfinished", "x does not answer; start it", None, error="Unavailable"),
-        ItemResult(mug, "2", "unfinished", "a defect in manitwin: KeyError: 'a'; the traceback is in e.txt", None),
-    ]
-    causes = causes_of_build(BuildReport(results))
-    assert [(cause.message, cause.remedy) for cause in causes] == [
-        ("x does not answer", "start it"),
-        ("a defect in manitwin: KeyError: 'a'; the traceback is in e.txt", None),
-    ]
-
-
 def test_rejections_are_grouped_by_their_reason_and_apart_from_failures() -> None:
     items = [
         Unaccepted("a.png", "rejected", "too_small", "too_small: a.png: 1 x 1 pixels"),
@@ -107,10 +90,10 @@ def test_rejections_are_grouped_by_their_reason_and_apart_from_failures() -> Non
     ]
     lines = cause_lines(group_causes(items), again="manitwin retry DATA", others="manitwin status DATA")
     assert lines == [
-        "why rejected: 2 of 3 empty, such as b.png: b.png: the file has zero bytes",
+        "why rejected: 2 of 3 empty, such as item b.png: b.png: the file has zero bytes",
         f"  remedy: {REMEDIES['empty']}",
         "  1 other cause: manitwin status DATA",
-        "why failed: 1 of 1, 1: no answer in 600 s",
+        "why failed: 1 of 1, item 1: no answer in 600 s",
         f"  remedy: {REMEDIES['timeout']}; then manitwin retry DATA",
     ]
 

@@ -12,13 +12,13 @@ from manitwin.cli import choices
 from manitwin.cli.commands.doctor import KINDS
 from manitwin.cli.commands.query import WRITERS
 from manitwin.dataset.index.tables import TABLES
+from manitwin.engine.drive import EXECUTORS
 from manitwin.episodes import collect
 from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
 from manitwin.errors import UsageError
 from manitwin.models.fakes.catalog import REHEARSALS
 from manitwin.models.registry import backends
-from manitwin.pipeline.dataset_run import EXECUTORS
 from manitwin.pipeline.manifest import Units, Up
 from manitwin.robots.grippers.gripper import shipped_grippers
 from manitwin.robots.load import load_robot, shipped_robots

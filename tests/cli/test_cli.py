@@ -47,7 +47,6 @@ def one_line(text: str) -> str:
             ("build", "PHOTO", "-o", "OUT", "--generator", "command:sh {text} {out}"),
             "makes no meshes of a photo (dot.png)",
         ),
-        (("run", "LIST", "-o", "OUT"), "list.csv:3: the generator 'lift' makes no meshes of text ('a cup')"),
         (("paint",), "paint"),
     ],
 )
@@ -151,8 +150,8 @@ WRONG_VALUES = [
     "build . -o out --gripper pandas",
     "build . -o out --vlm nobody",
     "build . -o out --config none.toml",
-    "run",
-    "run -o out --executor cloud",
+    "build",
+    "build -o out --executor cloud",
     "layout . -o out --surface bed",
     "layout . -o out --objects few",
     "layout . -o out --robot nobody",

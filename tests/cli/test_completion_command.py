@@ -40,7 +40,7 @@ def path_with_manitwin(tmp_path_factory: pytest.TempPathFactory) -> str:
         ("manitwin traj", {"trajectories"}),
         ("manitwin build --qu", {"--quick", "--quiet"}),
         ("manitwin export twins --to mjcf,usd", {"mjcf,usd", "mjcf,usdz"}),
-        ("manitwin run --executor ", {"local", "ray", "inline"}),
+        ("manitwin build --executor ", {"local", "ray", "inline"}),
         ("manitwin build --gripper pan", {"panda"}),
         ("manitwin trajectories twins --robot xarm", {"xarm7_panda"}),
         ("manitwin fake rod", {"rodin"}),

@@ -14,7 +14,6 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from json_documents import check_keys
-from manitwin.api import with_flags
 from manitwin.cli.dry_run import (
     CHAIN_CPU_S,
     ROBUSTNESS_CPU_S,
@@ -26,10 +25,11 @@ from manitwin.cli.dry_run import (
 from manitwin.cli.main import app
 from manitwin.config import BuildConfig
 from manitwin.engine.ledger.ledger import LEDGER, ItemState, Ledger
+from manitwin.engine.ledger.location import ledger_path
 from manitwin.errors import UsageError
-from manitwin.pipeline.dataset_run import ledger_path
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import TwinRecipe
+from manitwin.pipeline.settings import with_flags
 from manitwin.twin.dataset_root import DatasetRoot
 
 
@@ -67,13 +67,12 @@ def inputs(tmp_path: Path) -> Path:
 STATES = ["to_build", "to_build", "would_be_rejected", "would_be_rejected", "would_be_rejected"]
 
 
-@pytest.mark.parametrize("command", ["build", "run"])
-def test_it_names_every_input_and_writes_nothing(command: str, inputs: Path, tmp_path: Path) -> None:
+def test_it_names_every_input_and_writes_nothing(inputs: Path, tmp_path: Path) -> None:
     before = tree(tmp_path)
     document: dict[str, Any] = json.loads(
-        manitwin(command, inputs, "-o", tmp_path / "out", "--dry-run", "--quick", "--json")
+        manitwin("build", inputs, "-o", tmp_path / "out", "--dry-run", "--quick", "--json")
     )
-    text = manitwin(command, inputs, "-o", tmp_path / "out", "--dry-run", "--quick")
+    text = manitwin("build", inputs, "-o", tmp_path / "out", "--dry-run", "--quick")
     assert tree(tmp_path) == before and not (tmp_path / "out").exists()
 
     check_keys(document, "build --dry-run")
@@ -90,22 +89,19 @@ def test_it_names_every_input_and_writes_nothing(command: str, inputs: Path, tmp
     assert "box.stl (box, units m)" in text
 
 
-@pytest.mark.parametrize("command", ["build", "run"])
-def test_what_is_there_is_not_built_again_and_stays_as_it_is(command: str, inputs: Path, tmp_path: Path) -> None:
+def test_what_is_there_is_not_built_again_and_stays_as_it_is(inputs: Path, tmp_path: Path) -> None:
     bad, out = tmp_path / "inputs/empty.png", tmp_path / "out"
-    jobs = ("-j", 1) if command == "build" else ("--executor", "inline")
-    manitwin(command, bad, "-o", out, "--quick", *jobs, exit_status=3)
+    manitwin("build", bad, "-o", out, "--quick", "--executor", "inline", exit_status=3)
     before = tree(tmp_path)
-    again = json.loads(manitwin(command, bad, tmp_path / "inputs/box.stl", "-o", out, "--quick", "--dry-run", "--json"))
+    again = json.loads(manitwin("build", bad, tmp_path / "inputs/box.stl", "-o", out, "--quick", "--dry-run", "--json"))
     assert {Path(item["file"]).name: item["state"] for item in again["items"]} == {
         "empty.png": "rejected", "box.stl": "to_build"
     }  # fmt: skip
     assert again["items"][0]["detail"].startswith("empty: ") and tree(tmp_path) == before
-    other = json.loads(manitwin(command, bad, "-o", out, "--quick", "--seed", 5, "--dry-run", "--json"))
+    other = json.loads(manitwin("build", bad, "-o", out, "--quick", "--seed", 5, "--dry-run", "--json"))
     assert other["counts"]["would_be_rejected"] == 1, "another seed makes other twins"
-    if command == "run":
-        assert "1 rejected already" in manitwin("run", "-o", out, "--dry-run"), "with no inputs: what is there"
-        assert tree(tmp_path) == before
+    assert "1 rejected already" in manitwin("build", "-o", out, "--dry-run"), "with no inputs: what is there"
+    assert tree(tmp_path) == before
 
 
 def ended(ledger: Ledger, number: int, state: ItemState, recipe: str, twin: str | None = None) -> None:
@@ -115,13 +111,13 @@ def ended(ledger: Ledger, number: int, state: ItemState, recipe: str, twin: str 
 
 
 def planned(place: object) -> list[tuple[str | None, str]]:
-    document: dict[str, Any] = json.loads(manitwin("run", "-o", place, "--dry-run", "--quick", "--json"))
+    document: dict[str, Any] = json.loads(manitwin("build", "-o", place, "--dry-run", "--quick", "--json"))
     check_keys(document, "build --dry-run")
     return [(item["kind"], item["state"]) for item in document["items"]]
 
 
 def quick_recipe() -> str:
-    return TwinRecipe(with_flags(BuildConfig(), quick=True)).sha256
+    return TwinRecipe(with_flags(BuildConfig(), {"quick": True})).sha256
 
 
 def test_what_failed_is_not_said_to_be_built_until_it_is_opened_again(inputs: Path, tmp_path: Path) -> None:
@@ -134,7 +130,7 @@ def test_what_failed_is_not_said_to_be_built_until_it_is_opened_again(inputs: Pa
     ledger.close()
     before = tree(tmp_path)
     assert planned(data) == [("mesh", "failed"), ("image", "to_build"), (None, "failed")]
-    said = manitwin("run", "-o", data, "--dry-run", "--quick")
+    said = manitwin("build", "-o", data, "--dry-run", "--quick")
     assert "1 to build, 2 failed" in said and f"manitwin retry {data}" in said and "no answer" in said
     assert tree(tmp_path) == before
 

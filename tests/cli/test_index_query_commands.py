@@ -9,7 +9,7 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from manitwin.cli.commands.index import index
+from manitwin.cli.commands.maintenance import index
 from manitwin.cli.commands.query import query
 from manitwin.dataset.index.query import Index
 from manitwin.dataset.index.tables import TABLES

@@ -18,6 +18,8 @@ from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import read_record
 from scene_twins import THINGS, write_things
 
+NONE = dict.fromkeys(("open", "accepted", "rejected", "failed", "duplicate"), 0)
+
 
 def told(*arguments: object, exit_status: int = 0) -> dict[str, Any]:
     """Run a command with --json; stdout must be one document and nothing else."""
@@ -48,7 +50,7 @@ def bad(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_build_tells_every_input_and_why(bad: Path, tmp_path: Path) -> None:
     document = told("build", bad / "a.png", bad, "-o", tmp_path / "out", "-j", 1, exit_status=3)
     check_keys(document, "build")
-    assert document["counts"] == {"accepted": 0, "rejected": 2, "unfinished": 0} and document["exit_status"] == 3
+    assert document["counts"] == {**NONE, "rejected": 2, "unfinished": 0} and document["exit_status"] == 3
     assert {Path(item["file"]).name: item["reason"] for item in document["items"]} == {
         "a.png": "empty",
         "c.obj": "wrong_type",
@@ -58,15 +60,14 @@ def test_build_tells_every_input_and_why(bad: Path, tmp_path: Path) -> None:
     assert [Path(file).name for file in document["folders"][0]["left"]] == ["notes.txt"]
 
 
-def test_run_and_status_tell_a_data_set(bad: Path, tmp_path: Path) -> None:
+def test_build_and_status_tell_a_data_set(bad: Path, tmp_path: Path) -> None:
     out = tmp_path / "data"
-    ran = told("run", bad, "-o", out, "--executor", "inline", exit_status=3)
-    check_keys(ran, "run")
-    assert ran["counts"] == {"open": 0, "accepted": 0, "rejected": 2, "failed": 0, "duplicate": 0}
+    ran = told("build", bad, "-o", out, "--executor", "inline", exit_status=3)
+    check_keys(ran, "build")
     assert ran["out"] == str(out) and ran["stopped"] is None
     status = told("status", out)
     check_keys(status, "status")
-    assert status["items"] == ran["counts"] and status["causes"] == ran["causes"]
+    assert status["items"] == {**NONE, "rejected": 2} and status["causes"] == ran["causes"]
     assert [stage["stage"] for stage in status["stages"]] == ["input", "assemble"]
     assert status["stages"][0]["rejected"] == 2 and isinstance(status["cpu_seconds"], float)
     story = told("status", out, "--why", "c.obj")

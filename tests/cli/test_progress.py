@@ -10,7 +10,7 @@ from rich.console import Console
 
 from manitwin.cli.progress import RunProgress, ShownProgress, duration
 from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageStarted
-from manitwin.engine.stage_parts import StagePart
+from manitwin.engine.stage import StagePart
 from manitwin.engine.task import Task
 from manitwin.pipeline.item import Item
 

@@ -8,8 +8,10 @@ import os
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -17,7 +19,7 @@ from typer.testing import CliRunner
 
 from manitwin.cli.main import app
 from manitwin.cli.run_log import RunLog, WithoutSecrets, begin_log, end_log
-from manitwin.pipeline.dataset_run import local_log
+from manitwin.engine.ledger.location import local_log
 from manitwin.twin.dataset_root import DatasetRoot
 
 PACKAGE = logging.getLogger("manitwin")
@@ -31,13 +33,14 @@ from pathlib import Path
 import manitwin.cli.main as cli
 from manitwin.cli.reporting import reported
 from manitwin.cli.console import err_console, out_console, print_error
-from manitwin.cli.watched_run import WatchedRun
+from manitwin.cli.progress import WatchedRun
 
 def work() -> None:
     from manitwin.config import RunConfig
     from manitwin.twin.dataset_root import DatasetRoot
-    from manitwin.pipeline.dataset_run import drive, local_log
-    from manitwin.pipeline.rehearsal import RehearsalRecipe
+    from manitwin.engine.drive import drive
+    from manitwin.engine.ledger.location import local_log
+    from rehearsal_recipe import RehearsalRecipe
     from manitwin.pipeline.item import Item
 
     root = DatasetRoot("data")
@@ -109,7 +112,7 @@ def test_log_tells_the_whole_run_with_times_and_the_next_run_adds_to_it(tmp_path
         r"INFO    ends with exit status 0",
     ):
         assert re.search(rf"^{TIME} {said}", text, re.MULTILINE), (said, text)
-    assert "Traceback (most recent call last)" in text and "rehearsal.py" in text
+    assert "Traceback (most recent call last)" in text and "rehearsal_recipe.py" in text
     rehearse(tmp_path, "layout")
     again = (tmp_path / "data" / "run.log").read_text()
     assert again.startswith(text) and "run 2 begins" in again
@@ -133,9 +136,13 @@ def test_records_are_kept_only_for_a_log_that_has_a_place(
         end_log()
 
 
+def _closure(function: Callable[..., None]) -> dict[str, Any]:
+    return dict(inspect.getclosurevars(function).nonlocals)
+
+
 def test_commands_without_a_place_for_a_log_keep_no_records() -> None:
     callbacks = {each.name or each.callback.__name__: each.callback for each in app.registered_commands}  # type: ignore[union-attr]
-    own = {name for name in MAKING if inspect.getclosurevars(callbacks[name]).nonlocals["own_log"]}
+    own = {name for name in MAKING if _closure(_closure(callbacks[name])["command"])["own_log"]}
     assert own == {"build", "run", "layout", "trajectories", "render"}
 
 

@@ -98,7 +98,7 @@ def test_layouts_tell_why_they_were_rejected(scenes: Path, tmp_path: Path) -> No
     crowded = ("--objects", "60..60", "--clutter", "sparse", "--executor", "inline")
     done = manitwin("layout", scenes / "data", "-o", tmp_path / "scenes", "-n", 2, *crowded)
     assert done.exit_code == 3
-    assert "why rejected: 2 of 2 no_room, such as 1: no place was found" in done.stderr
+    assert "why rejected: 2 of 2 no_room, such as item 1: no place was found" in done.stderr
     assert "remedy: fewer --objects" in done.stderr
 
 
@@ -110,8 +110,8 @@ def test_a_build_tells_the_most_frequent_reason_and_that_there_are_others(tmp_pa
         "build", *(tmp_path / name for name in ("a.png", "b.png", "c.obj")), "-o", tmp_path / "out", "-j", 1
     )
     assert done.exit_code == 3, done.output
-    assert "why rejected: 2 of 3 empty, such as" in done.stderr
-    assert "remedy: export or download it again" in done.stderr and "1 other cause: in the lines above" in done.stderr
+    assert "why rejected: 1 of 2 empty, item 1: a.png" in done.stderr and "1 duplicate" in done.stdout
+    assert "remedy: export or download it again" in done.stderr and "1 other cause: manitwin status" in done.stderr
 
 
 def test_quiet_build_of_one_rejected_input_says_cause_and_remedy(tmp_path: Path) -> None:

@@ -29,7 +29,7 @@ class Arrangement:
 
 
 SLOW = (
-    r"\bmanitwin (build|run|layout|trajectories|render|stats|publish|prompts)\b",
+    r"\bmanitwin (build|layout|trajectories|render|stats|publish|prompts)\b",
     r"\bmanitwin\.(build|make_layouts|make_episodes|write_statistics)\(",
     r"\b(twins|SCENES|EPISODES)\b",
 )
@@ -37,8 +37,8 @@ SLOW = (
 
 EVERYWHERE: dict[str, str] = {
     # smaller, and in one process
-    r"(manitwin (?:build|run)\b)(?!.*--config)": r"\1 --config small.toml",
-    r"(manitwin (?:build|run|layout|trajectories|render)\b)(?!.*--jobs)(?!.*--executor ray)": r"\1 --jobs 1",
+    r"(manitwin build\b)(?!.*--config)": r"\1 --config small.toml",
+    r"(manitwin (?:build|layout|trajectories|render)\b)(?!.*--jobs)(?!.*--executor ray)": r"\1 --jobs 1",
     r"(manitwin (?:layout|trajectories)\b.*) -n \d+": r"\1 -n 2",
     r"(?<!>)> my\.toml": "> my.toml; cat small.toml >> my.toml",
     # a port may be taken
@@ -127,6 +127,6 @@ PAGES: dict[str, Arrangement] = {
         rewritten={r" -n 150 ": " -n12 "},  # of two, as elsewhere, one may fail: there is nothing to train on then
         slow=(r".",),
     ),
-    "docs/twin.md": Arrangement(blocks={"^<twin_id>/": "tree twins/*"}),
+    "docs/twin.md": Arrangement(blocks={"^<twin_id>/": "tree twins/twins/*/*"}),
     "docs/vlm.md": Arrangement(not_run=MODEL_SERVERS, blocks={"services": "settings run.toml"}),
 }

@@ -14,10 +14,10 @@ from pathlib import Path
 from doc_shell import Shell
 from PIL import Image
 
+from input_items import collect_items
 from manitwin.config import BuildConfig, load_config
 from manitwin.models.annotators.priors import _prior, _read, load_priors
 from manitwin.models.registry import GROUP
-from manitwin.pipeline.manifest import collect_items
 from manitwin.robots.load import load_robot
 
 ARM_LINKS = ("base", *(f"l{i}" for i in range(1, 6)), "tool0")

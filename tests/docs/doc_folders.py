@@ -115,8 +115,8 @@ class Folders:
 
     def twin_id(self, folder: Path) -> str:
         """Return the id of the mug's twin, if there is one in the folder."""
-        records = sorted(folder.glob("twins/*/twin.json"))
-        return records[0].parent.name if records else ""
+        records = sorted(folder.glob("twins/twins/*/*/twin.json"))
+        return str(records[0].parent.relative_to(folder / "twins")) if records else ""
 
 
 def _complete(twin: Path) -> None:

@@ -17,10 +17,10 @@ from manitwin.engine.executor import InlineExecutor
 from manitwin.engine.executors.local import LocalExecutor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.pipeline.dataset_run import sweep as sweep_work
+from manitwin.engine.work import sweep as sweep_work
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.rehearsal import RehearsalRecipe
 from manitwin.twin.dataset_root import DatasetRoot
+from rehearsal_recipe import RehearsalRecipe
 
 
 @dataclass

@@ -20,7 +20,7 @@ from manitwin.config import RunConfig
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.errors import UsageError
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.rehearsal import RehearsalRecipe
+from rehearsal_recipe import RehearsalRecipe
 
 SLOTS = 2
 UNDER_WAY = 2 * SLOTS  # of which half run, and half wait beside them
@@ -54,7 +54,7 @@ def test_a_mesh_that_crashes_native_code_costs_itself_alone(tmp_path: Path, reci
     assert {text for text, state in run.states.items() if state != "accepted"} == {"poisoned segfault:b"}
     assert run.attempts["poisoned segfault:b", "b"] == 3
     error = run.errors["poisoned segfault:b", "b"] or ""
-    assert "SIGSEGV" in error and "rehearsal.py" in error, "the native stack is kept"
+    assert "SIGSEGV" in error and "rehearsal_recipe.py" in error, "the native stack is kept"
     assert run.attempts["once segfault-once:b", "b"] == 2
     assert run.wrong == []
 
@@ -95,7 +95,7 @@ DRIVER = """
 import sys
 from pathlib import Path
 from manitwin.config import RunConfig
-from manitwin.pipeline.rehearsal import RehearsalRecipe
+from rehearsal_recipe import RehearsalRecipe
 from rehearsals import rehearse
 root = Path(sys.argv[1])
 rehearse(root, recipe=RehearsalRecipe(log=Path(sys.argv[2])), settings=RunConfig(cpu=2, index_every=5), processes=True,

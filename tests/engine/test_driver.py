@@ -10,8 +10,8 @@ from rehearsals import rehearse, runs
 
 from manitwin.config import RunConfig
 from manitwin.dataset.index.parts import indexed_twins
-from manitwin.pipeline.rehearsal import RehearsalRecipe
 from manitwin.twin.dataset_root import twin_name
+from rehearsal_recipe import RehearsalRecipe
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import pytest
 from rehearsals import Rehearsed, rehearse
 
 from manitwin.engine.budget import Budget
-from manitwin.pipeline.rehearsal import RehearsalRecipe
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import RUN
+from rehearsal_recipe import RehearsalRecipe
 
 PLAN = (("a", "cpu"), ("b", "vlm"), ("c", "cpu"))
 TEXTS = [f"charge:b:0.02 {number}" for number in range(10)]

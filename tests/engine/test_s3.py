@@ -9,9 +9,9 @@ from rehearsals import rehearse, runs
 
 from manitwin.config import RunConfig
 from manitwin.dataset.index.parts import indexed_twins
-from manitwin.pipeline.rehearsal import RehearsalRecipe
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.store import parse_record, sha256_of_file
+from rehearsal_recipe import RehearsalRecipe
 
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 

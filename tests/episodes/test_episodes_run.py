@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from grasped_twins import write_brick
-from manitwin.engine.stage_parts import StagePart, heard_by
+from manitwin.engine.stage import StagePart, heard_by
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.collect import batch_folders, collect, stored_episodes
 from manitwin.episodes.episode_pictures import draw_episodes, write_with_pictures

@@ -53,7 +53,7 @@ def test_the_mujoco_scene_can_say_that_a_grasp_misses(built: tuple[Path, str], t
     import mujoco
 
     example = _module("grasps_in_mujoco")
-    twin = manitwin.load(next(built[0].glob("twins/*/twin.json")).parent)
+    twin = manitwin.Dataset(built[0] / "twins")[0]
     object_file = manitwin.export_twin(twin, "mjcf", tmp_path)["mjcf"]
     beside = twin.grasps().gripper_to_object[0].copy()
     beside[:3, 3] += [0.0, 0.0, 0.2]

@@ -8,8 +8,8 @@ from pathlib import Path
 import msgpack._cmsgpack
 import pytest
 
-from manitwin.cli import machine_checks as doctor
 from manitwin.cli import main as cli
+from manitwin.cli.commands import doctor
 from manitwin.formats.installation import import_remedy, missing_libraries, package_by_contents, package_by_policy
 
 EXTENSION = Path(msgpack._cmsgpack.__file__)

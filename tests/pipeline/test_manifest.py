@@ -3,8 +3,8 @@ from pathlib import Path
 
 import pytest
 
+from input_items import collect_items
 from manitwin.errors import UsageError
-from manitwin.pipeline.manifest import collect_items
 
 
 @pytest.fixture

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from manitwin import errors
-from manitwin.engine.ledger.unaccepted import Unaccepted, UnacceptedState
+from manitwin.cli.console import print_error
+
+if TYPE_CHECKING:
+    from manitwin.engine.ledger.progress import Unaccepted, UnacceptedState
 
 REMEDIES = {
     "unreadable": "open it in the program that made it and save it again: a photo as PNG or JPEG, a mesh as GLB",
@@ -103,7 +107,7 @@ def cause_lines(causes: list[Cause], *, again: str, others: str) -> list[str]:
 
 
 def _reason(cause: Cause) -> str:
-    example = f", such as {cause.example}" if cause.count > 1 else f", {cause.example}"
+    example = f", such as item {cause.example}" if cause.count > 1 else f", item {cause.example}"
     return f" {cause.reason}{example}" if cause.state == "rejected" else example
 
 
@@ -142,3 +146,25 @@ def _without_what_varies(message: str) -> str:
     for pattern, stand_in in _VARIES:
         told = pattern.sub(stand_in, told)
     return told
+
+
+def print_causes(place: str, numbers: Collection[int] = (), told: bool = False) -> None:
+    """Print the most frequent causes that the ledger below a folder or URL tells of, with their remedies.
+
+    ``numbers`` are the items that are meant, none: all. ``told``: the first cause stands in the line above already.
+    """
+    again, others = f"manitwin retry {place} and the same command again", f"manitwin status {place}"
+    for line in cause_lines(causes_of(place, numbers), again=again, others=others)[1 if told else 0 :]:
+        print_error(line.strip() if told else line)
+
+
+def causes_of(place: str, numbers: Collection[int] = ()) -> list[Cause]:
+    """Return why items below a folder or URL were not accepted, the most frequent cause first; ``numbers`` empty: all items."""
+    from manitwin.engine.ledger.ledger import read_ledger
+    from manitwin.engine.ledger.location import local_ledger
+    from manitwin.engine.ledger.progress import read_unaccepted
+    from manitwin.twin.dataset_root import DatasetRoot
+
+    wanted = {str(number) for number in numbers}
+    with read_ledger(local_ledger(DatasetRoot(place))) as ledger:
+        return group_causes(each for each in read_unaccepted(ledger) if not wanted or each.which in wanted)

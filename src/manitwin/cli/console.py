@@ -6,12 +6,15 @@ Whatever is printed on these consoles also goes to the log of the run, where the
 from __future__ import annotations
 
 import logging
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
 PACKAGE = logging.getLogger("manitwin")
 
+
+if TYPE_CHECKING:
+    from manitwin.twin.dataset_root import DatasetRoot
 
 SAID = logging.getLogger("manitwin.said")
 """What was printed; the log of a run has it, and ``--verbose`` does not print it again."""
@@ -67,6 +70,14 @@ def print_estimate(usd_by_kind: dict[str, float]) -> None:
     if any(usd_by_kind.values()):
         each = ", ".join(f"{usd:.4f} USD of {kind}" for kind, usd in usd_by_kind.items())
         err_console.print(f"services charge about, for a twin: {each}", markup=False)
+
+
+def note_old_layout(root: DatasetRoot) -> None:
+    """Say so where a data set is of the layout of earlier versions."""
+    if root.flat:
+        err_console.print(
+            f"{root.url}: in the flat layout of earlier versions, which is read and not added to", markup=False
+        )
 
 
 def print_error(message: str) -> None:

@@ -1,38 +1,101 @@
-"""What commands print with ``--json``: documents of plain values, whose keys docs/json.md names."""
+"""``--json``: one document of plain values on stdout, and nothing else; docs/json.md names the keys."""
 
 from __future__ import annotations
 
+import json
+import sys
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from manitwin.cli.console import out_console
 
 if TYPE_CHECKING:
-    from manitwin.api import BuildReport
     from manitwin.cli.causes import Cause
     from manitwin.cli.dry_run import Plan
+    from manitwin.engine.drive import RunReport
     from manitwin.engine.ledger.progress import ItemStory, Progress
     from manitwin.episodes.collect import Collected
     from manitwin.episodes.retirement import Retirement
-    from manitwin.pipeline.build_item import ItemResult
-    from manitwin.pipeline.dataset_run import RunReport
+    from manitwin.pipeline.build_report import BuildReport, ItemResult
     from manitwin.pipeline.folder_listing import FolderListing
     from manitwin.scenes.layouts.layouts_run import LayoutTotals
     from manitwin.twin.loaded_twin import Twin
     from manitwin.twin.resting import RestingPose
 
 Document = dict[str, Any]
+FLAG = "--json"
 
 
-def build_document(report: BuildReport, out: str, causes: list[Cause]) -> Document:
+# the base of what typer raises for a wrong command line; it has no public name of its own
+CommandLineError: type[Exception] = next(
+    base for base in typer.BadParameter.__mro__ if base.__name__ == "ClickException"
+)
+
+_wanted = False
+
+
+def _keep_stdout(wanted: bool) -> bool:
+    """Send what is printed for a person to stderr, or no more."""
+    global _wanted
+    _wanted = out_console.stderr = wanted
+    return wanted
+
+
+Json = Annotated[
+    bool,
+    typer.Option(
+        FLAG, callback=_keep_stdout, help="Print one JSON document on stdout; all that is for a person goes to stderr."
+    ),
+]
+
+
+def print_document(document: Document) -> None:
+    """Print the document of a command."""
+    sys.stdout.write(json.dumps(document, indent=1, allow_nan=False) + "\n")
+
+
+def print_failure(error: BaseException, message: str, exit_status: int) -> None:
+    """Print the document of a command that could not be carried out."""
+    print_document({"error": {"type": type(error).__name__, "message": message, "exit_status": exit_status}})
+
+
+def asked_for_json(error: BaseException) -> bool:
+    """Return whether a command that ended with ``error`` was asked for JSON."""
+    return _wanted or (isinstance(error, CommandLineError) and _stands_in(sys.argv[1:], getattr(error, "ctx", None)))
+
+
+def _stands_in(arguments: list[str], context: typer.Context | None) -> bool:
+    """Return whether the flag stands in a wrong command line, of which nothing may have been parsed: not as a value."""
+    parameters = [] if context is None else [*context.command.params, *context.find_root().command.params]
+    take_value = {
+        name
+        for each in parameters
+        for name in each.opts
+        if each.param_type_name == "option" and not each.is_flag  # type: ignore[attr-defined]
+    }
+    left = iter(arguments)
+    for argument in left:
+        if argument in (FLAG, "--"):
+            return argument == FLAG
+        if argument in take_value:
+            next(left, None)
+    return False
+
+
+def build_document(report: BuildReport, causes: list[Cause]) -> Document:
     """Return what became of every input of a build."""
     from manitwin.cli.run_summary import summarize_grasps
 
     return {
-        "out": out,
-        "counts": {status: report.count(status) for status in ("accepted", "rejected", "unfinished")},
-        "items": [_item(result) for result in report.results],
+        **run_document(report.run, report.dataset, causes),
+        "counts": {
+            **_by_state(report.run.counts_of_given),
+            "unfinished": report.count("unfinished"),
+        },
+        "items": [_item(result) for result in report.iterate()],
         "grasps": asdict(summarize_grasps(report.records())),
-        "causes": _causes(causes),
-        "remarks": report.remarks,
         "folders": [_folder(listing) for listing in report.folders],
         "exit_status": report.exit_code,
     }
@@ -47,7 +110,7 @@ def run_document(report: RunReport, place: str, causes: list[Cause]) -> Document
         "stopped": report.stopped,
         "causes": _causes(causes),
         "remarks": report.remarks,
-        "folders": [_folder(listing) for listing in report.folders],
+        "folders": [],
         "exit_status": report.exit_code,
     }
 

@@ -1,4 +1,4 @@
-"""What a build or a run would do, and about what it would cost: everything is read, nothing is written."""
+"""``--dry-run``: what a build would do, and about what it would cost: everything is read, nothing is written."""
 
 from __future__ import annotations
 
@@ -6,15 +6,18 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from datetime import timedelta
 from pathlib import Path
 from typing import Literal, get_args
 
+from manitwin.cli.console import err_console, out_console
+from manitwin.cli.documents import plan_document, print_document
 from manitwin.config import BuildConfig
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
+from manitwin.engine.ledger.location import copy_ledger
 from manitwin.engine.recipe import Recipe
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import check_header
-from manitwin.pipeline.dataset_run import copy_ledger
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import TwinRecipe, estimate_usd
 from manitwin.twin.dataset_root import DatasetRoot
@@ -29,6 +32,16 @@ and robustness add for each gripper, and the trials that each further gripper ad
 ENOUGH_ITEMS = 3
 """So many accepted items must there be before a data set's own rate is believed."""
 MEASURED = "docs/measured.md, the median of 25 meshes"
+
+MOST_LINES = 50
+WORDS = {
+    "to_build": "to build",
+    "accepted": "accepted already",
+    "rejected": "rejected already",
+    "failed": "failed already",
+    "would_be_rejected": "would be rejected",
+    "duplicate": "the same again",
+}
 
 RecordOf = Callable[[str], bytes | None]
 PlannedState = Literal["to_build", "accepted", "rejected", "failed", "would_be_rejected", "duplicate"]
@@ -87,21 +100,8 @@ class Plan:
         return sum((number * self.usd_each[kind] for kind, number in self.to_build.items()), 0.0)
 
 
-def plan_build(items: Iterable[Item], out: Path, config: BuildConfig, remarks: list[str]) -> Plan:
-    """Say what ``build`` would make of items in the folder ``out``."""
-    recipe, usd = TwinRecipe(config), estimate_usd(config)
-
-    def record_of(twin_id: str) -> bytes | None:
-        path = out / twin_id / RECORD
-        return path.read_bytes() if path.is_file() else None
-
-    planner = _Planner(recipe, config, record_of)
-    planned = [planner.plan(item) for item in items]
-    return Plan(planned, dict.fromkeys(usd, measured_rate(config)), usd, remarks)
-
-
-def plan_run(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, remarks: list[str]) -> Plan:
-    """Say what ``run`` would do for a data set: all its items, and new ones. Its ledger is read, a copy is worked on.
+def plan_build(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, remarks: list[str]) -> Plan:
+    """Say what ``build`` would do for a data set: all its items, and new ones. Its ledger is read, a copy is worked on.
 
     ``remarks`` is filled while the items are read.
     """
@@ -116,9 +116,9 @@ def plan_run(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, rema
         copy_ledger(root, copy)
         ledger = Ledger(copy)
         try:
-            ledger.add_items(items)
+            given, _ = ledger.add_items(items)
             rates = {kind: own_rate(ledger, kind, recipe.sha256) or measured_rate(config) for kind in usd}
-            ledger.begin_run(recipe.sha256)  # opens again what a run would open again
+            ledger.begin_run(recipe.sha256, given)  # opens again what a run would open again
             return Plan(_planned_by(ledger, _Planner(recipe, config, record_of)), rates, usd, remarks)
         finally:
             ledger.close()
@@ -190,3 +190,41 @@ def _refused_by_header(item: Item, kind: str, config: BuildConfig) -> Rejected |
         except Rejected as answer:
             return answer
     return None
+
+
+def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:
+    """Print a plan: its items, how many are in each state, and the estimates with their source."""
+    for remark in plan.remarks:
+        err_console.print(remark, markup=False)
+    if as_json:
+        print_document(plan_document(plan, place))
+        return
+    for planned in plan.items[:MOST_LINES]:
+        out_console.print(_line_of(planned), markup=False)
+    if len(plan.items) > MOST_LINES:
+        out_console.print(f"... and {len(plan.items) - MOST_LINES} more (--json tells them all)", markup=False)
+    counts: Counter[str] = Counter(planned.state for planned in plan.items)
+    told = ", ".join(f"{counts[state]} {words}" for state, words in WORDS.items() if counts[state])
+    out_console.print(f"dry run, nothing is written: {told or 'nothing to do'}", markup=False)
+    if counts["failed"]:
+        out_console.print(f"what failed is not tried again by itself: manitwin retry {place}", markup=False)
+    each = "; ".join(
+        f"{number} {kind} of {plan.rates[kind].cpu_s:.1f} CPU-s ({plan.rates[kind].source})"
+        for kind, number in plan.to_build.items()
+    )
+    out_console.print(
+        f"about {timedelta(seconds=round(plan.cpu_s))} of CPU time{f': {each}' if each else ''}", markup=False
+    )
+    out_console.print(f"services charge about {plan.cost_usd:.2f} USD", markup=False)
+
+
+def _line_of(planned: PlannedItem) -> str:
+    item = planned.item
+    given = _given(item, planned.kind)
+    detail = f": {planned.detail}" if planned.detail else ""
+    return f"{WORDS[planned.state]:<17} {planned.kind or '?':<5} {item.title}{f' ({given})' if given else ''}{detail}"
+
+
+def _given(item: Item, kind: str | None) -> str:
+    units = f"units {item.units}" if kind == "mesh" else ""
+    return ", ".join(filter(None, (item.name or "no name", units)))

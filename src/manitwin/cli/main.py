@@ -13,35 +13,35 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer.completion import completion_init, get_completion_script
 
-from manitwin.cli.choices import must_exist
+from manitwin.cli.choices import SHELLS, must_exist
 from manitwin.cli.commands.audit import audit
-from manitwin.cli.commands.build import build
-from manitwin.cli.commands.check import check
-from manitwin.cli.commands.completion import COMPLETION_VARIABLE, PROGRAM, completion, completion_init
+from manitwin.cli.commands.build import build, run
 from manitwin.cli.commands.doctor import doctor
 from manitwin.cli.commands.export import export
 from manitwin.cli.commands.fake import fake
 from manitwin.cli.commands.import_ import import_
-from manitwin.cli.commands.index import index
 from manitwin.cli.commands.layout import layout
+from manitwin.cli.commands.maintenance import check, index, retry
 from manitwin.cli.commands.prompts import prompts
 from manitwin.cli.commands.publish import publish
 from manitwin.cli.commands.query import query
 from manitwin.cli.commands.render import render
-from manitwin.cli.commands.retry import retry
-from manitwin.cli.commands.run import run
 from manitwin.cli.commands.stats import stats
 from manitwin.cli.commands.status import status
 from manitwin.cli.commands.trajectories import trajectories
 from manitwin.cli.console import error_console, out_console
+from manitwin.cli.documents import CommandLineError, Json, asked_for_json, print_document, print_failure
 from manitwin.cli.interrupt import Interrupts
-from manitwin.cli.json_output import CommandLineError, Json, asked_for_json, print_document, print_failure
 from manitwin.cli.reporting import LOG, Quiet, Verbose, reported, say_as_told
 from manitwin.cli.run_log import end_log
 from manitwin.errors import BackendError, ManiTwinError, Unavailable
 from manitwin.formats.installation import import_remedy, installed_version, names_shared_library
 
+PROGRAM = "manitwin"
+COMPLETION_VARIABLE = f"_{PROGRAM.upper()}_COMPLETE"
+"""Where a shell's script asks for completions instead of a command to be run: typer's convention."""
 TYPER_INTERRUPTED = 130
 """What typer returns where it caught a KeyboardInterrupt by itself."""
 
@@ -71,12 +71,13 @@ def _manitwin(
         out_console.print(context.get_help(), markup=False)
 
 
-for watched in (build, run, layout, trajectories, render):
+for watched in (build, layout, trajectories, render):
     app.command()(reported(watched, own_log=True))
+app.command("run", hidden=True)(reported(run, own_log=True))
 for making in (index, stats, publish, export):
     app.command()(reported(making))
 app.command("import")(reported(import_))
-for other in (status, retry, check, query, doctor, fake, prompts, audit, completion):
+for other in (status, retry, check, query, doctor, fake, prompts, audit):
     app.command()(other)
 
 
@@ -98,6 +99,15 @@ def show(
         print_document(show_document(loaded))
     else:
         print_summary(loaded, out_console)
+
+
+@app.command()
+def completion(
+    shell: Annotated[str, SHELLS.argument(help="bash, zsh or fish.", metavar="SHELL")],
+) -> None:
+    """Print the script with which a shell completes commands, options and names."""
+    script = get_completion_script(prog_name=PROGRAM, complete_var=COMPLETION_VARIABLE, shell=shell)
+    sys.stdout.write(f"{script.strip()}\n")
 
 
 @app.command()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable, Mapping
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
@@ -10,7 +13,7 @@ import typer
 from manitwin.cli import choices
 
 if TYPE_CHECKING:
-    from manitwin.pipeline.dataset_run import ExecutorName
+    from manitwin.engine.drive import ExecutorName
 
 Text = Annotated[
     list[str] | None, typer.Option("--text", help="A thing to make from words alone; may be repeated.", metavar="WORDS")
@@ -68,6 +71,55 @@ Twins = Annotated[
 Record = Annotated[
     Path | None, typer.Option(help="Add every answer of the model to this file, for --vlm replay:FILE.", metavar="FILE")
 ]
+Name = Annotated[str | None, typer.Option(help="What the object is ('mug'): the key to the priors.")]
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="Say what would be done, and about what it would cost; write nothing.")
+]
+
+OF_INPUTS: dict[str, tuple[Any, Any]] = {
+    "name": (Name, None), "units": (Units, "auto"), "up": (Up, "auto"), "license": (License, None),
+    "attribution": (Attribution, None),
+}  # fmt: skip
+"""What holds for all inputs of a build, by the names of ``manitwin.build``: annotation and default."""
+
+FLAGS: dict[str, tuple[Any, Any]] = {
+    "seed": (Seed, None), "grippers": (Grippers, None), "vlm": (Vlm, None), "generator": (Generator, None),
+    "grasper": (Grasper, None), "max_cost_usd": (MaxCost, None), "record": (Record, None),
+    "require_agreement": (RequireAgreement, False), "quick": (Quick, False),
+}  # fmt: skip
+"""What is said on top of the configuration: the options of ``pipeline.settings.Flags``, by its names."""
+
+
+def with_options(
+    options: Mapping[str, tuple[Any, Any]], before: str = ""
+) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Return a decorator that gives a command ``options`` as well, for typer, which reads a signature.
+
+    They come behind the command's own, or ``before`` the one of that name, or in place of one of their own name; a parameter
+    that collects keywords gets them.
+    """
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        @wraps(command)
+        def call(**given: Any) -> None:
+            command(**given)
+
+        own = inspect.signature(command, eval_str=True)
+        kept = [each for each in own.parameters.values() if each.kind is not inspect.Parameter.VAR_KEYWORD]
+        added = {
+            name: inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+            for name, (annotation, default) in options.items()
+        }
+        parameters: dict[str, inspect.Parameter] = {}
+        for each in kept:
+            parameters |= added if each.name == before else {}
+            parameters[each.name] = each.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+        parameters |= added
+        call.__signature__ = own.replace(parameters=list(parameters.values()))  # type: ignore[attr-defined]
+        call.__annotations__ = {each.name: each.annotation for each in parameters.values()}
+        return call
+
+    return decorate
 
 
 def run_settings(jobs: int | None) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from datetime import UTC, datetime
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -16,8 +17,10 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from manitwin.cli.console import err_console, out_console
+from manitwin.cli.run_log import log_into
 from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageEvent, StageStarted
-from manitwin.engine.stage_parts import StagePart
+from manitwin.engine.stage import StagePart
 from manitwin.engine.task import Payload
 
 LINE_EVERY_S = 30.0
@@ -188,3 +191,20 @@ class ShownProgress:
         while not self._stop.wait(self._every_s):
             now = datetime.now(UTC).strftime("%Y-%m-%d %H:%M:%SZ")
             self._err.print(f"{now} {self.progress.line()}", markup=False)
+
+
+class WatchedRun(ShownProgress):
+    """The progress of a run on the consoles of this command, whose log lies at ``log()`` unless ``--log`` says otherwise.
+
+    ``what`` names the items in the plural.
+    """
+
+    def __init__(self, what: str, log: Callable[[], Path]):
+        super().__init__(RunProgress(what), out_console, err_console)
+        self._log = log
+
+    def start(self, total: int, opened: int) -> None:
+        """Begin a run, and its log: what was refused before leaves none behind."""
+        log_into(self._log())
+        self.progress.start(total, opened)
+        out_console.print(f"{total} {self.progress.what}, {opened} to do", markup=False)

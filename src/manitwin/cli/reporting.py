@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import logging
 import sys
 from collections.abc import Callable
@@ -13,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from manitwin.cli.console import be_quiet, be_verbose
+from manitwin.cli.options import with_options
 from manitwin.cli.run_log import begin_log
 from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
@@ -51,6 +51,7 @@ def reported(command: Callable[..., None], own_log: bool = False) -> Callable[..
     ``own_log``: it has a place for its log (``log_into``); of another command nothing is kept without ``--log``.
     """
 
+    @with_options(OPTIONS)
     @wraps(command)
     def call(*, verbose: bool, quiet: bool, log: Path | None, **given: Any) -> None:
         global _before_command
@@ -63,11 +64,4 @@ def reported(command: Callable[..., None], own_log: bool = False) -> Callable[..
         finally:
             _say(False, False)  # a process may run more commands than one
 
-    signature = inspect.signature(command, eval_str=True)
-    added = [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-        for name, (annotation, default) in OPTIONS.items()
-    ]
-    call.__signature__ = signature.replace(parameters=[*signature.parameters.values(), *added])  # type: ignore[attr-defined]
-    call.__annotations__ = {**command.__annotations__, **{name: each for name, (each, _) in OPTIONS.items()}}
     return call

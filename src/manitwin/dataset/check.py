@@ -10,7 +10,8 @@ from functools import partial
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.stage_runner import RESULT
 from manitwin.errors import TwinError
-from manitwin.twin.dataset_root import DatasetRoot, twin_name
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import RECORD, WORK, parse_record
 
 
@@ -53,7 +54,7 @@ def _ended_without_folder(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagre
 
 
 def _what_is_wrong(root: DatasetRoot, twin_id: str, state: str, revision: str) -> str | None:
-    name = f"{twin_name(twin_id)}/{RECORD}"
+    name = f"{root.twin_name(twin_id)}/{RECORD}"
     if not root.exists(name):
         return f"{state} in the ledger, and there is no folder"
     try:
@@ -64,8 +65,25 @@ def _what_is_wrong(root: DatasetRoot, twin_id: str, state: str, revision: str) -
         return f"{state} in the ledger, {record.status} in its folder"
     if record.revision != revision:
         return "its folder is of another revision than the ledger's"
-    missing = [file for file in record.files if not root.exists(f"{twin_name(twin_id)}/{file}")]
+    return _lacking(root, twin_id, record)
+
+
+def _lacking(root: DatasetRoot, twin_id: str, record: TwinRecord) -> str | None:
+    missing = [file for file in record.files if not root.exists(f"{root.twin_name(twin_id)}/{file}")]
     return f"its folder lacks {', '.join(missing)}" if missing else None
+
+
+def damaged_twins(root: DatasetRoot) -> Iterator[str]:
+    """Yield what is wrong with twins of a data set that has no ledger: one line a twin that cannot be read or lacks files."""
+    for twin_id in root.twin_ids():
+        name = f"{root.twin_name(twin_id)}/{RECORD}"
+        try:
+            lacking = _lacking(root, twin_id, parse_record(root.read_bytes(name), name))
+        except TwinError as error:
+            yield str(error)
+            continue
+        if lacking:
+            yield f"twin {twin_id}: {lacking}"
 
 
 def _folders_nobody_ended(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
@@ -145,7 +163,7 @@ def _is_json(content: bytes) -> bool:
 
 def _redo(ledger: Ledger, root: DatasetRoot, number: int, twin_id: str) -> None:
     """Have an item's folder put together again, from the results of its stages where they are still there."""
-    root.remove(twin_name(twin_id))
+    root.remove(root.twin_name(twin_id))
     ledger.reopen([number])
 
 

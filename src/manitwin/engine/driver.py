@@ -8,23 +8,22 @@ from __future__ import annotations
 
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from typing import get_args
 
 from manitwin.config import Resource, RunConfig
-from manitwin.engine.announcer import Announcer
 from manitwin.engine.budget import Budget
-from manitwin.engine.events import ItemEnded, OnStage
+from manitwin.engine.events import Announcer, ItemEnded, OnStage
 from manitwin.engine.executor import Executor
 from manitwin.engine.flight import Flight, PlannedStage
 from manitwin.engine.gate import Gate
 from manitwin.engine.jobs import MAKE_ROOM, Failure, Job, Reply, StageRejected, Surveyed, WriteTables
 from manitwin.engine.ledger.ledger import Ledger, LedgerFull
 from manitwin.engine.recipe import Ending, Recipe
-from manitwin.engine.stage_order import ASSEMBLE, INPUT
+from manitwin.engine.stage import ASSEMBLE, INPUT
 from manitwin.engine.stage_runner import StageRun
 from manitwin.engine.table_writer import TableWriter
 from manitwin.engine.task import Task
@@ -44,7 +43,10 @@ class RunResult:
 
 
 class Driver:
-    """One run over a ledger's open items; ``sweep`` deletes what a worker left half-made of an item that is given up."""
+    """One run over a ledger's open items; ``sweep`` deletes what a worker left half-made of an item that is given up.
+
+    ``given`` are the numbers of the items that are made again where another recipe made them; none: all.
+    """
 
     def __init__(
         self,
@@ -57,6 +59,7 @@ class Driver:
         clock: Callable[[], float] = time.monotonic,
         max_cost_usd: float | None = None,
         on_stage: OnStage = lambda event: None,
+        given: Collection[int] = (),
     ):
         self.ledger, self.executor, self.recipe, self.settings = ledger, executor, recipe, settings
         self._announcer, self._sweep, self._clock = Announcer(on_stage, on_ended), sweep, clock
@@ -68,7 +71,7 @@ class Driver:
         self._running: dict[int, tuple[Flight | None, Resource]] = {}
         self._outstanding: dict[Resource, int] = dict.fromkeys(RESOURCES, 0)
         self._plans: dict[str, list[PlannedStage]] = {}
-        self._flights = 0
+        self._flights, self._given = 0, given
         self._last_number, self._tickets = 0, 0
         self._more = True
         self._budget = Budget(max_cost_usd)
@@ -78,7 +81,7 @@ class Driver:
 
     def run(self) -> RunResult:
         """Work until every open item has ended, waits for a service that was given up, or something stops the run."""
-        run = self.ledger.begin_run(self.recipe.sha256)
+        run = self.ledger.begin_run(self.recipe.sha256, self._given)
         RUN.info("run %d begins: recipe %s, seed %d", run, self.recipe.sha256[:16], self.recipe.seed)
         how = "interrupted"
         try:
@@ -257,7 +260,7 @@ class Driver:
             flight.number, ending.status, recipe_sha256=self.recipe.sha256, reason=ending.reason, detail=ending.detail,
             revision=ending.revision,
         )  # fmt: skip
-        self._announcer.item_ended(flight, ending.status, ending.detail_and_hint, found)
+        self._announcer.item_ended(flight, ending.status, ending.detail_and_hint, found, ending.reason)
 
     def _failed(self, flight: Flight, gate: Gate, failure: Failure) -> None:
         """Try again later, or soon, or no more: what a service or the disk does is not the item's fault."""
@@ -283,8 +286,6 @@ class Driver:
             self._sweep(flight.task.item_id)
         self.ledger.stage_ended(number, stage, "failed", attempts=attempts, error=failure.message)
         self._announcer.stage_ended(flight, stage, "failed", 0.0, failure.message, failure.trace)
-        detail = f"{stage} failed {attempts} times: {failure.message}"
-        self.ledger.item_ended(
-            number, "failed", recipe_sha256=self.recipe.sha256, reason=FAILED_AS.get(failure.kind, "error"), detail=detail
-        )  # fmt: skip
-        self._announcer.item_ended(flight, "failed", detail)
+        detail, reason = f"{stage} failed {attempts} times: {failure.message}", FAILED_AS.get(failure.kind, "error")
+        self.ledger.item_ended(number, "failed", recipe_sha256=self.recipe.sha256, reason=reason, detail=detail)
+        self._announcer.item_ended(flight, "failed", detail, reason=reason)

@@ -1,15 +1,18 @@
-"""What happens in a run, as it happens: for whoever watches it, and for the log."""
+"""The events of a run, as they happen: for whoever watches it, and for the log."""
 
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from manitwin.engine.ledger.ledger import ItemState
-from manitwin.engine.stage_parts import StagePart
+from manitwin.engine.ledger.ledger import ItemRow, ItemState
+from manitwin.engine.stage import StagePart
 from manitwin.engine.task import Task
+
+if TYPE_CHECKING:
+    from manitwin.engine.flight import Flight
 
 RUN = logging.getLogger("manitwin.run")
 StageState = Literal["done", "there already", "rejected", "waiting", "failed"]
@@ -46,12 +49,18 @@ class StageEnded:
 
 @dataclass(frozen=True)
 class ItemEnded:
-    """What became of one item; ``found`` where its folder was there already."""
+    """What became of one item; ``found`` where its folder was there already, ``reason`` is the code of a rejection or failure."""
 
     task: Task
     state: ItemState
     detail: str
     found: bool = False
+    reason: str | None = None
+
+    def row(self) -> ItemRow:
+        """Return what a ledger keeps of the item."""
+        task = self.task
+        return ItemRow(task.number, task.payload.to_json(), task.item_id, self.state, self.reason, self.detail)
 
 
 StageEvent = StageStarted | StageAdvanced | StageEnded
@@ -78,3 +87,38 @@ def log_item(event: ItemEnded) -> None:
     found = " (there already)" if event.found else ""
     task = event.task
     RUN.info("item %d %s %s %s%s: %s", task.number, task.payload.title, task.item_id, event.state, found, event.detail)
+
+
+class Announcer:
+    """Makes the events of a driver's items; what part of a stage is done is not for the log."""
+
+    def __init__(self, on_stage: OnStage, on_ended: Callable[[ItemEnded], None]):
+        self._on_stage, self._on_ended = on_stage, on_ended
+
+    def stage_started(self, flight: Flight) -> None:
+        """Tell that the next stage of an item was given to a worker."""
+        self._stage(StageStarted(flight.task, flight.stage))
+
+    def stages_advanced(self, parts: Mapping[int, StagePart], running: Mapping[int, Flight | None]) -> None:
+        """Tell what part of each stage is done, by the ticket of its job; of a job that runs no more nothing is told."""
+        for ticket, part in parts.items():
+            if flight := running.get(ticket):
+                self._on_stage(StageAdvanced(flight.task, flight.stage, part))
+
+    def stage_ended(
+        self, flight: Flight, stage: str, state: StageState, seconds: float = 0.0, detail: str = "", trace: str = ""
+    ) -> None:
+        """Tell that a stage has ended, or waits to be tried again."""
+        self._stage(StageEnded(flight.task, stage, state, seconds, detail, trace))
+
+    def item_ended(
+        self, flight: Flight, state: ItemState, detail: str, found: bool = False, reason: str | None = None
+    ) -> None:
+        """Tell what became of an item."""
+        event = ItemEnded(flight.task, state, detail, found, reason)
+        log_item(event)
+        self._on_ended(event)
+
+    def _stage(self, event: StageStarted | StageEnded) -> None:
+        log_stage(event)
+        self._on_stage(event)

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from manitwin.config import Resource
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
-from manitwin.engine.stage_parts import StagePart
+from manitwin.engine.stage import StagePart
 from manitwin.engine.worker import Worker
 
 

@@ -7,6 +7,9 @@ ends in ``/`` (``views/``) a folder. Each is written by exactly one stage and re
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from dataclasses import field as dataclass_field
 from pathlib import Path
@@ -18,6 +21,9 @@ from manitwin.config import Resource
 from manitwin.engine.job_memory import JobMemory, NoMemory
 from manitwin.engine.task import PayloadT
 from manitwin.errors import ManiTwinError
+
+INPUT, ASSEMBLE = "input", "assemble"
+"""The two steps around the stages: to read what was given, and to put the folder together."""
 
 
 def is_field(name: str) -> bool:
@@ -124,3 +130,32 @@ class PaidStage(Protocol):
     def expected_usd(self) -> float:
         """About what it costs."""
         ...
+
+
+@dataclass(frozen=True)
+class StagePart:
+    """A stage has done ``done`` of ``total`` things, which ``unit`` names in the plural."""
+
+    done: int
+    total: int
+    unit: str
+
+
+_hear: ContextVar[Callable[[StagePart], None] | None] = ContextVar("hear_stage_parts", default=None)
+
+
+def tell_part(done: int, total: int, unit: str) -> None:
+    """Say how much of the stage that runs here is done; cheap where nobody listens."""
+    hear = _hear.get()
+    if hear is not None:
+        hear(StagePart(done, total, unit))
+
+
+@contextmanager
+def heard_by(hear: Callable[[StagePart], None]) -> Iterator[None]:
+    """Have the stages that run in the ``with`` statement heard."""
+    token = _hear.set(hear)
+    try:
+        yield
+    finally:
+        _hear.reset(token)

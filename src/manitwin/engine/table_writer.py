@@ -1,4 +1,4 @@
-"""What of a run the index's tables still lack, and what to write of it next."""
+"""The tables of a run: which items they still lack, and what to write next."""
 
 from __future__ import annotations
 
@@ -7,16 +7,17 @@ from manitwin.engine.ledger.ledger import Ledger
 
 
 class TableWriter:
-    """Give out one job at a time: tables of every so many twins, and at a run's end the rest, merged into few.
+    """Give out one job at a time: tables of every so many items, and at a run's end the rest, merged into few.
 
-    ``every`` items that ended make a job due (0: no tables at all); ``attempts`` failures in a row stop the run.
+    ``every`` items that ended make a job due (0: no tables at all); ``attempts`` failures in a row stop the run. A run that
+    has nothing to add merges nothing either, and so starts no worker.
     """
 
     def __init__(self, ledger: Ledger, every: int, attempts: int):
         self._ledger, self._every, self._attempts = ledger, every, attempts
         self._under_way: WriteTables | None = None
         self._ended, self._failures = 0, 0
-        self._merged = False
+        self._merged = True
 
     def item_ended(self) -> None:
         """Count an item that may have left a twin for the tables."""
@@ -30,9 +31,9 @@ class TableWriter:
 
     def due_at_the_end(self) -> WriteTables | None:
         """Return the next job, no item being under way any more; None when all is written and merged."""
-        if not self._every or self._merged:
+        if not self._every:
             return None
-        return self._of_unwritten_twins() or self._begun(WriteTables(()))
+        return self._of_unwritten_twins() or (None if self._merged else self._begun(WriteTables(())))
 
     def written(self, reply: Reply) -> str | None:
         """Take the answer to the job under way; returns why the run must stop, if it must."""
@@ -45,6 +46,7 @@ class TableWriter:
                 return f"the index cannot be written: {reply.message}; `manitwin check` says what is wrong"
         elif job is not None and job.item_ids:
             self._ledger.indexed(job.item_ids)
+            self._merged = False
             self._failures = 0
         else:
             self._merged = True

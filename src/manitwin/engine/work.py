@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from manitwin.engine.ledger.location import cache_folder
 from manitwin.engine.stage import Draft, Stage, is_field
 from manitwin.engine.stage_runner import LOST, RESULT, StageCost, StageRun, run_stage, stage_key, take_up
 from manitwin.twin.dataset_root import DatasetRoot
@@ -111,3 +112,8 @@ class WorkFolder:
         files = sorted((p for p in place.rglob("*") if p.is_file()), key=lambda p: (p.name == RESULT, p))
         for path in files:
             self.root.put_file(path, f"{self.name}/{stage}/{key}/{path.relative_to(place).as_posix()}")
+
+
+def sweep(root: DatasetRoot, item_id: str) -> None:
+    """Delete what workers left half-made of an item."""
+    WorkFolder(root, item_id, cache_folder(root)).sweep()

@@ -23,8 +23,7 @@ from manitwin.engine.jobs import (
     WriteTables,
 )
 from manitwin.engine.recipe import Ending
-from manitwin.engine.stage import Draft, Stage
-from manitwin.engine.stage_order import INPUT
+from manitwin.engine.stage import INPUT, Draft, Stage
 from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, lost_usd
 from manitwin.engine.task import Payload
 from manitwin.engine.work import WorkFolder

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from manitwin.config import Resource
+from manitwin.engine.drive import ExecutorName, RunReport, drive
 from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.folder_recipe import FolderRecipe, FolderRecord
+from manitwin.engine.ledger.location import CONFIG
 from manitwin.engine.recipe import Ending, Identity
-from manitwin.engine.stage import Draft, Stage
-from manitwin.engine.stage_parts import tell_part
+from manitwin.engine.stage import Draft, Stage, tell_part
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
 from manitwin.episodes.batch import batch_name
@@ -34,7 +35,6 @@ from manitwin.episodes.settings import PicturesConfig
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.video import EpisodesVideo
 from manitwin.errors import EpisodesError, Rejected
-from manitwin.pipeline.dataset_run import CONFIG, ExecutorName, RunReport, drive
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.furniture_pictures import lighting_of

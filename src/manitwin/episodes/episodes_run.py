@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+from manitwin.engine.drive import ExecutorName, RunReport, drive
 from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.ledger.ledger import read_ledger
+from manitwin.engine.ledger.location import CONFIG, local_ledger
 from manitwin.engine.recipe import Ending, Identity
 from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
@@ -21,7 +23,6 @@ from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.errors import Rejected, UsageError
-from manitwin.pipeline.dataset_run import CONFIG, ExecutorName, RunReport, drive, local_ledger
 from manitwin.robots.load import load_robot
 from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.run_settings import check_settings

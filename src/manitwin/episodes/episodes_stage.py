@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from manitwin.config import Resource
-from manitwin.engine.stage import Draft
-from manitwin.engine.stage_parts import tell_part
+from manitwin.engine.stage import Draft, tell_part
 from manitwin.episodes.attempts import ATTEMPTS, Attempt, write_attempts
 from manitwin.episodes.batch import Batch
 from manitwin.episodes.episode import EpisodeFacts, run_episode

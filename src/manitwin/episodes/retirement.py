@@ -73,7 +73,7 @@ def retire(twins: TwinSource, found: Iterable[Retirement]) -> int:
         if fresh:
             count += fresh
             revised[twin_id] = amend(folder, {GRASPS: _with_column(table, "retired", after)}).revision
-    if revised and not twins.flat and twins.root.exists(LEDGER):
+    if revised and twins.root.exists(LEDGER):
         _follow(twins.root, revised)
     return count
 

@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, TextIO, cast, get_args
 
+from manitwin.engine.ledger.ledger import LEDGER
+from manitwin.engine.ledger.location import CONFIG
 from manitwin.errors import UsageError, choose_from
+from manitwin.formats.output_folder import require_writable_folder
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
 from manitwin.pipeline.folder_listing import FolderListing, list_folder
 from manitwin.pipeline.item import Item
+from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported, read_import_record
 
 MANIFEST_SUFFIXES = frozenset({".csv", ".jsonl"})
@@ -32,25 +36,19 @@ class Notes:
     folders: list[FolderListing] = field(default_factory=list)
 
 
-def collect_items(
-    inputs: Iterable[str | Path],
-    texts: Iterable[str] = (),
-    *,
-    name: str | None = None,
-    units: str = "auto",
-    up: str = "auto",
-    license: str | None = None,
-    attribution: str | None = None,
-    strict: bool = False,
-    refusal: Refusal = lambda item: None,
-) -> tuple[list[Item], Notes]:
-    """Turn what a user typed into items, in order, without repeats; returns them and what is to be said of the inputs.
-
-    The keyword arguments hold for every item whose manifest row does not say otherwise. Raises as ``iterate_items``.
-    """
-    defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
-    notes = Notes()
-    return list(dict.fromkeys(iterate_items(inputs, defaults, notes, texts, strict=strict, refusal=refusal))), notes
+def require_inputs(root: DatasetRoot, inputs: Sequence[str | Path], texts: Sequence[str]) -> None:
+    """Raise UsageError where a build has no inputs and no data set to go on with, and where it cannot be made or written."""
+    if root.flat:
+        raise UsageError(
+            f"{root.url}: holds twins in the flat layout of earlier versions, which is read and no longer written; give a new"
+            " folder"
+        )
+    if not inputs and not texts and not root.exists(CONFIG) and not root.exists(LEDGER):
+        raise UsageError(
+            f"{root.url}: no inputs, and no data set there to go on with; give images, meshes, folders, manifests or texts"
+        )
+    if root.local is not None:
+        require_writable_folder(root.local, "twins")
 
 
 def iterate_items(

@@ -11,8 +11,7 @@ from typing import Literal, cast
 from manitwin.config import BuildConfig
 from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.recipe import Ending, Identity, Tables
-from manitwin.engine.stage import Draft, PaidStage, Stage
-from manitwin.engine.stage_order import INPUT
+from manitwin.engine.stage import INPUT, Draft, PaidStage, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.sniff import sniff
@@ -144,7 +143,7 @@ def config_sha256(config: BuildConfig) -> str:
 
     Grippers count by their content: a changed file is another configuration.
     """
-    decides = config.model_dump(mode="json", exclude={"seed", "item_timeout_s", "services", "run"})
+    decides = config.model_dump(mode="json", exclude={"seed", "services", "run"})
     decides["grippers"] = [gripper.sha256 for gripper, _ in _grippers(config)]
     decides |= {kind: without_url(decides[kind]) for kind in ("generator", "annotator", "grasper")}
     del decides["vlm"]["prompts"]  # their content counts, as part of what each stage is asked with

@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 from manitwin.config import Section, read_toml, validated
 from manitwin.engine.ledger.ledger import read_ledger
+from manitwin.engine.ledger.location import CONFIG, local_ledger
 from manitwin.errors import UsageError
-from manitwin.pipeline.dataset_run import CONFIG, local_ledger
 from manitwin.twin.dataset_root import DatasetRoot
 
 Application = TypeVar("Application", bound=Section)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path, PurePosixPath
 
 from fsspec.core import url_to_fs
@@ -41,6 +42,25 @@ class DatasetRoot:
             raise UsageError(f"{url}: {error}; give a folder, or a URL such as s3://bucket/name") from error
         self.url = str(url)
         self.local: Path | None = Path(self.path) if isinstance(self.fs, LocalFileSystem) else None
+
+    @cached_property
+    def flat(self) -> bool:
+        """Whether it is of the layout of earlier versions: twin folders directly below it. It is read, and no longer written."""
+        return self.local is not None and not self.exists(TWINS) and any(self._flat_ids())
+
+    @property
+    def has_twins(self) -> bool:
+        """Whether it holds twins, or will: in the layout of today or of earlier versions."""
+        return self.exists(TWINS) or self.flat
+
+    def _flat_ids(self) -> Iterator[str]:
+        assert self.local is not None
+        for record in self.local.glob(f"[!.]*/{RECORD}") if self.local.is_dir() else ():
+            yield record.parent.name
+
+    def twin_name(self, twin_id: str) -> str:
+        """Return the name of a twin's folder."""
+        return twin_id if self.flat else twin_name(twin_id)
 
     def __reduce__(self) -> tuple[type, tuple[str]]:
         return type(self), (self.path if self.local else self.url,)
@@ -126,6 +146,9 @@ class DatasetRoot:
 
     def twin_ids(self) -> Iterator[str]:
         """Yield the ids of all finished twins, sorted."""
+        if self.flat:
+            yield from sorted(self._flat_ids())
+            return
         prefixes = sorted(self._children(TWINS))
         for prefix in prefixes:
             for twin_id in sorted(self._children(f"{TWINS}/{prefix}")):

@@ -9,6 +9,7 @@ from typer import Typer
 from typer.testing import CliRunner
 
 from foreign_assets import mug_urdf
+from input_items import collect_items
 from manitwin.assets.importers.importer import import_assets
 from manitwin.cli.commands.import_ import import_
 from manitwin.engine.ledger.ledger import Ledger
@@ -16,7 +17,6 @@ from manitwin.errors import UsageError
 from manitwin.formats.source_files import pack_source
 from manitwin.pipeline.identity import twin_id
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.manifest import collect_items
 
 
 def imported(folder: Path, **mug: float) -> Path:

@@ -9,10 +9,10 @@ import pytest
 from manitwin.config import BuildConfig
 from manitwin.dataset.index.rows import rows_of
 from manitwin.dataset.index.tables import TABLES
-from manitwin.engine.stage_order import STAGE_ORDER
 from manitwin.errors import TwinError
 from manitwin.geometry.shape_descriptor import shape_descriptor
 from manitwin.pipeline.recipe import stages_for
+from manitwin.pipeline.stage_order import STAGE_ORDER
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.grasp_table import SCHEMA
 from manitwin.twin.store import read_record

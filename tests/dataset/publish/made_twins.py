@@ -15,11 +15,11 @@ import trimesh
 from handmade import visual
 from manitwin.dataset.index.parts import write_part
 from manitwin.formats.glb import write_glb
-from manitwin.pipeline.rehearsal_cube import CUBE
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.grasp_table import SCHEMA
 from manitwin.twin.store import seal
 from record_overlay import overlaid
+from rehearsal_cube import CUBE
 
 CORNERS_M = [0.02, 0.03, 0.05]
 

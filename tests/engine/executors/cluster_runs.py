@@ -19,10 +19,10 @@ from manitwin.engine.executors.ray_cluster import RayExecutor
 from manitwin.engine.jobs import RunStage, WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.task import Task
-from manitwin.pipeline.dataset_run import sweep as sweep_work
+from manitwin.engine.work import sweep as sweep_work
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.rehearsal import RehearsalRecipe
 from manitwin.twin.dataset_root import DatasetRoot
+from rehearsal_recipe import RehearsalRecipe
 
 ASKS = (("a", "cpu"), ("b", "vlm"), ("c", "cpu"))
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from manitwin.pipeline.rehearsal import RehearsalRecipe
+from rehearsal_recipe import RehearsalRecipe
 
 NODE = {"num_cpus": 2, "object_store_memory": 80 * 2**20}
 SOON = {"health_check_initial_delay_ms": 1000, "health_check_period_ms": 500, "health_check_failure_threshold": 3}

@@ -7,18 +7,17 @@ from pathlib import Path
 import pytest
 
 from manitwin.config import RunConfig
-from manitwin.engine.announcer import Announcer
-from manitwin.engine.events import StageAdvanced, StageEnded, StageEvent, StageStarted
+from manitwin.engine.drive import drive
+from manitwin.engine.events import Announcer, StageAdvanced, StageEnded, StageEvent, StageStarted
 from manitwin.engine.executors.local import LocalExecutor
 from manitwin.engine.executors.part_notes import parts_noted, read_notes
 from manitwin.engine.flight import Flight
 from manitwin.engine.jobs import Failure, RunStage, WorkerSetup
-from manitwin.engine.stage_parts import StagePart, heard_by, tell_part
+from manitwin.engine.stage import StagePart, heard_by, tell_part
 from manitwin.engine.task import Task
-from manitwin.pipeline.dataset_run import drive
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.rehearsal import RehearsalRecipe
 from manitwin.twin.dataset_root import DatasetRoot
+from rehearsal_recipe import RehearsalRecipe
 
 
 def test_a_run_tells_what_part_of_a_stage_is_done_while_it_runs(tmp_path: Path) -> None:

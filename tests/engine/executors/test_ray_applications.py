@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from grasped_twins import write_brick
+from manitwin.engine.drive import ExecutorName
 from manitwin.episodes.episodes_run import make_episodes
 from manitwin.episodes.settings import TrajectoriesConfig
-from manitwin.pipeline.dataset_run import ExecutorName
 from manitwin.scenes.layouts.layouts_run import make_layouts
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 

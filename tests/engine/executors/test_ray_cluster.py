@@ -13,7 +13,7 @@ from cluster_runs import asking, executor_for, replies, replies_after, run, stag
 from manitwin.engine.events import ItemEnded
 from manitwin.engine.jobs import Failure
 from manitwin.errors import Unavailable, UsageError
-from manitwin.pipeline.rehearsal import RehearsalRecipe
+from rehearsal_recipe import RehearsalRecipe
 
 
 def test_a_crash_costs_its_item_alone(connected: str, tmp_path: Path, recipe: RehearsalRecipe) -> None:
@@ -23,7 +23,7 @@ def test_a_crash_costs_its_item_alone(connected: str, tmp_path: Path, recipe: Re
     assert {text: state for text, state in ran.states.items() if state != "accepted"} == failing
     assert max(Counter(event.task.number for event in ran.ended).values()) == 1, "each ended once"
     crash = ran.errors["poisoned segfault:b", "b"] or ""
-    assert "Segmentation fault" in crash and "rehearsal.py" in crash, "the native stack is kept"
+    assert "Segmentation fault" in crash and "rehearsal_recipe.py" in crash, "the native stack is kept"
     assert (ran.attempts["poisoned segfault:b", "b"], ran.attempts["once segfault-once:c", "c"]) == (3, 2)
     repeated = sorted((what.split()[1], times) for what, times in times_run(tmp_path / "log").items() if times > 1)
     assert repeated == [("a", 3), ("b", 3), ("c", 2)], "three attempts of what fails, two of what failed once"

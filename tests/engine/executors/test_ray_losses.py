@@ -17,7 +17,7 @@ from cluster_runs import executor_for, replies, run, stage_job, times_run
 
 from manitwin.engine.events import ItemEnded
 from manitwin.engine.jobs import Failure
-from manitwin.pipeline.rehearsal import RehearsalRecipe
+from rehearsal_recipe import RehearsalRecipe
 
 
 def test_a_node_that_dies_takes_no_item_along(
@@ -50,7 +50,7 @@ from pathlib import Path
 from manitwin.config import RunConfig
 from manitwin.engine.driver import Driver
 from manitwin.engine.jobs import WorkerSetup
-from manitwin.pipeline.rehearsal import RehearsalRecipe
+from rehearsal_recipe import RehearsalRecipe
 from manitwin.engine.executors.ray_cluster import RayExecutor
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.pipeline.item import Item

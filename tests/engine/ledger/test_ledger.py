@@ -16,6 +16,7 @@ from manitwin.engine.ledger.migrations import MIGRATIONS
 from manitwin.engine.ledger.progress import read_progress, read_story
 from manitwin.errors import UsageError
 from manitwin.pipeline.item import Item
+from manitwin.pipeline.stage_order import place_in_pipeline
 
 
 @pytest.fixture
@@ -63,8 +64,8 @@ def test_a_ledger_of_a_newer_version_is_refused(tmp_path: Path) -> None:
 
 
 def test_items_are_added_once(ledger: Ledger) -> None:
-    assert ledger.add_items(mugs(3)) == (3, 3)
-    assert ledger.add_items(mugs(5)) == (5, 2)
+    assert ledger.add_items(mugs(3)) == ([1, 2, 3], 3)
+    assert ledger.add_items(mugs(5)) == ([1, 2, 3, 4, 5], 2)
 
 
 def test_a_manifest_with_a_wrong_row_adds_nothing(ledger: Ledger) -> None:
@@ -151,7 +152,7 @@ def test_a_story_is_found_by_number_id_or_file(path: Path, ledger: Ledger) -> No
 
 
 def test_a_data_set_without_a_ledger_is_said_to_be_none(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="manitwin run"), read_ledger(tmp_path / "ledger.sqlite"):
+    with pytest.raises(UsageError, match="manitwin build"), read_ledger(tmp_path / "ledger.sqlite"):
         pass
     assert list(tmp_path.iterdir()) == []
 
@@ -164,7 +165,7 @@ def test_stages_are_told_in_the_order_of_the_pipeline(path: Path, ledger: Ledger
             ledger.stage_ended(number, stage, "done", attempts=1)
     ledger.commit()
     with read_ledger(path) as connection:
-        assert [stage.stage for stage in read_progress(connection, at_work=False).stages] == [
+        assert [stage.stage for stage in read_progress(connection, False, place_in_pipeline).stages] == [
             *("input", "photo", "mesh", "gate", "grasps", "verify", "grasps-robotiq_2f85", "verify-robotiq_2f85"),
             *("record_grasps", "finish", "assemble"),
         ]

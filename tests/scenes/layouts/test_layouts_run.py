@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 import manitwin
 from manitwin.cli.main import app
 from manitwin.errors import UsageError
-from manitwin.pipeline.dataset_run import stored_config
+from manitwin.pipeline.settings import stored_config
 from manitwin.scenes.layouts.layouts_run import layout_totals, make_layouts
 from manitwin.scenes.scene_files import scene_ids, scene_name
 from manitwin.scenes.settings import LayoutsConfig, LayoutSettings

@@ -1,121 +1,165 @@
-"""``manitwin build``: twins of a few inputs, in one folder."""
+"""``manitwin build``: twins of one input or of 100,000, in a data set."""
 
 from __future__ import annotations
 
+from functools import wraps
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
 from manitwin.cli import choices, options
+from manitwin.cli.causes import print_causes
 from manitwin.cli.console import err_console, error_console, out_console, print_error, print_estimate
-from manitwin.cli.json_output import Json, print_document
-from manitwin.cli.planned import DryRun, print_plan
-from manitwin.cli.why import causes_of_build, print_causes_of_build
+from manitwin.cli.documents import Json, print_document
 
 if TYPE_CHECKING:
-    from manitwin.api import BuildReport
-    from manitwin.pipeline.build_item import ItemResult
+    from manitwin.engine.events import StageEvent
+    from manitwin.pipeline.build_report import BuildReport, ItemResult
 
-STYLES = {"accepted": "green", "rejected": "yellow", "unfinished": "red"}
-BUILD_LOG = "build.log"
+STYLES = {"accepted": "green", "rejected": "yellow", "unfinished": "red", "duplicate": "dim"}
+MOST_LINES = 50
+"""So many inputs that were there already, or wait, have a line of their own at the end."""
+MOST_RECORDS = 1000
+"""The grasps of so many twins are added up at the end: each record is read for it; `manitwin stats` does it for any number."""
+RUN_RENAMED = "`manitwin run` is `manitwin build` now; the old name goes with the next version"
 
 
+@options.with_options({**options.OF_INPUTS, **options.FLAGS}, before="strict")
 def build(
     inputs: Annotated[
         list[Path] | None,
         typer.Argument(
-            help="Images, meshes, folders, or .csv/.jsonl manifests.",
-            metavar="INPUT...",
+            help="Images, meshes, folders, or .csv/.jsonl manifests; none: go on with what is there.",
+            metavar="INPUT",
             callback=choices.must_exist("an image, a mesh, a folder, or a .csv or .jsonl manifest"),
         ),
     ] = None,
     out: Annotated[
-        Path | None,
-        typer.Option("--out", "-o", help="The folder to write twins into.", callback=choices.folder_to_write),
-    ] = None,
+        str,
+        typer.Option(
+            "--out", "-o", help="The data set: a folder, or a URL (s3://, gs://).", callback=choices.folder_to_write
+        ),
+    ] = "",
     text: options.Text = None,
-    name: Annotated[str | None, typer.Option(help="What the object is ('mug'): the key to the priors.")] = None,
-    units: options.Units = "auto",
-    up: options.Up = "auto",
-    license: options.License = None,
-    attribution: options.Attribution = None,
     strict: options.Strict = False,
-    jobs: options.Jobs = None,
-    seed: options.Seed = None,
     config: options.Config = None,
-    gripper: options.Grippers = None,
-    vlm: options.Vlm = None,
-    generator: options.Generator = None,
-    grasper: options.Grasper = None,
-    max_cost: options.MaxCost = None,
-    record: options.Record = None,
-    require_agreement: options.RequireAgreement = False,
-    quick: options.Quick = False,
+    executor: options.Executor = "local",
+    address: options.Address = None,
+    jobs: options.Jobs = None,
+    lines: Annotated[bool, typer.Option("--lines/--no-lines", help="Print a line for every input that ends.")] = True,
     json: Json = False,
-    dry_run: DryRun = False,
+    dry_run: options.DryRun = False,
+    **said: Any,
 ) -> None:
-    """Build a verified twin of every input."""
+    """Build a verified twin of every input; run it again to go on where it stopped."""
     from manitwin.errors import UsageError
 
-    if out is None:
-        raise UsageError("no folder to write twins into; give one with -o")
-    defaults = {
-        "name": name, "units": units, "up": up, "license": license, "attribution": attribution, "strict": strict,
-    }  # fmt: skip
-    flags = {
-        "seed": seed, "grippers": gripper or None, "vlm": vlm, "generator": generator, "grasper": grasper,
-        "max_cost_usd": max_cost, "record": record, "require_agreement": require_agreement, "quick": quick,
-    }  # fmt: skip
+    if not out:
+        raise UsageError("no data set to write twins into; give a folder or URL with -o")
+    arguments = {"texts": text or [], "strict": strict, "jobs": jobs, "config": config}
     if dry_run:
-        from manitwin.api import request_build
-        from manitwin.cli.dry_run import plan_build
-
-        request = request_build(inputs or [], out, text or [], config, defaults=defaults, flags=flags)
-        plan = plan_build(request.items, request.place, request.settings, request.notes.remarks)
-        print_plan(plan, str(out), as_json=json)
+        _print_dry_run(inputs or [], out, arguments, said, as_json=json)
         return
-    report = _build(inputs or [], out, texts=text or [], jobs=jobs, config=config, **defaults, **flags)
-    _print_report(report, out)
+    where = {"executor": options.executor_name(executor), "address": address}
+    report = _watched_build(inputs or [], out, lines=lines, **arguments, **where, **said)
+    _print_report(report, lines)
     if json:
+        from manitwin.cli.causes import causes_of
         from manitwin.cli.documents import build_document
 
-        print_document(build_document(report, str(out), causes_of_build(report)))
+        print_document(build_document(report, causes_of(out, report.run.given)))
     raise typer.Exit(report.exit_code)
 
 
-def _build(inputs: list[Path], out: Path, **arguments: Any) -> BuildReport:
+Dataset = Annotated[str, typer.Option("--dataset", "--out", "-o", callback=choices.folder_to_write)]
+
+
+@options.with_options({"out": (Dataset, "")})
+@wraps(build)
+def run(**given: Any) -> None:
+    """Do as ``build``, whose name for many inputs this was."""
+    err_console.print(RUN_RENAMED, markup=False)
+    build(**given)
+
+
+def _print_dry_run(
+    inputs: list[Path], out: str, arguments: dict[str, Any], said: dict[str, Any], *, as_json: bool
+) -> None:
+    from manitwin.cli.dry_run import plan_build, print_plan
+    from manitwin.pipeline.settings import Flags, request_build
+
+    defaults = {name: said.pop(name) for name in options.OF_INPUTS}
+    request = request_build(inputs, out, **arguments, defaults=defaults, flags=cast(Flags, said))
+    print_plan(plan_build(request.items, request.root, request.settings, request.notes.remarks), out, as_json=as_json)
+
+
+def _watched_build(inputs: list[Path], out: str, *, lines: bool, **arguments: Any) -> BuildReport:
     """Build while a person watches; ``arguments`` are those of ``api.build``."""
     from manitwin.api import build as build_twins
-    from manitwin.cli.watched_run import WatchedRun
-    from manitwin.render.device import require_renderer
-    from manitwin.twin.store import WORK
+    from manitwin.cli.progress import WatchedRun
+    from manitwin.engine.ledger.location import local_log
+    from manitwin.twin.dataset_root import DatasetRoot
 
-    require_renderer()
+    if arguments["executor"] != "ray":
+        from manitwin.render.device import require_renderer
+
+        require_renderer()
+    waits: set[str] = set()
+
+    def staged(event: StageEvent) -> None:
+        watched.progress.stage(event)
+        if getattr(event, "state", None) == "waiting" and event.stage not in waits:
+            waits.add(event.stage)
+            err_console.print(f"{event.stage} waits: {event.detail}", markup=False)  # type: ignore[union-attr]
 
     def ended(result: ItemResult) -> None:
         watched.progress.ended(result.item, result.status, result.reused)
-        _print_result(result)
+        if lines:
+            _print_result(result)
 
-    with WatchedRun("inputs", lambda: out / WORK / BUILD_LOG) as watched:
+    with WatchedRun("inputs", lambda: local_log(DatasetRoot(out))) as watched:
         return build_twins(
-            inputs, out, **arguments, on_estimate=print_estimate, on_start=watched.start,
-            on_stage=watched.progress.stage, on_result=ended,
+            inputs, out, **arguments, on_estimate=print_estimate, on_start=watched.start, on_stage=staged, on_result=ended
         )  # fmt: skip
 
 
-def _print_report(report: BuildReport, out: Path) -> None:
+def _print_report(report: BuildReport, lines: bool) -> None:
     from manitwin.cli.run_summary import grasp_lines, summarize_grasps
 
     for remark in report.remarks:
         err_console.print(remark, markup=False)
-    accepted, rejected, unfinished = (report.count(s) for s in ("accepted", "rejected", "unfinished"))
-    out_console.print(f"{accepted} accepted, {rejected} rejected, {unfinished} unfinished, in {out}", markup=False)
-    for line in grasp_lines(summarize_grasps(report.records())):
-        out_console.print(line, markup=False)
-    print_causes_of_build(report)
-    if unfinished:
-        print_error("run the same command again to go on where it stopped")
+    if lines:
+        _print_others(report)
+    counted = {status: report.count(status) for status in STYLES}
+    said = ", ".join(f"{count} {status}" for status, count in counted.items() if count or status != "duplicate")
+    out_console.print(f"{said}, in {report.dataset}", markup=False)
+    if counted["accepted"] <= MOST_RECORDS:
+        for line in grasp_lines(summarize_grasps(report.records())):
+            out_console.print(line, markup=False)
+    if report.run.left:
+        # a build that was stopped says by itself what for: no money left, a key that is refused
+        why = "" if report.run.stopped else " for a service that does not answer"
+        err_console.print(f"{report.run.left} inputs wait{why}", markup=False)
+    if report.run.stopped:
+        print_error(f"stopped: {report.run.stopped}")
+    told = len(report.run.given) == 1 and lines and not out_console.quiet
+    print_causes(report.dataset, report.run.given, told=told)
+    if report.open:
+        err_console.print(
+            f"manitwin status {report.dataset} says more; run the same command again to go on", markup=False
+        )
+
+
+def _print_others(report: BuildReport) -> None:
+    """Print what became of inputs that did not end now: they were there already, or wait."""
+    others = (each for each in report.iterate() if each.number not in report.ended)
+    for result in islice(others, MOST_LINES):
+        _print_result(result)
+    more = sum(1 for _ in others)
+    if more:
+        out_console.print(f"... and {more} more that were there already (--json tells them all)", markup=False)
 
 
 def _print_result(result: ItemResult) -> None:
@@ -123,6 +167,6 @@ def _print_result(result: ItemResult) -> None:
     shown = result.folder / "card.png" if result.folder is not None and result.status == "accepted" else result.folder
     where = f" -> {shown}" if shown is not None else ""
     line = f"{result.status:<10} {result.item.title}: {result.detail}{again}{where}"
-    # what has not been made is an error, though a person who looks on reads of it among the other items
+    # what has not been made is an error, though a person who looks on reads of it among the other inputs
     console = error_console if out_console.quiet and result.status == "unfinished" else out_console
     console.print(line, style=STYLES[result.status], markup=False)

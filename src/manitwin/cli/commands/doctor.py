@@ -2,17 +2,50 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
+import sysconfig
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from manitwin.cli import choices, options
 from manitwin.cli.console import out_console
+from manitwin.errors import ManiTwinError
+from manitwin.formats.installation import missing_libraries, package_by_policy
 
 if TYPE_CHECKING:
-    from manitwin.cli.machine_checks import Finding
     from manitwin.config import BuildConfig
+
+PACKAGES = (
+    "sapien",
+    "mujoco",
+    "trimesh",
+    "embreex",
+    "manifold3d",
+    "numpy",
+    "scipy",
+    "opencv-python",
+    "pyarrow",
+    "usd-core",
+    "pycollada",
+)
+MIN_FREE_GB = 2
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at."""
+
+    name: str
+    ok: bool
+    detail: str
+
 
 KINDS = {"vlm": "annotator", "generator": "generator", "grasper": "grasper"}
 """What the command calls a kind of backend, and what the registry and the configuration do."""
@@ -44,8 +77,6 @@ def doctor(
         given = [f"--{name}" for name, spec in specs.items() if spec is not None]
         if given or config is not None:
             raise UsageError(f"doctor without {', '.join(KINDS)} looks at this machine and takes no options")
-        from manitwin.cli.machine_checks import examine
-
         findings, wrong = examine(), "missing"
     else:
         from manitwin.config import BuildConfig, load_config
@@ -63,9 +94,7 @@ def asked(kind: str, spec: str, settings: BuildConfig) -> Finding:
 
     No remembered answer is taken for one, and none is remembered. Raises ConfigError for a name that no backend has.
     """
-    from manitwin.cli.machine_checks import Finding
     from manitwin.engine.charges import counted
-    from manitwin.errors import ManiTwinError
     from manitwin.models.registry import create, target
 
     target(kind, spec)
@@ -83,3 +112,113 @@ def asked(kind: str, spec: str, settings: BuildConfig) -> Finding:
     seconds = time.perf_counter() - started
     works += "; it is a rehearsal server, not a model" if bill.rehearsed else ""
     return Finding(spec, ok, f"{' '.join(works.split())} ({bill.usd:.4f} USD, {seconds:.1f} s)")
+
+
+def examine() -> list[Finding]:
+    """Look at Python, the packages, what they want of the system, physics, the renderer, the backends and the disk."""
+    looks: tuple[tuple[str, Callable[[], str]], ...] = (
+        ("python", _python),
+        ("packages", _packages),
+        ("shared libraries", _shared_libraries),
+        ("physics", _physics),
+        ("second engine", _second_engine),
+        ("grippers", _grippers),
+        ("ray casting", _ray_casting),
+        ("renderer", _renderer),
+        ("backends", _backends),
+        ("disk", _disk),
+    )
+    return [_look(name, look) for name, look in looks]
+
+
+def _look(name: str, look: Callable[[], str]) -> Finding:
+    try:
+        return Finding(name, True, look())
+    except (ManiTwinError, ImportError, RuntimeError, OSError) as error:
+        return Finding(name, False, " ".join(str(error).split()))
+
+
+def _python() -> str:
+    return f"{sys.version.split()[0]} at {sys.executable}"
+
+
+def _packages() -> str:
+    missing, found = [], []
+    for package in PACKAGES:
+        try:
+            found.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            missing.append(package)
+    if missing:
+        raise ImportError(f"{', '.join(missing)} not installed; run: make setup")
+    return ", ".join(found)
+
+
+def _shared_libraries() -> str:
+    places = sorted({sysconfig.get_path("platlib"), sysconfig.get_path("purelib")})
+    missing = sorted({library for place in places for library in missing_libraries(Path(place))})
+    if missing:
+        packages = " ".join(sorted({package_by_policy(library) for library in missing}))
+        raise ImportError(
+            f"{', '.join(missing)} not found by the loader; on Debian and Ubuntu they are in packages of such names: {packages}"
+            " (apt-file search finds others)"
+        )
+    return "the loader finds all that the installed packages want"
+
+
+def _physics() -> str:
+    import sapien
+    import sapien.physx
+
+    scene = sapien.Scene([sapien.physx.PhysxCpuSystem()])
+    scene.step()
+    return f"SAPIEN {sapien.__version__} steps a scene (PhysX on the CPU)"
+
+
+def _second_engine() -> str:
+    import mujoco
+
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    mujoco.mj_step(model, mujoco.MjData(model))
+    return f"MuJoCo {mujoco.__version__} steps a scene"
+
+
+def _grippers() -> str:
+    from manitwin.robots.grippers.gripper import load_gripper, shipped_grippers
+
+    usable, left_out = [], []
+    for name in shipped_grippers():
+        try:
+            usable.append(load_gripper(name).name)
+        except ManiTwinError as error:  # a hand whose files come with an extra
+            left_out.append(str(error))
+    return "; ".join([", ".join(usable), *left_out])
+
+
+def _ray_casting() -> str:
+    import trimesh
+    from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+    hit = RayMeshIntersector(trimesh.creation.box()).intersects_any([[0, 0, 2]], [[0, 0, -1]])
+    if not hit.all():
+        raise RuntimeError("embree misses a box that is there; reinstall embreex")
+    return "embree hits what it should"
+
+
+def _renderer() -> str:
+    from manitwin.render.device import renderer_summary
+
+    return renderer_summary()
+
+
+def _backends() -> str:
+    from manitwin.models.registry import backends
+
+    return "; ".join(f"{kind}: {', '.join(sorted(names))}" for kind, names in sorted(backends().items()))
+
+
+def _disk() -> str:
+    free = shutil.disk_usage(Path.cwd()).free / 1e9
+    if free < MIN_FREE_GB:
+        raise OSError(f"{free:.1f} GB free here; a thousand twins want about 10 GB")
+    return f"{free:.0f} GB free here"

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.cli import choices
-from manitwin.cli.console import out_console, print_error
+from manitwin.cli.console import note_old_layout, out_console, print_error
 
 if TYPE_CHECKING:
     from manitwin.assets.writers.exporter import TwinContent
@@ -43,7 +43,6 @@ def export(
     """Write twins as MJCF, URDF, SDF, USD and GLB, and for RoboTwin, ManiSkill, Isaac Lab and graspers; scenes as MJCF, USD."""
     from manitwin.assets.writers.licenses import allowed_licenses
     from manitwin.assets.writers.registry import chosen_formats
-    from manitwin.cli.commands.export_scenes import export_scenes, scenes_among
     from manitwin.errors import UsageError
 
     if scenes := scenes_among(twins):
@@ -61,17 +60,41 @@ def export(
     raise typer.Exit(3 if refused else 0)
 
 
+def scenes_among(given: list[str]) -> list[Path]:
+    """Return the files of the scenes that are given; none where twins are. Raises UsageError where both are given."""
+    from manitwin.errors import UsageError
+    from manitwin.scenes.scene_files import scene_files
+
+    by_place = {each: scene_files(Path(each)) for each in given}
+    found = [file for files in by_place.values() for file in files]
+    others = [each for each, files in by_place.items() if not files]
+    if found and others:
+        raise UsageError(f"{others[0]}: no scene, and {given[0]} is one; export twins and scenes apart")
+    return found
+
+
+def export_scenes(files: list[Path], out: Path, to: str) -> None:
+    """Write ``OUT/<scene>/<format>/`` of every scene; raises UsageError for a format that scenes have not, ExportError."""
+    from manitwin.api import export_scene
+
+    for file in files:
+        written = export_scene(file, [name.strip() for name in to.split(",")], out)
+        out_console.print(f"{file.parent.name}: {', '.join(written)}", markup=False)
+    out_console.print(f"{len(files):,} scenes exported to {out}", markup=False)
+
+
 def twin_folders(given: list[str]) -> Iterator[Path]:
     """Yield the folders of the twins that are meant, each once; those of a URL as copies that last until the next.
 
     Raises UsageError for what is not there or has no twins.
     """
     from manitwin.errors import UsageError
-    from manitwin.twin.dataset_root import DatasetRoot, twin_name
+    from manitwin.twin.dataset_root import DatasetRoot
 
     seen = set[Path]()
     for each in given:
         root, found = DatasetRoot(each), False
+        note_old_layout(root)
         for folder in _local_twins(root.local) if root.local is not None else ():
             found = True
             if folder.resolve() not in seen:
@@ -80,7 +103,7 @@ def twin_folders(given: list[str]) -> Iterator[Path]:
         for twin_id in root.twin_ids() if root.local is None else ():
             found = True
             with tempfile.TemporaryDirectory() as copy:
-                yield root.fetch_folder(twin_name(twin_id), Path(copy) / twin_id)
+                yield root.fetch_folder(root.twin_name(twin_id), Path(copy) / twin_id)
         if not found:
             raise UsageError(f"{each}: no twin.json in it or below it; give a folder that manitwin has built")
 

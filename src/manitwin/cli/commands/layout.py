@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from manitwin.cli import choices, options
+from manitwin.cli.causes import causes_of, print_causes
 from manitwin.cli.console import out_console, print_error
-from manitwin.cli.json_output import Json, print_document
-from manitwin.cli.why import causes_of, print_causes
+from manitwin.cli.documents import Json, print_document
 
 if TYPE_CHECKING:
     from manitwin.scenes.layouts.layouts_run import LayoutTotals
@@ -63,8 +63,8 @@ def layout(
         "upright": upright or None,
     }  # fmt: skip
     settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
-    from manitwin.cli.watched_run import WatchedRun
-    from manitwin.pipeline.dataset_run import local_log
+    from manitwin.cli.progress import WatchedRun
+    from manitwin.engine.ledger.location import local_log
     from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, layout_totals, make_layouts, without_upright
     from manitwin.twin.dataset_root import DatasetRoot
 

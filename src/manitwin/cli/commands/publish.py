@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.cli import choices, options
-from manitwin.cli.console import err_console, out_console
+from manitwin.cli.console import err_console, note_old_layout, out_console
 
 if TYPE_CHECKING:
     from manitwin.dataset.publish.publish import Published, ShardDone
@@ -53,6 +53,7 @@ def publish(
 
     allowed = None if license_allow is None else license_allow.split(",")
     root = DatasetRoot(dataset)
+    note_old_layout(root)
     if root.local is not None and root.exists(ATTEMPTS):
         if twins_per_shard is not None or shard_size_mb != SHARD_SIZE_MB:
             raise UsageError(f"{dataset}: holds episodes, which have no shards; leave the options of shards out")

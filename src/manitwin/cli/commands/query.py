@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TextIO
 import typer
 
 from manitwin.cli import choices
-from manitwin.cli.console import out_console
+from manitwin.cli.console import note_old_layout, out_console
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -57,7 +57,9 @@ def query(
         names = list(SHOWN.get(table, ())) or None
     if format == "ids":
         names = ["twin_id"]
-    rows = Index(dataset).select(table, where or (), columns=names, limit=limit)
+    answers = Index(dataset)
+    note_old_layout(answers.root)
+    rows = answers.select(table, where or (), columns=names, limit=limit)
     try:
         WRITERS[format](rows, sys.stdout)
         sys.stdout.flush()

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from manitwin.cli import choices, options
+from manitwin.cli.causes import print_causes
 from manitwin.cli.console import err_console, out_console, print_error
-from manitwin.cli.why import print_causes
 
 
 def render(
@@ -39,10 +39,10 @@ def render(
     names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
     given = {"cameras": names, "size_px": size, "codec": codec, "run": options.run_settings(jobs)}
     settings = load_settings(PicturesConfig, config, given)
-    from manitwin.cli.watched_run import WatchedRun
+    from manitwin.cli.progress import WatchedRun
+    from manitwin.engine.ledger.location import local_log
     from manitwin.episodes.episode_pictures import PICTURES, draw_episodes, write_with_pictures
     from manitwin.episodes.video import require_encoder
-    from manitwin.pipeline.dataset_run import local_log
     from manitwin.render.device import require_renderer
     from manitwin.twin.dataset_root import DatasetRoot
 

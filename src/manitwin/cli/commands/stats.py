@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from manitwin.cli import choices
-from manitwin.cli.console import out_console
+from manitwin.cli.console import note_old_layout, out_console
 
 
 def stats(
@@ -36,6 +36,7 @@ def stats(
     from manitwin.twin.dataset_root import DatasetRoot
 
     root = DatasetRoot(dataset)
+    note_old_layout(root)
     if root.local is not None and root.exists(ATTEMPTS):
         from manitwin.episodes.statistics.report import episode_statistics
 

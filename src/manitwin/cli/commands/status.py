@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.cli.console import out_console
-from manitwin.cli.json_output import Json, print_document
+from manitwin.cli.documents import Json, print_document
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -40,10 +40,10 @@ def status(
     from manitwin.cli.causes import group_causes
     from manitwin.cli.documents import status_document, story_document
     from manitwin.engine.ledger.ledger import read_ledger
+    from manitwin.engine.ledger.location import local_ledger
     from manitwin.engine.ledger.lock import is_written
-    from manitwin.engine.ledger.progress import read_progress, read_story
-    from manitwin.engine.ledger.unaccepted import read_unaccepted
-    from manitwin.pipeline.dataset_run import local_ledger
+    from manitwin.engine.ledger.progress import read_progress, read_story, read_unaccepted
+    from manitwin.pipeline.stage_order import place_in_pipeline
     from manitwin.twin.dataset_root import DatasetRoot
 
     path = local_ledger(DatasetRoot(dataset))
@@ -58,10 +58,10 @@ def status(
             else:
                 _print_story(story)
         elif json:
-            progress = read_progress(ledger, is_written(path))
+            progress = read_progress(ledger, is_written(path), place_in_pipeline)
             print_document(status_document(progress, dataset, group_causes(read_unaccepted(ledger))))
         else:
-            out_console.print(_view(read_progress(ledger, is_written(path))))
+            out_console.print(_view(read_progress(ledger, is_written(path), place_in_pipeline)))
             _print_causes(group_causes(read_unaccepted(ledger)), dataset)
 
 
@@ -72,10 +72,11 @@ def _watch(path: Path) -> None:
     from manitwin.engine.ledger.ledger import read_ledger
     from manitwin.engine.ledger.lock import is_written
     from manitwin.engine.ledger.progress import read_progress
+    from manitwin.pipeline.stage_order import place_in_pipeline
 
     def view() -> RenderableType:
         with read_ledger(path) as ledger:
-            return _view(read_progress(ledger, is_written(path)))
+            return _view(read_progress(ledger, is_written(path), place_in_pipeline))
 
     with (
         suppress(KeyboardInterrupt),  # how a watch is meant to end

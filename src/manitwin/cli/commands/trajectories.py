@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.cli import choices, options
+from manitwin.cli.causes import causes_of, print_causes
 from manitwin.cli.console import err_console, out_console, print_error
-from manitwin.cli.json_output import Json, print_document
-from manitwin.cli.why import causes_of, print_causes
+from manitwin.cli.documents import Json, print_document
 
 if TYPE_CHECKING:
+    from manitwin.engine.drive import RunReport
     from manitwin.episodes.retirement import Retirement
-    from manitwin.pipeline.dataset_run import RunReport
 
 
 def trajectories(
@@ -61,10 +61,10 @@ def trajectories(
     given = {"seed": seed, "robot": robot, "skill": skill, "others": others, "run": options.run_settings(jobs)}
     settings = load_settings(TrajectoriesConfig, config, given)
     from manitwin.cli.documents import trajectories_document
-    from manitwin.cli.watched_run import WatchedRun
+    from manitwin.cli.progress import WatchedRun
+    from manitwin.engine.ledger.location import local_log
     from manitwin.episodes.collect import chosen_formats, collect
     from manitwin.episodes.episodes_run import make_episodes, retire_failing
-    from manitwin.pipeline.dataset_run import local_log
     from manitwin.twin.dataset_root import DatasetRoot
 
     wanted = chosen_formats(formats)

@@ -14,8 +14,8 @@ from manitwin.dataset.index.part_list import INDEX, IndexPart, PartList, in_orde
 from manitwin.dataset.index.parts import merged, rows_of_twins, write_rows
 from manitwin.dataset.index.tables import TABLES, joined, parquet
 from manitwin.engine.main_module import WorkerContext, hidden_main_module
-from manitwin.errors import TwinError
-from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.errors import TwinError, UsageError
+from manitwin.twin.dataset_root import TWINS, DatasetRoot
 
 CHUNK = 64
 """Twins of a task: some seconds of work, some thousand rows."""
@@ -52,8 +52,13 @@ def rebuild(
     """Replace a data set's index by one made of its folders alone: the same rows as one that was written as the run went.
 
     ``on_start`` is told how many twins there are, ``on_read`` how many more of them have been read. The old index stays until
-    the new one is whole. Raises TwinError where a worker process dies: nothing has changed then.
+    the new one is whole. Raises UsageError where there are no twins, and TwinError where a
+    worker process dies: nothing has changed then.
     """
+    if not root.has_twins:
+        raise UsageError(
+            f"{root.url}: no data set ({TWINS}/ is missing); give the folder or URL that manitwin build wrote"
+        )
     ids = list(root.twin_ids())
     on_start(len(ids))
     chunks = [ids[start : start + CHUNK] for start in range(0, len(ids), CHUNK)]

@@ -13,11 +13,11 @@ import pyarrow.parquet as pq
 import trimesh
 
 from manitwin.dataset.index.tables import TABLES
-from manitwin.engine.stage_order import place_in_pipeline
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import InputError, TwinError
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.shape_descriptor import ShapeDescriptor, shape_descriptor
+from manitwin.pipeline.stage_order import place_in_pipeline
 from manitwin.twin.grasp_table import SCHEMA as GRASPS_OF_A_TWIN
 from manitwin.twin.record import GraspSummary, Points, TwinRecord
 from manitwin.twin.store import RECORD, RUN, read_record

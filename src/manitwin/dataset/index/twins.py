@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
-from manitwin.twin.dataset_root import DatasetRoot, twin_name
+from manitwin.twin.dataset_root import DatasetRoot
 
 if TYPE_CHECKING:
     from manitwin.twin.loaded_twin import Twin
@@ -84,10 +84,10 @@ def load_twin(root: DatasetRoot, twin_id: str) -> Twin:
     from manitwin.twin.loaded_twin import Twin
 
     if root.local is not None:
-        return Twin(root.local / twin_name(twin_id))
+        return Twin(root.local / root.twin_name(twin_id))
     copy = Path(tempfile.mkdtemp(prefix="manitwin-")) / twin_id
     try:
-        root.fetch_folder(twin_name(twin_id), copy)
+        root.fetch_folder(root.twin_name(twin_id), copy)
         twin = Twin(copy)
     except BaseException:
         shutil.rmtree(copy.parent, ignore_errors=True)
@@ -99,7 +99,7 @@ def load_twin(root: DatasetRoot, twin_id: str) -> Twin:
 @contextmanager
 def local_files(root: DatasetRoot, twin_id: str, files: Iterable[str]) -> Iterator[Path]:
     """Give a folder with those of a twin's files that are there: its own, or for a URL a copy that ends with the context."""
-    name = twin_name(twin_id)
+    name = root.twin_name(twin_id)
     if root.local is not None:
         yield root.local / name
         return

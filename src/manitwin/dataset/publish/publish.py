@@ -27,7 +27,7 @@ from manitwin.dataset.publish.tables import (
     shards_table,
 )
 from manitwin.errors import UsageError
-from manitwin.twin.dataset_root import DatasetRoot, twin_name
+from manitwin.twin.dataset_root import DatasetRoot
 
 SHARD_SIZE_MB = 1000
 """A shard is what one downloads to look at a category: some hundred twins."""
@@ -180,7 +180,7 @@ def _write_pages(source: DatasetRoot, publication: Publication, facts: CardFacts
     """Write the pictures that the card shows, the licences and the card."""
     for picture in facts.pictures:
         twin_id = Path(picture).stem
-        publication.write(picture, source.read_bytes(f"{twin_name(twin_id)}/{CARD}"))
+        publication.write(picture, source.read_bytes(f"{source.twin_name(twin_id)}/{CARD}"))
     publication.write(LICENSES_MD, licenses_page(facts.name, facts.twins).encode())
     publication.write(README, dataset_card(facts).encode())
 
@@ -190,5 +190,7 @@ def _pictures(source: DatasetRoot, twins: list[dict[str, Any]]) -> list[str]:
     best: dict[str, str] = {}
     for twin in sorted(twins, key=lambda twin: (-twin["verified"], twin["twin_id"])):
         best.setdefault(twin["category"], twin["twin_id"])
-    shown = [twin_id for twin_id in list(best.values())[:PICTURES] if source.exists(f"{twin_name(twin_id)}/{CARD}")]
+    shown = [
+        twin_id for twin_id in list(best.values())[:PICTURES] if source.exists(f"{source.twin_name(twin_id)}/{CARD}")
+    ]
     return [f"{PICTURE_FOLDER}/{twin_id}.png" for twin_id in shown]

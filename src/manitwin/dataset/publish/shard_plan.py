@@ -155,9 +155,11 @@ def tar_bytes_of_twins(root: DatasetRoot) -> dict[str, int]:
     An entry of an archive takes less than the tar header that is counted for it. Raises UsageError where there are no twins.
     """
     root.fs.invalidate_cache()
+    if root.flat:
+        return _sizes_below(root, root.path)
     top = root.full(TWINS)
     if not root.fs.isdir(top):
-        raise UsageError(f"{root.url}: no {TWINS}/ below it; give a data set that manitwin run made")
+        raise UsageError(f"{root.url}: no {TWINS}/ below it; give a data set that manitwin build made")
     sizes: dict[str, int] = {}
     for prefix in sorted(root.fs.ls(top, detail=False)):
         sizes |= _sizes_below(root, str(prefix))

@@ -52,7 +52,7 @@ def write_shard(stream: BinaryIO, root: DatasetRoot, shard: Shard, places: tuple
 
 def twin_parts(root: DatasetRoot, twin: ShardTwin) -> Iterator[tuple[str, bytes]]:
     """Yield a twin's parts by name: its files, and run.json without the machine that it ran on."""
-    folder = twin_name(twin.twin_id)
+    folder = root.twin_name(twin.twin_id)
     content = _contents(root, folder, [RECORD])[RECORD]
     record = _record(root, twin, content)
     contents = _contents(root, folder, sorted(record.files))
@@ -78,7 +78,7 @@ def _contents(root: DatasetRoot, folder: str, names: list[str]) -> dict[str, byt
 
 
 def _record(root: DatasetRoot, twin: ShardTwin, content: bytes) -> TwinRecord:
-    place = f"{root.full(twin_name(twin.twin_id))}/{RECORD}"
+    place = f"{root.full(root.twin_name(twin.twin_id))}/{RECORD}"
     try:
         data = json.loads(content)
         record = TwinRecord(**data)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from manitwin.dataset.index.query import sql_text
 from manitwin.dataset.statistics.query import Column, Query
-from manitwin.engine.stage_order import STAGE_ORDER
+from manitwin.pipeline.stage_order import STAGE_ORDER
 from manitwin.twin.record import REJECTION_REASONS
 
 STAGES = tuple(REJECTION_REASONS)

@@ -22,7 +22,7 @@ from manitwin.engine.executors.one_thread import one_thread_each
 from manitwin.engine.executors.part_notes import EVERY_S, drop_note, parts_noted, read_notes
 from manitwin.engine.jobs import Failure, Job, Reply, RunStage, WorkerSetup
 from manitwin.engine.main_module import WorkerContext, hidden_main_module
-from manitwin.engine.stage_parts import StagePart
+from manitwin.engine.stage import StagePart
 from manitwin.engine.worker import Worker
 
 JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
@@ -30,17 +30,20 @@ STACK_LINES = 12
 
 
 class LocalExecutor:
-    """One process pool a resource, made when it is first needed.
+    """One process pool a resource, made when it is first needed; one process for all of them where there is one item.
+
+    ``items`` is how many there are to do (None: many): no pool gets more processes, each of which imports the stages for seconds.
 
     Owns: the pools, and a folder for what dying workers leave behind.
     """
 
-    def __init__(self, setup: WorkerSetup, settings: RunConfig):
-        self._setup, self._settings = setup, settings
+    def __init__(self, setup: WorkerSetup, settings: RunConfig, items: int | None = None):
+        self._setup, self._settings, self._one_pool = setup, settings, items is not None and items <= 1
         cpu = settings.cpu or len(os.sched_getaffinity(0))
-        self._slots: dict[Resource, int] = {
+        wanted: dict[Resource, int] = {
             "cpu": cpu, "gpu": settings.gpu, "vlm": settings.vlm, "generator": settings.generator
         }  # fmt: skip
+        self._slots = {needs: slots if items is None else max(1, min(slots, items)) for needs, slots in wanted.items()}
         self._pools: dict[Resource, ProcessPool] = {}
         self._ended: queue.SimpleQueue[tuple[int, Reply]] = queue.SimpleQueue()
         self._stacks = tempfile.TemporaryDirectory(prefix="manitwin-")
@@ -93,6 +96,7 @@ class LocalExecutor:
         self._main.__exit__(None, None, None)
 
     def _pool(self, needs: Resource) -> ProcessPool:
+        needs = "cpu" if self._one_pool else needs
         if needs not in self._pools:
             self._pools[needs] = ProcessPool(
                 max_workers=self._slots[needs],

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from manitwin.engine.stage_parts import StagePart, heard_by
+from manitwin.engine.stage import StagePart, heard_by
 
 RUN = logging.getLogger("manitwin.run")
 NOTE = ".part"

@@ -17,7 +17,7 @@ from manitwin.engine.executors.ray_head import Head, reachable
 from manitwin.engine.executors.ray_pool import Actor, RayPool, Running
 from manitwin.engine.executors.ray_worker import RayWorker
 from manitwin.engine.jobs import Failure, Job, Reply, WorkerSetup
-from manitwin.engine.stage_parts import StagePart
+from manitwin.engine.stage import StagePart
 from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
 from manitwin.twin.dataset_root import DatasetRoot

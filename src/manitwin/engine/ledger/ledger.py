@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import sqlite3
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,18 @@ class OpenItem:
     number: int
     payload: dict[str, Any]
     attempts: dict[str, int]
+
+
+@dataclass(frozen=True)
+class ItemRow:
+    """What the ledger keeps of one item; ``detail`` of an open one says what it waits for."""
+
+    number: int
+    payload: dict[str, Any]
+    item_id: str
+    state: ItemState
+    reason: str | None
+    detail: str
 
 
 @dataclass(frozen=True)
@@ -102,20 +115,27 @@ class Ledger:
                 lock_file(self.path).unlink()
             self._lock.close()
 
-    def add_items(self, payloads: Iterable[Payload]) -> tuple[int, int]:
-        """Add items that are not there yet, in order, all or none; returns how many were given and how many are new."""
-        given, before = 0, self.connection.total_changes
+    def add_items(self, payloads: Iterable[Payload]) -> tuple[list[int], int]:
+        """Add items that are not there yet, in order, all or none; returns the numbers of all given, and how many are new."""
+        given: dict[int, None] = {}
+        new = 0
         self.commit()
         try:
             for payload in payloads:
-                self.connection.execute("INSERT OR IGNORE INTO items (item) VALUES (?)", (_text(payload),))
-                given += 1
+                text = (_text(payload),)
+                added = self.connection.execute("INSERT OR IGNORE INTO items (item) VALUES (?)", text)
+                new += added.rowcount
+                number = added.lastrowid if added.rowcount else self._number_of(text)
+                given[int(number or 0)] = None
         except BaseException:
             self.connection.execute("ROLLBACK")
             self.connection.execute("BEGIN")
             raise
         self.commit()
-        return given, self.connection.total_changes - before
+        return list(given), new
+
+    def _number_of(self, text: tuple[str]) -> int:
+        return int(self.connection.execute("SELECT number FROM items WHERE item = ?", text).fetchone()[0])
 
     def restate(self, read: Callable[[Mapping[str, Any]], Payload]) -> None:
         """Rewrite payloads that an earlier version wrote in another form; all of a ledger have one form, so the first tells.
@@ -130,10 +150,11 @@ class Ledger:
         self.connection.executemany("UPDATE items SET item = ? WHERE number = ?", restated)
         self.commit()
 
-    def begin_run(self, recipe_sha256: str) -> int:
+    def begin_run(self, recipe_sha256: str, given: Collection[int] = ()) -> int:
         """Note the begin of a run: what an earlier one left running was cut off, which is nobody's failed attempt.
 
-        Items that ended under another recipe are opened again, their attempts forgotten.
+        Items that ended under another recipe are opened again, their attempts forgotten: those with the ``given`` numbers, or
+        where none is given all.
         """
         run = self.connection.execute(
             "INSERT INTO runs (started_at, recipe_sha256) VALUES (?, ?)", (time.time(), recipe_sha256)
@@ -141,10 +162,7 @@ class Ledger:
         self.connection.execute(
             "UPDATE stages SET state = 'waiting', attempts = max(attempts - 1, 0) WHERE state = 'running'"
         )
-        ended_otherwise = self.connection.execute(
-            "SELECT number FROM items WHERE state NOT IN ('open', 'duplicate') AND recipe_sha256 <> ?", (recipe_sha256,)
-        ).fetchall()
-        self.reopen(number for (number,) in ended_otherwise)
+        self.reopen(self._ended_under_others(recipe_sha256, given))
         return int(run or 0)
 
     def end_run(self, run: int, how: str) -> None:
@@ -249,17 +267,25 @@ class Ledger:
             "UPDATE items SET revision = ?, indexed = 0 WHERE twin_id = ? AND state = 'accepted'", (revision, twin_id)
         )
 
-    def counts(self) -> dict[str, int]:
-        """Return the number of items by state."""
-        return dict(self.connection.execute("SELECT state, count(*) FROM items GROUP BY state"))
+    def counts(self, numbers: Iterable[int] | None = None) -> dict[str, int]:
+        """Return how many items are in each state: of all, or of those with these numbers."""
+        if numbers is None:
+            return dict(self.connection.execute("SELECT state, count(*) FROM items GROUP BY state"))
+        wanted = set(numbers)
+        rows = self.connection.execute("SELECT number, state FROM items")
+        return dict(Counter(state for number, state in rows if number in wanted))
 
-    def totals(self, recipe_sha256: str) -> tuple[int, int]:
-        """Return how many items there are, and how many are open, or to be opened again under this recipe."""
-        row = self.connection.execute(
-            "SELECT count(*), coalesce(sum(state = 'open' OR (state <> 'duplicate' AND recipe_sha256 <> ?)), 0) FROM items",
-            (recipe_sha256,),
-        ).fetchone()
-        return int(row[0]), int(row[1])
+    def totals(self, recipe_sha256: str, given: Collection[int] = ()) -> tuple[int, int]:
+        """Return how many items there are, and how many are open, or are opened again as ``begin_run`` does."""
+        row = self.connection.execute("SELECT count(*), coalesce(sum(state = 'open'), 0) FROM items").fetchone()
+        return int(row[0]), int(row[1]) + len(self._ended_under_others(recipe_sha256, given))
+
+    def _ended_under_others(self, recipe_sha256: str, given: Collection[int]) -> list[int]:
+        rows = self.connection.execute(
+            "SELECT number FROM items WHERE state NOT IN ('open', 'duplicate') AND recipe_sha256 <> ?", (recipe_sha256,)
+        )
+        wanted = set(given)
+        return [number for (number,) in rows if not wanted or number in wanted]
 
     def not_indexed(self, count: int) -> list[str]:
         """Return ids of finished twins that no table has yet."""
@@ -288,7 +314,7 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
     watches a ledger opens it anew each time: a run that begins meanwhile is not seen through such a connection.
     """
     if not path.is_file():
-        raise UsageError(f"{path}: no ledger; `manitwin run MANIFEST -o DATASET` makes one")
+        raise UsageError(f"{path}: no ledger; `manitwin build INPUT... -o DATASET` makes one")
     log = path.with_name(f"{path.name}-wal")
     at_rest = not is_written(path) and (not log.is_file() or log.stat().st_size == 0)
     connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro{'&immutable=1' if at_rest else ''}", uri=True)
@@ -297,6 +323,17 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
         yield connection
     finally:
         connection.close()
+
+
+def read_items(connection: sqlite3.Connection) -> Iterator[ItemRow]:
+    """Yield all items in the order of their numbers."""
+    rows = connection.execute(
+        "SELECT number, item, coalesce(twin_id, ''), state, reason, CASE state WHEN 'open' THEN coalesce((SELECT error FROM"
+        " stages s WHERE s.number = i.number AND s.state = 'waiting' ORDER BY at DESC LIMIT 1), '') ELSE detail END"
+        " FROM items i ORDER BY number"
+    )
+    for number, payload, *said in rows:
+        yield ItemRow(number, json.loads(payload), *said)
 
 
 def stage_rows(connection: sqlite3.Connection, number: int) -> list[StageRow]:

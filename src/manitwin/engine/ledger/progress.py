@@ -1,19 +1,20 @@
-"""What a ledger says of a run: how far it is, how fast, what it cost, and what became of one item."""
+"""Progress by a ledger: how far a run is, how fast, what it cost, what became of one item, and what was not accepted."""
 
 from __future__ import annotations
 
 import json
 import sqlite3
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from manitwin.engine.ledger.ledger import ITEM_STATES, StageRow, stage_rows
-from manitwin.engine.stage_order import place_in_pipeline
+from manitwin.engine.stage import ASSEMBLE, INPUT
 from manitwin.errors import UsageError
 
 RATE_OVER_S = 600.0
+StageOrder = Callable[[str], Any]
 
 
 @dataclass(frozen=True)
@@ -60,12 +61,17 @@ class ItemStory:
     stages: list[StageRow]
 
 
-def read_progress(connection: sqlite3.Connection, at_work: bool, now: float | None = None) -> Progress:
-    """Count everything; the ledger may be written at the same time: ``at_work`` tells whether it is."""
+def read_progress(
+    connection: sqlite3.Connection, at_work: bool, place_of: StageOrder = lambda stage: 0, now: float | None = None
+) -> Progress:
+    """Count everything; the ledger may be written at the same time: ``at_work`` tells whether it is.
+
+    ``place_of`` sorts a recipe's stages as they run, by name.
+    """
     now = time.time() if now is None else now
     states = dict.fromkeys(ITEM_STATES, 0)
     states |= dict(connection.execute("SELECT state, count(*) FROM items GROUP BY state").fetchall())
-    stages = _stages(connection)
+    stages = _stages(connection, place_of)
     run = connection.execute("SELECT * FROM runs ORDER BY run DESC LIMIT 1").fetchone()
     rate = _rate(connection, run, now)
     return Progress(
@@ -81,7 +87,7 @@ def read_progress(connection: sqlite3.Connection, at_work: bool, now: float | No
     )
 
 
-def _stages(connection: sqlite3.Connection) -> list[StageProgress]:
+def _stages(connection: sqlite3.Connection, place_of: StageOrder) -> list[StageProgress]:
     rows = connection.execute(
         "SELECT stage, sum(state = 'done') AS done, sum(state = 'running') AS running,"
         " sum(state = 'waiting') AS waiting, sum(state = 'rejected') AS rejected, sum(state = 'failed') AS failed,"
@@ -89,8 +95,12 @@ def _stages(connection: sqlite3.Connection) -> list[StageProgress]:
         " coalesce(avg(nullif(cpu_seconds, 0)), 0.0) AS mean_cpu_seconds, sum(cost_usd) AS cost_usd"
         " FROM stages GROUP BY stage ORDER BY count(*) DESC, min(at), stage"
     )
+
+    def place(row: StageProgress) -> tuple[int, Any]:
+        return (row.stage == ASSEMBLE) - (row.stage == INPUT), place_of(row.stage)
+
     # stages of another recipe stay in the order of the query: no item comes to a stage before it was at those before
-    return sorted((StageProgress(**dict(row)) for row in rows), key=lambda stage: place_in_pipeline(stage.stage))
+    return sorted((StageProgress(**dict(row)) for row in rows), key=place)
 
 
 def _by_reason(connection: sqlite3.Connection, state: str) -> dict[str, int]:
@@ -140,3 +150,34 @@ def read_story(connection: sqlite3.Connection, which: str) -> ItemStory:
 def told(payload: Mapping[str, Any]) -> str:
     """Return what a payload says, in a line for a person."""
     return ", ".join(f"{key} {value}" for key, value in payload.items() if value is not None)
+
+
+UnacceptedState = Literal["rejected", "failed", "waiting"]
+
+
+@dataclass(frozen=True)
+class Unaccepted:
+    """One item: ``which`` names it to a person, ``reason`` is a code, ``message`` says in words what happened.
+
+    The message of an error begins with its class, behind the stage and the attempts where these are told.
+
+    ``waiting`` is open and had to wait for a service as the run ended.
+    """
+
+    which: str
+    state: UnacceptedState
+    reason: str | None
+    message: str
+
+
+def read_unaccepted(connection: sqlite3.Connection) -> Iterator[Unaccepted]:
+    """Yield the items that were rejected or failed, then those that wait."""
+    for row in connection.execute(
+        "SELECT number, state, reason, detail FROM items WHERE state IN ('rejected', 'failed') ORDER BY number"
+    ):
+        yield Unaccepted(str(row["number"]), row["state"], row["reason"], row["detail"])
+    for row in connection.execute(
+        "SELECT s.number, s.error FROM stages s JOIN items i ON i.number = s.number"
+        " WHERE i.state = 'open' AND s.state = 'waiting' AND s.error IS NOT NULL ORDER BY s.number"
+    ):
+        yield Unaccepted(str(row["number"]), "waiting", None, row["error"])

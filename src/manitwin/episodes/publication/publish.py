@@ -17,6 +17,7 @@ import pyarrow.parquet as pq
 from manitwin.dataset.publish.licences import LICENSES_MD, licenses_page, without_attribution
 from manitwin.dataset.publish.privacy import check_words, places_of
 from manitwin.dataset.publish.publication import EPISODES, Publication
+from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.attempts import ATTEMPTS, Attempt, merge_attempts, read_attempts, success_of, write_attempts
 from manitwin.episodes.collect import batch_folders, stored_episodes
 from manitwin.episodes.episode_pictures import PICTURES, batch_name, read_pictures
@@ -35,7 +36,6 @@ from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.video import Codec, EpisodesVideo
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.formats.installation import installed_version
-from manitwin.pipeline.dataset_run import CONFIG
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from manitwin.engine.drive import ExecutorName, RunReport, drive
 from manitwin.engine.events import ItemEnded, OnStage
 from manitwin.engine.ledger.ledger import read_ledger
+from manitwin.engine.ledger.location import local_ledger
 from manitwin.errors import UsageError
-from manitwin.pipeline.dataset_run import ExecutorName, RunReport, drive, local_ledger
 from manitwin.scenes.layouts.layouts_recipe import LayoutNumber, LayoutsRecipe
 from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.run_settings import check_settings, earlier_settings

@@ -32,15 +32,14 @@ from manitwin.config import Resource
 from manitwin.engine.charges import charge
 from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.recipe import Ending, Identity, Tables
-from manitwin.engine.stage import Draft, Stage
-from manitwin.engine.stage_parts import tell_part
+from manitwin.engine.stage import Draft, Stage, tell_part
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import AccessDenied, RateLimited, Rejected, Unavailable
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.rehearsal_cube import CUBE, cube_files
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.record import SCHEMA_VERSION, TwinRecord
 from manitwin.twin.store import RECORD, RUN, canonical_json, parse_record, seal, sha256_of_json, write_bytes_atomically
+from rehearsal_cube import CUBE, cube_files
 
 
 class RehearsalSettings(BaseModel):

@@ -1,24 +1,19 @@
-"""The order of the stages: for tables and pages that name stages and build none."""
+"""The order of the pipeline's stages, for tables and pages that name stages and build none."""
 
 from __future__ import annotations
-
-INPUT, ASSEMBLE = "input", "assemble"
-"""The two steps around the stages: to read what was given, and to put the folder together."""
 
 STAGE_ORDER = (
     *("photo", "generate", "mesh", "views", "gate", "physical", "collision", "placement", "caption", "candidates"),
     *("points", "grasps", "verify", "second_opinion", "robustness", "record_grasps", "finish"),
 )
-"""The order of ``pipeline.stages_for``; twin.json keeps its stages by name."""
+"""The order of ``recipe.stages_for``; twin.json keeps its stages by name."""
 
 
 def place_in_pipeline(stage: str) -> tuple[int, str, int]:
     """Return what sorts stages as they run: all trials of one gripper (``verify-robotiq_2f85``) before the next one's.
 
-    A stage that is none of the pipeline's comes behind them, before the folder is put together.
+    A stage that is none of the pipeline's comes behind them.
     """
-    if stage in (INPUT, ASSEMBLE):
-        return (-1 if stage == INPUT else len(STAGE_ORDER) + 1), "", 0
     name, _, gripper = stage.partition("-")
     place = STAGE_ORDER.index(name) if name in STAGE_ORDER else len(STAGE_ORDER)
     first, last = STAGE_ORDER.index("grasps"), STAGE_ORDER.index("record_grasps")

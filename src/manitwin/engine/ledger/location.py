@@ -1,0 +1,84 @@
+"""The place of a data set's ledger and log: beside its folders, or for a URL on this machine, with a copy at the URL."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sqlite3
+import tempfile
+import time
+from contextlib import closing
+from pathlib import Path
+
+from manitwin.engine.ledger.ledger import LEDGER, read_ledger
+from manitwin.twin.dataset_root import DatasetRoot
+
+CONFIG = "config.json"
+RUN_LOG = "run.log"
+COPY_EVERY_S = 60.0
+
+
+def ledger_path(root: DatasetRoot) -> Path:
+    """Return where the ledger lies on this machine: in the data set, or of a URL in the user's state folder."""
+    if root.local is not None:
+        return root.local / LEDGER
+    state = Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "manitwin"
+    return state / f"{_digest(root.url)}.sqlite"
+
+
+def local_ledger(root: DatasetRoot) -> Path:
+    """Return the path of the ledger; of a URL it is made from the copy there where this machine has none."""
+    path = ledger_path(root)
+    if root.local is None and not path.is_file() and root.exists(LEDGER):
+        root.fetch_file(LEDGER, path)
+    return path
+
+
+def copy_ledger(root: DatasetRoot, copy: Path) -> None:
+    """Copy the ledger that a run would take up, also while one writes it; there is no copy where there is no ledger."""
+    path = ledger_path(root)
+    if path.is_file():
+        with read_ledger(path) as source, closing(sqlite3.connect(copy)) as target:
+            source.backup(target)
+    elif root.local is None and root.exists(LEDGER):
+        root.fetch_file(LEDGER, copy)
+
+
+def local_log(root: DatasetRoot) -> Path:
+    """Return the path of the log of a data set's runs: beside the ledger."""
+    ledger = local_ledger(root)
+    return ledger.with_name(RUN_LOG) if root.local is not None else ledger.with_suffix(".log")
+
+
+def cache_folder(root: DatasetRoot) -> Path:
+    """Return where a worker keeps copies of what lies at a URL; of a local data set nothing is copied."""
+    if root.local is not None:
+        return root.local
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return home / "manitwin" / _digest(root.url)
+
+
+def _digest(url: str) -> str:
+    return hashlib.sha256(url.encode()).hexdigest()[:16]
+
+
+class LedgerCopy:
+    """The copy of a ledger beside the folders at a URL, as the driver's machine may be lost too; a local data set has none."""
+
+    def __init__(self, root: DatasetRoot, path: Path):
+        self._root, self._path, self._at = root, path, time.monotonic()
+
+    def refresh(self) -> None:
+        """Copy the ledger again where the last copy is a minute old."""
+        if time.monotonic() - self._at > COPY_EVERY_S:
+            self.upload()
+
+    def upload(self) -> None:
+        """Copy the ledger."""
+        if self._root.local is not None:
+            return
+        with tempfile.NamedTemporaryFile(suffix=".sqlite") as copy:
+            with closing(sqlite3.connect(self._path)) as source, closing(sqlite3.connect(copy.name)) as target:
+                source.backup(target)
+            self._root.put_file(Path(copy.name), LEDGER)
+        self._at = time.monotonic()

@@ -1,0 +1,132 @@
+"""The arguments of a build: inputs, and the configuration with what a command line or a call says on top of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypedDict
+
+from pydantic import ValidationError
+
+from manitwin.config import BuildConfig, load_config
+from manitwin.engine.ledger.location import CONFIG
+from manitwin.errors import UsageError
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.manifest import Notes, iterate_items, require_inputs
+from manitwin.twin.dataset_root import DatasetRoot
+
+RETIRED = ("item_timeout_s",)
+"""Settings that earlier versions wrote into a data set's configuration, and that decided no twin."""
+
+
+class Flags(TypedDict, total=False):
+    """What may be said of a build beside its configuration; None, like what is left out, leaves the configuration as it is."""
+
+    seed: int | None
+    """The seed of everything random."""
+    grippers: Iterable[str] | None
+    """Names or ``.toml`` files; the first one's grasps are the twin's own."""
+    vlm: str | None
+    """The vision-language model: ``openai:MODEL@URL``, ``anthropic:MODEL``, ``replay:FILE`` or ``rules``."""
+    generator: str | None
+    """What makes meshes of photos and texts (docs/generators.md)."""
+    grasper: str | None
+    """What proposes grasps (docs/served_grasps.md)."""
+    max_cost_usd: float | None
+    """Once services have charged so much, items that would cost more are left for another run."""
+    record: str | Path | None
+    """A file that the model's answers are added to, for ``replay:FILE``."""
+    require_agreement: bool
+    """Verify only grasps that a second engine holds too."""
+    quick: bool
+    """No second engine and no robustness."""
+
+
+def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
+    """Return the settings with the flags on top; raises UsageError where two of them contradict each other."""
+    quick, agree = flags.get("quick", False), flags.get("require_agreement", False)
+    if quick and agree:
+        raise UsageError("quick leaves the second engine out, and require-agreement asks for it; give one of them")
+    max_cost_usd, record, grippers = flags.get("max_cost_usd"), flags.get("record"), flags.get("grippers")
+    if max_cost_usd is not None and max_cost_usd <= 0:
+        raise UsageError(f"max_cost_usd is {max_cost_usd:g}; give more than 0")
+    said = {
+        "seed": flags.get("seed"), "annotator": flags.get("vlm"), "generator": flags.get("generator"),
+        "grasper": flags.get("grasper"), "grippers": tuple(grippers) if grippers else None,
+    }  # fmt: skip
+    services = {"max_cost_usd": max_cost_usd, "record": None if record is None else Path(record).absolute()}
+    update: dict[str, Any] = _given(said) | {"services": settings.services.model_copy(update=_given(services))}
+    if agree:
+        update["second_opinion"] = settings.second_opinion.model_copy(
+            update={"enabled": True, "require_agreement": True}
+        )
+    if quick:
+        update["second_opinion"] = settings.second_opinion.model_copy(update={"enabled": False})
+        update["robustness"] = settings.robustness.model_copy(update={"enabled": False})
+    return settings.model_copy(update=update)
+
+
+def _given(said: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in said.items() if value is not None}
+
+
+def stored_config(root: DatasetRoot) -> BuildConfig:
+    """Return the configuration of a data set, the defaults for a new one. Raises UsageError where it cannot be read."""
+    if not root.exists(CONFIG):
+        return BuildConfig()
+    try:
+        said = json.loads(root.read_bytes(CONFIG))
+        if isinstance(said, dict) and "kind" in said:
+            raise UsageError(f"{root.url}: holds {said['kind']}, not twins; give the data set that they are of")
+        return BuildConfig(**{name: value for name, value in said.items() if name not in RETIRED})
+    except (ValueError, TypeError, AttributeError, ValidationError) as error:
+        raise UsageError(
+            f"{root.url}/{CONFIG}: not a configuration of this version ({str(error).splitlines()[0]}); give --config"
+        ) from error
+
+
+@dataclass(frozen=True)
+class BuildRequest:
+    """The arguments of ``build``, checked; nothing is written yet. ``items`` are read, and noted, as they are iterated."""
+
+    settings: BuildConfig
+    root: DatasetRoot
+    items: Iterator[Item]
+    notes: Notes
+
+
+def request_build(
+    inputs: str | Path | Iterable[str | Path],
+    out: str | Path,
+    *,
+    texts: Iterable[str],
+    strict: bool,
+    jobs: int | None,
+    config: BuildConfig | str | Path | None,
+    defaults: dict[str, str | None],
+    flags: Flags,
+) -> BuildRequest:
+    """Check the arguments of ``build``; ``defaults`` hold for all inputs. Raises UsageError for wrong ones."""
+    if jobs is not None and jobs < 1:
+        raise UsageError(f"jobs is {jobs}; give 1 or more")
+    root, words = DatasetRoot(out), list(texts)
+    given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
+    require_inputs(root, given, words)
+    base = config if isinstance(config, BuildConfig) else load_config(Path(config)) if config else stored_config(root)
+    settings = with_flags(base, flags)
+    if jobs is not None:
+        settings = settings.model_copy(update={"run": settings.run.model_copy(update={"cpu": jobs})})
+    # these take two CPU-seconds to import: what was given wrongly is said before
+    from manitwin.pipeline.generator_input import refusal
+    from manitwin.pipeline.recipe import check_names
+
+    check_names(settings)
+    notes = Notes()
+    if config is None and base != BuildConfig():
+        notes.remarks.append(
+            "the settings are those that the data set was built with; --config and options change them"
+        )
+    items = iterate_items(given, defaults, notes, words, strict=strict, refusal=refusal(settings))
+    return BuildRequest(settings, root, items, notes)
