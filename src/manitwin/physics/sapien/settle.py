@@ -109,6 +109,7 @@ def settle(
     watch, lost = RestWatch(bodies, limits), np.zeros(len(bodies), dtype=bool)
     limits_m = np.full(len(bodies), np.inf) if give_up_m is None else np.array(give_up_m, dtype=float)
     least, most, between = (round(time_s / timestep_s) for time_s in (at_least_s, seconds, limits.between_s))
+    between = max(1, between)
     done = 0
     while done < most:
         system.step()
@@ -154,6 +155,7 @@ def settle_on_plane(
     reach = max(float(np.linalg.norm(hull - body.center_of_mass_m, axis=1).max()) for hull in body.hulls)
     spacing = 8 * reach + 1.0
     offsets = [np.array([spacing * i, 0.0, drop_m]) for i in range(len(object_to_plane))]
+    # copies may sleep, for a fifth of the time: no contacts are asked for, and the 25 test objects rest the same without
     bodies = [
         _release(scene, body, hull_shapes(body.hulls), pose[:3, 3] + offset, pose[:3, :3], may_sleep=True)
         for pose, offset in zip(object_to_plane, offsets, strict=True)
