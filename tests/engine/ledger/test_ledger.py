@@ -41,7 +41,7 @@ def test_a_ledger_that_is_opened_again_goes_on_with_its_rows(path: Path) -> None
         ledger.commit()
     with closing(Ledger(path)) as again:
         assert again.counts() == {"open": 2}
-        assert again.add_items(mugs(3)) == (3, 1)
+        assert again.add_items(mugs(3)) == ([1, 2, 3], 1)
 
 
 def test_a_ledger_of_an_older_schema_takes_the_steps_that_it_lacks(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
