@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from manitwin.api import (
-        BuildReport,
         EpisodesReport,
         build,
         export_scene,
@@ -53,6 +52,7 @@ if TYPE_CHECKING:
         UsageError,
     )
     from manitwin.physics.sapien.robot import SapienRobot
+    from manitwin.pipeline.build_report import BuildReport
     from manitwin.robots.load import load_robot
     from manitwin.robots.robot import Robot
     from manitwin.scenes.loaded_scene import Scene
@@ -123,7 +123,6 @@ logging.getLogger("manitwin").addHandler(logging.NullHandler())  # else Python p
 
 _DEFINED_IN = {
     "manitwin.api": (
-        "BuildReport",
         "EpisodesReport",
         "build",
         "export_scene",
@@ -186,6 +185,7 @@ _DEFINED_IN = {
         "UsageError",
     ),
     "manitwin.physics.sapien.robot": ("SapienRobot",),
+    "manitwin.pipeline.build_report": ("BuildReport",),
     "manitwin.robots.load": ("load_robot",),
     "manitwin.robots.robot": ("Robot",),
     "manitwin.scenes.settings": ("LayoutsConfig",),

@@ -13,11 +13,11 @@ from manitwin.dataset.check import disagreements
 from manitwin.dataset.index.parts import IndexTables
 from manitwin.engine.driver import Driver, RunResult
 from manitwin.engine.events import ItemEnded
-from manitwin.engine.executor import InlineExecutor
 from manitwin.engine.executors.local import LocalExecutor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.engine.work import sweep as sweep_work
+from manitwin.engine.stage_runner import sweep as sweep_work
+from manitwin.engine.worker import InlineExecutor
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot
 from rehearsal_recipe import RehearsalRecipe

@@ -13,13 +13,14 @@ from typing import Any, Literal, get_args
 from manitwin.config import RunConfig
 from manitwin.engine.driver import Driver
 from manitwin.engine.events import ItemEnded, OnStage
-from manitwin.engine.executor import Executor, InlineExecutor
+from manitwin.engine.executor import Executor
 from manitwin.engine.jobs import WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.ledger.location import CONFIG, LedgerCopy, cache_folder, local_ledger
 from manitwin.engine.recipe import Recipe
+from manitwin.engine.stage_runner import sweep
 from manitwin.engine.task import Payload
-from manitwin.engine.work import sweep
+from manitwin.engine.worker import InlineExecutor
 from manitwin.errors import UsageError, choose_from
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from manitwin.config import Resource
 from manitwin.engine.jobs import Finish, Job, RunStage, StageRejected, Survey
 from manitwin.engine.stage import ASSEMBLE, INPUT, PaidStage, Stage
+from manitwin.engine.stage_runner import StageKey
 from manitwin.engine.task import Task
-from manitwin.engine.work import StageKey
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,8 @@ from typing import Literal
 
 from manitwin.config import Resource
 from manitwin.engine.recipe import Ending, Recipe
-from manitwin.engine.stage_runner import StageCost, StageRun
+from manitwin.engine.stage_runner import StageCost, StageKey, StageRun
 from manitwin.engine.task import Task
-from manitwin.engine.work import StageKey
 from manitwin.errors import Rejected
 
 FailureKind = Literal["unavailable", "rate_limited", "denied", "unsupported", "no_space", "error", "died", "timeout"]

@@ -8,6 +8,7 @@ import time
 import traceback
 from dataclasses import replace
 
+from manitwin.config import Resource
 from manitwin.engine.charges import counted
 from manitwin.engine.job_memory import RootJobMemory
 from manitwin.engine.jobs import (
@@ -23,10 +24,9 @@ from manitwin.engine.jobs import (
     WriteTables,
 )
 from manitwin.engine.recipe import Ending
-from manitwin.engine.stage import INPUT, Draft, Stage
-from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, lost_usd
+from manitwin.engine.stage import INPUT, Draft, Stage, StagePart
+from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, WorkFolder, lost_usd
 from manitwin.engine.task import Payload
-from manitwin.engine.work import WorkFolder
 from manitwin.errors import AccessDenied, BackendError, ManiTwinError, RateLimited, Rejected, Unavailable, Unsupported
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import WORK
@@ -160,6 +160,36 @@ class Worker:
     def _draft(self, item_id: str, payload: Payload) -> Draft:
         jobs = RootJobMemory(self.root, f"{WORK}/{item_id}/{JOBS}")
         return Draft(item_id, payload, self.setup.recipe.seed, jobs=jobs)
+
+
+class InlineExecutor:
+    """Do every job at once in this process: to look at a stage with a debugger, and to test what drives it."""
+
+    def __init__(self, setup: WorkerSetup, slots: int = 1):
+        self._worker, self._slots = Worker(setup), slots
+        self._ended: list[tuple[int, Reply]] = []
+
+    def slots(self, needs: Resource) -> int:
+        """Return the same for all."""
+        return self._slots
+
+    def submit(self, ticket: int, job: Job) -> None:
+        """Do it."""
+        self._ended.append((ticket, self._worker.do(job)))
+
+    def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
+        """Return what was done since the last call; sleep where that is nothing."""
+        if not self._ended:
+            time.sleep(timeout_s)
+        ended, self._ended = self._ended, []
+        return ended
+
+    def parts(self) -> dict[int, StagePart]:
+        """Return nothing: while a stage runs in this process, nobody asks."""
+        return {}
+
+    def close(self) -> None:
+        """Nothing is open."""
 
 
 def _line(error: Exception) -> str:

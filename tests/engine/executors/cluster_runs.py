@@ -18,8 +18,8 @@ from manitwin.engine.events import ItemEnded
 from manitwin.engine.executors.ray_cluster import RayExecutor
 from manitwin.engine.jobs import RunStage, WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.stage_runner import sweep as sweep_work
 from manitwin.engine.task import Task
-from manitwin.engine.work import sweep as sweep_work
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot
 from rehearsal_recipe import RehearsalRecipe
