@@ -23,7 +23,7 @@ def one_line(text: str) -> str:
     ("arguments", "message"),
     [
         (("build", "nothing_here.png", "-o", "OUT"), "nothing_here.png: not there"),
-        (("build", "FILE"), "give one with -o"),
+        (("build", "FILE"), "give a folder or URL with -o"),
         (("build", "FILE", "-o", "OUT", "--units", "inch"), "Valid: auto, cm, m, mm"),
         (("build", "FILE", "-o", "OUT", "--jobs", "0"), "jobs is 0"),
         (("build", "FILE", "-o", "FILE"), "give a folder"),

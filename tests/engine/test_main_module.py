@@ -34,7 +34,7 @@ PROGRAM = """
 import os, sys, time
 from pebble import ProcessPool
 import starting
-from manitwin.engine.main_module import WorkerContext, hidden_main_module
+from manitwin.engine.worker_processes import WorkerContext, hidden_main_module
 
 folder = sys.argv[1]
 with hidden_main_module():

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from rehearsals import Rehearsed, rehearse
 
-from manitwin.engine.budget import Budget
+from manitwin.engine.charges import Budget
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import RUN
 from rehearsal_recipe import RehearsalRecipe

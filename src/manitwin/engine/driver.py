@@ -15,7 +15,7 @@ from heapq import heappop, heappush
 from typing import get_args
 
 from manitwin.config import Resource, RunConfig
-from manitwin.engine.budget import Budget
+from manitwin.engine.charges import Budget
 from manitwin.engine.events import Announcer, ItemEnded, OnStage
 from manitwin.engine.executor import Executor
 from manitwin.engine.flight import Flight, PlannedStage

@@ -1,5 +1,7 @@
 """Run one stage, or take its result up again: results live in ``.work/<item_id>/<stage>/<key>``, by what decided them.
 
+They are kept below the data set's root; where that is a URL, this machine has copies.
+
 ``result.json`` beside a stage's files holds its fields, the digests of all that it wrote, what it cost, and, where its backend or
 that of a stage before it was a rehearsal server, the names of these stages.
 """

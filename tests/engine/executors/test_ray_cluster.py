@@ -121,7 +121,7 @@ def test_without_ray_the_remedy_is_said(
 
 
 def test_addresses_where_nobody_answers_are_refused_at_once() -> None:
-    from manitwin.engine.executors.ray_head import reachable
+    from manitwin.engine.executors.ray_cluster import reachable
 
     with pytest.raises(UsageError, match="host:port"):
         reachable("ray://head:10001")

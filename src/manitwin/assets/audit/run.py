@@ -18,7 +18,7 @@ from manitwin.assets.audit.finding import Complaint, Finding, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules import RULES, RULES_BY_CODE
 from manitwin.assets.read import find_assets, read_asset
-from manitwin.engine.main_module import WorkerContext, hidden_main_module
+from manitwin.engine.worker_processes import WorkerContext, hidden_main_module
 from manitwin.errors import AssetError, TwinError, UsageError
 from manitwin.twin.store import RECORD, read_record
 

@@ -13,7 +13,7 @@ from pyarrow.fs import LocalFileSystem
 from manitwin.dataset.index.part_list import INDEX, IndexPart, PartList, in_order_of_twins, sweep
 from manitwin.dataset.index.parts import merged, rows_of_twins, write_rows
 from manitwin.dataset.index.tables import TABLES, joined, parquet
-from manitwin.engine.main_module import WorkerContext, hidden_main_module
+from manitwin.engine.worker_processes import WorkerContext, hidden_main_module
 from manitwin.errors import TwinError, UsageError
 from manitwin.twin.dataset_root import TWINS, DatasetRoot
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import faulthandler
+import json
+import logging
 import os
 import queue
 import signal
 import tempfile
 import time
+from collections.abc import Iterator
 from concurrent.futures import CancelledError, TimeoutError
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -17,14 +21,22 @@ from typing import Any, TextIO
 from pebble import ProcessExpired, ProcessPool
 
 from manitwin.config import Resource, RunConfig
-from manitwin.engine.executors.child_processes import die_with, spared_from_interrupts
-from manitwin.engine.executors.one_thread import one_thread_each
-from manitwin.engine.executors.part_notes import EVERY_S, drop_note, parts_noted, read_notes
 from manitwin.engine.jobs import Failure, Job, Reply, RunStage, WorkerSetup
-from manitwin.engine.main_module import WorkerContext, hidden_main_module
-from manitwin.engine.stage import StagePart
+from manitwin.engine.stage import StagePart, heard_by
 from manitwin.engine.worker import Worker
+from manitwin.engine.worker_processes import (
+    WorkerContext,
+    die_with,
+    hidden_main_module,
+    one_thread_each,
+    spared_from_interrupts,
+)
 
+RUN = logging.getLogger("manitwin.run")
+NOTE = ".part"
+EVERY_S = 1.0
+
+_failure_told = False
 JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
 STACK_LINES = 12
 
@@ -158,3 +170,53 @@ def _do(ticket: int, job: Job) -> Reply:
         return _worker.do(job)
     with parts_noted(Path(_stack_file.name).parent, ticket):
         return _worker.do(job)
+
+
+@contextmanager
+def parts_noted(folder: Path, ticket: int) -> Iterator[None]:
+    """Note in a folder what the stage that runs in the ``with`` statement says of itself, under the ticket of its job."""
+    with heard_by(_Notes(folder / f"{ticket}{NOTE}")):
+        try:
+            yield
+        finally:
+            drop_note(folder, ticket)
+
+
+def read_notes(folder: Path) -> dict[int, StagePart]:
+    """Return what part of each job is done, by ticket; a job that has ended may still be among them."""
+    found = {}
+    for path in folder.glob(f"*{NOTE}"):
+        with suppress(FileNotFoundError):  # its stage has ended meanwhile
+            found[int(path.stem)] = StagePart(*json.loads(path.read_bytes()))
+    return found
+
+
+def drop_note(folder: Path, ticket: int) -> None:
+    """Remove the note of a job that has ended."""
+    (folder / f"{ticket}{NOTE}").unlink(missing_ok=True)
+
+
+class _Notes:
+    """Write down what a stage says of itself, once a second at most."""
+
+    def __init__(self, path: Path):
+        self._path, self._at = path, -EVERY_S
+
+    def __call__(self, part: StagePart) -> None:
+        if time.monotonic() - self._at < EVERY_S:
+            return
+        self._at = time.monotonic()
+        fresh = self._path.with_suffix(".fresh")
+        try:  # renamed, so that nobody reads a half, but not synced: it is of no use after a power cut
+            fresh.write_text(json.dumps([part.done, part.total, part.unit]))
+            os.replace(fresh, self._path)
+        except OSError as error:
+            _tell_once(error)
+
+
+def _tell_once(error: OSError) -> None:
+    """Log that a note was not written: the stage does its work all the same."""
+    global _failure_told
+    if not _failure_told:
+        _failure_told = True
+        RUN.warning("the progress of stages is not shown: %s", error)

@@ -9,9 +9,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from manitwin.engine.executors.one_thread import one_thread_each
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
+from manitwin.engine.worker_processes import one_thread_each
 from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
 

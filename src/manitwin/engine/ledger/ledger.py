@@ -48,20 +48,6 @@ class ItemRow:
     detail: str
 
 
-@dataclass(frozen=True)
-class StageRow:
-    """What the ledger keeps of one stage of one item."""
-
-    stage: str
-    key: str | None
-    state: StageState
-    attempts: int
-    seconds: float
-    cpu_seconds: float
-    cost_usd: float
-    error: str | None
-
-
 class Ledger:
     """One ledger file, open for writing by one process at a time.
 
@@ -323,23 +309,3 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
         yield connection
     finally:
         connection.close()
-
-
-def read_items(connection: sqlite3.Connection) -> Iterator[ItemRow]:
-    """Yield all items in the order of their numbers."""
-    rows = connection.execute(
-        "SELECT number, item, coalesce(twin_id, ''), state, reason, CASE state WHEN 'open' THEN coalesce((SELECT error FROM"
-        " stages s WHERE s.number = i.number AND s.state = 'waiting' ORDER BY at DESC LIMIT 1), '') ELSE detail END"
-        " FROM items i ORDER BY number"
-    )
-    for number, payload, *said in rows:
-        yield ItemRow(number, json.loads(payload), *said)
-
-
-def stage_rows(connection: sqlite3.Connection, number: int) -> list[StageRow]:
-    """Return the stages of one item in the order in which they were last touched."""
-    columns = "stage, key, state, attempts, seconds, cpu_seconds, cost_usd, error"
-    rows: list[Any] = connection.execute(
-        f"SELECT {columns} FROM stages WHERE number = ? ORDER BY at", (number,)
-    ).fetchall()
-    return [StageRow(**dict(zip(columns.split(", "), row, strict=True))) for row in rows]

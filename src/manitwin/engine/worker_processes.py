@@ -1,0 +1,83 @@
+"""Worker processes: spawned without the script that started them, spared from interrupts, and ended with the driver."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
+from multiprocessing.context import SpawnContext
+from multiprocessing.synchronize import RLock
+from typing import Any
+
+PR_SET_PDEATHSIG = 1  # prctl(2)
+
+
+@contextmanager
+def spared_from_interrupts() -> Iterator[None]:
+    """Keep Ctrl-C from the processes that threads started in here will spawn.
+
+    A terminal sends it to all of them, and one that is still importing would answer with a traceback. A thread inherits
+    the mask of the one that starts it, and a process that of its thread (pthread_sigmask(3)). The resource tracker is
+    started before: starting it lifts the mask of the thread that does (bugs.python.org/issue33613).
+    """
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def die_with(driver: int) -> None:
+    """Have this process killed when the driver is: an orphan would work on beside the next run."""
+    try:
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    except (OSError, AttributeError):  # not Linux: an orphan ends after its job, whose result is found by its key
+        return
+    if os.getppid() != driver:
+        os._exit(1)
+
+
+def one_thread_each() -> None:
+    """Keep libraries that are loaded later from starting threads of their own, where the environment does not say.
+
+    OpenMP's, and those of Mesa's lavapipe, which 0 makes draw in the thread that asks: two workers on two cores then
+    spend a sixth less on a picture.
+    """
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    os.environ.setdefault("LP_NUM_THREADS", "0")
+
+
+class WorkerContext(SpawnContext):
+    """Spawn the workers of one pool, whose locks last as long as this context.
+
+    pebble takes its locks away before it ends its last workers (``WorkerChannel.close``): one that is starting at that
+    moment does not find them, and says so with a traceback.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._kept: list[RLock] = []
+
+    def RLock(self) -> RLock:
+        """Return a lock that is there until this context is gone."""
+        lock = super().RLock()
+        self._kept.append(lock)
+        return lock
+
+
+@contextmanager
+def hidden_main_module() -> Iterator[None]:
+    """Keep spawned workers from importing the script that started them: without a guard it would start them again."""
+    main = sys.modules["__main__"].__dict__
+    hidden: dict[str, Any] = {name: main[name] for name in ("__file__", "__spec__") if name in main}
+    main.pop("__file__", None)
+    main["__spec__"] = None
+    try:
+        yield
+    finally:
+        main.update(hidden)
