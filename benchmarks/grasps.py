@@ -19,8 +19,7 @@ from manitwin.config import BuildConfig
 from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import StageCost, run_stage
 from manitwin.errors import Rejected
-from manitwin.pipeline.identity import twin_id
-from manitwin.pipeline.item import Item
+from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.recipe import stages_for
 
 LAST_STAGE = "verify"

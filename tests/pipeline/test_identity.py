@@ -1,8 +1,7 @@
 import dataclasses
 from pathlib import Path
 
-from manitwin.pipeline.identity import twin_id
-from manitwin.pipeline.item import Item
+from manitwin.pipeline.item import Item, twin_id
 
 
 def test_identity_depends_on_bytes_name_units_and_up_only(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from manitwin.pipeline.name_hint import NAME_HINT, name_would_help
+from manitwin.pipeline.assembly import NAME_HINT, name_would_help
 from manitwin.pipeline.recipe import ending_of
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.record import REJECTION_REASONS, TwinRecord

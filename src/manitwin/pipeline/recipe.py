@@ -18,7 +18,7 @@ from manitwin.formats.sniff import sniff
 from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.annotators.given import KeepsGiven
 from manitwin.models.registry import create, target, without_url
-from manitwin.pipeline.assembly import assemble
+from manitwin.pipeline.assembly import NAME_HINT, assemble, name_would_help
 from manitwin.pipeline.candidates import CandidatesStage
 from manitwin.pipeline.caption import CaptionStage
 from manitwin.pipeline.collision import CollisionStage
@@ -27,10 +27,8 @@ from manitwin.pipeline.gate import GateStage
 from manitwin.pipeline.generate import GenerateStage
 from manitwin.pipeline.grasps import GraspsStage
 from manitwin.pipeline.gripper_kinds import KINDS
-from manitwin.pipeline.identity import twin_id
-from manitwin.pipeline.item import Item
+from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.mesh import MeshStage
-from manitwin.pipeline.name_hint import NAME_HINT, name_would_help
 from manitwin.pipeline.photo import PhotoStage
 from manitwin.pipeline.physical import PhysicalStage
 from manitwin.pipeline.placement import PlacementStage

@@ -15,8 +15,7 @@ from manitwin.cli.commands.import_ import import_
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.errors import UsageError
 from manitwin.formats.source_files import pack_source
-from manitwin.pipeline.identity import twin_id
-from manitwin.pipeline.item import Item
+from manitwin.pipeline.item import Item, twin_id
 
 
 def imported(folder: Path, **mug: float) -> Path:
