@@ -37,7 +37,7 @@ class Survey:
 
 @dataclass(frozen=True)
 class Surveyed:
-    """What is there: the finished folder's ending, or the stages that need not run again."""
+    """The state of an item: the finished folder's ending, or the stages that need not run again."""
 
     item_id: str
     kind: str
@@ -90,7 +90,7 @@ class WriteTables:
 
 @dataclass(frozen=True)
 class Failure:
-    """Why a job has no answer: in one line, with the native stack where a worker died and left one.
+    """The reason why a job has no answer, in one line, with the native stack where a worker died and left one.
 
     ``charged_usd`` is what services charged all the same; ``trace`` is the traceback of an error that nobody expected.
     """

@@ -19,7 +19,7 @@ from manitwin.twin.dataset_root import DatasetRoot
 
 @dataclass(frozen=True)
 class Ending:
-    """How an item ended: ``reason`` is the code of a rejection; ``revision`` that of the folder that says so.
+    """The end of an item: ``reason`` is the code of a rejection; ``revision`` that of the folder that says so.
 
     ``hint`` says what would make more of the same input.
     """

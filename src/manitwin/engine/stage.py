@@ -99,7 +99,7 @@ class Stage(Protocol):
 
     @property
     def needs(self) -> Resource:
-        """What it runs on."""
+        """The resource that it runs on."""
         ...
 
     @property
@@ -109,12 +109,12 @@ class Stage(Protocol):
 
     @property
     def backend(self) -> str:
-        """Which backend does the work."""
+        """The backend that does the work."""
         ...
 
     @property
     def model(self) -> str | None:
-        """Which model, gripper or weights the backend uses."""
+        """The model, gripper or weights that the backend uses."""
         ...
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:

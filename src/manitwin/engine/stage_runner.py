@@ -35,7 +35,7 @@ LOST = "lost_usd.json"
 
 @dataclass(frozen=True)
 class StageCost:
-    """What a stage cost when it ran: wall and CPU seconds, and money."""
+    """The cost of a stage when it ran: wall and CPU seconds, and money."""
 
     seconds: float
     cpu_seconds: float
@@ -44,7 +44,7 @@ class StageCost:
 
 @dataclass(frozen=True)
 class StageRun:
-    """How a stage came by its result: the key, what it cost when it ran, and whether that was in an earlier run.
+    """A stage's way to its result: the key, what it cost when it ran, and whether that was in an earlier run.
 
     ``charged_usd`` is what services charged for it now; ``cost`` has what they charged in vain before as well.
     """
@@ -181,7 +181,7 @@ StageKey = tuple[str, str]
 
 
 class WorkFolder:
-    """Where the stages of one item read and write.
+    """The folder in which the stages of one item read and write.
 
     Owns: the local folder. Of a URL it holds copies: a result is complete there once its ``result.json`` is, which goes last.
     """

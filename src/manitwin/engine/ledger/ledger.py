@@ -38,7 +38,7 @@ class OpenItem:
 
 @dataclass(frozen=True)
 class ItemRow:
-    """What the ledger keeps of one item; ``detail`` of an open one says what it waits for."""
+    """One item as the ledger keeps it; ``detail`` of an open one says what it waits for."""
 
     number: int
     payload: dict[str, Any]

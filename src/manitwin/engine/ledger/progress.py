@@ -19,7 +19,7 @@ StageOrder = Callable[[str], Any]
 
 @dataclass(frozen=True)
 class StageRow:
-    """What the ledger keeps of one stage of one item."""
+    """The ledger's row of one stage of one item."""
 
     stage: str
     key: str | None
@@ -48,7 +48,7 @@ class StageProgress:
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a data set stands. ``items_per_hour`` is of the last ten minutes of work, None before anything ended."""
+    """The progress of a data set. ``items_per_hour`` is of the last ten minutes of work, None before anything ended."""
 
     items: dict[str, int]
     stages: list[StageProgress]
