@@ -15,8 +15,9 @@ from typer.testing import CliRunner
 from manitwin.cli.commands.stats import stats
 from manitwin.dataset.index.part_list import PartList
 from manitwin.dataset.index.parts import write_rows
+from manitwin.dataset.statistics.page import FIGURES, FOLDER, NUMBERS, REPORT
 from manitwin.dataset.statistics.query import ReportTables
-from manitwin.dataset.statistics.report import FIGURES, FOLDER, NUMBERS, REPORT, collect, write_dataset_report
+from manitwin.dataset.statistics.report import collect, write_dataset_report
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 

@@ -18,8 +18,9 @@ import pytest
 from synthetic_index import synthetic_tables
 
 from manitwin.dataset.index.near_duplicates import NearDuplicates, NearPair
+from manitwin.dataset.statistics.page import FIGURES, NUMBERS, REPORT
 from manitwin.dataset.statistics.query import ReportTables
-from manitwin.dataset.statistics.report import FIGURES, NO_TWIN, NUMBERS, REPORT, write_report
+from manitwin.dataset.statistics.report import NO_TWIN, write_report
 
 NAMES = (
     *("$x^2$", "<script>alert(1)</script>", "& \"quoted\" 'single'", "茶杯", 'id="x" #4477aa', "line\nbreak\x07bell"),

@@ -1,15 +1,20 @@
-"""The report as one HTML page: no request goes out and no script is needed to read it."""
+"""The report as one HTML page, which needs no request and no script, with its figures and its numbers beside it."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib import resources
+from pathlib import Path
 
 from manitwin.dataset.statistics.query import Column, Query, Result, Row
-from manitwin.dataset.statistics.style import Figure, for_page, printable
+from manitwin.dataset.statistics.style import Figure, for_page
+from manitwin.formats.markdown import one_line
+from manitwin.twin.store import canonical_json, write_bytes_atomically
 
+FOLDER, REPORT, NUMBERS, FIGURES = "statistics", "report.html", "statistics.json", "figures"
+SCHEMA_VERSION = 1
 MISSING = "–"
 
 
@@ -48,26 +53,88 @@ class ReportSection:
     parts: tuple[SectionPart, ...]
 
 
-class Page:
+def report_section(
+    results: Mapping[str, Result],
+    figures: Mapping[str, Figure | None],
+    anchor: str,
+    title: str,
+    *parts: str | tuple[str, ...],
+    empty: str,
+) -> ReportSection:
+    """Return a section of results and figures by name: ``lengths``, ``figure:lengths``, or figures side by side as a tuple."""
+    chosen: list[SectionPart] = []
+    for part in parts:
+        if isinstance(part, tuple):
+            chosen.append(tuple(figure for name in part if (figure := figures[name])))
+        elif not part.startswith("figure:"):
+            chosen.append(results[part])
+        elif figure := figures[part.removeprefix("figure:")]:
+            chosen.append(figure)
+    return ReportSection(anchor, title, empty, tuple(chosen))
+
+
+@dataclass(frozen=True)
+class Report:
+    """A report that can be written: ``lead`` are its first sentences, ``prelude`` the SQL that goes before every query.
+
+    ``views`` says, as HTML, what that SQL asks. A figure is None where there is nothing to draw.
+    """
+
+    title: str
+    lead: Sequence[str]
+    prelude: str
+    views: str
+    results: Mapping[str, Result]
+    figures: Mapping[str, Figure | None]
+    sections: Sequence[ReportSection]
+
+    def write(self, out: Path, **more: object) -> None:
+        """Write ``out/report.html``, ``out/statistics.json`` (with ``more`` in it) and ``out/figures/*.svg``.
+
+        The same report gives the same bytes. Figures of an earlier report that this one does not have are removed.
+        """
+        (out / FIGURES).mkdir(parents=True, exist_ok=True)
+        for name, figure in self.figures.items():
+            write_or_remove(out / FIGURES / f"{name}.svg", figure.svg.encode() if figure else None)
+        queries = {
+            name: {"caption": result.query.caption, "sql": result.query.sql, "rows": result.rows}
+            for name, result in self.results.items()
+        }
+        told = {"schema_version": SCHEMA_VERSION, "prelude": self.prelude, "queries": queries, **more}
+        write_bytes_atomically(out / NUMBERS, canonical_json(told).encode())
+        write_bytes_atomically(out / REPORT, _Page(self).html().encode())
+
+
+def write_or_remove(path: Path, content: bytes | None) -> None:
+    """Write a file, or remove it where there is no content for it."""
+    if content is None:
+        path.unlink(missing_ok=True)
+    else:
+        write_bytes_atomically(path, content)
+
+
+class _Page:
     """Number tables and figures as they come, and write them."""
 
-    def __init__(self, prelude: str, drawn: dict[str, Query]):
-        """Take the SQL that goes before every query, and the queries that are drawn but not shown as tables."""
-        self.prelude, self.drawn = prelude, drawn
+    def __init__(self, report: Report):
+        self.report = report
         self.tables = self.figures = 0
 
-    def html(self, title: str, lead: Sequence[str], sections: Sequence[ReportSection]) -> str:
-        """Return the whole page."""
+    def html(self) -> str:
+        title = self.report.title
         style = resources.files("manitwin.dataset.statistics").joinpath("report.css").read_text(encoding="utf-8")
-        links = "".join(f'<li><a href="#{s.anchor}">{escape(s.title)}</a></li>' for s in sections)
+        links = "".join(f'<li><a href="#{s.anchor}">{escape(s.title)}</a></li>' for s in self.report.sections)
         return (
             f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
             f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{escape(title)}</title>\n'
             f"<style>\n{style}</style>\n</head>\n<body>\n<header>\n<h1>{escape(title)}</h1>\n"
-            + "".join(f"<p>{escape(line)}</p>\n" for line in lead)
+            + "".join(f"<p>{escape(line)}</p>\n" for line in self.report.lead)
             + f'<nav aria-label="Sections"><ul>{links}</ul></nav>\n</header>\n<main>\n'
-            + "".join(self._section(section) for section in sections)
-            + f"{self._reproduce()}</main>\n</body>\n</html>\n"
+            + "".join(self._section(section) for section in self.report.sections)
+            + '<section id="reproduce">\n<h2>Every number again</h2>\n<p>Each table and figure has its SQL below it '
+            "(DuckDB); statistics.json has the same SQL with all its rows. It asks "
+            f"{self.report.views}, after these macros:</p>\n"
+            f"<pre><code>{escape(self.report.prelude)}</code></pre>\n</section>\n</main>\n</body>\n</html>\n"
         )
 
     def _section(self, section: ReportSection) -> str:
@@ -108,27 +175,17 @@ class Page:
             return f'<p class="note">{escape(none)}</p>\n'
         shown = near.nearest[:_SHOWN_PAIRS]
         caption = f"Near-duplicates: {near.pairs:,} pairs of {near.twins:,} twins with nearly one shape and size."
-        note = (
-            f"The {len(shown)} nearest. Found by {near.found_by}."
-            if near.pairs > len(shown)
-            else f"Found by {near.found_by}."
-        )
+        note = f"The {len(shown)} nearest. " if near.pairs > len(shown) else ""
+        note += f"Found by {near.found_by}."
         return f"<div>\n{self._rows('near_duplicates', caption, _PAIR_COLUMNS, shown, note)}</div>\n"
 
     def _figure(self, figure: Figure) -> str:
         self.figures += 1
-        sql = "".join(_sql(self.drawn[name]) for name in figure.queries if name in self.drawn)
+        queries = (self.report.results[name].query for name in figure.queries)
+        sql = "".join(_sql(query) for query in queries if not query.columns)  # a table has its own below it
         return (
             f'<figure id="figure-{figure.name}">\n{for_page(figure.svg)}\n'
             f"<figcaption><b>Figure {self.figures}.</b> {escape(figure.caption)}</figcaption>\n{sql}</figure>\n"
-        )
-
-    def _reproduce(self) -> str:
-        return (
-            '<section id="reproduce">\n<h2>Every number again</h2>\n<p>Each table and figure has its SQL below it '
-            "(DuckDB); statistics.json has the same SQL with all its rows. It asks the views twins, points, grasps, "
-            "placements, rejections and stages of the data set’s index, after these macros:</p>\n"
-            f"<pre><code>{escape(self.prelude)}</code></pre>\n</section>\n"
         )
 
 
@@ -158,7 +215,7 @@ def written(column: Column, row: Row) -> str:
 
 def _plain(column: Column, value: object) -> str:
     if isinstance(value, str):
-        return printable(value)
+        return one_line(value)
     if not isinstance(value, (int, float)):
         raise AssertionError(f"{column.name}: a cell is text or a number, not {type(value).__name__}")
     match column.kind:

@@ -1,11 +1,11 @@
-"""Ask the queries, draw the figures, and write the report, its figures and its numbers."""
+"""The report of a data set: ask the queries, draw the figures, and put both into sections."""
 
 from __future__ import annotations
 
 import tempfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from manitwin.dataset.index.near_duplicates import MAX_SHAPE_DISTANCE, MAX_SIZE_RATIO, NearDuplicates, near_duplicates
 from manitwin.dataset.index.query import Index
@@ -13,17 +13,15 @@ from manitwin.dataset.statistics import grasp_queries as grasps
 from manitwin.dataset.statistics import object_queries as objects
 from manitwin.dataset.statistics import stage_queries as stages
 from manitwin.dataset.statistics.figures import bars, histograms, masses, words
-from manitwin.dataset.statistics.page import NearPairs, Page, ReportSection, SectionPart
+from manitwin.dataset.statistics.page import FOLDER, REPORT, NearPairs, Report, ReportSection, report_section
 from manitwin.dataset.statistics.query import PRELUDE, Query, ReportTables, Result
 from manitwin.dataset.statistics.style import Figure, drawing
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.store import canonical_json, write_bytes_atomically
 
-FOLDER, REPORT, NUMBERS, FIGURES = "statistics", "report.html", "statistics.json", "figures"
-SCHEMA_VERSION = 1
 MOST_PAIRS = 1000
 """So many pairs of near-duplicates are written, the nearest; the call that finds all is written with them."""
 NO_TWIN = "There is no accepted twin."
+VIEWS = "the views twins, points, grasps, placements, rejections and stages of the data set’s index"
 
 QUERIES: tuple[Query, ...] = (
     *(stages.TOTALS, stages.SUCCESS_BY_STAGE, stages.REJECTIONS_BY_REASON, stages.BESIDE_THE_PAPER),
@@ -73,40 +71,15 @@ def collect(tables: ReportTables) -> dict[str, Result]:
     return {**results, against.query.name: against}
 
 
-def numbers(results: dict[str, Result], near: NearPairs | None) -> dict[str, Any]:
-    """Return what statistics.json holds: every query with its SQL and all its rows."""
-    return {
-        "schema_version": SCHEMA_VERSION,
-        "prelude": PRELUDE,
-        "queries": {
-            name: {"caption": result.query.caption, "sql": result.query.sql, "rows": result.rows}
-            for name, result in results.items()
-        },
-        "near_duplicates": None if near is None else vars(near),
-    }
-
-
 def write_report(tables: ReportTables, out: Path, *, title: str, duplicates: NearDuplicates | None = None) -> str:
-    """Write ``out/report.html``, ``out/statistics.json`` and ``out/figures/*.svg``; return the page's first sentence.
-
-    The same tables give the same bytes. Figures of an earlier report that this one does not have are removed.
-    """
+    """Write the report of tables into a folder; return the page's first sentence. The same tables give the same bytes."""
     results = collect(tables)
     near = None if duplicates is None else _near_pairs(duplicates)
     with drawing():
         figures = draw(results)
-    (out / FIGURES).mkdir(parents=True, exist_ok=True)
-    for name, figure in figures.items():
-        place = out / FIGURES / f"{name}.svg"
-        if figure is None:
-            place.unlink(missing_ok=True)
-        else:
-            write_bytes_atomically(place, figure.svg.encode())
     lead = _lead(results)
-    drawn = {name: result.query for name, result in results.items() if not result.query.columns}
-    page = Page(PRELUDE, drawn).html(title, lead, sections(results, figures, near))
-    write_bytes_atomically(out / NUMBERS, canonical_json(numbers(results, near)).encode())
-    write_bytes_atomically(out / REPORT, page.encode())
+    report = Report(title, lead, PRELUDE, VIEWS, results, figures, sections(results, figures, near))
+    report.write(out, near_duplicates=None if near is None else vars(near))
     return lead[0].rstrip(".")
 
 
@@ -136,19 +109,7 @@ def sections(
     results: dict[str, Result], figures: dict[str, Figure | None], near: NearPairs | None
 ) -> list[ReportSection]:
     """Return the report's sections with their tables and figures in order."""
-
-    def section(anchor: str, title: str, *parts: str | tuple[str, ...], empty: str = NO_TWIN) -> ReportSection:
-        chosen: list[SectionPart] = []
-        for part in parts:
-            if isinstance(part, tuple):
-                chosen.append(tuple(figure for name in part if (figure := figures[name]) is not None))
-            elif part.startswith("figure:"):
-                figure = figures[part.removeprefix("figure:")]
-                chosen += [figure] if figure else []
-            else:
-                chosen.append(results[part])
-        return ReportSection(anchor, title, empty, tuple(chosen))
-
+    section = partial(report_section, results, figures, empty=NO_TWIN)
     accepted = results["totals"].only["accepted"] > 0
     about_twins = [
         section(
@@ -179,7 +140,7 @@ def sections(
         ),
         *(about_twins if accepted else [ReportSection("twins", "Twins", NO_TWIN, ())]),
         section("cost", "Time and money", "cost", "figure:cost_by_stage", "cost_by_stage"),
-        ReportSection(origin.anchor, origin.title, origin.empty, (*origin.parts, *([near] if near else []))),
+        replace(origin, parts=(*origin.parts, near)) if near else origin,
         rest,
     ]
 

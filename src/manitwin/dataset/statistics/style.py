@@ -5,10 +5,10 @@ from __future__ import annotations
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 from xml.sax.saxutils import escape
 
 import matplotlib
@@ -17,47 +17,35 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure as Canvas
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-INK, MUTED, GRID, SURFACE = "#1f2328", "#59626c", "#d9dde2", "#ffffff"
-BLUE, RED, GREEN, YELLOW, PURPLE, CYAN, GREY = (
-    "#4477aa",
-    "#dd5566",
-    "#228833",
-    "#b89b1f",
-    "#aa3377",
-    "#3399bb",
-    "#8d959e",
-)
-"""After Paul Tol's bright scheme (Colour Schemes, SRON/EPS/TN/09-002), told apart by the colour-blind; yellow, cyan and grey
-darker, so that words in them can be read on white."""
+from manitwin.dataset.statistics.query import Result
+from manitwin.formats.markdown import one_line
 
 VARIABLES = {
-    INK: "ink",
-    MUTED: "muted",
-    GRID: "grid",
-    SURFACE: "surface",
-    BLUE: "blue",
-    RED: "red",
-    GREEN: "green",
-    YELLOW: "yellow",
-    PURPLE: "purple",
-    CYAN: "cyan",
-    GREY: "grey",
+    "#1f2328": "ink",
+    "#59626c": "muted",
+    "#d9dde2": "grid",
+    "#ffffff": "surface",
+    "#4477aa": "blue",
+    "#dd5566": "red",
+    "#228833": "green",
+    "#b89b1f": "yellow",
+    "#aa3377": "purple",
+    "#3399bb": "cyan",
+    "#8d959e": "grey",
 }
-"""The style sheet's variables: in the page, colours follow light and dark."""
+"""The style sheet's variables by colour: in the page, colours follow light and dark.
+
+After Paul Tol's bright scheme (Colour Schemes, SRON/EPS/TN/09-002), told apart by the colour-blind; yellow, cyan and grey
+darker, so that words in them can be read on white."""
+INK, MUTED, GRID, SURFACE, BLUE, RED, GREEN, YELLOW, PURPLE, CYAN, GREY = VARIABLES
 
 FONT = "Helvetica, Arial, 'Liberation Sans', 'DejaVu Sans', sans-serif"
 FULL_IN, HALF_IN = 7.6, 3.7
 """Widths of figures, inch: of the page's column, and of half of it."""
-_PER_INCH = 72
 
 _RC: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 9,
-    "axes.titlesize": 9,
-    "axes.labelsize": 9,
-    "xtick.labelsize": 9,
-    "ytick.labelsize": 9,
-    "legend.fontsize": 9,
     "text.color": INK,
     "axes.labelcolor": INK,
     "axes.edgecolor": MUTED,
@@ -70,7 +58,6 @@ _RC: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.axisbelow": True,
-    "axes.linewidth": 0.8,
     "grid.color": GRID,
     "grid.linewidth": 0.6,
     "legend.frameon": False,
@@ -90,7 +77,6 @@ class Figure:
     alt: str
     queries: tuple[str, ...]
     svg: str
-    half: bool = False
 
 
 @contextmanager
@@ -111,15 +97,21 @@ def canvas(width_in: float, height_in: float, columns: int = 1) -> tuple[Canvas,
     return figure, list(figure.subplots(1, columns, squeeze=False)[0])
 
 
-def to_svg(figure: Canvas, name: str, alt: str) -> str:
-    """Return a drawn figure as SVG with its alternative text, ids that no other figure has, and no dates."""
-    stream = io.StringIO()
-    figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
-    return finished(stream.getvalue(), name, alt)
+def row_canvas(labels: Sequence[str], row_in: float = 0.22, frame_in: float = 0.75) -> tuple[Canvas, Axes]:
+    """Return an empty figure with a row a label, the first on top."""
+    figure, (axis,) = canvas(FULL_IN, frame_in + row_in * max(len(labels), 2))
+    axis.set_yticks(range(len(labels)), labels)
+    axis.set_ylim(len(labels) - 0.4, -0.6)
+    axis.tick_params(axis="y", length=0)
+    return figure, axis
 
 
-def finished(svg: str, name: str, alt: str) -> str:
-    """Return SVG without its prologue, with own ids, the report's font and a description for who cannot see it."""
+def finished(figure: Canvas | str, name: str, caption: str, alt: str, *results: Result) -> Figure:
+    """Return a figure of results, from what was drawn or SVG, without its prologue and dates.
+
+    It has own ids, the report's font and a description for who cannot see it.
+    """
+    svg = figure if isinstance(figure, str) else _svg(figure)
     body = re.sub(r"<metadata>.*?</metadata>\s*", "", svg[svg.index("<svg") :], flags=re.DOTALL)
 
     def own(tag: str) -> str:
@@ -128,11 +120,18 @@ def finished(svg: str, name: str, alt: str) -> str:
 
     body = _in_tags(body, own)
     opening = body.index(">") + 1
-    return (
+    svg = (
         f'<svg role="img" aria-labelledby="{name}-title {name}-description" {body[len("<svg ") : opening]}\n'
         f'<title id="{name}-title">{escape(name.replace("_", " "))}</title>'
-        f'<desc id="{name}-description">{escape(printable(alt))}</desc>{body[opening:]}'
+        f'<desc id="{name}-description">{escape(one_line(alt))}</desc>{body[opening:]}'
     )
+    return Figure(name, caption, alt, tuple(result.query.name for result in results), svg)
+
+
+def _svg(figure: Canvas) -> str:
+    stream = io.StringIO()
+    figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+    return stream.getvalue()
 
 
 def for_page(svg: str) -> str:
@@ -151,14 +150,9 @@ def _in_tags(svg: str, change: Callable[[str], str]) -> str:
     return re.sub(r"<[a-z][^<>]*>", lambda tag: change(tag[0]), svg)
 
 
-def printable(words: str) -> str:
-    """Return words on one line without control characters, which SVG cannot hold."""
-    return " ".join("".join(c if c.isprintable() else " " for c in words).split())
-
-
 def shortened(words: str, most: int = 36) -> str:
     """Return words that fit beside an axis, on one line."""
-    line = printable(words)
+    line = one_line(words)
     return line if len(line) <= most else line[: most - 1].rstrip() + "…"
 
 
@@ -167,13 +161,23 @@ def plain_number(value: float) -> str:
     return f"{value:,.0f}" if value >= 10 else f"{value:.4g}"
 
 
-def count_axis(axis: Axes, which: str, label: str) -> None:
+def beside_bar(axis: Axes, end: float, row: float, words: str) -> None:
+    """Write beside the end of a horizontal bar."""
+    axis.annotate(words, (end, row), (3, 0), textcoords="offset points", va="center")
+
+
+def legend_above(axis: Axes, columns: int, **more: Any) -> None:
+    """Put the legend above an axis, from its left end."""
+    axis.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=columns, borderaxespad=0.2, **more)
+
+
+def count_axis(axis: Axes, which: Literal["x", "y"], label: str) -> None:
     """Make an axis one of whole numbers from 0, with a grid."""
     chosen = axis.xaxis if which == "x" else axis.yaxis
     chosen.set_major_locator(MaxNLocator(integer=True, nbins=6))
     chosen.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
     chosen.set_label_text(label)
-    axis.grid(axis="x" if which == "x" else "y")
+    axis.grid(axis=which)
     (axis.set_xlim if which == "x" else axis.set_ylim)(0, None)
 
 
@@ -187,8 +191,3 @@ def logarithmic_axis(axis: Axes, which: str, label: str) -> None:
     chosen.set_major_formatter(FuncFormatter(lambda value, _: plain_number(value)))
     chosen.set_minor_formatter(NullFormatter())
     chosen.set_label_text(label)
-
-
-def size_pt(width_in: float, height_in: float) -> tuple[float, float]:
-    """Return a size in points, the unit of SVG's user space in all figures."""
-    return width_in * _PER_INCH, height_in * _PER_INCH

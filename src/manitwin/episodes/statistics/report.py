@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape, unescape
+from functools import partial
+from html import unescape
 from pathlib import Path
-from typing import Any
 
 from manitwin.dataset.index.query import sql_text
-from manitwin.dataset.statistics.page import Page, ReportSection, SectionPart, written
+from manitwin.dataset.statistics.page import (
+    FIGURES,
+    REPORT,
+    Report,
+    ReportSection,
+    report_section,
+    write_or_remove,
+    written,
+)
 from manitwin.dataset.statistics.query import Column, ReportTables, Result, Row
 from manitwin.dataset.statistics.style import Figure, drawing
 from manitwin.episodes.attempts import ATTEMPTS
@@ -17,32 +25,21 @@ from manitwin.episodes.statistics import figures as drawn
 from manitwin.episodes.statistics import queries as q
 from manitwin.episodes.statistics.joint_ranges import joint_ranges
 from manitwin.errors import EpisodesError
-from manitwin.twin.store import canonical_json, write_bytes_atomically
 
 _WIDEST = 110
 _BAR = 40
 
-FOLDER, PAGE, NUMBERS, FIGURES = "statistics", "report.html", "statistics.json", "figures"
 LENGTHS_PICTURE = "lengths.png"
-SCHEMA_VERSION = 1
+VIEWS = (
+    "the view <code>attempts</code>, which is attempts.parquet, and <code>joints</code>, whose rows are read out of the "
+    "recorded episodes"
+)
 EPISODE_FILES = "batches/*/*/episodes.h5"
 _MERGED = "maniskill/trajectory.h5"
 _PRINTED = (
     *("funnel", "outcomes", "plan_failures", "by_robot", "by_category", "never_kept", "by_grasp_type", "by_others"),
     *("placement", "joints", "grasps", "beside_the_paper"),
 )
-
-
-class EpisodePage(Page):
-    """The page of a folder of episodes: its last section says where these numbers come from."""
-
-    def _reproduce(self) -> str:
-        return (
-            '<section id="reproduce">\n<h2>Every number again</h2>\n<p>Each table and figure has its SQL below it '
-            "(DuckDB); statistics.json has the same SQL with all its rows. It asks the view <code>attempts</code>, which is "
-            "attempts.parquet, and <code>joints</code>, whose rows are read out of the recorded episodes, after these "
-            f"macros:</p>\n<pre><code>{escape(self.prelude)}</code></pre>\n</section>\n"
-        )
 
 
 def table_text(result: Result, most: int = 20) -> str:
@@ -110,79 +107,43 @@ class EpisodeReport:
         tables.insert(-3, histogram_text(q.LENGTH_HISTOGRAM.caption, steps))
         return "\n".join([self.summary + "\n", *filter(None, tables)])
 
-    def numbers(self) -> dict[str, Any]:
-        """Return what statistics.json holds: every query with its SQL and all its rows."""
-        told = {
-            name: {"caption": result.query.caption, "sql": result.query.sql, "rows": result.rows}
-            for name, result in self.results.items()
-        }
-        return {"schema_version": SCHEMA_VERSION, "prelude": q.PRELUDE, "queries": told}
-
     def write(self, out: Path) -> Path:
-        """Write ``report.html``, ``statistics.json`` and ``figures/`` into a folder; return the page.
-
-        The same results give the same bytes. Figures of an earlier report that this one does not have are removed.
-        """
+        """Write ``report.html``, ``statistics.json`` and ``figures/`` into a folder; return the page."""
         with drawing():
             figures, lengths_png = self._draw()
-        (out / FIGURES).mkdir(parents=True, exist_ok=True)
-        files = {f"{name}.svg": figure.svg.encode() if figure else None for name, figure in figures.items()}
-        for name, content in {**files, LENGTHS_PICTURE: lengths_png}.items():
-            if content is None:
-                (out / FIGURES / name).unlink(missing_ok=True)
-            else:
-                write_bytes_atomically(out / FIGURES / name, content)
-        undrawn = {name: result.query for name, result in self.results.items() if not result.query.columns}
-        page = EpisodePage(q.PRELUDE, undrawn).html(self.title, [self.summary], self._sections(figures))
-        write_bytes_atomically(out / NUMBERS, canonical_json(self.numbers()).encode())
-        write_bytes_atomically(out / PAGE, page.encode())
-        return out / PAGE
+        lead, sections = [self.summary], self._sections(figures)
+        Report(self.title, lead, q.PRELUDE, VIEWS, self.results, figures, sections).write(out)
+        write_or_remove(out / FIGURES / LENGTHS_PICTURE, lengths_png)
+        return out / REPORT
 
     def _draw(self) -> tuple[dict[str, Figure | None], bytes | None]:
         of = self.results.__getitem__
-        lengths = drawn.lengths(of("length_histogram"), of("lengths"))
+        lengths, lengths_png = drawn.lengths(of("length_histogram"), of("lengths")) or (None, None)
         figures = {
             "outcomes": drawn.outcomes(of("outcomes")),
             "categories": drawn.categories(of("by_category")),
-            "lengths": lengths[0] if lengths else None,
+            "lengths": lengths,
             "placement": drawn.placement(of("placement_histogram"), of("placement")),
         }
-        return figures, lengths[1] if lengths else None
+        return figures, lengths_png
 
     def _sections(self, figures: dict[str, Figure | None]) -> list[ReportSection]:
-        def parts(*names: str) -> tuple[SectionPart, ...]:
-            found: list[SectionPart] = []
-            for name in names:
-                if not name.startswith("figure:"):
-                    found.append(self.results[name])
-                elif figure := figures[name.removeprefix("figure:")]:
-                    found.append(figure)
-            return tuple(found)
-
-        beside = tuple(figure for name in ("lengths", "placement") if (figure := figures[name]))
-        nothing = "There is nothing to count."
+        section = partial(report_section, self.results, figures, empty="There is nothing to count.")
         return [
-            ReportSection(
-                "attempts", "Attempts", nothing, parts("funnel", "figure:outcomes", "outcomes", "plan_failures")
+            section("attempts", "Attempts", "funnel", "figure:outcomes", "outcomes", "plan_failures"),
+            section("paper", "Beside the paper", "beside_the_paper"),
+            section(
+                *("success", "Success", "by_robot", "figure:categories", "by_category", "by_grasp_type", "by_others"),
+                "by_object",
             ),
-            ReportSection("paper", "Beside the paper", nothing, parts("beside_the_paper")),
-            ReportSection(
-                *("success", "Success", nothing),
-                parts(*("by_robot", "figure:categories", "by_category", "by_grasp_type", "by_others", "by_object")),
+            section("never", "Objects without a kept episode", "never_kept", empty="Every object has one."),
+            section(
+                *("episodes", "Lengths, placement and joints"),
+                *(("lengths", "placement"), "lengths", "placement", "joints"),
+                empty="No episode was kept.",
             ),
-            ReportSection(
-                "never", "Objects without a kept episode", "Every object has one.", _filled(parts("never_kept"))
-            ),
-            ReportSection(
-                *("episodes", "Lengths, placement and joints", "No episode was kept."),
-                (*((beside,) if beside else ()), *parts("lengths", "placement", "joints")),
-            ),
-            ReportSection("grasps", "Grasps", nothing, parts("grasps", "failed_grasps")),
+            section("grasps", "Grasps", "grasps", "failed_grasps"),
         ]
-
-
-def _filled(parts: Sequence[SectionPart]) -> tuple[SectionPart, ...]:
-    return tuple(part for part in parts if not isinstance(part, Result) or part.rows)
 
 
 def episode_statistics(folder: Path) -> EpisodeReport:

@@ -17,9 +17,10 @@ from manitwin.dataset.statistics.style import (
     Figure,
     canvas,
     count_axis,
+    finished,
+    legend_above,
     logarithmic_axis,
     plain_number,
-    to_svg,
 )
 
 _HEIGHT_IN = 2.4
@@ -38,14 +39,13 @@ def grasps_per_object(simulated: Result, verified: Result) -> Figure | None:
     axis.set_xlim(0, top)
     axis.set_xlabel("grasps per object")
     count_axis(axis, "y", "objects")
-    axis.legend(loc="lower left", bbox_to_anchor=(0, 1.0), ncols=2, borderaxespad=0.2, handlelength=1)
-    queries = (simulated.query.name, verified.query.name)
+    legend_above(axis, 2, handlelength=1)
     alt = "Histograms. " + " ".join(
         f"{label} grasps per object: most often {_mode(r.rows, 'low', 'objects')} to {_mode(r.rows, 'low', 'objects') + _BIN}."
         for r, label in ((simulated, "Simulated"), (verified, "Verified"))
     )
     caption = f"Grasps per object in steps of {_BIN}: simulated, and of these verified."
-    return Figure("grasps_per_object", caption, alt, queries, to_svg(figure, "grasps_per_object", alt))
+    return finished(figure, "grasps_per_object", caption, alt, simulated, verified)
 
 
 def rates(result: Result) -> Figure | None:
@@ -55,14 +55,8 @@ def rates(result: Result) -> Figure | None:
 
 def robustness(result: Result) -> Figure | None:
     """Draw in what share of perturbed trials verified grasps hold."""
-    return _shares(
-        result,
-        "robustness",
-        "Perturbed trials that a verified grasp holds in.",
-        "share of perturbed trials held",
-        "verified grasps",
-        10,
-    )
+    caption = "Perturbed trials that a verified grasp holds in."
+    return _shares(result, "robustness", caption, "share of perturbed trials held", "verified grasps", 10)
 
 
 def counts_per_object(results: Sequence[Result]) -> Figure | None:
@@ -81,8 +75,7 @@ def counts_per_object(results: Sequence[Result]) -> Figure | None:
         said.append(f"{label}: " + ", ".join(f"{row['objects']} with {row['number']}" for row in result.rows))
     alt = f"Bars of objects by number. {'; '.join(said)}."
     caption = "Functional points, grasp points and placements per object."
-    queries = tuple(result.query.name for result in results)
-    return Figure("points_per_object", caption, alt, queries, to_svg(figure, "points_per_object", alt))
+    return finished(figure, "points_per_object", caption, alt, *results)
 
 
 def sizes(result: Result, dimensions: Result) -> Figure | None:
@@ -107,20 +100,15 @@ def _logarithmic(result: Result, dimensions: Result, steps: int, name: str, quan
     logarithmic_axis(axis, "x", f"{quantity}, {unit}")
     (row,) = (row for row in dimensions.rows if row["quantity"] == f"{quantity}, {unit}")
     axis.axvline(row["median"], color=INK, linewidth=1, linestyle=(0, (4, 2)))
-    axis.annotate(
-        f"median {row['median']:.2g} {unit}",
-        (row["median"], 1),
-        (4, 2),
-        xycoords=("data", "axes fraction"),
-        textcoords="offset points",
-    )
+    words, place = f"median {row['median']:.2g} {unit}", (row["median"], 1)
+    axis.annotate(words, place, (4, 2), xycoords=("data", "axes fraction"), textcoords="offset points")
     count_axis(axis, "y", "objects")
     alt = (
         f"Histogram of the {quantity} of {row['objects']} objects on a logarithmic axis, from {row['min']:.3g} to "
         f"{row['max']:.3g} {unit}, median {row['median']:.3g} {unit}."
     )
     caption = f"{quantity[0].upper()}{quantity[1:]} of accepted twins, {steps} steps a decade."
-    return Figure(name, caption, alt, (result.query.name,), to_svg(figure, name, alt), half=True)
+    return finished(figure, name, caption, alt, result)
 
 
 def _shares(result: Result, name: str, caption: str, label: str, what: str, steps: int) -> Figure | None:
@@ -136,7 +124,7 @@ def _shares(result: Result, name: str, caption: str, label: str, what: str, step
     most = _mode(result.rows, "step", what.split()[-1]) / steps
     often = f"{plain_number(most)} to {plain_number(most + 1 / steps)}"
     alt = f"Histogram of the {label} of {sum(heights):,} {what}; most often {often}."
-    return Figure(name, caption, alt, (result.query.name,), to_svg(figure, name, alt), half=True)
+    return finished(figure, name, caption, alt, result)
 
 
 def _heights(result: Result, key: str, at: np.ndarray) -> list[int]:

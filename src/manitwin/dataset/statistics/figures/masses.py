@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
@@ -21,9 +20,11 @@ from manitwin.dataset.statistics.style import (
     YELLOW,
     Figure,
     canvas,
+    finished,
+    legend_above,
     logarithmic_axis,
+    row_canvas,
     shortened,
-    to_svg,
 )
 
 _MOST_CATEGORIES, _MOST_INTERVALS, _MOST_BANDS = 40, 200, 60
@@ -61,7 +62,7 @@ def mass_and_size(sample: Result, priors: Result) -> Figure | None:
     logarithmic_axis(axis, "y", "mass, kg")
     axis.grid()
     handles = _legend(present, len(rows), bool(priors.rows))
-    axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), ncols=4, borderaxespad=0.2)
+    legend_above(axis, 4, handles=handles)
     bands = min(len(priors.rows), _MOST_BANDS)
     alt = (
         f"Scatter of mass against longest side of {len(rows)} twins, both axes logarithmic, over the intervals that the "
@@ -73,8 +74,7 @@ def mass_and_size(sample: Result, priors: Result) -> Figure | None:
     caption = (
         f"Mass against longest side, over the intervals that the priors{shown} have of both: darker where more overlap."
     )
-    queries = (sample.query.name, priors.query.name)
-    return Figure("mass_and_size", caption, alt, queries, to_svg(figure, "mass_and_size", alt))
+    return finished(figure, "mass_and_size", caption, alt, sample, priors)
 
 
 def _points_with_intervals(axis: Axes, rows: list[Row], present: list[str]) -> None:
@@ -116,7 +116,8 @@ def mass_by_category(priors: Result) -> Figure | None:
     rows = priors.rows[:_MOST_CATEGORIES]
     if not rows:
         return None
-    figure, (axis,) = canvas(FULL_IN, 0.95 + 0.22 * max(len(rows), 2))
+    names = [f"{shortened(row['category'])} ({row['twins']:,})" for row in rows]
+    figure, axis = row_canvas(names, frame_in=0.95)
     for y, row in enumerate(rows):
         axis.barh(
             y, row["mass_high_kg"] - row["mass_low_kg"], left=row["mass_low_kg"], height=0.62, color=CYAN, alpha=0.35
@@ -124,10 +125,6 @@ def mass_by_category(priors: Result) -> Figure | None:
         axis.plot([row["mass_typical_kg"]] * 2, [y - 0.31, y + 0.31], color=CYAN, linewidth=1.4)
         axis.plot([row["p10_kg"], row["p90_kg"]], [y, y], color=BLUE, linewidth=1.6)
         axis.plot(row["median_kg"], y, "o", color=BLUE, markersize=4)
-    names = [f"{shortened(row['category'])} ({row['twins']:,})" for row in rows]
-    axis.set_yticks(np.arange(len(rows)), names)
-    axis.set_ylim(len(rows) - 0.4, -0.6)
-    axis.tick_params(axis="y", length=0)
     ends = [row[key] for row in rows for key in ("mass_low_kg", "mass_high_kg", "p10_kg", "p90_kg") if row[key] > 0]
     axis.set_xlim(min(ends) / 1.3, max(ends) * 1.3)
     logarithmic_axis(axis, "x", "mass, kg")
@@ -137,10 +134,10 @@ def mass_by_category(priors: Result) -> Figure | None:
         Line2D([], [], color=CYAN, linewidth=1.4, label="typical"),
         Line2D([], [], color=BLUE, marker="o", markersize=4, linewidth=1.6, label="twins: median, p10 to p90"),
     ]
-    axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(0, 1.0), ncols=3, borderaxespad=0.2)
+    legend_above(axis, 3, handles=handles)
     alt = "Masses by category beside the prior. " + " ".join(
         f"{row['category']}: median {row['median_kg']:.2g} kg, prior {row['mass_low_kg']:.2g} to {row['mass_high_kg']:.2g} kg."
         for row in rows[:10]
     )
     caption = "Masses of the twins of a category (their number in brackets) beside the interval of its prior."
-    return Figure("mass_by_category", caption, alt, (priors.query.name,), to_svg(figure, "mass_by_category", alt))
+    return finished(figure, "mass_by_category", caption, alt, priors)

@@ -22,11 +22,10 @@ from manitwin.dataset.statistics.style import (
     Figure,
     finished,
     shortened,
-    size_pt,
 )
 
 SEED = 0
-_HEIGHT_IN = 2.2
+_WIDTH_PT, _HEIGHT_PT = HALF_IN * 72, 2.2 * 72
 _PIXELS_PER_PT, _LEAST_PIXELS, _MOST_PIXELS, _MOST_WORDS = 2, 15, 84, 100
 _COLORS = (BLUE, GREEN, RED, PURPLE, CYAN, YELLOW)
 _TOLD = 8
@@ -40,27 +39,23 @@ def word_cloud(result: Result, attribute: str) -> Figure | None:
     Placed by the ``wordcloud`` library with seed ``SEED``; all words lie flat.
     """
     counts: dict[str, int] = {}
-    for row in result.rows[
-        :_MOST_WORDS
-    ]:  # most frequent first: of two that are cut to the same words, the first counts
+    for row in result.rows[:_MOST_WORDS]:  # of two that are cut to the same words, the more frequent counts
         counts.setdefault(shortened(row["term"], 32), row["twins"])
     counts.pop("", None)
     if not counts:
         return None
-    width_pt, height_pt = size_pt(HALF_IN, _HEIGHT_IN)
-    width, height = int(width_pt * _PIXELS_PER_PT), int(height_pt * _PIXELS_PER_PT)
+    width, height = int(_WIDTH_PT * _PIXELS_PER_PT), int(_HEIGHT_PT * _PIXELS_PER_PT)
     words = _placed(counts, width, height)
     name = f"words_{attribute}"
     told = ", ".join(f"{term} {count}" for term, count in list(counts.items())[:_TOLD])
     alt = f"Word cloud of {attribute}, {len(words)} terms. Most frequent: {told}."
     svg = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width_pt}pt" height="{height_pt}pt" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{_WIDTH_PT}pt" height="{_HEIGHT_PT}pt" '
         f'viewBox="0 0 {width} {height}">\n<rect width="100%" height="100%" style="fill: {SURFACE}"/>\n'
         + "\n".join(words)
         + "\n</svg>\n"
     )
-    caption = f"Words of {attribute}."
-    return Figure(name, caption, alt, (result.query.name,), finished(svg, name, alt), half=True)
+    return finished(svg, name, f"Words of {attribute}.", alt, result)
 
 
 def _placed(counts: dict[str, int], width: int, height: int) -> list[str]:
