@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from manitwin.dataset.statistics.query import Column, Query, summary, summary_columns
+from manitwin.dataset.statistics.query import Column, Query, counts, histogram, labels, summary
 
-GRASPS_PER_OBJECT = Query(
+GRASPS_PER_OBJECT = summary(
     "grasps_per_object",
     "Grasps of an accepted twin's own gripper.",
-    summary(
-        "twins",
-        [
-            ("proposed", "proposed"),
-            ("simulated", "simulated"),
-            ("verified", "verified"),
-            ("approach octants", "approach_octants"),
-            ("verification rate", "success_rate"),
-            ("unfiltered rate", "unfiltered_success_rate"),
-        ],
-    ),
-    summary_columns("quantity per object", total=False),
-    "Proposed: grasps left by the gripper's own checks. Simulated: those near a chosen point, thinned for diversity (the "
+    {
+        "proposed": "proposed",
+        "simulated": "simulated",
+        "verified": "verified",
+        "approach octants": "approach_octants",
+        "verification rate": "success_rate",
+        "unfiltered rate": "unfiltered_success_rate",
+    },
+    heading="quantity per object",
+    note="Proposed: grasps left by the gripper's own checks. Simulated: those near a chosen point, thinned for diversity (the "
     "paper's grasp candidates). Verified: held in simulation. Octants: directions of approach among the verified, of 8.",
 )
 
@@ -44,10 +41,7 @@ SELECT proposals, objects, tried, held, p.rate,
   CASE WHEN half >= 0 THEN least(p.rate + half, 1) END AS high
 FROM pooled p JOIN spread USING (position) ORDER BY position""",
     (
-        Column("proposals", "proposals", "text"),
-        Column("objects", "objects"),
-        Column("tried", "simulated"),
-        Column("held", "held"),
+        *(*labels("proposals"), *counts("objects"), Column("tried", "simulated"), *counts("held")),
         Column("rate", "rate [95 %]", "share", ("low", "high")),
     ),
     "Grasps of one object are alike: the interval is that of a ratio with objects as clusters (the linearised variance; "
@@ -112,10 +106,7 @@ BY_GRASP_TYPE = Query(
 FROM grasps g JOIN points p ON g.twin_id = p.twin_id AND g.grasp_point_id = p.point_id AND p.role = 'grasp'
 WHERE own(proposer) GROUP BY type ORDER BY simulated DESC, type""",
     (
-        Column("type", "type", "text"),
-        Column("points", "grasp points"),
-        Column("simulated", "simulated"),
-        Column("verified", "verified"),
+        *(*labels("type"), Column("points", "grasp points"), *counts("simulated", "verified")),
         Column("rate", "rate", "share"),
     ),
     "All grippers.",
@@ -128,9 +119,7 @@ ROBUST = Query(
   sum(robust) / nullif(sum(verified), 0) AS robust_share, median(robustness_median) AS median_of_medians
 FROM twins WHERE robust IS NOT NULL""",
     (
-        Column("objects", "objects"),
-        Column("verified", "verified"),
-        Column("robust", "robust"),
+        *counts("objects", "verified", "robust"),
         Column("robust_share", "robust share", "share"),
         Column("median_of_medians", "median share held", "number"),
     ),
@@ -172,24 +161,24 @@ FROM counted ORDER BY held_tried DESC, gripper""",
     "κ is over the jittered controls alone, pooled over objects: among grasps that nearly all hold, agreement says little.",
 )
 
-_PER_OBJECT = """SELECT ({value} // 5) * 5 AS low, count(*) AS objects FROM twins
-WHERE {value} IS NOT NULL GROUP BY low ORDER BY low"""
 
-SIMULATED_HISTOGRAM = Query(
-    "simulated_histogram", "Simulated grasps per object.", _PER_OBJECT.format(value="simulated")
-)
-VERIFIED_HISTOGRAM = Query("verified_histogram", "Verified grasps per object.", _PER_OBJECT.format(value="verified"))
+def _per_object(column: str) -> Query:
+    place, caption = f"({column} // 5) * 5 AS low", f"{column.capitalize()} grasps per object."
+    return histogram(f"{column}_histogram", caption, place, f"{column} IS NOT NULL")
 
-RATE_HISTOGRAM = Query(
-    "rate_histogram",
-    "Verification rate of objects, in steps of 0.05.",
-    """SELECT least(floor(success_rate * 20 + 1e-9), 19)::INT AS step, count(*) AS objects FROM twins
-WHERE success_rate IS NOT NULL GROUP BY step ORDER BY step""",
+
+SIMULATED_HISTOGRAM, VERIFIED_HISTOGRAM = _per_object("simulated"), _per_object("verified")
+
+RATE_HISTOGRAM = histogram(
+    *("rate_histogram", "Verification rate of objects, in steps of 0.05."),
+    *("least(floor(success_rate * 20 + 1e-9), 19)::INT AS step", "success_rate IS NOT NULL"),
 )
 
-ROBUSTNESS_HISTOGRAM = Query(
+ROBUSTNESS_HISTOGRAM = histogram(
     "robustness_histogram",
     "Share of perturbed trials in which a verified grasp holds, in steps of 0.1.",
-    """SELECT least(floor(robustness * 10 + 1e-9), 9)::INT AS step, count(*) AS grasps FROM grasps
-WHERE robustness IS NOT NULL AND verified AND own(proposer) GROUP BY step ORDER BY step""",
+    "least(floor(robustness * 10 + 1e-9), 9)::INT AS step",
+    "robustness IS NOT NULL AND verified AND own(proposer)",
+    rows="grasps",
+    table="grasps",
 )

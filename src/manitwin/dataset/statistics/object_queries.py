@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from manitwin.dataset.index.query import sql_text
-from manitwin.dataset.statistics.query import Column, Query, summary, summary_columns
+from manitwin.dataset.statistics.query import Column, Query, counts, histogram, labels, summary
 from manitwin.models.annotators.priors import Prior, lookup
 
 ATTRIBUTES = ("category", "color", "material", "size", "shape", "function")
@@ -13,14 +13,12 @@ ATTRIBUTES = ("category", "color", "material", "size", "shape", "function")
 
 SAMPLE, SAMPLE_SEED = 2000, 0
 
-POINTS_PER_OBJECT = Query(
+POINTS_PER_OBJECT = summary(
     "points_per_object",
     "Functional points, grasp points and placements of an accepted twin.",
-    summary(
-        "twins",
-        [("functional points", "functional_points"), ("grasp points", "grasp_points"), ("placements", "placements")],
-    ),
-    summary_columns("quantity per object"),
+    {"functional points": "functional_points", "grasp points": "grasp_points", "placements": "placements"},
+    heading="quantity per object",
+    total=True,
 )
 
 FUNCTIONAL_LABELS = Query(
@@ -28,7 +26,7 @@ FUNCTIONAL_LABELS = Query(
     "Labels of functional points.",
     """SELECT label, count(*) AS points, count(DISTINCT twin_id) AS objects FROM points WHERE role = 'functional'
 GROUP BY label ORDER BY points DESC, label""",
-    (Column("label", "label", "text"), Column("points", "points"), Column("objects", "objects")),
+    (*labels("label"), *counts("points", "objects")),
     shown=20,
 )
 
@@ -50,22 +48,18 @@ PLACEMENTS = Query(
     ),
 )
 
-DIMENSIONS = Query(
+DIMENSIONS = summary(
     "dimensions",
     "Size, mass and contact of accepted twins.",
-    summary(
-        "twins",
-        [
-            ("longest side, m", "longest_m"),
-            ("height, m", "extent_z_m"),
-            ("volume, litres", "volume_m3 * 1000"),
-            ("mass, kg", "mass_kg"),
-            ("density, kg/m³", "density_kg_m3"),
-            ("static friction", "friction_static"),
-            ("collision hulls", "hulls"),
-        ],
-    ),
-    summary_columns("quantity", total=False),
+    {
+        "longest side, m": "longest_m",
+        "height, m": "extent_z_m",
+        "volume, litres": "volume_m3 * 1000",
+        "mass, kg": "mass_kg",
+        "density, kg/m³": "density_kg_m3",
+        "static friction": "friction_static",
+        "collision hulls": "hulls",
+    },
 )
 
 MASS_SOURCES = Query(
@@ -76,8 +70,7 @@ MASS_SOURCES = Query(
 FROM (SELECT mass_source, mass_low_kg AS mass_low, mass_high_kg AS mass_high FROM twins)
 GROUP BY source ORDER BY twins DESC, source""",
     (
-        Column("source", "source", "text"),
-        Column("twins", "twins"),
+        *(*labels("source"), *counts("twins")),
         Column("share", "share", "share"),
         Column("spread", "median of high / low", "number"),
     ),
@@ -91,8 +84,7 @@ CATEGORIES = Query(
   avg(verified) AS verified, sum(verified) / nullif(sum(simulated), 0) AS rate
 FROM twins GROUP BY category ORDER BY twins DESC, category""",
     (
-        Column("category", "category", "text"),
-        Column("twins", "twins"),
+        *(*labels("category"), *counts("twins")),
         Column("longest_m", "median longest side, m", "number"),
         Column("mass_kg", "median mass, kg", "number"),
         Column("verified", "mean verified grasps", "number"),
@@ -101,20 +93,15 @@ FROM twins GROUP BY category ORDER BY twins DESC, category""",
     shown=1000,
 )
 
-_LOGARITHMIC = """SELECT floor(log10({value}) * {steps} + 1e-9)::INT AS step, count(*) AS objects FROM twins
-WHERE {value} > 0 GROUP BY step ORDER BY step"""
+
+def _logarithmic(name: str, quantity: str, column: str, unit: str, steps: int) -> Query:
+    caption = f"{quantity}, {steps} steps a decade: step s is from 10^(s/{steps}) {unit}."
+    return histogram(name, caption, f"floor(log10({column}) * {steps} + 1e-9)::INT AS step", f"{column} > 0")
+
 
 SIZE_STEPS, MASS_STEPS = 20, 10
-SIZE_HISTOGRAM = Query(
-    "size_histogram",
-    f"Longest side, {SIZE_STEPS} steps a decade: step s is from 10^(s/{SIZE_STEPS}) m.",
-    _LOGARITHMIC.format(value="longest_m", steps=SIZE_STEPS),
-)
-MASS_HISTOGRAM = Query(
-    "mass_histogram",
-    f"Mass, {MASS_STEPS} steps a decade: step s is from 10^(s/{MASS_STEPS}) kg.",
-    _LOGARITHMIC.format(value="mass_kg", steps=MASS_STEPS),
-)
+SIZE_HISTOGRAM = _logarithmic("size_histogram", "Longest side", "longest_m", "m", SIZE_STEPS)
+MASS_HISTOGRAM = _logarithmic("mass_histogram", "Mass", "mass_kg", "kg", MASS_STEPS)
 
 COUNT_HISTOGRAMS = tuple(
     Query(
@@ -181,8 +168,7 @@ SELECT category, count(*) AS twins, p.mass_low_kg, p.mass_typical_kg, p.mass_hig
 FROM twins JOIN priors p USING (category)
 GROUP BY ALL ORDER BY twins DESC, category""",
         (
-            Column("category", "category", "text"),
-            Column("twins", "twins"),
+            *(*labels("category"), *counts("twins")),
             Column("mass_low_kg", "prior low, kg", "given"),
             Column("mass_typical_kg", "typical", "given"),
             Column("mass_high_kg", "high", "given"),

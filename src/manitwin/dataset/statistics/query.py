@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -46,6 +46,16 @@ class Column:
     interval: tuple[str, str] | None = None
 
 
+def labels(*names: str) -> tuple[Column, ...]:
+    """Return columns of text that are headed by their names."""
+    return tuple(Column(name, name, "text") for name in names)
+
+
+def counts(*names: str) -> tuple[Column, ...]:
+    """Return columns of counts that are headed by their names."""
+    return tuple(Column(name, name) for name in names)
+
+
 @dataclass(frozen=True)
 class Query:
     """SQL (DuckDB, after ``tables.PRELUDE``) with the words that go with its result.
@@ -76,11 +86,23 @@ class Result:
         return row
 
 
-def summary(table: str, quantities: Sequence[tuple[str, str]]) -> str:
-    """Return SQL with a row a quantity ``(name, expression)``: its distribution over the rows of a table that have it."""
-    names = sql_texts(name for name, _ in quantities)
-    values = ", ".join(f"({expression})::DOUBLE" for _, expression in quantities)
-    return f"""SELECT quantity, count(value) AS objects, favg(value) AS mean, median(value) AS median,
+def summary(
+    name: str,
+    caption: str,
+    quantities: Mapping[str, str],
+    *,
+    table: str = "twins",
+    rows: str = "objects",
+    heading: str = "quantity",
+    total: bool = False,
+    note: str = "",
+) -> Query:
+    """Return the query of a row a quantity, of ``{quantity: expression}``: its distribution over the rows of a table that
+    have it, whose number is headed ``rows``; with its ``total`` where adding up means something.
+    """
+    names = sql_texts(quantities)
+    values = ", ".join(f"({expression})::DOUBLE" for expression in quantities.values())
+    sql = f"""SELECT quantity, count(value) AS objects, favg(value) AS mean, median(value) AS median,
   quantile_cont(value, 0.1) AS p10, quantile_cont(value, 0.9) AS p90,
   min(value) AS min, max(value) AS max, fsum(value) AS total
 FROM (SELECT unnest([{names}]) AS quantity,
@@ -88,14 +110,16 @@ FROM (SELECT unnest([{names}]) AS quantity,
       FROM {table})
 GROUP BY quantity
 ORDER BY list_position([{names}], quantity)"""
+    spread = ("mean", "median", "p10", "p90", "min", "max", *(["total"] if total else []))
+    columns = (Column("objects", rows), *(Column(each, each, "number") for each in spread))
+    return Query(name, caption, sql, (Column("quantity", heading, "text"), *columns), note)
 
 
-def summary_columns(heading: str, *, total: bool = True) -> tuple[Column, ...]:
-    """Return the columns of ``summary``; ``total`` only where adding up means something."""
-    numbers = ("mean", "median", "p10", "p90", "min", "max")
-    shown = tuple(Column(name, name, "number") for name in numbers)
-    last = (Column("total", "total", "number"),) if total else ()
-    return (Column("quantity", heading, "text"), Column("objects", "objects"), *shown, *last)
+def histogram(name: str, caption: str, place: str, where: str, *, rows: str = "objects", table: str = "twins") -> Query:
+    """Return the query of how many ``rows`` of a table are at every place ``expression AS name``."""
+    key = place.rpartition(" ")[2]
+    sql = f"SELECT {place}, count(*) AS {rows} FROM {table}\nWHERE {where} GROUP BY {key} ORDER BY {key}"
+    return Query(name, caption, sql)
 
 
 class ReportTables:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from manitwin.dataset.index.query import sql_text
-from manitwin.dataset.statistics.query import Column, Query
+from manitwin.dataset.statistics.query import Column, Query, counts, labels
 from manitwin.pipeline.stage_order import STAGE_ORDER
 from manitwin.twin.record import REJECTION_REASONS
 
@@ -13,6 +13,10 @@ STAGES = tuple(REJECTION_REASONS)
 _ITEMS = """items AS (
   SELECT twin_id, kind, NULL AS stage, NULL AS reason FROM twins
   UNION ALL SELECT twin_id, kind, stage, reason FROM rejections)"""
+_ITEM_COLUMNS = (
+    *counts("items", "accepted", "rejected"),
+    Column("accepted_share", "accepted share [95 %]", "share", ("low", "high")),
+)
 _ORDER = ", ".join(f"({sql_text(stage)}, {position})" for position, stage in enumerate(STAGES))
 
 TOTALS = Query(
@@ -22,12 +26,7 @@ TOTALS = Query(
   accepted / nullif(accepted + rejected, 0) AS accepted_share,
   wilson_low(accepted, accepted + rejected) AS low, wilson_high(accepted, accepted + rejected) AS high
 FROM (SELECT (SELECT count(*) FROM twins) AS accepted, (SELECT count(*) FROM rejections) AS rejected)""",
-    (
-        Column("items", "items"),
-        Column("accepted", "accepted"),
-        Column("rejected", "rejected"),
-        Column("accepted_share", "accepted share [95 %]", "share", ("low", "high")),
-    ),
+    _ITEM_COLUMNS,
     "An item that waits for a backend is neither, and is not here. Intervals of shares of items are Wilson's.",
 )
 
@@ -48,10 +47,7 @@ SELECT stage, entered, passed, entered - passed AS rejected, passed / nullif(ent
   wilson_low(passed, entered) AS low, wilson_high(passed, entered) AS high
 FROM counted ORDER BY position""",
     (
-        Column("stage", "stage", "text"),
-        Column("entered", "entered"),
-        Column("passed", "passed"),
-        Column("rejected", "rejected"),
+        *(*labels("stage"), *counts("entered", "passed", "rejected")),
         Column("passed_share", "passed share [95 %]", "share", ("low", "high")),
     ),
     "The stages are those that can reject. A mesh does not enter generate.",
@@ -67,9 +63,7 @@ SELECT stage, reason, count(*) AS items,
 FROM rejections LEFT JOIN stage_order USING (stage)
 GROUP BY stage, reason, position ORDER BY position, items DESC, reason""",
     (
-        Column("stage", "stage", "text"),
-        Column("reason", "reason", "text"),
-        Column("items", "items"),
+        *(*labels("stage", "reason"), *counts("items")),
         Column("share_of_rejected", "of rejected", "share"),
         Column("share_of_items", "of all items", "share"),
     ),
@@ -84,13 +78,7 @@ SOURCES = Query(
 SELECT kind, items, accepted, items - accepted AS rejected, accepted / items AS accepted_share,
   wilson_low(accepted, items) AS low, wilson_high(accepted, items) AS high
 FROM counted ORDER BY items DESC, kind""",
-    (
-        Column("kind", "source", "text"),
-        Column("items", "items"),
-        Column("accepted", "accepted"),
-        Column("rejected", "rejected"),
-        Column("accepted_share", "accepted share [95 %]", "share", ("low", "high")),
-    ),
+    (Column("kind", "source", "text"), *_ITEM_COLUMNS),
 )
 
 LICENCES = Query(
@@ -117,7 +105,7 @@ FINDINGS = Query(
     """SELECT check_name, count(*) AS twins, count(*) / (SELECT count(*) FROM twins) AS share
 FROM (SELECT unnest(failed_checks) AS check_name FROM twins)
 GROUP BY check_name ORDER BY twins DESC, check_name""",
-    (Column("check_name", "check not passed", "text"), Column("twins", "twins"), Column("share", "share", "share")),
+    (Column("check_name", "check not passed", "text"), *counts("twins"), Column("share", "share", "share")),
     "A finding is shown and can be filtered by; it does not reject.",
 )
 
@@ -129,12 +117,7 @@ CONFIGURATIONS = Query(
 FROM (SELECT config_sha256, seed, true AS accepted FROM twins
       UNION ALL SELECT config_sha256, seed, false FROM rejections)
 GROUP BY config_sha256, seed ORDER BY count(*) DESC, config_sha256, seed""",
-    (
-        Column("configuration", "configuration (sha256)", "text"),
-        Column("seed", "seed"),
-        Column("accepted", "accepted"),
-        Column("rejected", "rejected"),
-    ),
+    (Column("configuration", "configuration (sha256)", "text"), *counts("seed", "accepted", "rejected")),
 )
 
 SAME_SOURCE = Query(
@@ -143,7 +126,7 @@ SAME_SOURCE = Query(
     """SELECT source_sha256, count(*) AS items, string_agg(twin_id, ', ' ORDER BY twin_id) AS twin_ids
 FROM (SELECT source_sha256, twin_id FROM twins UNION ALL SELECT source_sha256, twin_id FROM rejections)
 GROUP BY source_sha256 HAVING count(*) > 1 ORDER BY items DESC, source_sha256""",
-    (Column("items", "items"), Column("twin_ids", "twins", "text")),
+    (*counts("items"), Column("twin_ids", "twins", "text")),
     "The same bytes under another name, unit or up axis are another item.",
 )
 
@@ -160,8 +143,7 @@ COST_BY_STAGE = Query(
   coalesce(fsum(seconds), 0) AS seconds, coalesce(fsum(cost_usd), 0) AS cost_usd
 FROM stages GROUP BY stage ORDER BY {_PLACE}, stage""",
     (
-        Column("stage", "stage", "text"),
-        Column("items", "items"),
+        *(*labels("stage"), *counts("items")),
         Column("cpu_mean", "mean CPU s", "number"),
         Column("cpu_median", "median", "number"),
         Column("cpu_p90", "p90", "number"),
@@ -184,7 +166,7 @@ FROM (SELECT unnest(['CPU s', 'wall s', 'USD']) AS quantity,
         (SELECT count(*) FROM twins) + (SELECT count(*) FROM rejections) AS items
       FROM stages)""",
     (
-        Column("quantity", "quantity", "text"),
+        *labels("quantity"),
         Column("total", "total", "number"),
         Column("per_item", "per item", "number"),
         Column("per_accepted", "per accepted twin", "number"),
@@ -197,14 +179,10 @@ BACKENDS = Query(
     "Code and backends of the stages.",
     f"""SELECT stage, version, backend, count(DISTINCT model) AS models, count(*) AS items
 FROM stages GROUP BY stage, version, backend ORDER BY {_PLACE}, stage, version, backend""",
-    (
-        Column("stage", "stage", "text"),
-        Column("version", "version", "text"),
-        Column("backend", "backend", "text"),
-        Column("models", "different models"),
-        Column("items", "items"),
-    ),
+    (*labels("stage", "version", "backend"), Column("models", "different models"), *counts("items")),
 )
+
+PAPER_COLUMNS = (*labels("metric"), Column("here", "here", "number"), Column("paper", "paper", "given"))
 
 BESIDE_THE_PAPER = Query(
     "beside_the_paper",
@@ -225,11 +203,7 @@ SELECT metric, here, paper::DOUBLE AS paper FROM (
   UNION ALL SELECT 8, 'smallest longest side, m', min(longest_m), 0.02 FROM twins
   UNION ALL SELECT 9, 'largest longest side, m', max(longest_m), 0.37 FROM twins)
 ORDER BY position""",
-    (
-        Column("metric", "metric", "text"),
-        Column("here", "here", "number"),
-        Column("paper", "paper", "given"),
-    ),
+    PAPER_COLUMNS,
     "Published figures: tables 3 and 4 and section 5.3 of the paper. Generation is of images and texts alone: through "
     "generation and the quality gate, of those that could be read. The two sets differ in objects, backends and trial: "
     "the figures stand beside each other, not against each other.",

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from manitwin.dataset.index.query import sql_text
 from manitwin.dataset.statistics.query import PRELUDE as SHARES
-from manitwin.dataset.statistics.query import Column, Query, summary, summary_columns
+from manitwin.dataset.statistics.query import Column, Query, counts, histogram, labels, summary
+from manitwin.dataset.statistics.stage_queries import PAPER_COLUMNS
 from manitwin.episodes.attempts import EXECUTION_FAILURES, OUTCOMES
 
 SUCCEEDED = ("kept", "unplanned_contact", "disturbed")
@@ -35,11 +36,10 @@ CREATE OR REPLACE TEMP MACRO kept(outcome) AS outcome = 'kept';
 
 _COUNTS = """count(*) AS attempted, count(*) FILTER (executed(outcome)) AS executed,
   count(*) FILTER (succeeded(outcome)) AS succeeded, count(*) FILTER (kept(outcome)) AS kept"""
-_RATES = """*, executed / nullif(attempted, 0) AS planned_share, succeeded / nullif(executed, 0) AS rate,
+_RATES = """executed / nullif(attempted, 0) AS planned_share, succeeded / nullif(executed, 0) AS rate,
   wilson_low(succeeded, executed) AS low, wilson_high(succeeded, executed) AS high, kept / nullif(attempted, 0) AS kept_share"""
 _RATE_COLUMNS = (
-    Column("attempted", "attempted"),
-    Column("executed", "executed"),
+    *counts("attempted", "executed"),
     Column("planned_share", "of attempted", "share"),
     Column("succeeded", "succeeded"),
     Column("rate", "of executed [95 %]", "share", ("low", "high")),
@@ -53,9 +53,19 @@ _CATEGORY = "coalesce(nullif(category, ''), 'not told')"
 
 
 def _by(
-    name: str, caption: str, keys: str, columns: tuple[Column, ...], order: str, note: str = "", where: str = ""
+    name: str,
+    caption: str,
+    keys: str,
+    columns: tuple[Column, ...],
+    order: str,
+    *,
+    named: str = "*",
+    note: str = "",
+    where: str = "",
 ) -> Query:
-    sql = f"SELECT {_RATES} FROM (SELECT {keys}, {_COUNTS} FROM attempts {where} GROUP BY ALL) ORDER BY {order}"
+    sql = (
+        f"SELECT {named}, {_RATES} FROM (SELECT {keys}, {_COUNTS} FROM attempts {where} GROUP BY ALL) ORDER BY {order}"
+    )
     return Query(name, caption, sql, (*columns, *_RATE_COLUMNS), note)
 
 
@@ -69,8 +79,7 @@ FROM (SELECT unnest(['attempted', 'set up and standing', 'planned and executed',
         unnest([attempted, started, executed, succeeded, kept]) AS attempts, attempted AS first,
         unnest([NULL, attempted, started, executed, succeeded]) AS before FROM counted)""",
     (
-        Column("step", "step", "text"),
-        Column("attempts", "attempts"),
+        *(*labels("step"), *counts("attempts")),
         Column("of_all", "of all", "share"),
         Column("of_before", "of the step before [95 %]", "share", ("low", "high")),
     ),
@@ -114,12 +123,12 @@ FROM failed GROUP BY reason ORDER BY grasps DESC, reason""",
 
 BY_CATEGORY = _by(
     *("by_category", "Success by category.", f"{_CATEGORY} AS category, count(DISTINCT twin_id) AS objects"),
-    (Column("category", "category", "text"), Column("objects", "objects")),
+    (*labels("category"), *counts("objects")),
     "attempted DESC, category",
 )
 BY_OBJECT = _by(
     *("by_object", "Success by object, the worst first.", "twin_id, max(category) AS category"),
-    (Column("twin_id", "twin", "text"), Column("category", "category", "text")),
+    (Column("twin_id", "twin", "text"), *labels("category")),
     "kept_share, attempted DESC, twin_id",
     where="WHERE twin_id <> ''",
 )
@@ -127,21 +136,14 @@ BY_GRASP_TYPE = _by(
     *("by_grasp_type", "Success by the type of the grasp that was used.", "coalesce(grasp_type, 'none') AS grasp_type"),
     (Column("grasp_type", "grasp type", "text"),),
     "attempted DESC, grasp_type",
-    "Only attempts that found a plan have a grasp.",
-    "WHERE executed(outcome)",
+    note="Only attempts that found a plan have a grasp.",
+    where="WHERE executed(outcome)",
 )
 BY_ROBOT = _by(
     *("by_robot", "Success by robot, with its own grasps and with those of another gripper.", "robot, transferred"),
-    (Column("robot", "robot", "text"), Column("grasps_of", "grasps", "text")),
+    (*labels("robot"), Column("grasps_of", "grasps", "text")),
     "robot, transferred",
-)
-BY_ROBOT = Query(
-    BY_ROBOT.name,
-    BY_ROBOT.caption,
-    BY_ROBOT.sql.replace(
-        "SELECT *,", "SELECT *, CASE WHEN transferred THEN 'transferred' ELSE 'own' END AS grasps_of,", 1
-    ),
-    BY_ROBOT.columns,
+    named="*, CASE WHEN transferred THEN 'transferred' ELSE 'own' END AS grasps_of",
 )
 BY_OTHERS = _by(
     *("by_others", "Success by the number of other objects.", "others"),
@@ -158,52 +160,52 @@ NEVER_KEPT = Query(
 FROM (SELECT twin_id, max(category) AS category, {_COUNTS} FROM attempts WHERE twin_id <> '' GROUP BY twin_id) a
 WHERE kept = 0 ORDER BY attempted DESC, twin_id""",
     (
-        Column("twin_id", "twin", "text"),
-        Column("category", "category", "text"),
-        Column("attempted", "attempted"),
-        Column("executed", "executed"),
-        Column("succeeded", "succeeded"),
+        *(Column("twin_id", "twin", "text"), *labels("category"), *counts("attempted", "executed", "succeeded")),
         Column("outcomes", "what became of them", "text"),
     ),
     "A share over all attempts hides them: none of their episodes is in the data.",
     shown=1000,
 )
 
-_LENGTHS = [("length, s", "length_s"), ("frames", "length_s * 20")]
-LENGTHS = Query(
+LENGTHS = summary(
     "lengths",
     "Lengths of kept episodes.",
-    summary("(SELECT * FROM attempts WHERE kept(outcome))", _LENGTHS),
-    tuple(c if c.name != "objects" else Column("objects", "episodes") for c in summary_columns("quantity")),
+    {"length, s": "length_s", "frames": "length_s * 20"},
+    table="(SELECT * FROM attempts WHERE kept(outcome))",
+    rows="episodes",
+    total=True,
 )
 LENGTH_STEP_S = 0.5
-LENGTH_HISTOGRAM = Query(
+LENGTH_HISTOGRAM = histogram(
     "length_histogram",
     f"Lengths of kept episodes in steps of {LENGTH_STEP_S} s.",
-    f"""SELECT floor(length_s / {LENGTH_STEP_S} + 1e-9)::INT AS step, count(*) AS episodes FROM attempts
-WHERE kept(outcome) AND length_s IS NOT NULL GROUP BY step ORDER BY step""",
+    f"floor(length_s / {LENGTH_STEP_S} + 1e-9)::INT AS step",
+    "kept(outcome) AND length_s IS NOT NULL",
+    rows="episodes",
+    table="attempts",
 )
 
-PLACEMENT = Query(
+PLACEMENT = summary(
     "placement",
     "How well objects are placed.",
-    summary(
-        "(SELECT * FROM attempts WHERE succeeded(outcome))",
-        [
-            ("position error, mm", "position_error_m * 1000"),
-            ("tilt, degrees", "degrees(tilt_rad)"),
-            ("yaw error, degrees", "degrees(yaw_error_rad)"),
-            ("slip in the hand, mm", "slip_m * 1000"),
-        ],
-    ),
-    tuple(c if c.name != "objects" else Column("objects", "episodes") for c in summary_columns("error", total=False)),
-    "Of all that succeeded, of the object at rest after its release, against the goal that was asked for.",
+    {
+        "position error, mm": "position_error_m * 1000",
+        "tilt, degrees": "degrees(tilt_rad)",
+        "yaw error, degrees": "degrees(yaw_error_rad)",
+        "slip in the hand, mm": "slip_m * 1000",
+    },
+    table="(SELECT * FROM attempts WHERE succeeded(outcome))",
+    rows="episodes",
+    heading="error",
+    note="Of all that succeeded, of the object at rest after its release, against the goal that was asked for.",
 )
-PLACEMENT_HISTOGRAM = Query(
+PLACEMENT_HISTOGRAM = histogram(
     "placement_histogram",
     "Position errors of what succeeded, in steps of 1 mm; the last one is 20 mm and more.",
-    """SELECT least(floor(position_error_m * 1000 + 1e-9), 20)::INT AS step, count(*) AS episodes FROM attempts
-WHERE succeeded(outcome) AND position_error_m IS NOT NULL GROUP BY step ORDER BY step""",
+    "least(floor(position_error_m * 1000 + 1e-9), 20)::INT AS step",
+    "succeeded(outcome) AND position_error_m IS NOT NULL",
+    rows="episodes",
+    table="attempts",
 )
 
 FAILED_GRASPS = Query(
@@ -215,12 +217,8 @@ FAILED_GRASPS = Query(
 FROM attempts WHERE executed(outcome) AND grasp_id IS NOT NULL GROUP BY twin_id, category, grasp_id, robot
 HAVING failed > 0 ORDER BY failed DESC, share DESC, twin_id, grasp_id, robot""",
     (
-        Column("twin_id", "twin", "text"),
-        Column("category", "category", "text"),
-        Column("grasp_id", "grasp", "text"),
-        Column("robot", "robot", "text"),
-        Column("executed", "executed"),
-        Column("failed", "failed"),
+        *(Column("twin_id", "twin", "text"), *labels("category"), Column("grasp_id", "grasp", "text")),
+        *(*labels("robot"), *counts("executed", "failed")),
         Column("share", "share", "share"),
         Column("outcomes", "how", "text"),
     ),
@@ -249,8 +247,7 @@ JOINTS = Query(
     "Joint positions and speeds of kept episodes, against the limits of the robot.",
     "SELECT * FROM joints ORDER BY robot, position",
     (
-        Column("robot", "robot", "text"),
-        Column("joint", "joint", "text"),
+        *labels("robot", "joint"),
         Column("lowest_rad", "lowest, rad", "signed"),
         Column("highest_rad", "highest", "signed"),
         Column("lower_rad", "lower limit", "signed"),
@@ -284,12 +281,7 @@ BESIDE_THE_PAPER = Query(
   UNION ALL SELECT 8, 'success of executed, %', 100 * count(*) FILTER (succeeded(outcome))
       / nullif(count(*) FILTER (executed(outcome)), 0), NULL, 'the paper does not say' FROM attempts)
 ORDER BY position""",
-    (
-        Column("metric", "metric", "text"),
-        Column("here", "here", "number"),
-        Column("paper", "paper", "given"),
-        Column("comparable", "what is compared", "text"),
-    ),
+    (*PAPER_COLUMNS, Column("comparable", "what is compared", "text")),
     "Published figures: the paper's table of data generation statistics.",
 )
 
