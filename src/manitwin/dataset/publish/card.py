@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from manitwin.dataset.publish.card_statistics import category_lines, licence_lines, total_lines
 from manitwin.dataset.publish.licences import LICENSES_MD, hub_license, without_attribution
-from manitwin.dataset.publish.tables import PUBLISHED, columns_of
+from manitwin.dataset.publish.tables import columns_of
 from manitwin.formats.installation import installed_version
 from manitwin.formats.markdown import markdown_escaped, table
 
-TASK_CATEGORIES = ("robotics",)
 TAGS = ("robotics", "manipulation", "grasping", "simulation", "digital-twin", "3d", "webdataset")
 
 _SIZES = (("n<1K", 10**3), ("1K<n<10K", 10**4), ("10K<n<100K", 10**5), ("100K<n<1M", 10**6), ("1M<n<10M", 10**7))
@@ -45,10 +44,10 @@ class CardFacts:
 def dataset_card(facts: CardFacts) -> str:
     """Return README.md: front matter that the hub and ``datasets`` read, statistics, how to load, frames and licences."""
     verified = sum(twin["verified"] for twin in facts.twins)
+    licences = [twin["license"] for twin in facts.twins]
+    configs = {name: f"index/{name}-*.parquet" for name in _TABLES}
     lines = [
-        "---",
-        *_front_matter(facts),
-        "---",
+        *front_matter(facts.name, licences, len(facts.twins), TAGS, configs),
         "",
         f"# {markdown_escaped(facts.name)}",
         "",
@@ -74,13 +73,11 @@ def dataset_card(facts: CardFacts) -> str:
         "",
         *usage_text(facts),
         "",
-        "## Licences and attribution",
-        "",
-        *licence_lines(facts.twins),
-        "",
-        f"Every twin stays under the licence of its source; whom to credit is in [{LICENSES_MD}]({LICENSES_MD}), and for "
-        "each twin in the columns `license` and `attribution` of the table `twins`.",
-        *_missing_attribution(facts),
+        *licence_section(
+            facts.twins,
+            f"Every twin stays under the licence of its source; whom to credit is in [{LICENSES_MD}]({LICENSES_MD}), and for "
+            "each twin in the columns `license` and `attribution` of the table `twins`.",
+        ),
         "",
         f"Made with manitwin {installed_version()}.",
     ]
@@ -101,36 +98,33 @@ def size_category(count: int) -> str:
     return next((word for word, limit in _SIZES if count < limit), "10M<n<100M")
 
 
-def _front_matter(facts: CardFacts) -> list[str]:
-    licence = hub_license(twin["license"] for twin in facts.twins)
-    lines = [f"{key}: {_quoted(value)}" for key, value in {"pretty_name": facts.name, **licence}.items()]
-    lines += ["size_categories:", f"- {_quoted(size_category(len(facts.twins)))}"]
-    lines += ["task_categories:", *[f"- {each}" for each in TASK_CATEGORIES]]
-    lines += ["tags:", *[f"- {each}" for each in TAGS], "configs:"]
-    for name in (*PUBLISHED, "shards"):
-        lines += [f"- config_name: {name}", *(["  default: true"] if name == "twins" else [])]
-        lines += ["  data_files:", "  - split: train", f"    path: index/{name}-*.parquet"]
-    return lines
-
-
-def _quoted(text: str) -> str:
-    return json.dumps(text)  # a JSON string is a YAML string
+def front_matter(
+    name: str, licences: Iterable[str], rows: int, tags: Sequence[str], configs: Mapping[str, str]
+) -> list[str]:
+    """Return the lines of a card's front matter; ``configs`` are paths of tables by their name, the default one first."""
+    fields = {"pretty_name": name, **hub_license(licences)}
+    lines = ["---", *(f"{key}: {json.dumps(value)}" for key, value in fields.items())]  # a JSON string is a YAML string
+    lines += ["size_categories:", f"- {json.dumps(size_category(rows))}"]
+    lines += ["task_categories:", "- robotics", "tags:", *[f"- {each}" for each in tags], "configs:"]
+    for number, (config, path) in enumerate(configs.items()):
+        lines += [f"- config_name: {config}", *(["  default: true"] if number == 0 else [])]
+        lines += ["  data_files:", "  - split: train", f"    path: {path}"]
+    return [*lines, "---"]
 
 
 def _table_rows(facts: CardFacts) -> list[list[str]]:
     return [
-        [f"`{name}`", f"{_TABLES[name]} ({len(columns_of(name))} columns)", f"{facts.rows[name]:,}"]
-        for name in (*PUBLISHED, "shards")
+        [f"`{name}`", f"{_TABLES[name]} ({len(columns_of(name))} columns)", f"{facts.rows[name]:,}"] for name in _TABLES
     ]
 
 
-def _missing_attribution(facts: CardFacts) -> list[str]:
-    missing = len(without_attribution(facts.twins))
-    return (
-        ["", f"**Of {missing:,} twins under a licence that asks for attribution no author is known.**"]
-        if missing
-        else []
-    )
+def licence_section(twins: Sequence[Mapping[str, Any]], terms: str) -> list[str]:
+    """Return the lines of the card's section on licences: their table, the terms, and whether authors are unknown."""
+    lines = ["## Licences and attribution", "", *licence_lines(twins), "", terms]
+    missing = len(without_attribution(twins))
+    if missing:
+        lines += ["", f"**Of {missing:,} twins under a licence that asks for attribution no author is known.**"]
+    return lines
 
 
 _TEXT = """\

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -40,17 +40,18 @@ def total_lines(twins: Rows) -> list[str]:
     totals = [
         ["twins", f"{len(twins):,}"],
         ["categories", f"{len({twin['category'] for twin in twins}):,}"],
-        ["made of", _counted(twins, "kind")],
+        ["made of", _counted(twin["kind"] for twin in twins)],
         ["grasps tried in physics", f"{simulated:,}"],
         ["grasps verified", f"{verified:,}{_share(verified, simulated)}"],
-        ["gripper", _counted(twins, "gripper")],
+        ["gripper", _counted(str(twin["gripper"]) for twin in twins)],
         ["held in a second engine too, mean over twins", _mean_share(opinions)],
         ["functional points", f"{sum(twin['functional_points'] for twin in twins):,}"],
         ["grasp points", f"{sum(twin['grasp_points'] for twin in twins):,}"],
         ["stable poses", f"{sum(twin['placements'] for twin in twins):,}"],
         ["watertight", f"{sum(twin['watertight'] for twin in twins):,}"],
         ["with a failed quality check", f"{sum(bool(twin['failed_checks']) for twin in twins):,}"],
-        ["where the masses come from", _mass_sources(twins)],
+        # prior:mug and prior:bowl are both prior
+        ["where the masses come from", _counted(twin["mass_source"].partition(":")[0] for twin in twins)],
     ]
     spread = [
         _spread("longest side (m)", [twin["longest_m"] for twin in twins]),
@@ -87,14 +88,8 @@ def licence_lines(twins: Rows) -> list[str]:
     return table(["licence", "twins", "with attribution"], rows)
 
 
-def _counted(twins: Rows, column: str) -> str:
-    count = Counter(str(twin[column]) for twin in twins)
-    return ", ".join(f"{markdown_escaped(name)} {number:,}" for name, number in sorted(count.items()))
-
-
-def _mass_sources(twins: Rows) -> str:
-    """Count masses by who said so: ``prior:mug`` and ``prior:bowl`` are both ``prior``."""
-    count = Counter(twin["mass_source"].partition(":")[0] for twin in twins)
+def _counted(words: Iterable[str]) -> str:
+    count = Counter(words)
     return ", ".join(f"{markdown_escaped(name)} {number:,}" for name, number in sorted(count.items()))
 
 

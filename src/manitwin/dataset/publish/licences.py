@@ -66,14 +66,14 @@ def select(
     allowed = Allowed.of(allow)
     published, kept_back, left_out, rehearsals = set[str](), set[str](), Counter[str](), 0
     for twin in twins:
-        if not with_rehearsals and REHEARSAL in twin["failed_checks"] and allowed.has(twin["license"]):
-            kept_back.add(twin["twin_id"])
-            rehearsals += 1
-        elif allowed.has(twin["license"]):
-            published.add(twin["twin_id"])
-        else:
-            kept_back.add(twin["twin_id"])
+        if not allowed.has(twin["license"]):
             left_out[twin["license"] or UNKNOWN] += 1
+        elif not with_rehearsals and REHEARSAL in twin["failed_checks"]:
+            rehearsals += 1
+        else:
+            published.add(twin["twin_id"])
+            continue
+        kept_back.add(twin["twin_id"])
     check_some_go_out("accepted twin", len(published), left_out, rehearsals)
     return Selection(frozenset(published), frozenset(kept_back), dict(sorted(left_out.items())), rehearsals)
 
@@ -110,15 +110,13 @@ def licenses_page(name: str, twins: Sequence[Mapping[str, Any]], *, introduction
     for twin in twins:
         authors = by_licence.setdefault(twin["license"], {})
         authors.setdefault(twin["attribution"] or "", []).append(twin["twin_id"])
+    counted = [[_linked(name), f"{sum(map(len, ids.values())):,}"] for name, ids in sorted(by_licence.items())]
     lines = [
         f"# Licences of {markdown_escaped(name)}",
         "",
         introduction,
         "",
-        *table(
-            ["licence", "twins"],
-            [[_linked(k), f"{sum(map(len, v.values())):,}"] for k, v in sorted(by_licence.items())],
-        ),
+        *table(["licence", "twins"], counted),
     ]
     missing = without_attribution(twins)
     if missing:
@@ -133,12 +131,10 @@ def licenses_page(name: str, twins: Sequence[Mapping[str, Any]], *, introduction
 
 
 def _linked(licence: str) -> str:
-    spdx = licence != UNKNOWN and not licence.startswith("LicenseRef-") and " " not in licence
-    return (
-        f"[{markdown_escaped(licence)}](https://spdx.org/licenses/{licence}.html)"
-        if spdx
-        else markdown_escaped(licence)
-    )
+    words = markdown_escaped(licence)
+    if licence == UNKNOWN or licence.startswith("LicenseRef-") or " " in licence:
+        return words
+    return f"[{words}](https://spdx.org/licenses/{licence}.html)"
 
 
 HUB_LICENSES = frozenset(

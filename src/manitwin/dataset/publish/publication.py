@@ -29,7 +29,7 @@ from manitwin.twin.store import canonical_json, sha256_of_file
 SUMS = "SHA256SUMS"
 OPEN = ".publish"
 _STARTED = f"{OPEN}/started"
-_INCOMING, _SCRATCH = "incoming-", "scratch-"
+_SCRATCH = "scratch-"
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Publication:
     def write_shard(self, shard: Shard, write: Callable[[BinaryIO], None]) -> None:
         """Write a shard to a temporary file, put it in its place and note that it is there."""
         receipt = _receipt_name(shard.name)
-        with self._incoming() as scratch:
+        with self.scratch() as scratch:
             path = scratch / "shard.tar"
             with path.open("wb") as stream:
                 write(stream)
@@ -136,7 +136,12 @@ class Publication:
     def put(self, path: Path, name: str) -> None:
         """Take a finished file of the root's own file system to its place."""
         self.digests[name], self.sizes[name] = sha256_of_file(path), path.stat().st_size
-        self._place(path, name)
+        if self.root.local is None:
+            self.root.put_file(path, name)
+            return
+        place = self.root.local / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        os.replace(path, place)
 
     def write(self, name: str, content: bytes) -> None:
         """Write a small file."""
@@ -184,21 +189,6 @@ class Publication:
             for folder in (opened, *fresh):
                 if folder.is_dir() and not any(folder.iterdir()):
                     folder.rmdir()
-
-    @contextmanager
-    def _incoming(self) -> Iterator[Path]:
-        """Yield a temporary folder: on the root's own file system where that is local."""
-        place = None if self.root.local is None else self.root.local / OPEN
-        with tempfile.TemporaryDirectory(prefix=_INCOMING, dir=place) as scratch:
-            yield Path(scratch)
-
-    def _place(self, path: Path, name: str) -> None:
-        if self.root.local is None:
-            self.root.put_file(path, name)
-            return
-        place = self.root.local / name
-        place.parent.mkdir(parents=True, exist_ok=True)
-        os.replace(path, place)
 
     def _write_receipt(self, row: dict[str, Any]) -> None:
         self.root.write_bytes(_receipt_name(row["shard"]), canonical_json(row).encode())

@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import pyarrow as pa
+
 from manitwin.dataset.index.part_list import PartList
 from manitwin.dataset.index.tables import parquet
 from manitwin.dataset.publish.card import CardFacts, dataset_card
@@ -20,11 +22,11 @@ from manitwin.dataset.publish.shards import write_shard
 from manitwin.dataset.publish.tables import (
     INDEX,
     PUBLISHED,
+    SHARDS,
     SHARDS_FILE,
     parts_of_index,
     published_rows,
     rows_of_table,
-    shards_table,
 )
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
@@ -172,7 +174,8 @@ def _write_tables(
             publication.write(f"{INDEX}/{table}-{number:05d}.parquet", parquet(each))
             counts[table] += len(each)
         twins += rows["twins"].select(list(COLUMNS)).to_pylist()
-    publication.write(SHARDS_FILE, shards_table([publication.row(shard) for shard in shards]))
+    written = pa.Table.from_pylist([publication.row(shard) for shard in shards], schema=SHARDS)
+    publication.write(SHARDS_FILE, parquet(written))
     return twins, counts
 
 

@@ -19,14 +19,12 @@ from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
-from pydantic import ValidationError
-
 from manitwin.dataset.publish.privacy import check_part, check_source
 from manitwin.dataset.publish.shard_plan import VIEWS, Shard, ShardTwin
 from manitwin.errors import TwinError, UsageError
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.record import TwinRecord
-from manitwin.twin.store import RECORD, RUN, canonical_json, read_record, replace_folder, revision_of
+from manitwin.twin.store import RECORD, RUN, canonical_json, parse_record, read_record, replace_folder, revision_of
 
 KEY = re.compile(r"[0-9A-Za-z_-]+")
 """What can be the key of a sample and the name of a folder."""
@@ -79,12 +77,8 @@ def _contents(root: DatasetRoot, folder: str, names: list[str]) -> dict[str, byt
 
 def _record(root: DatasetRoot, twin: ShardTwin, content: bytes) -> TwinRecord:
     place = f"{root.full(root.twin_name(twin.twin_id))}/{RECORD}"
-    try:
-        data = json.loads(content)
-        record = TwinRecord(**data)
-    except (ValueError, TypeError, ValidationError) as error:
-        raise TwinError(f"{place}: cannot be read ({str(error).splitlines()[0]}); build the twin again") from error
-    if revision_of(data) != record.revision:
+    record = parse_record(content, place)
+    if revision_of(json.loads(content)) != record.revision:
         raise TwinError(f"{place}: altered since it was written; build the twin again")
     if (record.twin_id, record.revision) != (twin.twin_id, twin.revision):
         raise UsageError(f"{place}: not the revision that the index has; run manitwin index {root.url}")

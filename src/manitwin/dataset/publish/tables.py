@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from manitwin.dataset.index.part_list import PartList, read_part_list
 from manitwin.dataset.index.parts import file_system, files_of, merged, read_rows
-from manitwin.dataset.index.tables import TABLES, parquet
+from manitwin.dataset.index.tables import TABLES
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -35,11 +35,8 @@ def parts_of_index(root: DatasetRoot, finished: set[str]) -> PartList:
     parts = read_part_list(root)
     if parts is None or not parts.parts:
         raise UsageError(f"{root.url}: has no index; run manitwin index {root.url}")
-    files, fs = files_of(root, parts.parts), file_system(root)
     indexed = {
-        twin_id
-        for table in ("twins", "rejections")
-        for twin_id in read_rows(files, table, fs, columns=["twin_id"])["twin_id"].to_pylist()
+        row["twin_id"] for table in ("twins", "rejections") for row in rows_of_table(root, parts, table, ["twin_id"])
     }
     if indexed != finished:
         raise UsageError(
@@ -69,11 +66,6 @@ def published_rows(
             continue
         shards = pa.array([shard_of[twin_id] for twin_id in twins["twin_id"].to_pylist()], pa.string())
         yield {table: rows[table] for table in PUBLISHED} | {"twins": twins.append_column("shard", shards)}
-
-
-def shards_table(rows: list[dict[str, Any]]) -> bytes:
-    """Return the list of shards as Parquet."""
-    return parquet(pa.Table.from_pylist(rows, schema=SHARDS))
 
 
 def columns_of(table: str) -> list[str]:

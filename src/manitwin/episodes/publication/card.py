@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
-from manitwin.dataset.publish.card import size_category
-from manitwin.dataset.publish.card_statistics import licence_lines
-from manitwin.dataset.publish.licences import LICENSES_MD, hub_license, without_attribution
-from manitwin.episodes.attempts import Success, Tally
-from manitwin.episodes.publication.choose import TwinInEpisodes
+from manitwin.dataset.publish.card import front_matter, licence_section
+from manitwin.dataset.publish.licences import LICENSES_MD
+from manitwin.episodes.attempts import ATTEMPTS, Success, Tally
 from manitwin.formats.markdown import markdown_escaped, table
 
 TAGS = ("LeRobot", "robotics", "manipulation", "pick-and-place", "simulation", "synthetic")
-ATTEMPTS_FILE, TWINS_FILE = "attempts.parquet", "twins.parquet"
-CONFIGS = {"default": "data/*/*.parquet", "attempts": ATTEMPTS_FILE, "twins": TWINS_FILE}
+TWINS_FILE = "twins.parquet"
+CONFIGS = {"default": "data/*/*.parquet", "attempts": ATTEMPTS, "twins": TWINS_FILE}
 CATEGORIES_SHOWN, NEVER_SHOWN = 50, 200
 
 OF_EPISODES = (
@@ -27,11 +24,14 @@ OF_EPISODES = (
 
 @dataclass(frozen=True)
 class EpisodesCard:
-    """The card's facts. ``info`` is meta/info.json; ``made_of`` names the data set, scenes and versions, without folders."""
+    """The card's facts: ``twins`` are rows of the table of twins.
+
+    ``info`` is meta/info.json; ``made_of`` names the data set, scenes and versions, without folders.
+    """
 
     name: str
     info: Mapping[str, Any]
-    twins: Sequence[TwinInEpisodes]
+    twins: Sequence[Mapping[str, Any]]
     success: Success
     left_out: Mapping[str, int]
     attempt_rows: int
@@ -40,8 +40,9 @@ class EpisodesCard:
 
 def episodes_card(facts: EpisodesCard) -> str:
     """Return README.md."""
+    licences = [twin["license"] for twin in facts.twins]
     lines = [
-        *_front_matter(facts),
+        *front_matter(facts.name, licences, facts.info["total_frames"], TAGS, CONFIGS),
         "",
         *_introduction(facts),
         "",
@@ -50,7 +51,11 @@ def episodes_card(facts: EpisodesCard) -> str:
         "",
         *_success(facts.success),
         "",
-        *_licences(facts),
+        *licence_section(
+            facts.twins,
+            "An episode stays under the licences of all objects in it; whom to credit is in "
+            f"[{LICENSES_MD}]({LICENSES_MD}).",
+        ),
         "",
         "## How it was made",
         "",
@@ -85,7 +90,7 @@ def _contents(facts: EpisodesCard) -> list[str]:
         ["episodes", f"{info['total_episodes']:,}"],
         ["frames", f"{info['total_frames']:,} at {info['fps']} a second ({hours:.2f} hours)"],
         ["tasks (phrasings)", f"{info['total_tasks']:,}"],
-        ["objects in them", f"{sum(bool(twin.episodes) for twin in facts.twins):,}"],
+        ["objects in them", f"{sum(bool(twin['episodes']) for twin in facts.twins):,}"],
         ["cameras", _cameras(info)],
     ]
     return [
@@ -97,32 +102,9 @@ def _contents(facts: EpisodesCard) -> list[str]:
         "",
         "SI units, radians, world frame (the robot's base at the origin, +X forward, +Z up), quaternions wxyz.",
         "",
-        f"`{ATTEMPTS_FILE}` has {facts.attempt_rows:,} attempts, kept or not, with the reason; `{TWINS_FILE}` the objects. "
+        f"`{ATTEMPTS}` has {facts.attempt_rows:,} attempts, kept or not, with the reason; `{TWINS_FILE}` the objects. "
         "`sha256sum -c SHA256SUMS` checks every file.",
     ]
-
-
-def _licences(facts: EpisodesCard) -> list[str]:
-    return [
-        "## Licences and attribution",
-        "",
-        *licence_lines([asdict(twin) for twin in facts.twins]),
-        "",
-        f"An episode stays under the licences of all objects in it; whom to credit is in [{LICENSES_MD}]({LICENSES_MD}).",
-        *_missing_attribution(facts),
-    ]
-
-
-def _front_matter(facts: EpisodesCard) -> list[str]:
-    licence = hub_license(twin.license for twin in facts.twins)
-    fields = {"pretty_name": facts.name, **licence}
-    lines = ["---", *(f"{key}: {json.dumps(value)}" for key, value in fields.items())]
-    lines += ["size_categories:", f"- {json.dumps(size_category(facts.info['total_frames']))}"]
-    lines += ["task_categories:", "- robotics", "tags:", *[f"- {each}" for each in TAGS], "configs:"]
-    for name, path in CONFIGS.items():
-        lines += [f"- config_name: {name}", *(["  default: true"] if name == "default" else [])]
-        lines += ["  data_files:", "  - split: train", f"    path: {path}"]
-    return [*lines, "---"]
 
 
 def _features(info: Mapping[str, Any]) -> list[list[str]]:
@@ -155,7 +137,7 @@ def _success(success: Success) -> list[str]:
         return [*lines, "Every object that was tried succeeded at least once."]
     shown = ", ".join(f"{markdown_escaped(category)} `{twin_id}`" for twin_id, category in success.never[:NEVER_SHOWN])
     rest = len(success.never) - NEVER_SHOWN
-    more = f", and {rest:,} more (see `{ATTEMPTS_FILE}`)" if rest > 0 else ""
+    more = f", and {rest:,} more (see `{ATTEMPTS}`)" if rest > 0 else ""
     return [
         *lines,
         f"**Objects without a single success**, which no episode moves ({len(success.never):,}): {shown}{more}.",
@@ -177,12 +159,3 @@ def _left_out(facts: EpisodesCard) -> list[str]:
         f"({why}), and all attempts at such objects. The success rates below count every attempt at the objects that "
         "may go out, whatever stood around.",
     ]
-
-
-def _missing_attribution(facts: EpisodesCard) -> list[str]:
-    missing = len(without_attribution([asdict(twin) for twin in facts.twins]))
-    return (
-        ["", f"**Of {missing:,} twins under a licence that asks for attribution no author is known.**"]
-        if missing
-        else []
-    )

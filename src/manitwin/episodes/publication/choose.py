@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +48,11 @@ class Chosen:
     left_out: dict[str, int]
     allowed_targets: frozenset[str]
     rehearsals: int = 0
+
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The twins as rows."""
+        return [asdict(twin) for twin in self.twins]
 
     def tells_of(self, attempt: Attempt) -> bool:
         """Tell whether success rates may count an attempt: its object's licence allows it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Iterator, Set
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, cast
@@ -18,21 +18,14 @@ from manitwin.dataset.publish.licences import LICENSES_MD, licenses_page, withou
 from manitwin.dataset.publish.privacy import check_words, places_of
 from manitwin.dataset.publish.publication import EPISODES, Publication
 from manitwin.engine.ledger.location import CONFIG
-from manitwin.episodes.attempts import ATTEMPTS, Attempt, merge_attempts, read_attempts, success_of, write_attempts
+from manitwin.episodes.attempts import ATTEMPTS, Success, merge_attempts, read_attempts, success_of, write_attempts
 from manitwin.episodes.collect import batch_folders, stored_episodes
 from manitwin.episodes.episode_pictures import PICTURES, batch_name, read_pictures
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip, video_facts
 from manitwin.episodes.lerobot.write import write_lerobot
-from manitwin.episodes.publication.card import (
-    ATTEMPTS_FILE,
-    OF_EPISODES,
-    TWINS_FILE,
-    EpisodesCard,
-    episodes_card,
-)
+from manitwin.episodes.publication.card import OF_EPISODES, TWINS_FILE, EpisodesCard, episodes_card
 from manitwin.episodes.publication.choose import Chosen, choose_episodes
-from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.video import Codec, EpisodesVideo
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.formats.installation import installed_version
@@ -154,11 +147,12 @@ def publish_episodes(
         with publication.scratch() as scratch:
             made = scratch / "made"
             films = films_of(episodes, batches, chosen.index_of.keys(), scratch / "films")
-            write_lerobot(_chosen_episodes(batches, chosen), made, videos=films)
+            kept = (each for each in stored_episodes(batches) if each.attempt.episode_id in chosen.index_of)
+            write_lerobot(kept, made, videos=films)
             checked = read_lerobot(made)
-            _write_tables(episodes, chosen, made)
-            rows = pq.read_metadata(made / ATTEMPTS_FILE).num_rows
-            pages = _pages(title, checked, chosen, _success_attempts(episodes, chosen), rows, said)
+            rows = _write_tables(episodes, chosen, made)
+            success = success_of(each for each in read_attempts(episodes / ATTEMPTS) if chosen.tells_of(each))
+            pages = _pages(title, checked, chosen, success, rows, said)
             places = places_of([DatasetRoot(episodes), source.root, publication.root])
             for page, words in {**pages, "meta/tasks.parquet": "\n".join(checked.tasks)}.items():
                 check_words(page, words, places, EpisodesError)
@@ -175,7 +169,7 @@ def publish_episodes(
         frames=checked.info["total_frames"],
         twins=len(chosen.twins),
         left_out=chosen.left_out,
-        without_attribution=len(without_attribution([asdict(twin) for twin in chosen.twins])),
+        without_attribution=len(without_attribution(chosen.rows)),
         files=len(publication.sizes) + 1,
         bytes=sum(publication.sizes.values()),
         rehearsals=chosen.rehearsals,
@@ -196,26 +190,19 @@ def _configuration(episodes: Path) -> dict[str, Any]:
     return said
 
 
-def _chosen_episodes(batches: list[Path], chosen: Chosen) -> Iterator[StoredEpisode]:
-    return (each for each in stored_episodes(batches) if each.attempt.episode_id in chosen.index_of)
-
-
-def _success_attempts(episodes: Path, chosen: Chosen) -> Iterator[Attempt]:
-    return (attempt for attempt in read_attempts(episodes / ATTEMPTS) if chosen.tells_of(attempt))
-
-
-def _write_tables(episodes: Path, chosen: Chosen, made: Path) -> None:
-    """Write the attempts that go out, numbered as the episodes are, and the twins."""
-    unnumbered = made / f".{ATTEMPTS_FILE}"
+def _write_tables(episodes: Path, chosen: Chosen, made: Path) -> int:
+    """Write the attempts that go out, numbered as the episodes are, and the twins; return how many attempts."""
+    unnumbered = made / f".{ATTEMPTS}"
     write_attempts(unnumbered, (each for each in read_attempts(episodes / ATTEMPTS) if chosen.publishes(each)))
-    merge_attempts([unnumbered], made / ATTEMPTS_FILE)
+    rows, _ = merge_attempts([unnumbered], made / ATTEMPTS)
     unnumbered.unlink()
-    twins = pa.Table.from_pylist([asdict(twin) for twin in chosen.twins], schema=TWINS_SCHEMA)
+    twins = pa.Table.from_pylist(chosen.rows, schema=TWINS_SCHEMA)
     pq.write_table(twins, made / TWINS_FILE, compression="zstd", version="2.6")
+    return rows
 
 
 def _pages(
-    title: str, checked: LeRobotSet, chosen: Chosen, attempts: Iterator[Attempt], rows: int, said: dict[str, Any]
+    title: str, checked: LeRobotSet, chosen: Chosen, success: Success, rows: int, said: dict[str, Any]
 ) -> dict[str, str]:
     made_of = {"objects": f"data set {Path(said['dataset']).name}"}
     if said["scenes"]:
@@ -229,6 +216,6 @@ def _pages(
         "twins": f"in the revisions that {TWINS_FILE} names",
         "published with": f"manitwin {installed_version()}",
     }
-    facts = EpisodesCard(title, checked.info, chosen.twins, success_of(attempts), chosen.left_out, rows, made_of)
-    licences = licenses_page(title, [asdict(twin) for twin in chosen.twins], introduction=OF_EPISODES)
+    facts = EpisodesCard(title, checked.info, chosen.rows, success, chosen.left_out, rows, made_of)
+    licences = licenses_page(title, chosen.rows, introduction=OF_EPISODES)
     return {LICENSES_MD: licences, README: episodes_card(facts)}
