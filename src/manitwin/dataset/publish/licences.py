@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from manitwin.errors import UsageError
 from manitwin.formats.markdown import markdown_escaped, table
 from manitwin.pipeline.quality import REHEARSAL
 
 UNKNOWN = "unknown"
+A_REHEARSAL = ""
+"""No licence: the reason of what stays though its licences let it go."""
 LICENSES_MD = "LICENSES.md"
 
 _IDS_SHOWN = 50
@@ -25,72 +27,76 @@ OF_TWINS = (
 _HUB_NAMES = {"odbl-1.0": "odbl", "odc-by-1.0": "odc-by", "pddl-1.0": "pddl"}
 
 
+class Terms(NamedTuple):
+    """What decides on a twin: its licence, and whether a rehearsal server (``manitwin fake``) had a part in it."""
+
+    licence: str
+    rehearsal: bool
+
+
 @dataclass(frozen=True)
 class Selection:
-    """The ids of the twins that go out and of those that stay here, and how many of these there are by licence.
+    """The ids that go out, numbered as they came, those that stay here, and how many of these there are by licence.
 
-    ``rehearsals`` are those that stay although their licence lets them go: a rehearsal server made part of them.
+    ``rehearsals`` are those that stay although their licences let them go: a rehearsal server made part of them.
     """
 
-    published: frozenset[str]
+    published: dict[str, int]
     kept_back: frozenset[str]
     left_out: dict[str, int]
-    rehearsals: int = 0
+    rehearsals: int
 
 
-@dataclass(frozen=True)
 class Allowed:
-    """The licences that may go out: those that are named, in lower case; None: all that are known."""
+    """The terms under which twins may go out: licences by name, in any case (None: all that are known), and rehearsals."""
 
-    named: frozenset[str] | None
+    def __init__(self, licences: Iterable[str] | None, with_rehearsals: bool):
+        self._named = None if licences is None else {name.strip().lower() for name in licences if name.strip()}
+        self._with_rehearsals = with_rehearsals
 
-    @classmethod
-    def of(cls, names: Iterable[str] | None) -> Allowed:
-        """Take licences by name, in any case."""
-        return cls(None if names is None else frozenset(name.strip().lower() for name in names if name.strip()))
+    def refusal(self, twins: Sequence[Terms]) -> str | None:
+        """Return why what shows these twins may not go out, None where it may: ``CC-BY-NC-4.0 + unknown``, or ``A_REHEARSAL``."""
+        forbidden = {twin.licence for twin in twins if not self._has(twin.licence.lower())}
+        if forbidden:
+            return " + ".join(sorted(forbidden))
+        return None if self._with_rehearsals or not any(twin.rehearsal for twin in twins) else A_REHEARSAL
 
-    def has(self, licence: str | None) -> bool:
-        """Tell whether a licence may go out; None is the unknown one."""
-        lower = (licence or UNKNOWN).lower()
-        return lower != UNKNOWN if self.named is None else lower in self.named
+    def _has(self, licence: str) -> bool:
+        return licence != UNKNOWN if self._named is None else licence in self._named
 
 
-def select(
-    twins: Iterable[Mapping[str, Any]], allow: Iterable[str] | None, *, with_rehearsals: bool = False
-) -> Selection:
-    """Choose the twins whose licence is named in ``allow`` (in any case), or known at all where nothing is named.
-
-    Those that a rehearsal server had a part in stay here unless ``with_rehearsals``. ``twins`` are rows with ``twin_id``,
-    ``license`` and ``failed_checks``. Raises UsageError where nothing may go out.
-    """
-    allowed = Allowed.of(allow)
-    published, kept_back, left_out, rehearsals = set[str](), set[str](), Counter[str](), 0
+def terms_of(twins: Iterable[Mapping[str, Any]]) -> Iterator[tuple[str, list[Terms]]]:
+    """Yield the id and the terms of twins, rows with ``twin_id``, ``license`` and ``failed_checks``."""
     for twin in twins:
-        if not allowed.has(twin["license"]):
-            left_out[twin["license"] or UNKNOWN] += 1
-        elif not with_rehearsals and REHEARSAL in twin["failed_checks"]:
-            rehearsals += 1
+        yield twin["twin_id"], [Terms(twin["license"] or UNKNOWN, REHEARSAL in twin["failed_checks"])]
+
+
+def select(noun: str, things: Iterable[tuple[str, Sequence[Terms]]], allowed: Allowed) -> Selection:
+    """Choose among things by id those whose twins are all allowed; raises UsageError where nothing may go out."""
+    published, kept_back, left_out = dict[str, int](), set[str](), Counter[str]()
+    for name, twins in things:
+        why = allowed.refusal(twins)
+        if why is None:
+            published[name] = len(published)
         else:
-            published.add(twin["twin_id"])
-            continue
-        kept_back.add(twin["twin_id"])
-    check_some_go_out("accepted twin", len(published), left_out, rehearsals)
-    return Selection(frozenset(published), frozenset(kept_back), dict(sorted(left_out.items())), rehearsals)
+            kept_back.add(name)
+            left_out[why] += 1
+    rehearsals = left_out.pop(A_REHEARSAL, 0)
+    if not published:
+        raise _nothing_goes_out(noun, left_out, rehearsals)
+    return Selection(published, frozenset(kept_back), dict(sorted(left_out.items())), rehearsals)
 
 
-def check_some_go_out(noun: str, count: int, left_out: Mapping[str, int], rehearsals: int) -> None:
-    """Raise UsageError where the ``count`` of what goes out is 0; others stay by licence, or because they are rehearsals."""
-    if count:
-        return
+def _nothing_goes_out(noun: str, left_out: Mapping[str, int], rehearsals: int) -> UsageError:
     if rehearsals:
-        raise UsageError(
+        return UsageError(
             f"no {noun} may go out: {rehearsals:,} are rehearsals, made by manitwin fake and not by models; build the"
             " twins again with models into a new folder, or ask for them with --with-rehearsals"
         )
     if not left_out:
-        raise UsageError(f"no {noun} is there, so nothing can go out; make some first")
+        return UsageError(f"no {noun} is there, so nothing can go out; make some first")
     there = ", ".join(f"{name} ({count})" for name, count in sorted(left_out.items()))
-    raise UsageError(
+    return UsageError(
         f"no {noun} may go out; licences that keep them here: {there}; name those that may in --license-allow,"
         f" {UNKNOWN!r} too if you know that you may"
     )

@@ -14,7 +14,15 @@ from manitwin.dataset.index.part_list import PartList
 from manitwin.dataset.index.tables import parquet
 from manitwin.dataset.publish.card import CardFacts, dataset_card
 from manitwin.dataset.publish.card_statistics import COLUMNS
-from manitwin.dataset.publish.licences import LICENSES_MD, Selection, licenses_page, select, without_attribution
+from manitwin.dataset.publish.licences import (
+    LICENSES_MD,
+    Allowed,
+    Selection,
+    licenses_page,
+    select,
+    terms_of,
+    without_attribution,
+)
 from manitwin.dataset.publish.privacy import places_of
 from manitwin.dataset.publish.publication import Publication
 from manitwin.dataset.publish.shard_plan import HUB_FILE_BYTES, Shard, ShardTwin, plan_shards, tar_bytes_of_twins
@@ -98,7 +106,7 @@ def publish_dataset(
     columns = ["twin_id", "revision", "license", "attribution", "category", "seconds", "cpu_seconds", "cost_usd"]
     columns.append("failed_checks")
     rows = rows_of_table(source, parts, "twins", columns)
-    selection = select(rows, license_allow, with_rehearsals=with_rehearsals)
+    selection = select("accepted twin", terms_of(rows), Allowed(license_allow, with_rehearsals))
     shards = plan_shards(
         _shard_twins(rows, tar_bytes, selection), max_bytes=shard_size_mb * MEGABYTE, max_twins=twins_per_shard
     )

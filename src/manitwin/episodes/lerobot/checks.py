@@ -8,13 +8,12 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from manitwin.episodes.lerobot.lerobot_format import STATISTICS, TIMESTAMP_TOLERANCE_S, arrays_of, place_of
-from manitwin.episodes.lerobot.videos import video_facts
+from manitwin.episodes.lerobot.videos import frames_of, video_facts
 from manitwin.errors import EpisodesError
 
 _REMEDY = "write the set again"
@@ -217,7 +216,7 @@ def _check_file(
     facts = video_facts(path)
     if abs(facts.rate_hz - fps) > 1e-6 * fps or [facts.height_px, facts.width_px] != feature["shape"][:2]:
         raise EpisodesError(f"{path}: {facts}, info.json says {feature['shape']} at {fps} Hz; {_REMEDY}")
-    frames = _decoded(path) if decode else facts.frames
+    frames = sum(1 for _ in frames_of(path)) if decode else facts.frames
     for before, after in pairwise(clips):
         if after[0] < before[1] - TIMESTAMP_TOLERANCE_S:
             raise EpisodesError(f"{path}: episodes {before[2]} and {after[2]} share frames; {_REMEDY}")
@@ -225,12 +224,3 @@ def _check_file(
         raise EpisodesError(
             f"{path}: {frames} frames, episode {clips[-1][2]} ends at {round(clips[-1][1] * fps)}; {_REMEDY}"
         )
-
-
-def _decoded(path: Path) -> int:
-    capture = cv2.VideoCapture(str(path))
-    frames = 0
-    while capture.read()[0]:
-        frames += 1
-    capture.release()
-    return frames

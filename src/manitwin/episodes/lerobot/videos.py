@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -71,6 +71,16 @@ def video_facts(path: Path) -> VideoFacts:
             width_px=int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)),
             codec=_CODECS.get(name, name.strip("\0 ").lower()),
         )
+    finally:
+        capture.release()
+
+
+def frames_of(path: Path) -> Iterator[np.ndarray]:
+    """Yield a film's pictures, ``(height, width, 3) uint8`` BGR, as far as it can be decoded."""
+    capture = cv2.VideoCapture(str(path))
+    try:
+        while (picture := capture.read()[1]) is not None:
+            yield picture
     finally:
         capture.release()
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
-from manitwin.dataset.publish.licences import UNKNOWN, Allowed, check_some_go_out
+from manitwin.dataset.publish.licences import UNKNOWN, Allowed, Selection, Terms, select
 from manitwin.episodes.attempts import Attempt
 from manitwin.episodes.batch import read_batch
 from manitwin.episodes.episodes_stage import EPISODES
@@ -33,21 +34,19 @@ class TwinInEpisodes:
     revisions: tuple[str, ...] = ()
     episodes: tuple[int, ...] = ()
 
+    @property
+    def terms(self) -> Terms:
+        """What decides whether it goes out."""
+        return Terms(self.license, self.rehearsal)
+
 
 @dataclass(frozen=True)
 class Chosen:
-    """The numbers of the episodes that go out by their ids, the ids of those ``held_back``, and how many these are by licence.
+    """The episodes that go out, the twins of all their objects, and the ids of the allowed ones that were to be moved."""
 
-    ``rehearsals`` are those held back although all licences let them go: a rehearsal server had a part in one of their twins.
-    ``twins`` are those of all objects of what goes out, and ``allowed_targets`` the ids of those that were to be moved.
-    """
-
-    index_of: dict[str, int]
-    held_back: frozenset[str]
+    episodes: Selection
     twins: tuple[TwinInEpisodes, ...]
-    left_out: dict[str, int]
     allowed_targets: frozenset[str]
-    rehearsals: int = 0
 
     @property
     def rows(self) -> list[dict[str, Any]]:
@@ -60,7 +59,7 @@ class Chosen:
 
     def publishes(self, attempt: Attempt) -> bool:
         """Tell whether an attempt's row goes out."""
-        return self.tells_of(attempt) and attempt.episode_id not in self.held_back
+        return self.tells_of(attempt) and attempt.episode_id not in self.episodes.kept_back
 
 
 def choose_episodes(
@@ -77,53 +76,22 @@ def choose_episodes(
     with a twin that a rehearsal server had a part in is left out unless ``with_rehearsals``. Raises
     UsageError where a twin is gone, and where no episode may go out; EpisodesError for a batch that cannot be read.
     """
-    twins = _Twins(source, Allowed.of(license_allow), with_rehearsals)
-    index_of, held_back, rehearsals = dict[str, int](), set[str](), 0
-    seen, left_out = defaultdict[str, list[int]](list), Counter[str]()
-    for episode_id, twin_ids in objects_of_episodes(batches):
-        forbidden = twins.forbidding_licences(twin_ids)
-        if not forbidden and not any(map(twins.held_as_rehearsal, twin_ids)):
-            for each in twin_ids:
-                seen[each].append(len(index_of))
-            index_of[episode_id] = len(index_of)
-            continue
-        held_back.add(episode_id)
-        if forbidden:
-            left_out[" + ".join(forbidden)] += 1
-        else:
-            rehearsals += 1
-    check_some_go_out("kept episode", len(index_of), left_out, rehearsals)
-    targets = twins.allowed({attempt.twin_id for attempt in attempts if attempt.twin_id})
+    twin, allowed = cache(partial(_read, source)), Allowed(license_allow, with_rehearsals)
+    objects = dict(objects_of_episodes(batches))
+    terms = ((episode_id, [twin(each).terms for each in ids]) for episode_id, ids in objects.items())
+    selection = select("kept episode", terms, allowed)
+    seen = defaultdict[str, list[int]](list)
+    for episode_id, number in selection.published.items():
+        for each in objects[episode_id]:
+            seen[each].append(number)
+    targets = {attempt.twin_id for attempt in attempts if attempt.twin_id}
+    targets = {each for each in targets if allowed.refusal([twin(each).terms]) is None}
     revisions = revisions_of_twins(batches)
     shown = (
-        replace(twins[each], revisions=revisions.get(each, ()), episodes=tuple(seen[each]))
+        replace(twin(each), revisions=revisions.get(each, ()), episodes=tuple(seen[each]))
         for each in sorted(set(seen) | targets)
     )
-    return Chosen(index_of, frozenset(held_back), tuple(shown), dict(sorted(left_out.items())), targets, rehearsals)
-
-
-class _Twins:
-    """The twins of episodes, each read once, and what keeps those from going out that may not."""
-
-    def __init__(self, source: TwinSource, licences: Allowed, with_rehearsals: bool):
-        self._source, self._licences, self._with_rehearsals = source, licences, with_rehearsals
-        self._known: dict[str, TwinInEpisodes] = {}
-
-    def __getitem__(self, twin_id: str) -> TwinInEpisodes:
-        if twin_id not in self._known:
-            self._known[twin_id] = _read(self._source, twin_id)
-        return self._known[twin_id]
-
-    def forbidding_licences(self, twin_ids: Iterable[str]) -> list[str]:
-        return sorted({name for each in twin_ids if not self._licences.has(name := self[each].license)})
-
-    def held_as_rehearsal(self, twin_id: str) -> bool:
-        return not self._with_rehearsals and self[twin_id].rehearsal
-
-    def allowed(self, twin_ids: Iterable[str]) -> frozenset[str]:
-        return frozenset(
-            each for each in twin_ids if not self.forbidding_licences([each]) and not self.held_as_rehearsal(each)
-        )
+    return Chosen(selection, tuple(shown), frozenset(targets))
 
 
 def revisions_of_twins(batches: Iterable[Path]) -> dict[str, tuple[str, ...]]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Set
+from collections.abc import Iterable, Set
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any, cast
 
 import cv2
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -22,7 +21,7 @@ from manitwin.episodes.attempts import ATTEMPTS, Success, merge_attempts, read_a
 from manitwin.episodes.collect import batch_folders, stored_episodes
 from manitwin.episodes.episode_pictures import PICTURES, batch_name, read_pictures
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
-from manitwin.episodes.lerobot.videos import CameraVideos, Clip, video_facts
+from manitwin.episodes.lerobot.videos import CameraVideos, Clip, frames_of, video_facts
 from manitwin.episodes.lerobot.write import write_lerobot
 from manitwin.episodes.publication.card import OF_EPISODES, TWINS_FILE, EpisodesCard, episodes_card
 from manitwin.episodes.publication.choose import Chosen, choose_episodes
@@ -75,29 +74,17 @@ def cut_film(film: Path, first_frames: dict[str, int], allowed: Set[str], place:
     order = sorted(first_frames, key=first_frames.__getitem__)
     ends = [*(later for _, later in pairwise(first_frames[name] for name in order)), facts.frames]
     clips: dict[str, Clip] = {}
-    pictures = _decoded(film)
+    pictures = frames_of(film)
     with EpisodesVideo(
         place, width_px=facts.width_px, height_px=facts.height_px, codec=cast(Codec, facts.codec)
     ) as cut:
         for name, end in zip(order, ends, strict=True):
-            shown = [picture for _, picture in zip(range(first_frames[name], end), pictures, strict=False)]
+            shown = [cv2.cvtColor(each, cv2.COLOR_BGR2RGB) for each in islice(pictures, end - first_frames[name])]
             if len(shown) != end - first_frames[name]:
                 raise EpisodesError(f"{film}: ends within episode {name}; run manitwin render again")
             if name in allowed:
                 clips[name] = Clip(place, cut.add(shown).first_frame)
     return clips
-
-
-def _decoded(film: Path) -> Iterator[np.ndarray]:
-    capture = cv2.VideoCapture(str(film))
-    try:
-        while True:
-            read, picture = capture.read()
-            if not read:
-                return
-            yield cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)
-    finally:
-        capture.release()
 
 
 @dataclass(frozen=True)
@@ -146,8 +133,8 @@ def publish_episodes(
     try:
         with publication.scratch() as scratch:
             made = scratch / "made"
-            films = films_of(episodes, batches, chosen.index_of.keys(), scratch / "films")
-            kept = (each for each in stored_episodes(batches) if each.attempt.episode_id in chosen.index_of)
+            films = films_of(episodes, batches, chosen.episodes.published.keys(), scratch / "films")
+            kept = (each for each in stored_episodes(batches) if each.attempt.episode_id in chosen.episodes.published)
             write_lerobot(kept, made, videos=films)
             checked = read_lerobot(made)
             rows = _write_tables(episodes, chosen, made)
@@ -168,11 +155,11 @@ def publish_episodes(
         episodes=checked.info["total_episodes"],
         frames=checked.info["total_frames"],
         twins=len(chosen.twins),
-        left_out=chosen.left_out,
+        left_out=chosen.episodes.left_out,
         without_attribution=len(without_attribution(chosen.rows)),
         files=len(publication.sizes) + 1,
         bytes=sum(publication.sizes.values()),
-        rehearsals=chosen.rehearsals,
+        rehearsals=chosen.episodes.rehearsals,
     )
 
 
@@ -216,6 +203,6 @@ def _pages(
         "twins": f"in the revisions that {TWINS_FILE} names",
         "published with": f"manitwin {installed_version()}",
     }
-    facts = EpisodesCard(title, checked.info, chosen.rows, success, chosen.left_out, rows, made_of)
+    facts = EpisodesCard(title, checked.info, chosen.rows, success, chosen.episodes.left_out, rows, made_of)
     licences = licenses_page(title, chosen.rows, introduction=OF_EPISODES)
     return {LICENSES_MD: licences, README: episodes_card(facts)}
