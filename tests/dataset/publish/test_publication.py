@@ -82,7 +82,7 @@ def test_killed_publication_leaves_nothing_that_counts(dataset: Path, published:
     out = tmp_path / "small-set"
     with pytest.raises(KeyboardInterrupt):
         publish_dataset(dataset, out, twins_per_shard=2, on_shard=stop_after(1))
-    half = out / ".publish" / "incoming-1" / "shard.tar"
+    half = out / ".publish" / "scratch-1" / "shard.tar"
     half.parent.mkdir()
     half.write_bytes(b"half")
     (out / "data" / "mug" / "mug-000000.tar").write_bytes(b"cut")  # its receipt says that it is larger

@@ -107,8 +107,7 @@ def parts_of(files: Iterable[str]) -> dict[str, list[str]]:
     for file in sorted(files):
         if not _FILE.fullmatch(file):
             raise TwinError(f"{file!r}: no name for a file of a twin; give letters, digits and . _ - in relative names")
-        path = PurePosixPath(file)
-        alone = len(path.parts) == 1 or (len(path.parts) == 2 and path.parts[0] == VIEWS)
+        path, alone = PurePosixPath(file), not is_archive([file])
         part = path.name if alone else f"{path.parts[0]}.zip"
         part = part.lower()  # as webdataset reads it
         if part in single or (alone and part in parts):

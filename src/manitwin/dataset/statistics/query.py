@@ -97,8 +97,9 @@ def summary(
     total: bool = False,
     note: str = "",
 ) -> Query:
-    """Return the query of a row a quantity, of ``{quantity: expression}``: its distribution over the rows of a table that
-    have it, whose number is headed ``rows``; with its ``total`` where adding up means something.
+    """Return the query of the distributions of ``{quantity: expression}`` over the rows of a table, a row a quantity.
+
+    ``rows`` heads the number of those that have it; the ``total`` is shown where adding up means something.
     """
     names = sql_texts(quantities)
     values = ", ".join(f"({expression})::DOUBLE" for expression in quantities.values())

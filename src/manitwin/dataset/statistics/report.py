@@ -86,16 +86,23 @@ def write_report(tables: ReportTables, out: Path, *, title: str, duplicates: Nea
 def draw(results: dict[str, Result]) -> dict[str, Figure | None]:
     """Return all figures by name, None where there is nothing to draw."""
     of = results.__getitem__
+    of_size, of_mass = ((of(name), of("dimensions")) for name in ("size_histogram", "mass_histogram"))
     figures = {
         "success_by_stage": bars.success_by_stage(of("success_by_stage")),
         "rejections": bars.rejections(of("rejections_by_reason")),
         "grasps_per_object": histograms.grasps_per_object(of("simulated_histogram"), of("verified_histogram")),
-        "verification_rates": histograms.rates(of("rate_histogram")),
-        "robustness": histograms.robustness(of("robustness_histogram")),
+        "verification_rates": histograms.shares(
+            *(of("rate_histogram"), "verification_rates", "Verification rate of objects."),
+            *("verification rate", "objects", 20),
+        ),
+        "robustness": histograms.shares(
+            *(of("robustness_histogram"), "robustness", "Perturbed trials that a verified grasp holds in."),
+            *("share of perturbed trials held", "verified grasps", 10),
+        ),
         "failed_outcomes": bars.outcomes(of("failed_outcomes")),
         "points_per_object": histograms.counts_per_object([of(query.name) for query in objects.COUNT_HISTOGRAMS]),
-        "sizes": histograms.sizes(of("size_histogram"), of("dimensions")),
-        "masses": histograms.masses(of("mass_histogram"), of("dimensions")),
+        "sizes": histograms.logarithmic(*of_size, objects.SIZE_STEPS, "sizes", "longest side", "m"),
+        "masses": histograms.logarithmic(*of_mass, objects.MASS_STEPS, "masses", "mass", "kg"),
         "mass_and_size": masses.mass_and_size(of("mass_and_size"), of("mass_in_prior")),
         "mass_by_category": masses.mass_by_category(of("mass_in_prior")),
         "categories": bars.categories(of("categories")),

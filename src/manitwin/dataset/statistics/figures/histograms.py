@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from manitwin.dataset.statistics.object_queries import MASS_STEPS, SIZE_STEPS
 from manitwin.dataset.statistics.query import Result
 from manitwin.dataset.statistics.style import (
     BLUE,
@@ -48,17 +47,6 @@ def grasps_per_object(simulated: Result, verified: Result) -> Figure | None:
     return finished(figure, "grasps_per_object", caption, alt, simulated, verified)
 
 
-def rates(result: Result) -> Figure | None:
-    """Draw the verification rates of objects."""
-    return _shares(result, "verification_rates", "Verification rate of objects.", "verification rate", "objects", 20)
-
-
-def robustness(result: Result) -> Figure | None:
-    """Draw in what share of perturbed trials verified grasps hold."""
-    caption = "Perturbed trials that a verified grasp holds in."
-    return _shares(result, "robustness", caption, "share of perturbed trials held", "verified grasps", 10)
-
-
 def counts_per_object(results: Sequence[Result]) -> Figure | None:
     """Draw how many functional points, grasp points and placements objects have."""
     if not any(result.rows for result in results):
@@ -78,17 +66,8 @@ def counts_per_object(results: Sequence[Result]) -> Figure | None:
     return finished(figure, "points_per_object", caption, alt, *results)
 
 
-def sizes(result: Result, dimensions: Result) -> Figure | None:
-    """Draw the longest sides on a logarithmic axis."""
-    return _logarithmic(result, dimensions, SIZE_STEPS, "sizes", "longest side", "m")
-
-
-def masses(result: Result, dimensions: Result) -> Figure | None:
-    """Draw the masses on a logarithmic axis."""
-    return _logarithmic(result, dimensions, MASS_STEPS, "masses", "mass", "kg")
-
-
-def _logarithmic(result: Result, dimensions: Result, steps: int, name: str, quantity: str, unit: str) -> Figure | None:
+def logarithmic(result: Result, dimensions: Result, steps: int, name: str, quantity: str, unit: str) -> Figure | None:
+    """Draw a quantity of objects on a logarithmic axis, in so many steps a decade, with its median."""
     if not result.rows:
         return None
     figure, (axis,) = canvas(HALF_IN, _HEIGHT_IN)
@@ -111,7 +90,7 @@ def _logarithmic(result: Result, dimensions: Result, steps: int, name: str, quan
     return finished(figure, name, caption, alt, result)
 
 
-def _shares(result: Result, name: str, caption: str, label: str, what: str, steps: int) -> Figure | None:
+def shares(result: Result, name: str, caption: str, label: str, what: str, steps: int) -> Figure | None:
     """Draw a histogram of shares between 0 and 1 in equal steps."""
     if not result.rows:
         return None
