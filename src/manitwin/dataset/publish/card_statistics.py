@@ -13,18 +13,8 @@ from manitwin.formats.markdown import markdown_escaped, table
 CATEGORIES_SHOWN = 40
 
 COLUMNS = (
-    *(
-        "twin_id",
-        "category",
-        "kind",
-        "license",
-        "attribution",
-        "shard",
-        "gripper",
-        "simulated",
-        "verified",
-        "success_rate",
-    ),
+    *("twin_id", "category", "kind", "license", "attribution", "shard"),
+    *("gripper", "simulated", "verified", "success_rate"),
     *("held_in_second_engine_share", "functional_points", "grasp_points", "placements", "watertight", "failed_checks"),
     *("mass_source", "longest_m", "mass_kg", "hulls"),
 )

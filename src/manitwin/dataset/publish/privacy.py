@@ -36,28 +36,22 @@ def check_part(twin_id: str, part: str, content: bytes, places: tuple[bytes, ...
 
     The source is its author's, byte for byte, and is not searched for people's folders.
     """
-    words = part.endswith(_TEXT) and not part.startswith("source.")
-    found = _folder_in(content, places, of_people=words)
-    if found is not None:
-        raise TwinError(
-            f"{twin_id}/{part}: names the folder {found.decode(errors='replace')!r} of a machine; "
-            "take it out of the input's name, prompt or attribution and build the twin again"
-        )
+    of_people = part.endswith(_TEXT) and not part.startswith("source.")
+    remedy = "take it out of the input's name, prompt or attribution and build the twin again"
+    _refuse_folders(f"{twin_id}/{part}", content, places, TwinError, remedy, of_people=of_people)
 
 
 def check_words(where: str, words: str, places: tuple[bytes, ...], error: type[ManiTwinError]) -> None:
     """Raise ``error`` where words that are to go out name a local folder of what is published, or a person's folder."""
-    found = _folder_in(words.encode(), places, of_people=True)
-    if found is not None:
-        raise error(
-            f"{where}: names the folder {found.decode(errors='replace')!r} of a machine; take it out of the name, the prompt "
-            "or the attribution that it comes from"
-        )
+    remedy = "take it out of the name, the prompt or the attribution that it comes from"
+    _refuse_folders(where, words.encode(), places, error, remedy, of_people=True)
 
 
-def _folder_in(content: bytes, places: tuple[bytes, ...], *, of_people: bool) -> bytes | None:
+def _refuse_folders(
+    where: str, content: bytes, places: tuple[bytes, ...], error: type[ManiTwinError], remedy: str, *, of_people: bool
+) -> None:
     found = next((place for place in places if place in content), None)
-    if found is None and of_people:
-        match = HOME_FOLDER.search(content)
-        found = match.group() if match else None
-    return found
+    if found is None and of_people and (match := HOME_FOLDER.search(content)):
+        found = match.group()
+    if found is not None:
+        raise error(f"{where}: names the folder {found.decode(errors='replace')!r} of a machine; {remedy}")

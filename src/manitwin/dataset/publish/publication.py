@@ -151,20 +151,15 @@ class Publication:
     def finish(self) -> None:
         """Remove what an older publication had more, and write the digests of all files."""
         check_hub_limits({**self.sizes, SUMS: 0})
-        for folder in self.kind.folders:
-            for name in self.root.names_below(folder):
-                if name not in self.digests:
-                    self.root.remove(name)
-                    self._remove_empty_folder(name)
+        there = {name for folder in self.kind.folders for name in self.root.names_below(folder)}
+        for name in there - self.digests.keys():
+            self.root.remove(name)
+            folder = None if self.root.local is None else (self.root.local / name).parent
+            if folder is not None and not any(folder.iterdir()):
+                folder.rmdir()
         lines = [f"{digest}  {name}\n" for name, digest in sorted(self.digests.items())]
         self.root.write_bytes(SUMS, "".join(lines).encode())
         self.root.remove(OPEN)
-
-    def _remove_empty_folder(self, name: str) -> None:
-        if self.root.local is not None:
-            folder = (self.root.local / name).parent
-            if not any(folder.iterdir()):
-                folder.rmdir()
 
     @contextmanager
     def scratch(self) -> Iterator[Path]:

@@ -89,12 +89,10 @@ def category_slug(category: str) -> str:
     return slug or f"category-{sha256(category.encode()).hexdigest()[:8]}"
 
 
-def plan_shards(
-    twins: Iterable[ShardTwin], *, max_bytes: int, max_twins: int | None = None, folders: int = CATEGORY_FOLDERS
-) -> list[Shard]:
+def plan_shards(twins: Iterable[ShardTwin], *, max_bytes: int, max_twins: int | None = None) -> list[Shard]:
     """Return the shards of all twins, sorted by name.
 
-    Each category has its own shards, as one wants mugs and not a tenth of everything; only beyond ``folders`` categories
+    Each category has its own shards, as one wants mugs and not a tenth of everything; only beyond ``CATEGORY_FOLDERS``
     do the smallest share those of the folder ``various``. A shard takes no more than ``max_bytes``, unless a single twin
     does. Raises UsageError where the hub's limits would be broken.
     """
@@ -102,7 +100,7 @@ def plan_shards(
     for twin in sorted(twins, key=lambda twin: twin.twin_id):
         by_folder.setdefault(category_slug(twin.category), []).append(twin)
     largest_first = sorted(by_folder, key=lambda slug: (-len(by_folder[slug]), slug))
-    for slug in largest_first[folders:]:
+    for slug in largest_first[CATEGORY_FOLDERS:]:
         if slug != SHARED_FOLDER:
             by_folder.setdefault(SHARED_FOLDER, []).extend(by_folder.pop(slug))
     shards = []

@@ -10,9 +10,6 @@ from manitwin.twin.record import REJECTION_REASONS
 STAGES = tuple(REJECTION_REASONS)
 """The stages that can reject, in their order: those of the record's schema."""
 
-_ITEMS = """items AS (
-  SELECT twin_id, kind, NULL AS stage, NULL AS reason FROM twins
-  UNION ALL SELECT twin_id, kind, stage, reason FROM rejections)"""
 _ITEM_COLUMNS = (
     *counts("items", "accepted", "rejected"),
     Column("accepted_share", "accepted share [95 %]", "share", ("low", "high")),
@@ -34,7 +31,9 @@ SUCCESS_BY_STAGE = Query(
     "success_by_stage",
     "Success by stage, of the items that entered it.",
     f"""WITH stage_order(stage, position) AS (VALUES {_ORDER}),
-{_ITEMS},
+items AS (
+  SELECT twin_id, kind, NULL AS stage, NULL AS reason FROM twins
+  UNION ALL SELECT twin_id, kind, stage, reason FROM rejections),
 ended AS (
   SELECT kind, coalesce(position, {len(STAGES)}) AS position, count(*) AS items
   FROM items LEFT JOIN stage_order USING (stage) GROUP BY ALL),

@@ -26,8 +26,7 @@ from manitwin.episodes.statistics import queries as q
 from manitwin.episodes.statistics.joint_ranges import joint_ranges
 from manitwin.errors import EpisodesError
 
-_WIDEST = 110
-_BAR = 40
+_WIDEST, _MOST_ROWS, _BAR = 110, 20, 40
 
 LENGTHS_PICTURE = "lengths.png"
 VIEWS = (
@@ -42,9 +41,9 @@ _PRINTED = (
 )
 
 
-def table_text(result: Result, most: int = 20) -> str:
+def table_text(result: Result) -> str:
     """Return a table as plain text: its caption, its head, its rows, its note; empty where there are no rows."""
-    columns, rows = result.query.columns, result.rows[:most]
+    columns, rows = result.query.columns, result.rows[:_MOST_ROWS]
     if not columns or not rows:
         return ""
     cells = [[column.heading for column in columns], *([_cell(column, row) for column in columns] for row in rows)]
