@@ -87,8 +87,6 @@ class Publication:
             if name.endswith(".json") and PurePosixPath(name).parent == PurePosixPath(OPEN):
                 receipt = json.loads(root.read_bytes(name))
                 self._receipts[receipt["shard"]] = receipt
-            elif name != _STARTED and not name.startswith(f"{OPEN}/{_SCRATCH}"):
-                root.remove(name)  # half a file
 
     def _is_finished(self) -> bool:
         return self.root.exists(SUMS) and self.root.exists(self.kind.sign)
