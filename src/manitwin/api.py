@@ -18,9 +18,10 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.config import BuildConfig
     from manitwin.dataset.index.rebuild import Rebuilt
     from manitwin.dataset.statistics.report import WrittenReport
-    from manitwin.engine.drive import ExecutorName, RunReport
+    from manitwin.engine.drive import ExecutorName, RunOptions, RunReport
     from manitwin.engine.events import ItemEnded, OnStage
     from manitwin.episodes.collect import AttemptTotals
+    from manitwin.episodes.lerobot.write import LeRobotSummary
     from manitwin.episodes.retirement import Retirement
     from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
     from manitwin.pipeline.build_report import BuildReport, ItemResult
@@ -174,8 +175,7 @@ def make_layouts(
     *,
     config: LayoutsConfig | str | Path | None = None,
     jobs: int | None = None,
-    executor: ExecutorName = "local",
-    address: str | None = None,
+    **run: Unpack[RunOptions],
 ) -> RunReport:
     """Sample ``count`` scenes of a data set's twins at rest below ``out``; those that are there stay (docs/layouts.md).
 
@@ -187,7 +187,7 @@ def make_layouts(
     from manitwin.scenes.settings import LayoutsConfig
 
     settings = _settings(LayoutsConfig, config, jobs)
-    return make(dataset, out, count, settings, executor=executor, address=address)
+    return make(dataset, out, count, settings, **run)
 
 
 def find_scenes(place: str | Path) -> list[Path]:
@@ -250,8 +250,7 @@ def make_episodes(
     formats: Iterable[str] = ("lerobot", "maniskill"),
     retire: bool = True,
     jobs: int | None = None,
-    executor: ExecutorName = "local",
-    address: str | None = None,
+    **run: Unpack[RunOptions],
 ) -> EpisodesReport:
     """Attempt ``count`` pick-and-place episodes with the twins of a data set or in scenes, and keep what succeeded.
 
@@ -265,13 +264,13 @@ def make_episodes(
     from manitwin.episodes.episodes_run import retire_failing
     from manitwin.episodes.settings import TrajectoriesConfig
 
-    settings, wanted = _settings(TrajectoriesConfig, config, jobs), chosen_formats(",".join(formats))
-    run = make_batches(source, out, count, settings, twins=twins, executor=executor, address=address)
-    if run.exit_code == 4:
-        return EpisodesReport(run)
+    settings, wanted = _settings(TrajectoriesConfig, config, jobs), chosen_formats(formats)
+    ended = make_batches(source, out, count, settings, twins=twins, **run)
+    if ended.exit_code == 4:
+        return EpisodesReport(ended)
     collected = collect(Path(out), wanted)
     retired, fresh = retire_failing(Path(out)) if retire else ([], 0)
-    return EpisodesReport(run, collected.totals, collected.lines, retired, fresh)
+    return EpisodesReport(ended, collected.totals, collected.lines, retired, fresh)
 
 
 def render_episodes(
@@ -280,8 +279,8 @@ def render_episodes(
     config: PicturesConfig | str | Path | None = None,
     twins: str | Path | None = None,
     jobs: int | None = None,
-    executor: ExecutorName = "local",
-    address: str | None = None,
+    on_written: Callable[[LeRobotSummary], None] = lambda summary: None,
+    **run: Unpack[RunOptions],
 ) -> RunReport:
     """Draw the kept episodes of a folder by showing their states again, and write its LeRobot data set with the films.
 
@@ -294,24 +293,31 @@ def render_episodes(
     from manitwin.render.device import require_renderer
 
     settings = _settings(PicturesConfig, config, jobs)
-    if executor != "ray":
+    if run.get("executor") != "ray":
         require_renderer()
         require_encoder(settings.codec)
-    report = draw_episodes(Path(episodes), settings, twins=twins, executor=executor, address=address)
+    report = draw_episodes(Path(episodes), settings, twins=twins, **run)
     if report.exit_code != 4:
-        write_with_pictures(Path(episodes), settings.cameras)
+        on_written(write_with_pictures(Path(episodes), settings.cameras))
     return report
 
 
-def write_index(dataset: str | Path, *, jobs: int | None = None) -> Rebuilt:
+def write_index(
+    dataset: str | Path,
+    *,
+    jobs: int | None = None,
+    on_start: Callable[[int], None] = lambda twins: None,
+    on_read: Callable[[int], None] = lambda twins: None,
+) -> Rebuilt:
     """Write the index of a data set again from its twins alone, in ``jobs`` processes; the old one serves until then.
 
+    ``on_start`` is called with the number of twins, ``on_read`` with that of those just read.
     Raises UsageError where there is no data set, TwinError where a process dies: nothing has changed then.
     """
     from manitwin.dataset.index.rebuild import rebuild
     from manitwin.twin.dataset_root import DatasetRoot
 
-    return rebuild(DatasetRoot(dataset), jobs=jobs or os.cpu_count() or 1)
+    return rebuild(DatasetRoot(dataset), jobs=jobs or os.cpu_count() or 1, on_start=on_start, on_read=on_read)
 
 
 def write_statistics(dataset: str | Path, out: str | Path | None = None) -> WrittenReport:
@@ -329,7 +335,8 @@ def write_statistics(dataset: str | Path, out: str | Path | None = None) -> Writ
     from manitwin.episodes.statistics.report import episode_statistics
 
     report = episode_statistics(root.local)
-    return WrittenReport(str(report.write(Path(out or root.local / "statistics"))), report.summary.rstrip("."))
+    page = report.write(Path(out or root.local / "statistics"))
+    return WrittenReport(str(page), report.summary.rstrip("."), report.text())
 
 
 def statistics_connection(dataset: str | Path) -> duckdb.DuckDBPyConnection:

@@ -46,7 +46,6 @@ class InterruptsWhenTakenDown:
 def rehearse() -> None:
     from manitwin.config import RunConfig
     from manitwin.engine.drive import drive
-    from manitwin.engine.ledger.location import local_log
     from manitwin.pipeline.item import Item
     from manitwin.twin.dataset_root import DatasetRoot
     from rehearsal_recipe import RehearsalRecipe
@@ -54,7 +53,7 @@ def rehearse() -> None:
     root = DatasetRoot(FOLDER / "data")
     recipe = RehearsalRecipe(log=FOLDER / "started")  # which a worker writes as it begins a stage
     items = [Item(file=None, text=f"{n} sleep:a:600") for n in range(4)]
-    with WatchedRun("items", lambda: local_log(root)) as watched:
+    with WatchedRun("items", root.url) as watched:
         drive(recipe, items, root, RunConfig(cpu=2), configuration={}, on_start=watched.start)
 
 

@@ -39,16 +39,15 @@ def work() -> None:
     from manitwin.config import RunConfig
     from manitwin.twin.dataset_root import DatasetRoot
     from manitwin.engine.drive import drive
-    from manitwin.engine.ledger.location import local_log
     from rehearsal_recipe import RehearsalRecipe
     from manitwin.pipeline.item import Item
 
     root = DatasetRoot("data")
     items = [Item(file=None, text=text) for text in ("good", "reject:b", "raise:a")]
-    with WatchedRun("layouts", lambda: local_log(root)) as watched:
+    with WatchedRun("layouts", "data") as watched:
         drive(
             RehearsalRecipe(), items, root, RunConfig(cpu=1, attempts=1), configuration={}, executor="inline",
-            on_start=watched.start, on_stage=watched.progress.stage, on_ended=watched.progress.item_ended,
+            **watched.callbacks,
         )
     err_console.print("a remark with https://user:word@host/x and %s" % KEY, markup=False)
     out_console.print("a result", markup=False)

@@ -1,4 +1,4 @@
-"""Why items were not accepted: equal causes counted, the most frequent one told with its remedy."""
+"""Causes for which items were not accepted: equal causes counted, the most frequent one told with its remedy."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What commands print on: results and remarks, which ``--quiet`` leaves out, and errors, which are always said.
+"""Consoles of commands: one for results and remarks, which ``--quiet`` leaves out, and one for errors, which are always printed.
 
 Whatever is printed on these consoles also goes to the log of the run, where there is one (``run_log``).
 """

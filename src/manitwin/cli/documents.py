@@ -12,12 +12,11 @@ import typer
 from manitwin.cli.console import out_console
 
 if TYPE_CHECKING:
+    from manitwin.api import EpisodesReport
     from manitwin.cli.causes import Cause
     from manitwin.cli.dry_run import Plan
     from manitwin.engine.drive import RunReport
     from manitwin.engine.ledger.progress import ItemStory, Progress
-    from manitwin.episodes.collect import Collected
-    from manitwin.episodes.retirement import Retirement
     from manitwin.pipeline.build_report import BuildReport, ItemResult
     from manitwin.pipeline.folder_listing import FolderListing
     from manitwin.scenes.layouts.layouts_run import LayoutTotals
@@ -124,21 +123,13 @@ def layouts_document(report: RunReport, place: str, causes: list[Cause], totals:
     }
 
 
-def trajectories_document(
-    report: RunReport,
-    place: str,
-    causes: list[Cause],
-    collected: Collected | None,
-    retired: list[Retirement],
-    fresh: int,
-) -> Document:
-    """Return what became of batches, attempts and grasps; nothing is ``collected`` where a batch is missing."""
-    attempts = None if collected is None else asdict(collected.totals)
+def trajectories_document(report: EpisodesReport, place: str, causes: list[Cause]) -> Document:
+    """Return what became of batches, attempts and grasps; there are no totals where a batch is missing."""
     return {
-        **run_document(report, place, causes),
-        "attempts": attempts,
-        "failing_grasps": [{**asdict(each), "failed": each.failed} for each in retired],
-        "retired_now": fresh,
+        **run_document(report.run, place, causes),
+        "attempts": None if report.totals is None else asdict(report.totals),
+        "failing_grasps": [{**asdict(each), "failed": each.failed} for each in report.retired],
+        "retired_now": report.newly_retired,
     }
 
 

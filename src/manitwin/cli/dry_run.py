@@ -73,7 +73,7 @@ class Rate:
 
 @dataclass(frozen=True)
 class Plan:
-    """What would be done. ``rates`` is by kind of input; results of single stages that are there are not taken off."""
+    """The work that a build would do. ``rates`` is by kind of input; stages that are done already are not taken off."""
 
     items: list[PlannedItem]
     rates: dict[str, Rate]

@@ -1,4 +1,4 @@
-"""Where the command ``manitwin`` begins: an interrupt is answered before anything that takes time is imported."""
+"""Entry point of the command ``manitwin``: an interrupt is answered before anything that takes time is imported."""
 
 from __future__ import annotations
 

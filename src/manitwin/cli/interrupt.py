@@ -52,7 +52,7 @@ def leave_when_interrupted() -> None:
 
 
 class Interrupts:
-    """What an interrupt does to a command: ``command`` is its name, once it is known."""
+    """Handle interrupts of a command: ``command`` is its name, once it is known."""
 
     def __init__(self) -> None:
         self.command = ""
@@ -66,7 +66,7 @@ class Interrupts:
 
     @property
     def message(self) -> str:
-        """What is said of an interrupted command."""
+        """The message of an interrupted command."""
         again = "; run the same command again to go on where it stopped" if self.command in RESUMABLE else ""
         return f"{f'manitwin {self.command}'.rstrip()}: interrupted{again}"
 

@@ -15,7 +15,8 @@ from typing import Annotated
 import typer
 from typer.completion import completion_init, get_completion_script
 
-from manitwin.cli.choices import SHELLS, must_exist
+from manitwin.cli import options
+from manitwin.cli.choices import SHELLS
 from manitwin.cli.commands.audit import audit
 from manitwin.cli.commands.build import build, run
 from manitwin.cli.commands.doctor import doctor
@@ -83,10 +84,7 @@ for other in (status, retry, check, query, doctor, fake, prompts, audit):
 
 @app.command()
 def show(
-    twin: Annotated[
-        Path,
-        typer.Argument(help="A twin folder.", metavar="TWIN", callback=must_exist("a folder that manitwin build made")),
-    ],
+    twin: Annotated[Path, options.existing("A twin folder.", "TWIN", "a folder that manitwin build made")],
     json_: Json = False,
 ) -> None:
     """Print a readable summary of a twin, after checking its files."""

@@ -6,14 +6,14 @@ import inspect
 from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
 from manitwin.cli import choices
 
 if TYPE_CHECKING:
-    from manitwin.engine.drive import ExecutorName
+    from manitwin.config import Section
 
 Text = Annotated[
     list[str] | None, typer.Option("--text", help="A thing to make from words alone; may be repeated.", metavar="WORDS")
@@ -89,6 +89,24 @@ FLAGS: dict[str, tuple[Any, Any]] = {
 }  # fmt: skip
 """What is said on top of the configuration: the options of ``pipeline.settings.Flags``, by its names."""
 
+RUN: dict[str, tuple[Any, Any]] = {
+    "seed": (Seed, None), "config": (Config, None), "jobs": (Jobs, None), "executor": (Executor, "local"),
+    "address": (Address, None),
+}  # fmt: skip
+"""Options of a run that makes scenes, episodes or pictures: ``read_settings`` and ``placed`` take them."""
+
+Settings = TypeVar("Settings", bound="Section")
+
+
+def existing(help: str, metavar: str, remedy: str) -> Any:
+    """Return the argument of places that must be there; ``remedy`` says what to give."""
+    return typer.Argument(help=help, metavar=metavar, callback=choices.must_exist(remedy))
+
+
+def output_folder(help: str) -> Any:
+    """Return the option ``--out`` of a folder that can be written."""
+    return typer.Option("--out", "-o", help=help, callback=choices.folder_to_write)
+
 
 def with_options(
     options: Mapping[str, tuple[Any, Any]], before: str = ""
@@ -122,11 +140,15 @@ def with_options(
     return decorate
 
 
-def run_settings(jobs: int | None) -> dict[str, Any]:
-    """Return what ``--jobs`` says of an application's run."""
-    return {"index_every": 0, "keep_work": False, **({} if jobs is None else {"cpu": jobs})}
+def read_settings(kind: type[Settings], run: dict[str, Any], given: dict[str, Any]) -> Settings:
+    """Return an application's settings: those of the options ``RUN`` and its own, ``given`` ones, above its TOML file's."""
+    from manitwin.scenes.run_settings import load_settings
+
+    jobs = {} if run["jobs"] is None else {"cpu": run["jobs"]}
+    own = {"seed": run.get("seed"), "run": {"index_every": 0, "keep_work": False, **jobs}}
+    return load_settings(kind, run["config"], {**own, **given})
 
 
-def executor_name(given: str) -> ExecutorName:
-    """Return what ``Executor`` holds, which was checked as it was read, under its own type."""
-    return cast("ExecutorName", given)
+def placed(run: dict[str, Any]) -> dict[str, Any]:
+    """Return where the options ``RUN`` say that a run is: its executor and address."""
+    return {"executor": run["executor"], "address": run["address"]}

@@ -1,4 +1,4 @@
-"""What a person watches while items are made: how many of how many, what became of them, the stages at work, the time left."""
+"""Show the progress of a run: how many of how many, what became of them, the stages at work, the time left."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from rich.console import Console
 from rich.live import Live
@@ -20,8 +20,13 @@ from rich.text import Text
 from manitwin.cli.console import err_console, out_console
 from manitwin.cli.run_log import log_into
 from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageEvent, StageStarted
+from manitwin.engine.ledger.location import local_log
 from manitwin.engine.stage import StagePart
 from manitwin.engine.task import Payload
+from manitwin.twin.dataset_root import DatasetRoot
+
+if TYPE_CHECKING:
+    from manitwin.engine.drive import RunOptions
 
 LINE_EVERY_S = 30.0
 """Between two lines where nobody looks at a terminal."""
@@ -49,12 +54,12 @@ class RunProgress:
 
     @property
     def done(self) -> int:
-        """How many items have ended, in this run or before."""
+        """The number of items that have ended, in this run or before."""
         return self.before + self.counts.total()
 
     @property
     def parts_done(self) -> float:
-        """How many items are done in parts: two at a half are one."""
+        """The number of items that are done in parts: two at a half are one."""
         with self._lock:
             return sum(part.done / part.total for part in self._parts.values() if part.total)
 
@@ -194,17 +199,22 @@ class ShownProgress:
 
 
 class WatchedRun(ShownProgress):
-    """The progress of a run on the consoles of this command, whose log lies at ``log()`` unless ``--log`` says otherwise.
+    """The progress of a run below ``place`` on the consoles of this command; its log lies there unless ``--log`` says otherwise.
 
     ``what`` names the items in the plural.
     """
 
-    def __init__(self, what: str, log: Callable[[], Path]):
+    def __init__(self, what: str, place: str | Path):
         super().__init__(RunProgress(what), out_console, err_console)
-        self._log = log
+        self._place = place
+
+    @property
+    def callbacks(self) -> RunOptions:
+        """The callbacks of a run that is shown."""
+        return {"on_start": self.start, "on_stage": self.progress.stage, "on_ended": self.progress.item_ended}
 
     def start(self, total: int, opened: int) -> None:
         """Begin a run, and its log: what was refused before leaves none behind."""
-        log_into(self._log())
+        log_into(local_log(DatasetRoot(self._place)))
         self.progress.start(total, opened)
         out_console.print(f"{total} {self.progress.what}, {opened} to do", markup=False)

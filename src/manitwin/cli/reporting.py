@@ -1,4 +1,4 @@
-"""How much a command says, and where it leaves a log: the options of every command that makes something."""
+"""Verbosity and log file: the options of every command that makes something."""
 
 from __future__ import annotations
 

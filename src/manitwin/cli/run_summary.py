@@ -1,4 +1,4 @@
-"""What a whole run says of its grasps: how many held, what the second engine and the repetitions say, why others failed."""
+"""Summarize the grasps of a run: how many held, the results of second engine and repetitions, why others failed."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ REHEARSAL_MARK = "x-manitwin-rehearsal"
 
 @dataclass
 class Bill:
-    """What has been charged so far; ``rehearsed``: a rehearsal server (``manitwin fake``) answered, not a model."""
+    """The amount that has been charged so far; ``rehearsed``: a rehearsal server (``manitwin fake``) answered, not a model."""
 
     usd: float = 0.0
     rehearsed: bool = False
@@ -78,7 +78,7 @@ class Budget:
 
     @property
     def nothing_under_way(self) -> bool:
-        """Whether no paid job is under way: what is spent now is all that will be."""
+        """True where no paid job is under way: what is spent now is all that will be."""
         return not self._expected
 
     def why_stopped(self, expected_usd: float) -> str:

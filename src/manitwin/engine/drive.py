@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager, closing, suppress
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypedDict, get_args
 
 from manitwin.config import RunConfig
 from manitwin.engine.driver import Driver
@@ -30,9 +30,23 @@ ExecutorName = Literal["local", "ray", "inline"]
 EXECUTORS: tuple[ExecutorName, ...] = get_args(ExecutorName)
 
 
+class RunOptions(TypedDict, total=False):
+    """Options of a run that decide nothing of its results: where it runs, and the callbacks of those who watch it.
+
+    ``executor`` is local by default; ``address`` is that of a Ray cluster. ``on_start`` is called with the number of items of
+    the data set and of those to do, ``on_stage`` and ``on_ended`` with the events of stages and items.
+    """
+
+    executor: ExecutorName
+    address: str | None
+    on_start: Callable[[int, int], None]
+    on_stage: OnStage
+    on_ended: Callable[[ItemEnded], None]
+
+
 @dataclass(frozen=True)
 class RunReport:
-    """How a run ended: items of the whole data set by state, and why it stopped where it did before its end.
+    """The outcome of a run: items of the whole data set by state, and why it stopped where it did before its end.
 
     ``left`` counts the items that wait for a service. ``given`` are the numbers of those that this run was given, and
     ``counts_of_given`` has them by state; where none was given, all are meant.
@@ -47,7 +61,7 @@ class RunReport:
 
     @property
     def open(self) -> bool:
-        """Whether the same run again would go on: what failed is not tried again by itself."""
+        """True where the same run again would go on: what failed is not tried again by itself."""
         return bool(self.stopped or self.counts.get("open"))
 
     @property

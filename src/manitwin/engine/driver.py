@@ -36,7 +36,7 @@ FAILED_AS = {"died": "crashed", "timeout": "timeout"}
 
 @dataclass
 class RunResult:
-    """How a run ended: ``stopped`` says why before its end, ``left`` how many items wait for a service."""
+    """The end of a run: ``stopped`` says why before its end, ``left`` how many items wait for a service."""
 
     stopped: str | None = None
     left: int = 0

@@ -49,7 +49,7 @@ class StageEnded:
 
 @dataclass(frozen=True)
 class ItemEnded:
-    """What became of one item; ``found`` where its folder was there already, ``reason`` is the code of a rejection or failure."""
+    """An item has ended; ``found`` where its folder was there already, ``reason`` is the code of a rejection or failure."""
 
     task: Task
     state: ItemState

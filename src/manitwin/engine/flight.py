@@ -27,7 +27,7 @@ class PlannedStage:
 
 @dataclass
 class Flight:
-    """Where an item stands; ``plan`` names its stages and what each needs, once its kind is known.
+    """The state of an item under way; ``plan`` names its stages and what each needs, once its kind is known.
 
     ``attempts`` counts how often stages that are not done were tried, in earlier runs as well.
     """
@@ -47,7 +47,7 @@ class Flight:
 
     @property
     def stage(self) -> str:
-        """What is to be done next."""
+        """The stage that comes next."""
         if self.plan is None:
             return INPUT
         if self.rejected is not None or len(self.done) == len(self.plan):
@@ -56,7 +56,7 @@ class Flight:
 
     @property
     def needs(self) -> Resource:
-        """What the next job runs on."""
+        """The resource that the next job runs on."""
         return self.plan[len(self.done)].needs if self.plan is not None and self.stage != ASSEMBLE else "cpu"
 
     @property

@@ -1,4 +1,4 @@
-"""When a service may be asked again: its rate, and how long it is left alone after it failed."""
+"""Rate limiter and circuit breaker of a service: its rate, and the pause after it failed."""
 
 from __future__ import annotations
 
@@ -59,5 +59,5 @@ class Gate:
 
     @property
     def given_up(self) -> bool:
-        """Whether the service has been down for longer than anybody waits."""
+        """True where the service has been down for longer than a run waits."""
         return self._down_since is not None and self._clock() - self._down_since >= self._patience_s

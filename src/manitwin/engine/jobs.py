@@ -1,4 +1,4 @@
-"""What the driver asks of a worker, and what it gets back: ids, names and short texts, never meshes."""
+"""Jobs of workers and their results: ids, names and short texts, never meshes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAKE_ROOM = "make room, then run again to go on where it stopped"
 
 @dataclass(frozen=True)
 class WorkerSetup:
-    """What every worker of a run is told once: the data set, the recipe, and a folder for copies where the root is a URL."""
+    """Settings sent to every worker of a run: the data set, the recipe, and a folder for copies where the root is a URL."""
 
     root_url: str
     recipe: Recipe

@@ -39,9 +39,9 @@ class Collected:
     totals: AttemptTotals
 
 
-def chosen_formats(text: str) -> list[str]:
-    """Return the formats of a list by commas; raises UsageError naming those that there are."""
-    names = [name.strip() for name in text.split(",") if name.strip()]
+def chosen_formats(given: Iterable[str]) -> list[str]:
+    """Return the formats of these names; raises UsageError naming those that there are."""
+    names = [name.strip() for name in given if name.strip()]
     for name in names:
         if name not in FORMATS:
             raise UsageError(choose_from("format", name, FORMATS))

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
 from manitwin.config import Resource
-from manitwin.engine.drive import ExecutorName, RunReport, drive
-from manitwin.engine.events import ItemEnded, OnStage
+from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.folder_recipe import FolderRecipe, FolderRecord
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.engine.recipe import Ending, Identity
@@ -196,11 +195,7 @@ def draw_episodes(
     config: PicturesConfig,
     *,
     twins: str | Path | None = None,
-    executor: ExecutorName = "local",
-    address: str | None = None,
-    on_start: Callable[[int, int], None] = lambda items, opened: None,
-    on_stage: OnStage = lambda event: None,
-    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+    **run: Unpack[RunOptions],
 ) -> RunReport:
     """Draw the kept episodes of a finished run below ``out/pictures``; what is there already stays.
 
@@ -214,17 +209,9 @@ def draw_episodes(
     drawings = (BatchDrawing(folder.name) for folder in batch_folders(out))
     recipe = PicturesRecipe(config, str(out.resolve()), dataset, said["robot"])
     return drive(
-        recipe,
-        drawings,
-        DatasetRoot(out / PICTURES),
-        config.run,
-        configuration={"kind": PICTURES, **config.model_dump(mode="json")},
-        executor=executor,
-        address=address,
-        on_start=on_start,
-        on_stage=on_stage,
-        on_ended=on_ended,
-    )
+        recipe, drawings, DatasetRoot(out / PICTURES), config.run,
+        configuration={"kind": PICTURES, **config.model_dump(mode="json")}, **run,
+    )  # fmt: skip
 
 
 def write_with_pictures(out: Path, cameras: tuple[str, ...]) -> LeRobotSummary:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Unpack
 
-from manitwin.engine.drive import ExecutorName, RunReport, drive
-from manitwin.engine.events import ItemEnded, OnStage
+from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.ledger.ledger import read_ledger
 from manitwin.engine.ledger.location import CONFIG, local_ledger
@@ -152,11 +151,7 @@ def make_episodes(
     config: TrajectoriesConfig,
     *,
     twins: str | Path | None = None,
-    executor: ExecutorName = "local",
-    address: str | None = None,
-    on_start: Callable[[int, int], None] = lambda items, opened: None,
-    on_stage: OnStage = lambda event: None,
-    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+    **run: Unpack[RunOptions],
 ) -> RunReport:
     """Attempt ``count`` episodes with the twins, or in the scenes, of a place; those that are there stay.
 
@@ -182,8 +177,7 @@ def make_episodes(
         raise UsageError(f"{root.url}: {error}") from error
     report = drive(
         EpisodesRecipe(config, source.dataset, source.scenes), deal, root, config.run,
-        configuration=configuration, executor=executor, address=address, on_start=on_start, on_stage=on_stage,
-        on_ended=on_ended,
+        configuration=configuration, **run,
     )  # fmt: skip
     before = sum(batch.count for batch in there)
     if before > count:

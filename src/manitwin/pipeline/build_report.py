@@ -70,7 +70,7 @@ class BuildReport:
 
     @cached_property
     def results(self) -> list[ItemResult]:
-        """What became of each item, in the order of their numbers; read from the ledger when it is first asked for."""
+        """The result of each item, in the order of their numbers; read from the ledger when it is first asked for."""
         return list(self.iterate())
 
     def iterate(self) -> Iterator[ItemResult]:
@@ -96,12 +96,12 @@ class BuildReport:
 
     @property
     def remarks(self) -> list[str]:
-        """What a user should be told of the inputs, a line each."""
+        """Remarks on the inputs for the user, a line each."""
         return self.run.remarks
 
     @property
     def open(self) -> bool:
-        """Whether the same build again would go on; what failed is not tried again by itself (``manitwin retry``)."""
+        """True where the same build again would go on; what failed is not tried again by itself (``manitwin retry``)."""
         return bool(self.run.stopped or self.run.left or self.run.counts_of_given.get("open"))
 
     @property

@@ -1,4 +1,4 @@
-"""What each file of a folder is to a build: an input, a part of one, or left alone with the reason."""
+"""List the files of a folder as a build takes them: an input, a part of one, or left alone with the reason."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class FolderListing:
 
     @property
     def files(self) -> int:
-        """How many files the folder has, in all folders below it."""
+        """The number of files of the folder, in all folders below it."""
         return len(self.inputs) + len(self.parts) + len(self.left)
 
     def remarks(self) -> list[str]:

@@ -1,4 +1,4 @@
-"""What the chosen generator can never make a mesh of: told before anything is begun."""
+"""Find inputs that the chosen generator can never make a mesh of, before anything is begun."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Why a file of a folder is no input, by its name, and by its first bytes where the name says nothing."""
+"""Reasons for which a file of a folder is no input, by its name, and by its first bytes where the name says nothing."""
 
 from __future__ import annotations
 

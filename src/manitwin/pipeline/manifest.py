@@ -1,4 +1,4 @@
-"""What to build: files, folders and CSV or JSONL manifests, as a list of items."""
+"""Read the inputs of a build: files, folders and CSV or JSONL manifests, as a list of items."""
 
 from __future__ import annotations
 

@@ -167,7 +167,7 @@ def _decided_by(stage: Stage | StageProvenance) -> tuple[str, str, str | None]:
 
 @dataclass(frozen=True)
 class TwinRecipe(FolderRecipe[TwinRecord]):
-    """What the engine makes of an item: a twin. ``tables`` are kept of the twins while a run goes on."""
+    """The engine's recipe that makes a twin of an item. ``tables`` are kept of the twins while a run goes on."""
 
     payload = Item
     record = RECORD

@@ -22,7 +22,7 @@ RETIRED = ("item_timeout_s",)
 
 
 class Flags(TypedDict, total=False):
-    """What may be said of a build beside its configuration; None, like what is left out, leaves the configuration as it is."""
+    """Flags of a build beside its configuration; None, like what is left out, leaves the configuration as it is."""
 
     seed: int | None
     """The seed of everything random."""

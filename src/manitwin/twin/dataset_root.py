@@ -45,12 +45,12 @@ class DatasetRoot:
 
     @cached_property
     def flat(self) -> bool:
-        """Whether it is of the layout of earlier versions: twin folders directly below it. It is read, and no longer written."""
+        """True for the layout of earlier versions: twin folders directly below it. It is read, and no longer written."""
         return self.local is not None and not self.exists(TWINS) and any(self._flat_ids())
 
     @property
     def has_twins(self) -> bool:
-        """Whether it holds twins, or will: in the layout of today or of earlier versions."""
+        """True where it holds twins, or will: in the layout of today or of earlier versions."""
         return self.exists(TWINS) or self.flat
 
     def _flat_ids(self) -> Iterator[str]:

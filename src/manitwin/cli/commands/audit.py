@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices
+from manitwin.cli import choices, options
 from manitwin.cli.console import err_console
 
 if TYPE_CHECKING:
@@ -20,12 +20,7 @@ if TYPE_CHECKING:
 
 def audit(
     paths: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            help="Assets, or folders of assets.",
-            metavar="PATH...",
-            callback=choices.must_exist("an asset, or a folder of them"),
-        ),
+        list[Path] | None, options.existing("Assets, or folders of assets.", "PATH...", "an asset, or a folder of them")
     ] = None,
     select: Annotated[
         str | None, typer.Option(help="Only these rules: codes or their beginnings.", metavar="A,B")

@@ -30,18 +30,13 @@ RUN_RENAMED = "`manitwin run` is `manitwin build` now; the old name goes with th
 def build(
     inputs: Annotated[
         list[Path] | None,
-        typer.Argument(
-            help="Images, meshes, folders, or .csv/.jsonl manifests; none: go on with what is there.",
-            metavar="INPUT",
-            callback=choices.must_exist("an image, a mesh, a folder, or a .csv or .jsonl manifest"),
+        options.existing(
+            "Images, meshes, folders, or .csv/.jsonl manifests; none: go on with what is there.",
+            "INPUT",
+            "an image, a mesh, a folder, or a .csv or .jsonl manifest",
         ),
     ] = None,
-    out: Annotated[
-        str,
-        typer.Option(
-            "--out", "-o", help="The data set: a folder, or a URL (s3://, gs://).", callback=choices.folder_to_write
-        ),
-    ] = "",
+    out: Annotated[str, options.output_folder("The data set: a folder, or a URL (s3://, gs://).")] = "",
     text: options.Text = None,
     strict: options.Strict = False,
     config: options.Config = None,
@@ -58,12 +53,12 @@ def build(
 
     if not out:
         raise UsageError("no data set to write twins into; give a folder or URL with -o")
-    arguments = {"texts": text or [], "strict": strict, "jobs": jobs, "config": config}
+    arguments: dict[str, Any] = {"texts": text or [], "strict": strict, "jobs": jobs, "config": config}
     if dry_run:
         _print_dry_run(inputs or [], out, arguments, said, as_json=json)
         return
-    where = {"executor": options.executor_name(executor), "address": address}
-    report = _watched_build(inputs or [], out, lines=lines, **arguments, **where, **said)
+    arguments |= {"executor": executor, "address": address}
+    report = _watched_build(inputs or [], out, lines=lines, **arguments, **said)
     _print_report(report, lines)
     if json:
         from manitwin.cli.causes import causes_of
@@ -99,8 +94,6 @@ def _watched_build(inputs: list[Path], out: str, *, lines: bool, **arguments: An
     """Build while a person watches; ``arguments`` are those of ``api.build``."""
     from manitwin.api import build as build_twins
     from manitwin.cli.progress import WatchedRun
-    from manitwin.engine.ledger.location import local_log
-    from manitwin.twin.dataset_root import DatasetRoot
 
     if arguments["executor"] != "ray":
         from manitwin.render.device import require_renderer
@@ -119,7 +112,7 @@ def _watched_build(inputs: list[Path], out: str, *, lines: bool, **arguments: An
         if lines:
             _print_result(result)
 
-    with WatchedRun("inputs", lambda: local_log(DatasetRoot(out))) as watched:
+    with WatchedRun("inputs", out) as watched:
         return build_twins(
             inputs, out, **arguments, on_estimate=print_estimate, on_start=watched.start, on_stage=staged, on_result=ended
         )  # fmt: skip

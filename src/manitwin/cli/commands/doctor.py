@@ -39,8 +39,8 @@ MIN_FREE_GB = 2
 
 
 @dataclass(frozen=True)
-class Finding:
-    """One thing that was looked at."""
+class Examined:
+    """The result of one check of this installation: ``name`` is what was checked."""
 
     name: str
     ok: bool
@@ -89,7 +89,7 @@ def doctor(
     raise typer.Exit(0 if all(finding.ok for finding in findings) else 4)
 
 
-def asked(kind: str, spec: str, settings: BuildConfig) -> Finding:
+def asked(kind: str, spec: str, settings: BuildConfig) -> Examined:
     """Send one small request to the backend of a spec: what works, what it cost and how long it took.
 
     No remembered answer is taken for one, and none is remembered. Raises ConfigError for a name that no backend has.
@@ -105,16 +105,16 @@ def asked(kind: str, spec: str, settings: BuildConfig) -> Finding:
         try:
             backend = create(kind, spec, settings)
             if not hasattr(backend, "probe"):
-                return Finding(spec, True, "built in, nothing to ask")
+                return Examined(spec, True, "built in, nothing to ask")
             works, ok = backend.probe(), True
         except ManiTwinError as error:
             works, ok = str(error), False
     seconds = time.perf_counter() - started
     works += "; it is a rehearsal server, not a model" if bill.rehearsed else ""
-    return Finding(spec, ok, f"{' '.join(works.split())} ({bill.usd:.4f} USD, {seconds:.1f} s)")
+    return Examined(spec, ok, f"{' '.join(works.split())} ({bill.usd:.4f} USD, {seconds:.1f} s)")
 
 
-def examine() -> list[Finding]:
+def examine() -> list[Examined]:
     """Look at Python, the packages, what they want of the system, physics, the renderer, the backends and the disk."""
     looks: tuple[tuple[str, Callable[[], str]], ...] = (
         ("python", _python),
@@ -131,11 +131,11 @@ def examine() -> list[Finding]:
     return [_look(name, look) for name, look in looks]
 
 
-def _look(name: str, look: Callable[[], str]) -> Finding:
+def _look(name: str, look: Callable[[], str]) -> Examined:
     try:
-        return Finding(name, True, look())
+        return Examined(name, True, look())
     except (ManiTwinError, ImportError, RuntimeError, OSError) as error:
-        return Finding(name, False, " ".join(str(error).split()))
+        return Examined(name, False, " ".join(str(error).split()))
 
 
 def _python() -> str:

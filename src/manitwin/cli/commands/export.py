@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices
+from manitwin.cli import choices, options
 from manitwin.cli.console import note_old_layout, out_console, print_error
 
 if TYPE_CHECKING:
@@ -20,18 +20,13 @@ if TYPE_CHECKING:
 def export(
     twins: Annotated[
         list[str],
-        typer.Argument(
-            help="Twin folders, folders of twins, data sets (a folder or URL); or scenes of `manitwin layout`.",
-            metavar="TWIN|SCENE",
-            callback=choices.must_exist("a folder that manitwin has built"),
+        options.existing(
+            "Twin folders, folders of twins, data sets (a folder or URL); or scenes of `manitwin layout`.",
+            "TWIN|SCENE",
+            "a folder that manitwin has built",
         ),
     ],
-    out: Annotated[
-        Path,
-        typer.Option(
-            "--out", "-o", help="The folder to write OUT/<twin>/<format>/ into.", callback=choices.folder_to_write
-        ),
-    ],
+    out: Annotated[Path, options.output_folder("The folder to write OUT/<twin>/<format>/ into.")],
     to: Annotated[
         str, choices.EXPORT_FORMATS.option(help="Formats by commas (mjcf,urdf,sdf,usd,...), or all.")
     ] = "all",

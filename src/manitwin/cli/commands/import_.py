@@ -7,23 +7,18 @@ from typing import Annotated
 
 import typer
 
-from manitwin.cli import choices
+from manitwin.cli import choices, options
 from manitwin.cli.console import out_console, print_error
 
 
 def import_(
     paths: Annotated[
         list[Path],
-        typer.Argument(
-            help="Assets: files, folders, or folders of them.",
-            metavar="PATH...",
-            callback=choices.must_exist("an asset's file or folder, or a folder of assets"),
+        options.existing(
+            "Assets: files, folders, or folders of them.", "PATH...", "an asset's file or folder, or a folder of assets"
         ),
     ],
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", help="The folder to write imported assets into.", callback=choices.folder_to_write),
-    ],
+    out: Annotated[Path, options.output_folder("The folder to write imported assets into.")],
     format: Annotated[
         str,
         choices.IMPORT_FORMATS.option(

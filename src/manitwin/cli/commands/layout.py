@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import degrees
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,21 +14,17 @@ from manitwin.cli.documents import Json, print_document
 
 if TYPE_CHECKING:
     from manitwin.scenes.layouts.layouts_run import LayoutTotals
-    from manitwin.scenes.settings import LayoutsConfig
 
 
+@options.with_options(options.RUN, before="json")
 def layout(
     dataset: Annotated[
         str,
-        typer.Argument(
-            help="A data set, or a folder of twins.",
-            metavar="DATASET",
-            callback=choices.must_exist("a data set, or the folder that manitwin build wrote"),
+        options.existing(
+            "A data set, or a folder of twins.", "DATASET", "a data set, or the folder that manitwin build wrote"
         ),
     ],
-    out: Annotated[
-        str, typer.Option("--out", "-o", help="The folder to write scenes into.", callback=choices.folder_to_write)
-    ],
+    out: Annotated[str, options.output_folder("The folder to write scenes into.")],
     count: Annotated[int, typer.Option("-n", help="How many layouts.", callback=choices.count_of("-n"))] = 100,
     objects: Annotated[str | None, typer.Option(help="How many objects: LOW..HIGH.", metavar="LOW..HIGH")] = None,
     surface: Annotated[str | None, choices.SURFACES.option(help="table, shelf or tray.")] = None,
@@ -49,12 +44,8 @@ def layout(
         bool, typer.Option("--pictures", help="Also draw each (colours, depth, normals, instance ids) and a sheet.")
     ] = False,
     sheet: Annotated[bool, typer.Option("--sheet", help="Draw one picture of the first 48 scenes.")] = False,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    jobs: options.Jobs = None,
-    executor: options.Executor = "local",
-    address: options.Address = None,
     json: Json = False,
+    **run: Any,
 ) -> None:
     """Sample scenes of twins at rest on a table, a shelf or a tray; run it again to go on where it stopped."""
     given = {
@@ -62,10 +53,13 @@ def layout(
         "include": tuple(include) if include else None, "stacked": stacked, "contained": contained,
         "upright": upright or None,
     }  # fmt: skip
-    settings = _settings(config, {k: v for k, v in given.items() if v is not None}, seed, pictures, jobs)
+    from manitwin.scenes.settings import LayoutsConfig
+
+    chosen = {name: value for name, value in given.items() if value is not None}
+    settings = options.read_settings(LayoutsConfig, run, {"pictures": pictures or None, "layout": chosen})
+    from manitwin.api import make_layouts
     from manitwin.cli.progress import WatchedRun
-    from manitwin.engine.ledger.location import local_log
-    from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, layout_totals, make_layouts, without_upright
+    from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, layout_totals, without_upright
     from manitwin.twin.dataset_root import DatasetRoot
 
     sheet = sheet or settings.pictures or DatasetRoot(out).exists(CONTACT_SHEET)  # one that is there is kept up to date
@@ -73,11 +67,8 @@ def layout(
         from manitwin.render.device import require_renderer
 
         require_renderer()
-    with WatchedRun("layouts", lambda: local_log(DatasetRoot(out))) as watched:
-        report = make_layouts(
-            dataset, out, count, settings, executor=options.executor_name(executor), address=address,
-            on_start=watched.start, on_stage=watched.progress.stage, on_ended=watched.progress.item_ended,
-        )  # fmt: skip
+    with WatchedRun("layouts", out) as watched:
+        report = make_layouts(dataset, out, count, config=settings, **options.placed(run), **watched.callbacks)
     totals = layout_totals(out)
     if settings.layout.upright and (lying := without_upright(dataset)):
         out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}", markup=False)
@@ -117,13 +108,3 @@ def _range(text: str) -> tuple[int, int]:
         return int(low), int(high or low)
     except ValueError:
         raise UsageError(f"--objects {text}: give LOW..HIGH, such as 3..12") from None
-
-
-def _settings(
-    file: Path | None, layout: dict[str, Any], seed: int | None, pictures: bool, jobs: int | None
-) -> LayoutsConfig:
-    from manitwin.scenes.run_settings import load_settings
-    from manitwin.scenes.settings import LayoutsConfig
-
-    given = {"seed": seed, "pictures": pictures or None, "layout": layout, "run": options.run_settings(jobs)}
-    return load_settings(LayoutsConfig, file, given)

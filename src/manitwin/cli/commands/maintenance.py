@@ -102,30 +102,23 @@ def retry(
 def index(
     dataset: Annotated[
         str,
-        typer.Argument(
-            help="A data set: a folder or URL.",
-            metavar="DATASET",
-            callback=choices.must_exist("the folder or URL of a data set"),
-        ),
+        options.existing("A data set: a folder or URL.", "DATASET", "the folder or URL of a data set"),
     ],
     jobs: options.Jobs = None,
 ) -> None:
     """Write the index of a data set again, from its twins alone; the old one serves until the new one is whole."""
-    import os
-
     from rich.progress import MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    from manitwin.dataset.index.rebuild import rebuild
+    from manitwin.api import write_index
     from manitwin.twin.dataset_root import DatasetRoot
 
-    root = DatasetRoot(dataset)
-    note_old_layout(root)
+    note_old_layout(DatasetRoot(dataset))
     columns = (TextColumn("reading"), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=err_console, transient=True) as progress:
         task = progress.add_task("reading", total=None)
-        written = rebuild(
-            root,
-            jobs=jobs or os.cpu_count() or 1,
+        written = write_index(
+            dataset,
+            jobs=jobs,
             on_start=lambda twins: progress.update(task, total=twins),
             on_read=lambda twins: progress.advance(task, twins),
         )

@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from manitwin.cli import choices, options
 from manitwin.cli.console import out_console
 
@@ -15,16 +13,8 @@ if TYPE_CHECKING:
 
 
 def prompts(
-    twin: Annotated[
-        Path,
-        typer.Argument(
-            help="A twin folder.", metavar="TWIN", callback=choices.must_exist("a folder that manitwin build made")
-        ),
-    ],
-    out: Annotated[
-        Path,
-        typer.Option("--out", "-o", help="The folder to write the questions into.", callback=choices.folder_to_write),
-    ],
+    twin: Annotated[Path, options.existing("A twin folder.", "TWIN", "a folder that manitwin build made")],
+    out: Annotated[Path, options.output_folder("The folder to write the questions into.")],
     config: options.Config = None,
     vlm: Annotated[
         str, choices.ANNOTATORS.option(help="The model, as for build; nothing is sent to it.")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from manitwin.cli import choices, options
+from manitwin.cli import options
 from manitwin.cli.console import err_console, note_old_layout, out_console
 
 if TYPE_CHECKING:
@@ -20,18 +20,13 @@ SHARD_SIZE_MB = 1000  # as in publish/publish.py, which is imported when it is n
 def publish(
     dataset: Annotated[
         str,
-        typer.Argument(
-            help="A data set (a folder or a URL), or a folder of episodes.",
-            metavar="DATASET|EPISODES",
-            callback=choices.must_exist("the folder or URL of a data set"),
+        options.existing(
+            "A data set (a folder or a URL), or a folder of episodes.",
+            "DATASET|EPISODES",
+            "the folder or URL of a data set",
         ),
     ],
-    out: Annotated[
-        str,
-        typer.Option(
-            "--out", "-o", help="A new folder or URL, or an older publication.", callback=choices.folder_to_write
-        ),
-    ],
+    out: Annotated[str, options.output_folder("A new folder or URL, or an older publication.")],
     license_allow: Annotated[
         str | None,
         typer.Option(help="Licences that may go out, by commas (CC-BY-4.0,CC0-1.0); default: all but 'unknown'."),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -11,14 +11,16 @@ from manitwin.cli import choices, options
 from manitwin.cli.causes import print_causes
 from manitwin.cli.console import err_console, out_console, print_error
 
+if TYPE_CHECKING:
+    from manitwin.episodes.lerobot.write import LeRobotSummary
 
+
+@options.with_options({name: each for name, each in options.RUN.items() if name != "seed"})
 def render(
     episodes: Annotated[
         Path,
-        typer.Argument(
-            help="What `manitwin trajectories` wrote.",
-            metavar="EPISODES",
-            callback=choices.must_exist("the folder that manitwin trajectories wrote"),
+        options.existing(
+            "What `manitwin trajectories` wrote.", "EPISODES", "the folder that manitwin trajectories wrote"
         ),
     ],
     cameras: Annotated[str | None, choices.CAMERAS.option(help="By commas: front, side, top, wrist.")] = None,
@@ -27,33 +29,28 @@ def render(
         str | None, choices.CODECS.option(help="vp9 (plays in browsers), or mpeg4 (quicker to write).")
     ] = None,
     twins: options.Twins = None,
-    config: options.Config = None,
-    jobs: options.Jobs = None,
-    executor: options.Executor = "local",
-    address: options.Address = None,
+    **run: Any,
 ) -> None:
     """Draw the kept episodes by showing their states again, and add the films to the LeRobot data set."""
     from manitwin.episodes.settings import PicturesConfig
-    from manitwin.scenes.run_settings import load_settings
 
     names = None if cameras is None else tuple(name.strip() for name in cameras.split(","))
-    given = {"cameras": names, "size_px": size, "codec": codec, "run": options.run_settings(jobs)}
-    settings = load_settings(PicturesConfig, config, given)
+    settings = options.read_settings(PicturesConfig, run, {"cameras": names, "size_px": size, "codec": codec})
+    from manitwin.api import render_episodes
     from manitwin.cli.progress import WatchedRun
-    from manitwin.engine.ledger.location import local_log
-    from manitwin.episodes.episode_pictures import PICTURES, draw_episodes, write_with_pictures
-    from manitwin.episodes.video import require_encoder
-    from manitwin.render.device import require_renderer
-    from manitwin.twin.dataset_root import DatasetRoot
+    from manitwin.episodes.episode_pictures import PICTURES
 
-    if executor != "ray":
-        require_renderer()
-        require_encoder(settings.codec)
-    with WatchedRun("batches", lambda: local_log(DatasetRoot(episodes / PICTURES))) as watched:
-        report = draw_episodes(
-            episodes, settings, twins=twins, executor=options.executor_name(executor), address=address,
-            on_start=watched.start, on_stage=watched.progress.stage, on_ended=watched.progress.item_ended,
+    written: list[LeRobotSummary] = []
+    with WatchedRun("batches", episodes / PICTURES) as watched:
+        report = render_episodes(
+            episodes, config=settings, twins=twins, on_written=written.append,
+            **options.placed(run), **watched.callbacks,
         )  # fmt: skip
+    for each in written:
+        out_console.print(
+            f"{each.episodes} episodes, {each.frames} frames, {len(settings.cameras)} cameras: {episodes}/lerobot",
+            markup=False,
+        )
     if report.exit_code == 4:
         if report.stopped:
             print_error(f"stopped: {report.stopped}")
@@ -63,8 +60,3 @@ def render(
                 f"manitwin status {episodes}/pictures says more; run the same command again", markup=False
             )
         raise typer.Exit(4)
-    written = write_with_pictures(episodes, settings.cameras)
-    out_console.print(
-        f"{written.episodes} episodes, {written.frames} frames, {len(settings.cameras)} cameras: {episodes}/lerobot",
-        markup=False,
-    )

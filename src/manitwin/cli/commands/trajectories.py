@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,18 +17,17 @@ if TYPE_CHECKING:
     from manitwin.episodes.retirement import Retirement
 
 
+@options.with_options(options.RUN, before="json")
 def trajectories(
     source: Annotated[
         str,
-        typer.Argument(
-            help="A data set, a folder of twins, or scenes of `manitwin layout`.",
-            metavar="DATASET|SCENES",
-            callback=choices.must_exist("a data set, a folder of twins, or what manitwin layout wrote"),
+        options.existing(
+            "A data set, a folder of twins, or scenes of `manitwin layout`.",
+            "DATASET|SCENES",
+            "a data set, a folder of twins, or what manitwin layout wrote",
         ),
     ],
-    out: Annotated[
-        Path, typer.Option("--out", "-o", help="The folder to write episodes into.", callback=choices.folder_to_write)
-    ],
+    out: Annotated[Path, options.output_folder("The folder to write episodes into.")],
     count: Annotated[
         int, typer.Option("-n", help="How many episodes to attempt.", callback=choices.count_of("-n"))
     ] = 100,
@@ -47,48 +46,36 @@ def trajectories(
             "--format", help="What to write beside the batches: lerobot, maniskill, or both by a comma."
         ),
     ] = "lerobot,maniskill",
-    seed: options.Seed = None,
-    config: options.Config = None,
-    jobs: options.Jobs = None,
-    executor: options.Executor = "local",
-    address: options.Address = None,
     json: Json = False,
+    **run: Any,
 ) -> None:
     """Plan and execute pick-and-place episodes, and keep what succeeded; run it again to go on where it stopped."""
     from manitwin.episodes.settings import TrajectoriesConfig
-    from manitwin.scenes.run_settings import load_settings
 
-    given = {"seed": seed, "robot": robot, "skill": skill, "others": others, "run": options.run_settings(jobs)}
-    settings = load_settings(TrajectoriesConfig, config, given)
+    settings = options.read_settings(TrajectoriesConfig, run, {"robot": robot, "skill": skill, "others": others})
+    from manitwin.api import make_episodes
     from manitwin.cli.documents import trajectories_document
     from manitwin.cli.progress import WatchedRun
-    from manitwin.engine.ledger.location import local_log
-    from manitwin.episodes.collect import chosen_formats, collect
-    from manitwin.episodes.episodes_run import make_episodes, retire_failing
-    from manitwin.twin.dataset_root import DatasetRoot
 
-    wanted = chosen_formats(formats)
-    with WatchedRun("batches", lambda: local_log(DatasetRoot(out))) as watched:
+    with WatchedRun("batches", out) as watched:
         report = make_episodes(
-            source, out, count, settings, twins=twins, executor=options.executor_name(executor), address=address,
-            on_start=watched.start, on_stage=watched.progress.stage, on_ended=watched.progress.item_ended,
+            source, out, count, config=settings, twins=twins, formats=formats.split(","), retire=retire,
+            **options.placed(run), **watched.callbacks,
         )  # fmt: skip
-    for remark in report.remarks:
+    for remark in report.run.remarks:
         err_console.print(remark, markup=False)
-    if report.exit_code == 4:
-        _print_unfinished(report, out)
-        if json:
-            print_document(trajectories_document(report, str(out), causes_of(str(out)), None, [], 0))
-        raise typer.Exit(4)
-    collected = collect(out, wanted)
-    found, fresh = retire_failing(out) if retire else ([], 0)
-    for line in collected.lines:
-        out_console.print(line, markup=False)
-    if retire:
-        _print_retired(found, fresh)
-    out_console.print(f"manitwin stats {out} says more", markup=False)
+    if report.totals is None:
+        _print_unfinished(report.run, out)
+    else:
+        for line in report.lines:
+            out_console.print(line, markup=False)
+        if retire:
+            _print_retired(report.retired, report.newly_retired)
+        out_console.print(f"manitwin stats {out} says more", markup=False)
     if json:
-        print_document(trajectories_document(report, str(out), causes_of(str(out)), collected, found, fresh))
+        print_document(trajectories_document(report, str(out), causes_of(str(out))))
+    if report.totals is None:
+        raise typer.Exit(4)
 
 
 def _print_unfinished(report: RunReport, out: Path) -> None:

@@ -39,10 +39,14 @@ QUERIES: tuple[Query, ...] = (
 
 @dataclass(frozen=True)
 class WrittenReport:
-    """A report that is in its place: the path or URL of its page, and its first sentence without the full stop."""
+    """A report that is in its place: the path or URL of its page, and its first sentence without the full stop.
+
+    ``text`` are the main numbers of a report on episodes as lines; of a data set's there is none.
+    """
 
     page: str
     summary: str
+    text: str = ""
 
 
 def write_dataset_report(root: DatasetRoot, out: Path | None = None) -> WrittenReport:

@@ -221,7 +221,7 @@ def reachable(address: str) -> str:
 
 
 class Head:
-    """What the head said last.
+    """The last answer of the cluster's head.
 
     Owns: a thread that asks it. A head that is lost never answers, and the call hangs: so nobody else asks.
     """

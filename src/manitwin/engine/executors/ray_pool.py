@@ -74,7 +74,7 @@ class RayPool:
 
     @property
     def refs(self) -> list[Any]:
-        """What Ray is to be asked for."""
+        """The object references to ask Ray for."""
         return list(self._of)
 
     def submit(self, ticket: int, job: Job) -> None:

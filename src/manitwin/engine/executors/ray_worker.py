@@ -1,4 +1,4 @@
-"""What runs on a cluster's nodes: the process that does jobs, and what is read of one that died."""
+"""The worker process on a cluster's nodes, which does jobs, and the reading of one that died."""
 
 from __future__ import annotations
 

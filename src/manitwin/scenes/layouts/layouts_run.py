@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
-from manitwin.engine.drive import ExecutorName, RunReport, drive
-from manitwin.engine.events import ItemEnded, OnStage
+from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.ledger.ledger import read_ledger
 from manitwin.engine.ledger.location import local_ledger
 from manitwin.errors import UsageError
@@ -48,12 +46,7 @@ def make_layouts(
     out: str | Path,
     count: int,
     config: LayoutsConfig,
-    *,
-    executor: ExecutorName = "local",
-    address: str | None = None,
-    on_start: Callable[[int, int], None] = lambda items, opened: None,
-    on_stage: OnStage = lambda event: None,
-    on_ended: Callable[[ItemEnded], None] = lambda event: None,
+    **run: Unpack[RunOptions],
 ) -> RunReport:
     """Sample the layouts number 0 to ``count - 1`` of a data set's twins below ``out``; those that are there stay.
 
@@ -77,11 +70,12 @@ def make_layouts(
     def started(items: int, opened: int) -> None:
         if opened and root.exists(CONTACT_SHEET):
             root.remove(CONTACT_SHEET)
-        on_start(items, opened)
+        if "on_start" in run:
+            run["on_start"](items, opened)
 
+    watched: RunOptions = {**run, "on_start": started}
     return drive(
-        recipe, map(LayoutNumber, range(count)), root, config.run, configuration=configuration, executor=executor,
-        address=address, on_start=started, on_stage=on_stage, on_ended=on_ended,
+        recipe, map(LayoutNumber, range(count)), root, config.run, configuration=configuration, **watched
     )  # fmt: skip
 
 
