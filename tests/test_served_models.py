@@ -51,6 +51,8 @@ cpu = 2
 vlm = 1
 generator = 1
 patience_s = 60
+[generate]
+attempts = 3
 [grasps]
 simulated = 20
 unfiltered = 0
@@ -178,13 +180,13 @@ def test_a_photo_and_a_text_become_twins_while_every_server_fails(tmp_path: Path
     generator, grasper = Faults(dict.fromkeys(faults, 1)), Faults({"disconnects": 1})
     with servers(vlm, generator, grasper) as served:
         inputs = [str(SAMPLE), "--text", "a bottle", "--license", "CC0-1.0"]
-        status, said = finished(tmp_path, "run", *inputs, "-o", "data", *served.flags, "--jobs", "2")
+        status, said = finished(tmp_path, "build", *inputs, "-o", "data", *served.flags, "--jobs", "2")
         assert status == 0, said
         assert not any(key in said for key in KEYS.values())
         assert "services charge about, for a twin" in said
         made = [load(twin) for twin in twins(tmp_path)]
         assert {twin.record.source.kind for twin in made} == {"image", "text"}
-        again, _ = finished(tmp_path, "run", "-o", "data", *served.flags)
+        again, _ = finished(tmp_path, "build", "-o", "data", *served.flags)
         jobs, questions = served.jobs(), served.questions()
         assert again == 0 and (served.jobs(), served.questions()) == (jobs, questions), "nothing is asked twice"
     assert said.count("grasps verified; a rehearsal") == 2
