@@ -13,8 +13,7 @@ from typing import Any, Literal, TypedDict, get_args
 from manitwin.config import RunConfig
 from manitwin.engine.driver import Driver
 from manitwin.engine.events import ItemEnded, OnStage
-from manitwin.engine.executor import Executor
-from manitwin.engine.jobs import WorkerSetup
+from manitwin.engine.jobs import Executor, WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.ledger.location import CONFIG, LedgerCopy, cache_folder, local_ledger
 from manitwin.engine.recipe import Recipe

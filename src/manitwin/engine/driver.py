@@ -17,10 +17,9 @@ from typing import get_args
 from manitwin.config import Resource, RunConfig
 from manitwin.engine.charges import Budget
 from manitwin.engine.events import Announcer, ItemEnded, OnStage
-from manitwin.engine.executor import Executor
 from manitwin.engine.flight import Flight, PlannedStage
 from manitwin.engine.gate import Gate
-from manitwin.engine.jobs import MAKE_ROOM, Failure, Job, Reply, StageRejected, Surveyed, WriteTables
+from manitwin.engine.jobs import MAKE_ROOM, Executor, Failure, Job, Reply, StageRejected, Surveyed, WriteTables
 from manitwin.engine.ledger.ledger import Ledger, LedgerFull
 from manitwin.engine.recipe import Ending, Recipe
 from manitwin.engine.stage import ASSEMBLE, INPUT

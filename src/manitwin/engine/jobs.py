@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Protocol
 
 from manitwin.config import Resource
 from manitwin.engine.recipe import Ending, Recipe
+from manitwin.engine.stage import StagePart
 from manitwin.engine.stage_runner import StageCost, StageKey, StageRun
 from manitwin.engine.task import Task
 from manitwin.errors import Rejected
@@ -104,3 +105,27 @@ class Failure:
 
 Job = Survey | RunStage | Finish | WriteTables
 Reply = Surveyed | StageRun | StageRejected | Ending | Failure | None
+
+
+class Executor(Protocol):
+    """Slots for each resource; a job that is submitted comes back exactly once, with an answer or a Failure."""
+
+    def slots(self, needs: Resource) -> int:
+        """Return how many jobs of a resource run at a time, now: machines may come and go."""
+        ...
+
+    def submit(self, ticket: int, job: Job) -> None:
+        """Give a job to a free slot, or to the short queue before it; ``ticket`` names it in ``ended``."""
+        ...
+
+    def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
+        """Wait until a job has ended, or the time is up; returns all that have ended."""
+        ...
+
+    def parts(self) -> dict[int, StagePart]:
+        """Return how much the stages that run have done, by ticket, where they say so and it is time to look."""
+        ...
+
+    def close(self) -> None:
+        """Stop: jobs that run are cut off."""
+        ...
