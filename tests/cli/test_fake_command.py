@@ -48,17 +48,19 @@ def test_it_serves_what_it_says_until_interrupted() -> None:
 def test_an_interrupt_while_it_says_how_to_use_it_stops_it_as_well(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    console = fake_command.out_console
+    console, before = fake_command.out_console, signal.getsignal(signal.SIGINT)
     said = console.print
 
     def interrupted(text: str, **options: bool) -> None:
-        said(text, **options)
         if text.startswith("manitwin build"):
-            raise KeyboardInterrupt
+            signal.raise_signal(signal.SIGINT)
+        said(text, **options)
 
     monkeypatch.setattr(console, "print", interrupted)
     fake("graspgen")
-    assert capsys.readouterr().out.endswith("stopped\n")
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1].startswith("manitwin build") and lines[2:] == ["stopped"], "each line once"
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_it_says_the_key_to_set() -> None:

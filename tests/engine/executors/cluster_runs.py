@@ -95,7 +95,7 @@ def stage_job(number: int, text: str, recipe: RehearsalRecipe, stage: str = "a")
     return RunStage(Task(number, item, recipe.identify(item).item_id), "text", 0, stage, recipe.plan[0][1], ())
 
 
-def replies(executor: RayExecutor, count: int, within_s: float = 60) -> Iterator[tuple[int, Any]]:
+def replies(executor: RayExecutor, count: int, within_s: float = 600) -> Iterator[tuple[int, Any]]:
     """The next replies."""
     until = time.monotonic() + within_s
     while count:

@@ -96,7 +96,7 @@ def test_a_machine_that_falls_silent_takes_no_job_along(
         while len(times_run(tmp_path / "log")) < 4:
             assert executor.ended(0.2) == []
         machines.freeze(second)
-        answers = dict(replies(executor, 4, within_s=120))
+        answers = dict(replies(executor, 4))
         machines.kill(second)
     lost = [reply for reply in answers.values() if isinstance(reply, Failure)]
     assert [reply.kind for reply in lost] == ["unavailable"] * 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from typing import Annotated
 
@@ -34,12 +35,21 @@ def fake(
     if name is None:
         raise UsageError(f"no service is named; give one of {', '.join(REHEARSALS)}")
     given = Faults.parse(fault or [])
+    stop, before = threading.Event(), signal.getsignal(signal.SIGINT)
+
+    def interrupted(number: int, frame: object) -> None:
+        signal.signal(signal.SIGINT, before)  # a second one ends what does not stop
+        stop.set()
+
+    # an interrupt that was raised inside of a line's printing would print that line again
+    signal.signal(signal.SIGINT, interrupted)
     try:
         with serving(name, port=port, faults=given, key=key, polls=polls) as server:
             out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)", markup=False)
             if server.key_variable is not None:
                 out_console.print(f"export {server.key_variable}={server.key}", markup=False)
             out_console.print(f"manitwin build PHOTO -o OUT {server.option} {server.spec}", markup=False)
-            threading.Event().wait()
-    except KeyboardInterrupt:  # as soon as it has said where it is, it may be interrupted
+            stop.wait()
         out_console.print("stopped", markup=False)
+    finally:
+        signal.signal(signal.SIGINT, before)
