@@ -1,4 +1,4 @@
-"""Boxes, spheres, cylinders and capsules as meshes, in metres, centred on their origin, along Z."""
+"""Spheres, cylinders and capsules as meshes, in metres, centred on their origin, along Z."""
 
 from __future__ import annotations
 
@@ -6,11 +6,6 @@ import numpy as np
 import trimesh
 
 _SECTIONS = 48  # a cylinder's volume is 0.3 % short of the round one's
-
-
-def box(full_extents_m: np.ndarray) -> trimesh.Trimesh:
-    """Return a box of these full side lengths ``(3,)``."""
-    return trimesh.creation.box(np.asarray(full_extents_m, float))
 
 
 def sphere(radius_m: float) -> trimesh.Trimesh:

@@ -228,7 +228,7 @@ def _written_out(model: Any, mesh: int) -> tuple[np.ndarray, np.ndarray]:
 def _primitive(kind: int, size: np.ndarray) -> trimesh.Trimesh | None:
     """Return a geom's mesh: sizes are half lengths (MJCF reference, geom size)."""
     if kind == int(_KINDS.mjGEOM_BOX):
-        return primitives.box(2 * size)
+        return trimesh.creation.box(2 * size)
     if kind == int(_KINDS.mjGEOM_SPHERE):
         return primitives.sphere(float(size[0]))
     if kind == int(_KINDS.mjGEOM_CYLINDER):

@@ -186,7 +186,7 @@ class SdfShapes:
 
 def _primitive(shape: etree._Element, what: str) -> trimesh.Trimesh | None:
     if shape.tag == "box":
-        return primitives.box(_all_positive(shape, "size", what))
+        return trimesh.creation.box(_all_positive(shape, "size", what))
     if shape.tag == "ellipsoid":
         return primitives.ellipsoid(_all_positive(shape, "radii", what))
     if shape.tag == "sphere":

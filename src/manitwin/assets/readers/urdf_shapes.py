@@ -109,7 +109,7 @@ def _rgba(material: etree._Element) -> np.ndarray | None:
 
 def _primitive(shape: etree._Element) -> trimesh.Trimesh:
     if shape.tag == "box":
-        return primitives.box(values_of(shape, "size"))
+        return trimesh.creation.box(values_of(shape, "size"))
     if shape.tag == "sphere":
         return primitives.sphere(float(shape.get("radius")))
     build = primitives.cylinder if shape.tag == "cylinder" else primitives.capsule

@@ -111,7 +111,7 @@ class StageShapes:
         """Return a cube, sphere, cylinder, capsule or cone as a mesh in its own axes and unit."""
         kind = str(prim.GetTypeName())
         if kind == "Cube":
-            return _grey(primitives.box(np.full(3, self._number(prim, "size"))), prim)
+            return _grey(trimesh.creation.box(np.full(3, self._number(prim, "size"))), prim)
         radius = self._number(prim, "radius")
         if kind == "Sphere":
             return _grey(primitives.sphere(radius), prim)

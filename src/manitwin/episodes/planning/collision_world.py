@@ -13,9 +13,6 @@ from manitwin.episodes.planning.libraries import pin
 from manitwin.episodes.planning.obstacle_shapes import ObstacleShapes, obstacle_shapes, pose_of
 from manitwin.episodes.planning.problem import Phase, PickPlaceProblem, PlannerSettings
 
-ACTIVE = (Phase.REACH, Phase.APPROACH, Phase.LIFT, Phase.CARRY, Phase.LOWER, Phase.RETREAT)
-HELD = (Phase.LIFT, Phase.CARRY, Phase.LOWER)
-
 
 class CollisionWorld:
     """A body among obstacles, and the target twice: where it stands, and in the hand.
