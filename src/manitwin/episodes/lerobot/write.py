@@ -38,7 +38,7 @@ from manitwin.twin.store import folder_beside
 
 @dataclass(frozen=True)
 class LeRobotSummary:
-    """The numbers of episodes, frames and tasks of a set that was written."""
+    """The numbers of episodes, frames and tasks of a LeRobot data set that was written."""
 
     episodes: int
     frames: int
