@@ -1,7 +1,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test docs vlm-real usd-validate lerobot-real lint lock lock-vlm-real lock-usd-validate lock-lerobot-real clean
+.PHONY: setup demo test docs vlm-real usd-validate lerobot-real lint licences vulnerabilities lock lock-vlm-real lock-usd-validate lock-lerobot-real clean
 
 setup:
 	@$(PYTHON) scripts/setup.py
@@ -33,6 +33,13 @@ lint: setup
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
 	@$(BIN)/lint-imports
+
+# of all locked packages: the licence of each, and the vulnerabilities that the package index knows
+licences: setup
+	@$(BIN)/python scripts/locked_licences.py
+
+vulnerabilities: setup
+	@$(BIN)/python scripts/locked_vulnerabilities.py
 
 lock:
 	@$(BIN)/uv pip compile --quiet --universal --generate-hashes --python-version 3.11 --extra dev \

@@ -18,7 +18,7 @@ from collections import Counter
 from importlib import import_module
 from pathlib import Path
 
-from manitwin.assets.audit.run import audit_all, find_all, select_rules
+from manitwin.assets.audit.run import audit_all, find_all, rules_selected
 from manitwin.assets.writers.exporter import TwinContent
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD
@@ -69,7 +69,7 @@ def main() -> None:
         write_assets(arguments.dataset, Path(temporary), arguments.count, formats)
         cpu, wall = cpu_seconds(), time.perf_counter()
         paths = find_all([Path(temporary)])
-        audited = list(audit_all(paths, select_rules(), jobs=arguments.jobs))
+        audited = list(audit_all(paths, rules_selected(), jobs=arguments.jobs))
         cpu, wall = cpu_seconds() - cpu, time.perf_counter() - wall
     by_format = Counter(each.format or "unreadable" for each in audited)
     found = Counter(finding.code for each in audited for finding in each.findings)

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from manitwin.engine.ledger.ledger import read_ledger
 from manitwin.engine.ledger.location import local_ledger
+from manitwin.engine.ledger.reading import read_ledger
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.twin.dataset_root import DatasetRoot
 

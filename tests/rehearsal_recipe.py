@@ -7,6 +7,9 @@ The text of an item is words apart by spaces, each ``what:stage`` or ``what:stag
     segfault:b            it kills its process with SIGSEGV, each time
     segfault-once:b       the first time only
     hang:b                it does not end
+    stuck:b               it does not end, in native code
+    eat:b:2               it takes so many gigabytes of memory
+    bad_alloc:b           it is refused memory as C++ is: a line on stderr, and SIGABRT
     unavailable:b:/file   it raises Unavailable while that file is there
     limited:b:/file       it raises RateLimited (0.2 s) while that file is there
     denied:b:/file        it raises AccessDenied while that file is there
@@ -20,6 +23,8 @@ Every run of a stage adds a line ``<twin_id> <stage>`` to the recipe's log, so t
 
 from __future__ import annotations
 
+import os
+import re
 import signal
 import time
 from dataclasses import dataclass
@@ -36,9 +41,10 @@ from manitwin.engine.stage import Draft, Stage, tell_part
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import AccessDenied, RateLimited, Rejected, Unavailable
 from manitwin.pipeline.item import Item
-from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.record import SCHEMA_VERSION, TwinRecord
 from manitwin.twin.store import RECORD, RUN, canonical_json, parse_record, seal, sha256_of_json, write_bytes_atomically
+from manitwin.twin.wholeness import note_sizes, size_damage
 from rehearsal_cube import CUBE, cube_files
 
 
@@ -100,6 +106,13 @@ class RehearsedStage:
             time.sleep(0.02)
         if what == "hang":
             _hang()
+        if what == "stuck":
+            re.match("(a+)+b", "a" * 64)
+        if what == "eat":
+            bytearray(int(more) << 30)
+        if what == "bad_alloc":
+            os.write(2, b"terminate called after throwing an instance of 'std::bad_alloc'\n  what():  std::bad_alloc\n")
+            os.abort()
 
     def _first_time(self, twin_id: str) -> bool:
         assert self._log is not None, "a recipe without a log cannot count"
@@ -158,6 +171,10 @@ class RehearsalRecipe(FolderRecipe[TwinRecord]):
             for at, (name, needs) in enumerate(self.plan)
         ]
 
+    def damage(self, root: DatasetRoot, item_id: str) -> str | None:
+        """Return what is wrong with a twin's folder by the sizes of its files."""
+        return size_damage(root, twin_name(item_id))
+
     def parse(self, record: bytes) -> TwinRecord:
         """Read a twin's record."""
         return parse_record(record)
@@ -188,7 +205,9 @@ class RehearsalRecipe(FolderRecipe[TwinRecord]):
         if rejected is None:
             for name, file in cube_files().items():
                 (fresh / name).write_bytes(file)
-        return seal(fresh, rehearsed_record(draft, self.sha256, rejected))
+        sealed = seal(fresh, rehearsed_record(draft, self.sha256, rejected))
+        note_sizes(fresh)
+        return sealed
 
 
 def rehearsed_record(draft: Draft[Item], recipe_sha256: str, rejected: Rejected | None) -> dict[str, Any]:

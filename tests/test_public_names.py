@@ -25,7 +25,10 @@ NAMES_MODULES = {
     "errors.md": "documents the whole error tree, also what is raised inside alone",
 }
 """Pages whose directives for the site's generator name modules, and why: no reader types what is in them."""
-FOR_CONTRIBUTORS = {"architecture.md": "says where things are in the package, by the names of its modules"}
+FOR_CONTRIBUTORS = {
+    "architecture.md": "says where things are in the package, by the names of its modules",
+    "threat_model.md": "says where each limit holds, by the name of the constant",
+}
 """Pages that name modules in their text, and why; their programs use public names like all others."""
 
 

@@ -42,7 +42,7 @@ KEYS = {"MANITWIN_VLM_KEY": "key-of-the-vlm-3141", "RODIN_API_KEY": "key-of-the-
 USD_PER_JOB = 0.5
 SETTINGS = f"""
 [services]
-timeout_s = 8
+timeout_s = 60
 usd_per_million_tokens = [2.0, 8.0]
 usd_per_job = {USD_PER_JOB}
 longest_wait_s = 5

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
         write_index,
         write_statistics,
     )
-    from manitwin.assets.audit.run import Audited, audit_assets
+    from manitwin.assets.audit.finding import Audited
+    from manitwin.assets.audit.run import audit_assets
     from manitwin.assets.importers.importer import Imported
     from manitwin.config import BuildConfig, load_config
     from manitwin.dataset.index.dataset import Dataset
@@ -139,10 +140,8 @@ _DEFINED_IN = {
         "write_index",
         "write_statistics",
     ),
-    "manitwin.assets.audit.run": (
-        "Audited",
-        "audit_assets",
-    ),
+    "manitwin.assets.audit.finding": ("Audited",),
+    "manitwin.assets.audit.run": ("audit_assets",),
     "manitwin.assets.importers.importer": ("Imported",),
     "manitwin.config": (
         "BuildConfig",

@@ -156,10 +156,10 @@ Settings = TypeVar("Settings", "LayoutsConfig", "TrajectoriesConfig", "PicturesC
 
 def _settings(kind: type[Settings], config: Settings | str | Path | None, jobs: int | None) -> Settings:
     """Return an application's settings: given, of a TOML file, or the default ones; raises ConfigError and UsageError."""
-    from manitwin.config import load_config
+    from manitwin.config import MOST_SLOTS, load_config
 
-    if jobs is not None and jobs < 1:
-        raise UsageError(f"jobs is {jobs}; give 1 or more")
+    if jobs is not None and not 1 <= jobs <= MOST_SLOTS:
+        raise UsageError(f"jobs is {jobs:.6g}; give 1 to {MOST_SLOTS}")
     settings = (
         config if isinstance(config, kind) else kind() if config is None else load_config(Path(str(config)), kind)
     )

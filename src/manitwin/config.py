@@ -5,14 +5,18 @@ Every section belongs to one stage and is part of that stage's key: a changed va
 
 from __future__ import annotations
 
-import tomllib
+import os
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar, cast, overload
+from typing import Annotated, Any, Literal, Self, TypeVar, cast, overload
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic_core import ErrorDetails
 
 from manitwin.errors import ConfigError, choose_from
+from manitwin.formats import toml_file
+from manitwin.formats.printable import printable_line
+
+_SHOWN_CHARACTERS = 200
 
 Resource = Literal["cpu", "gpu", "vlm", "generator"]
 """The resource that a stage runs on; each has slots of its own in a run."""
@@ -24,10 +28,28 @@ AbsolutePath = Annotated[Path, AfterValidator(Path.absolute)]
 Kind = TypeVar("Kind", bound=BaseModel)
 
 
-class Section(BaseModel):
-    """A part of the configuration: unknown keys are errors, values do not change."""
+LARGEST_SEED = 2**63 - 1
+"""What ledgers, tables and generators of random numbers hold in 64 bits."""
+MOST_SLOTS = 1024
+LARGEST_COUNT = 10**9
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+
+
+class Section(BaseModel):
+    """A part of the configuration: unknown keys are errors, values do not change, numbers are finite and whole ones bounded."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Self:
+        for name, value in self:
+            if isinstance(value, int) and name not in _OF_ANY_SIZE and abs(value) > LARGEST_COUNT:
+                raise ValueError(f"{name} is larger than {LARGEST_COUNT}")
+        return self
+
+
+_OF_ANY_SIZE = frozenset({"seed", "max_bytes"})
 
 
 NO_SETTINGS = Section()
@@ -66,7 +88,7 @@ class RepairConfig(Section):
 class MeshConfig(Section):
     """Limits of a mesh file's size, and of its textures."""
 
-    max_bytes: int = Field(default=1 << 30, gt=0)
+    max_bytes: int = Field(default=1 << 30, gt=0, le=1 << 40)
     max_faces: int = Field(default=4_000_000, gt=0)
     max_texture_pixels: int = Field(default=1 << 26, gt=0)
     max_texture_size: int = Field(default=2048, ge=16)
@@ -225,6 +247,8 @@ class ServicesConfig(Section):
     on this machine costs nothing; for any other one a price has to be known, so that ``max_cost_usd`` can hold.
     ``record`` is a file that every answer of a VLM is added to, for ``replay:FILE``. ``submit_again``: a generator's job
     whose submit was broken off before its answer came is submitted again, although the first may have been taken and paid.
+    ``timeout_s`` is for a whole request, from the look-up of its name to the last byte (of a file: one second more for each
+    MiB that has come).
     """
 
     usd_per_million_tokens: tuple[float, float] | None = None
@@ -238,6 +262,10 @@ class ServicesConfig(Section):
     submit_again: bool = False
 
 
+DEFAULT_MEMORY_GB = 16.0
+"""Measured: a worker has at most 9.6 GiB of heap and stacks for 4 million triangles with an 8k texture, 1.9 for 2.4 MB."""
+
+
 class RunConfig(Section):
     """Slots, retries and patience of a run; nothing here decides what a twin is.
 
@@ -245,18 +273,20 @@ class RunConfig(Section):
     Ray cluster the gpu slots are its cards, and cpu 0 is all of its cores.
     ``vlm_per_minute`` bounds how many stages that ask a VLM begin in a minute. A stage that kills its worker or fails is
     tried ``attempts`` times. A service that is down is asked again for ``patience_s`` before its items are left for the
-    next run. ``in_flight`` bounds the items that are begun and not ended. The tables get ``index_every`` twins at a time
-    (0: none, ``manitwin index`` writes them).
+    next run. ``memory_gb`` is how much memory (2^30 bytes of heap and stacks) each worker process may take: an input that
+    asks for more is rejected as ``too_large`` (0: no limit). ``in_flight`` bounds the items that are begun and not ended. The
+    tables get ``index_every`` twins at a time (0: none, ``manitwin index`` writes them).
     """
 
-    cpu: int = Field(default=0, ge=0)
-    gpu: int = Field(default=1, ge=1)
-    vlm: int = Field(default=8, ge=1)
-    generator: int = Field(default=4, ge=1)
+    cpu: int = Field(default=0, ge=0, le=MOST_SLOTS)
+    gpu: int = Field(default=1, ge=1, le=MOST_SLOTS)
+    vlm: int = Field(default=8, ge=1, le=MOST_SLOTS)
+    generator: int = Field(default=4, ge=1, le=MOST_SLOTS)
     vlm_per_minute: float = Field(default=600.0, gt=0)
     attempts: int = Field(default=3, ge=1)
     stage_timeout_s: float = Field(default=1800.0, gt=0)
     patience_s: float = Field(default=1800.0, ge=0)
+    memory_gb: float = Field(default=DEFAULT_MEMORY_GB, ge=0)
     in_flight: int = Field(default=1000, ge=1)
     index_every: int = Field(default=500, ge=0)
     keep_work: bool = True
@@ -265,7 +295,7 @@ class RunConfig(Section):
 class BuildConfig(Section):
     """Everything that decides what a build makes of its inputs."""
 
-    seed: int = 0
+    seed: Seed = 0
     generator: str = "lift"
     annotator: str = "rules"
     grasper: str = "antipodal"
@@ -311,12 +341,9 @@ def load_config(path: str | Path, kind: Any = BuildConfig) -> Any:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """Return the content of a TOML file of settings; raises ConfigError."""
-    if not path.is_file():
+    if not os.path.exists(path):
         raise ConfigError(f"{path}: not there; give a TOML file of settings")
-    try:
-        return tomllib.loads(path.read_text())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not TOML: {error}") from error
+    return toml_file.read_toml(path, ConfigError, name=str(path))
 
 
 def validated(kind: type[Kind], data: dict[str, Any], where: str) -> Kind:
@@ -327,11 +354,21 @@ def validated(kind: type[Kind], data: dict[str, Any], where: str) -> Kind:
         raise ConfigError(f"{where}: {_explain(error.errors()[0], kind)}") from error
 
 
+def _cause(error: ErrorDetails) -> str:
+    """Return what is wrong with a value: the words of our own validators, or pydantic's with the value."""
+    if error["type"] == "value_error":
+        return printable_line(error["msg"].removeprefix("Value error, "), max_characters=_SHOWN_CHARACTERS)
+    value = error["input"]
+    huge = isinstance(value, int) and abs(value) > LARGEST_SEED  # Python writes no integer of many thousand digits
+    shown = "a larger integer" if huge else printable_line(repr(value), max_characters=_SHOWN_CHARACTERS)
+    return f"{error['msg']} (it is {shown})"
+
+
 def _explain(error: ErrorDetails, kind: type[BaseModel]) -> str:
-    where = [str(part) for part in error["loc"]]
+    where = [printable_line(str(part), max_characters=_SHOWN_CHARACTERS) for part in error["loc"]]
     if error["type"] != "extra_forbidden":
-        return f"{'.'.join(where)}: {error['msg']} (it is {error['input']!r})"
+        return f"{'.'.join(where)}: {_cause(error)}"
     section = kind
-    for part in where[:-1]:
+    for part in map(str, error["loc"][:-1]):
         section = cast(type[BaseModel], section.model_fields[part].annotation)
     return f"{'.'.join(where)}: {choose_from('setting', where[-1], section.model_fields)}"

@@ -5,6 +5,7 @@
     │   └── ConfigError       a configuration that cannot be used
     ├── InputError            an input that cannot be read: ends as a rejected twin          exit 3
     ├── Rejected              an answer, not an accident: kept with its reason               exit 3
+    ├── InputChanged          an input that was changed or deleted while it was worked on       exit 4
     ├── TwinError             a finished twin folder that cannot be read or written
     ├── AssetError            an asset of another tool that cannot be read
     ├── ExportError           a twin that cannot be written in a format
@@ -25,9 +26,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+_SHOWN_CHARACTERS = 100
+
 
 class ManiTwinError(Exception):
-    """Base of every error that this package raises on purpose."""
+    """Base of every error that this package raises on purpose.
+
+    Its message is text that UTF-8 has: the bytes of a file's name that are none are written out, as ``\\udce9``.
+    """
+
+    def __init__(self, *args: object):
+        super().__init__(*(encodable(each) if isinstance(each, str) else each for each in args))
 
 
 class UsageError(ManiTwinError):
@@ -62,6 +71,7 @@ class Rejected(ManiTwinError):
     """
 
     def __init__(self, reason: str, detail: str, stage: str | None = None):
+        detail = encodable(detail)
         super().__init__(f"{reason}: {detail}")
         self.reason, self.detail, self.stage = reason, detail, stage
 
@@ -74,6 +84,10 @@ class InputError(Rejected):
 
     def __init__(self, reason: str, detail: str, stage: str | None = "input"):
         super().__init__(reason, detail, stage)
+
+
+class InputChanged(ManiTwinError):
+    """An input that was changed or deleted while a run was at work on it: the item stays open for the next run."""
 
 
 class BackendError(ManiTwinError):
@@ -111,9 +125,14 @@ class RendererMissing(Unavailable):
     """No Vulkan device that SAPIEN can render with."""
 
 
+def encodable(text: str) -> str:
+    """Return text with lone surrogates written out, which no ledger, table or file of UTF-8 takes."""
+    return text.encode("utf-8", errors="backslashreplace").decode("utf-8")
+
+
 def choose_from(kind: str, name: str, valid: Iterable[str]) -> str:
-    """Describe an unknown name: the nearest valid one first, then all of them."""
-    valid = sorted(valid)
+    """Describe an unknown name, of a long one its begin: the nearest valid one first, then all of them."""
+    valid, name = sorted(valid), name if len(name) <= _SHOWN_CHARACTERS else f"{name[:_SHOWN_CHARACTERS]}..."
     near = get_close_matches(name, valid, n=1)
     hint = f"; did you mean {near[0]!r}?" if near else "."
     return f"unknown {kind} {name!r}{hint} Valid: {', '.join(valid)}"

@@ -198,7 +198,7 @@ def test_variant_by_its_file_and_the_lowest_by_the_folder(tmp_path: Path) -> Non
         ({"scale": [1, 2]}, "scale is neither"),
         ({"scale": "big"}, "scale is not made of numbers"),
         ('{"scale": [1e300, 1, 1]}', "scale holds a number"),
-        ('{"contact_points_pose": [[[NaN, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]]}', "not finite"),
+        ('{"contact_points_pose": [[[NaN, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]]}', "no finite number"),
         ({"contact_points_pose": [[1, 2, 3]]}, "no list of 4x4 matrices"),
         ({"contact_points_pose": [[[1]], [[1, 2]]]}, "not made of numbers"),
         ({"contact_points_group": [3]}, "no list of lists"),

@@ -2,17 +2,20 @@
 
 It notes in FOLDER that it is at work (``started``) and that it is ending (``ending``). MODE ``busy`` computes until it is
 interrupted; ``slow`` then takes for ever over its end; ``late`` gets a second one as Python takes the process down;
-``run`` has two workers asleep in a stage.
+``run`` has two workers asleep in a stage; ``native`` is in native code; ``listing``,
+``manifest`` and ``inspection`` look at inputs.
 """
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import manitwin.cli.main as cli
 from manitwin.cli.progress import WatchedRun
@@ -25,7 +28,13 @@ def work() -> None:
     try:
         if MODE == "run":
             rehearse()
+        if MODE in ("listing", "manifest", "inspection"):
+            look_at_inputs()
         (FOLDER / "started").touch()
+        if MODE == "native":  # which answers no signal, and lets other threads run
+            while True:
+                ctypes.CDLL(None).usleep(1_000)
+                ctypes.CDLL(None).sem_wait(ctypes.byref(ctypes.create_string_buffer(64)))
         while True:
             sum(range(1000))
     finally:
@@ -41,6 +50,34 @@ class InterruptsWhenTakenDown:
         self, kill: Callable[[int, int], None] = os.kill, number: int = signal.SIGINT, me: int = os.getpid()
     ) -> None:
         kill(me, number)
+
+
+def look_at_inputs() -> None:
+    """Read inputs of a build that have no end: folders in folders, rows of a manifest, a file that is never inspected."""
+    from manitwin.pipeline import folder_listing, inspection, manifest
+
+    def endless(*arguments: object, **options: object) -> Iterator[tuple[int, dict[str, str]]]:
+        (FOLDER / "started").touch()
+        while True:
+            yield 1, {"text": "a mug"}
+
+    if MODE == "manifest":
+        manifest.read_csv = endless
+        (FOLDER / "list.csv").touch()
+        for _ in manifest.iterate_items([FOLDER / "list.csv"], {}, manifest.Notes()):
+            pass
+    if MODE == "listing":
+        scan = folder_listing.os.scandir
+
+        def again(folder: Path) -> Any:
+            (FOLDER / "started").touch()
+            (FOLDER / "in/in").mkdir(parents=True, exist_ok=True)
+            return scan(FOLDER / "in")
+
+        folder_listing.os.scandir = again
+        folder_listing.list_folder(FOLDER)
+    (FOLDER / "started").touch()
+    inspection.run_isolated("time:sleep", 1000)
 
 
 def rehearse() -> None:

@@ -35,9 +35,13 @@ def one_line(text: str) -> str:
         (("layout", "OUT", "-o", "OUT"), "not there; give a data set"),
         (("layout", "FILE", "-o", "OUT", "--objects", "few"), "give LOW..HIGH"),
         (("trajectories", "FILE", "-o", "OUT", "-n", "0"), "-n is 0; give 1 or more"),
-        (("build", "--text", "a mug", "-o", "OUT"), "--text: the generator 'lift' makes no meshes of text ('a mug')"),
-        (("build", "--text", "a mug", "-o", "OUT"), "(command, fal, meshy, rodin, tripo), or give a photo or a mesh"),
-        (("build", "LIST", "-o", "OUT"), "list.csv:3: the generator 'lift' makes no meshes of text ('a cup')"),
+        (("build", "--text", "a hamer", "-o", "OUT"), "--text: no template makes 'a hamer'; did you mean hammer"),
+        (("build", "--text", "a mug, 3 m", "-o", "OUT"), "a mug of 3 m: such are 0.08 to 0.16 m; check the unit"),
+        (
+            ("build", "--text", "a unicorn", "-o", "OUT"),
+            "--generator command, fal, meshy, rodin, tripo make other things of a text",
+        ),
+        (("build", "LIST", "-o", "OUT"), "list.csv:3: no template makes 'a unicorn'"),
         (("build", "LIST", "-o", "OUT", "--generator", "hunyuan3d"), "list.csv:3: the generator 'hunyuan3d'"),
         (
             ("build", "LIST", "-o", "OUT", "--generator", "command:sh {image} {out}"),
@@ -53,7 +57,7 @@ def one_line(text: str) -> str:
 def test_wrong_use_is_one_line_and_exit_status_2(tmp_path: Path, arguments: tuple[str, ...], message: str) -> None:
     file = tmp_path / "cup.stl"
     file.write_bytes(b"x")
-    (tmp_path / "list.csv").write_text("file,text\ncup.stl,\n,a cup\n")
+    (tmp_path / "list.csv").write_text("file,text\ncup.stl,\n,a unicorn\n")
     (tmp_path / "dot.png").write_bytes(b"\x89PNG\r\n\x1a\n")
     places = {
         "FILE": file, "OUT": tmp_path / "out", "LIST": tmp_path / "list.csv", "PHOTO": tmp_path / "dot.png"

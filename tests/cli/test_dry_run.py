@@ -24,8 +24,9 @@ from manitwin.cli.dry_run import (
 )
 from manitwin.cli.main import app
 from manitwin.config import BuildConfig
-from manitwin.engine.ledger.ledger import LEDGER, ItemState, Ledger
+from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.engine.ledger.location import ledger_path
+from manitwin.engine.ledger.rows import ItemState
 from manitwin.errors import UsageError
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import TwinRecipe
@@ -178,8 +179,8 @@ def test_what_services_charge_is_counted_for_what_would_be_built(inputs: Path, t
 
 
 def test_wrong_use_is_wrong_use(tmp_path: Path) -> None:
-    arguments = ["build", "--text", "a mug", "-o", str(tmp_path / "out"), "--dry-run"]
-    with pytest.raises(UsageError, match="makes no meshes of text"):
+    arguments = ["build", "--text", "a unicorn", "-o", str(tmp_path / "out"), "--dry-run"]
+    with pytest.raises(UsageError, match="no template makes"):
         CliRunner().invoke(app, arguments, catch_exceptions=False)
     assert not (tmp_path / "out").exists()
 

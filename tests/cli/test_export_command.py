@@ -97,7 +97,7 @@ def test_a_twin_that_cannot_be_read_does_not_stop_the_others(
     (dataset / "broken").mkdir()
     (dataset / "broken" / "twin.json").write_text("{")
     status, told, refused = said(capsys, dataset, out=tmp_path / "out")
-    assert status == 3 and "not JSON" in refused and "2 twins exported" in told
+    assert status == 3 and "its JSON is broken" in refused and "2 twins exported" in told
 
 
 @pytest.mark.parametrize(

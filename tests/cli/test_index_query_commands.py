@@ -74,7 +74,6 @@ def test_query_writes_each_id_once(place: Path) -> None:
         (("--columns", "mas"), "did you mean 'mass_kg'"),
         (("--table", "grasp"), "did you mean 'grasps'"),
         (("--format", "xml"), "unknown format 'xml'"),
-        (("--limit", "-1"), "limit is -1"),
         (("--format", "ids", "--columns", "name"), "leave out --columns"),
     ],
 )

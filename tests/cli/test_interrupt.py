@@ -59,7 +59,7 @@ def _group_lives(group: int) -> bool:
 AGAIN = "; run the same command again to go on where it stopped"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize(
     ("name", "status", "line"),
     [
@@ -111,6 +111,40 @@ def test_an_interrupt_is_how_a_watch_ends(tmp_path: Path, monkeypatch: pytest.Mo
     assert "interrupted" not in done.output.lower() and "aborted" not in done.output.lower()
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_native_code_that_does_not_return_is_ended_too(tmp_path: Path, number: signal.Signals) -> None:
+    program = Interrupted(tmp_path, "stats", "native")
+    program.wait_for("started")
+    program.send(number)
+    assert program.end() == (130, ["manitwin stats: interrupted"])
+
+
+@pytest.mark.parametrize("what", ["listing", "manifest", "inspection"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_build_that_looks_at_its_inputs_answers_signals(tmp_path: Path, what: str, number: signal.Signals) -> None:
+    program = Interrupted(tmp_path, "build", what)
+    program.wait_for("started")
+    program.send(number)
+    assert program.end() == (4, [f"manitwin build: interrupted{AGAIN}"])
+
+
+def test_a_signal_that_is_ignored_stays_so(tmp_path: Path) -> None:
+    program = (
+        "import signal; signal.signal(signal.SIGHUP, signal.SIG_IGN); import runpy, sys; sys.argv = sys.argv[1:];"
+        " runpy.run_path(sys.argv[0], run_name='__main__')"
+    )
+    command = [sys.executable, "-c", program, str(PROGRAM), "stats", str(tmp_path), "busy"]
+    process = subprocess.Popen(command, start_new_session=True, stderr=subprocess.PIPE, text=True)
+    until = time.monotonic() + PATIENCE_S
+    while not (tmp_path / "started").exists():
+        assert process.poll() is None and time.monotonic() < until
+        time.sleep(0.01)
+    process.send_signal(signal.SIGHUP)
+    process.send_signal(signal.SIGTERM)
+    _, errors = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 130 and errors.splitlines() == ["manitwin stats: interrupted"]
+
+
 @pytest.mark.parametrize(("name", "status"), [("layout", 4), ("export", 130)])
 def test_interrupt_while_python_takes_itself_down_keeps_the_exit_status(tmp_path: Path, name: str, status: int) -> None:
     program = Interrupted(tmp_path, name, "late")
@@ -134,6 +168,30 @@ main()
 """
     done = subprocess.run([sys.executable, "-c", program, str(int(number))], capture_output=True, text=True)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "manitwin: interrupted\n")
+
+
+def test_an_interrupted_command_does_its_exit_functions_and_takes_no_module_down(tmp_path: Path) -> None:
+    program = """
+import atexit, os, sys
+import manitwin.cli.main as cli
+class TakenDown:
+    def __del__(self, write=os.write):
+        write(1, b"taken down")
+last = TakenDown()
+def work():
+    atexit.register(print, "an exit function")
+    print("said", end=" ")
+    os.kill(os.getpid(), 15)
+cli.app.registered_commands = []
+cli.app.command("run")(work)
+cli.app.command("other")(work)
+from manitwin.cli.entry import main
+sys.argv[1:] = ["run"]
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode in (4, 130) and "interrupted" in done.stderr
+    assert done.stdout == "said an exit function\n"
 
 
 def test_entry_imports_nothing_that_takes_time() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -81,7 +82,16 @@ def test_scenes_whose_twins_are_gone_are_refused_before_any_work(scenes: Path, t
 def test_twins_at_a_url_are_refused_by_their_url(command: str, scenes: Path, tmp_path: Path) -> None:
     episodes = tmp_path / "episodes"
     episodes.mkdir()
-    (episodes / "config.json").write_text('{"robot": "panda", "dataset": "gone"}')
+    kept = {"max_placed_m": 0.05, "max_tilt_deg": 15.0}
+    of_episodes = {
+        "robot": "panda",
+        "dataset": "gone",
+        "scenes": None,
+        "skill": "pick_place",
+        "seed": 0,
+        "episode": kept,
+    }
+    (episodes / "config.json").write_text(json.dumps(of_episodes | {"retire_failed_share": 0.5}))
     url = "memory://bucket/set"
     of = [scenes / "scenes", "-o", tmp_path / "out"] if command == "trajectories" else [episodes]
     done = manitwin(command, *of, "--twins", url)

@@ -37,6 +37,9 @@ class Words(FolderRecipe[WordRecord]):
 
     sha256: str = "one"
 
+    def folder_of(self, item_id: str) -> str:
+        return f"words/{item_id}"
+
     def write(self, draft: Draft[Word], *given: Any) -> WordRecord:
         fresh = given[-1]
         (fresh / "word.txt").write_text(draft.payload.word)

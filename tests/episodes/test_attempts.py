@@ -56,5 +56,5 @@ def test_unknown_outcomes_and_other_tables_are_refused(tmp_path: Path) -> None:
     pq.write_table(pa.table({"episode_id": ["a"]}), tmp_path / "a.parquet")
     with pytest.raises(EpisodesError, match="has no column robot"):
         list(table.read_attempts(tmp_path / "a.parquet"))
-    with pytest.raises(EpisodesError, match="no Parquet file"):
+    with pytest.raises(EpisodesError, match="cannot be opened"):
         list(table.read_attempts(tmp_path / "missing.parquet"))

@@ -80,8 +80,8 @@ def action(values: list[Any]) -> None:
 
 
 SPOILT: dict[str, tuple[Spoil, str]] = {
-    "info gone": (lambda root: (root / "meta/info.json").unlink(), "no JSON"),
-    "info cut": (lambda root: (root / "meta/info.json").write_text("{"), "no JSON"),
+    "info gone": (lambda root: (root / "meta/info.json").unlink(), "cannot be opened"),
+    "info cut": (lambda root: (root / "meta/info.json").write_text("{"), "its JSON is broken"),
     "version": (json_of("meta/info.json", lambda i: i.update(codebase_version="v2.1")), "this reads v3.0"),
     "fps": (json_of("meta/info.json", lambda i: i.update(fps=20.0)), "fps is 20.0"),
     "splits": (json_of("meta/info.json", lambda i: i.update(splits={"train": "0:3"})), "splits"),
@@ -97,7 +97,7 @@ SPOILT: dict[str, tuple[Spoil, str]] = {
     ),
     "column more": (json_of("meta/info.json", lambda i: i["features"].pop("phase")), "the column phase"),
     "slash": (json_of("meta/info.json", lambda i: i["features"].update({"a/b": i["features"]["phase"]})), "a/b"),
-    "tasks gone": (lambda root: (root / "meta/tasks.parquet").unlink(), "no Parquet file"),
+    "tasks gone": (lambda root: (root / "meta/tasks.parquet").unlink(), "cannot be opened"),
     "tasks index": (table_of("meta/tasks.parquet", lambda t: t.replace_schema_metadata(None)), "pandas index"),
     "tasks order": (column("meta/tasks.parquet", "task_index", lambda v: v[::-1]), "does not count from 0"),
     "tasks twice": (column("meta/tasks.parquet", "task", lambda v: v.__setitem__(1, v[0])), "there twice"),
@@ -127,7 +127,7 @@ SPOILT: dict[str, tuple[Spoil, str]] = {
     "value changed": (column(DATA, "action", action), "its statistics of action"),
     "value nan": (column(DATA, "observation.velocity", put(3, [float("nan")] * 7)), "observation.velocity is not finite"),
     "cell empty": (column(DATA, "phase", put(3, None)), "empty cells"),
-    "stats gone": (lambda root: (root / "meta/stats.json").unlink(), "no JSON"),
+    "stats gone": (lambda root: (root / "meta/stats.json").unlink(), "cannot be opened"),
     "stats of camera": (json_of("meta/stats.json", lambda s: s.pop("observation.images.front")), "observation.images"),
     "stats shape": (json_of("meta/stats.json", lambda s: s["action"]["mean"].pop()), "mean of action has the shape"),
     "stats wrong": (json_of("meta/stats.json", lambda s: s["action"].update(max=[9.0] * 8)), "of the episodes together"),
@@ -180,5 +180,5 @@ def test_episodes_that_share_frames_of_a_video_are_refused(sound: Path, tmp_path
 
 
 def test_a_folder_without_anything_is_no_set(tmp_path: Path) -> None:
-    with pytest.raises(EpisodesError, match=r"info\.json: no JSON"):
+    with pytest.raises(EpisodesError, match=r"info\.json: cannot be opened"):
         read_lerobot(tmp_path)

@@ -55,7 +55,7 @@ def test_what_cannot_be_published_leaves_nothing(run: Path, twins: Path, tmp_pat
     half = tmp_path / "half"
     write_run(half, twins, drawn=True)
     (half / "pictures" / batch_name("11batch") / PICTURES_RECORD).unlink()
-    with pytest.raises(EpisodesError, match=r"no record of pictures.*manitwin render"):
+    with pytest.raises(EpisodesError, match=r"pictures.json: cannot be opened.*manitwin render"):
         publish_episodes(half, out, license_allow=LICENCES.values())
     assert not out.exists()
     assert sorted(path.name for path in tmp_path.iterdir()) == ["half"]

@@ -70,7 +70,7 @@ def test_chosen_frame_of_an_animation_is_read_and_said(shared_data: Path) -> Non
     middle = (slice(90, 150), slice(130, 190))
     apple, orange = first.pixels[middle][..., :3].mean((0, 1)), last.pixels[middle][..., :3].mean((0, 1))
     assert orange[1] - apple[1] > 40  # an orange has far more green than a red apple
-    with pytest.raises(InputError, match="Valid: 0, 1, 2"):
+    with pytest.raises(InputError, match=r"no frame 3; set frame in the configuration to 0\.\.2"):
         read_image(shared_data / "bad" / "animated.gif", frame=3)
 
 
@@ -161,4 +161,11 @@ def test_decompression_bomb_is_refused_before_decoding(tmp_path: Path) -> None:
         b"\x89PNG\r\n\x1a\n" + header + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
     )
     error = refusal(tmp_path / "bomb.png")
-    assert error.reason == "unreadable" and "megapixels" in error.detail and "scale" in error.detail
+    assert error.reason == "too_large" and "megapixels" in error.detail and "scale" in error.detail
+
+
+def test_broken_exif_is_told_and_the_picture_read(tmp_path: Path) -> None:
+    Image.new("RGB", (48, 40), (200, 20, 20)).save(tmp_path / "a.png", exif=b"Exif\0\0MM\0*")
+    photo = read_image(tmp_path / "a.png")
+    assert photo.pixels.shape == (40, 48, 3)
+    assert photo.findings == ("its EXIF is broken (error) and was not read",)

@@ -12,7 +12,7 @@ from PIL import Image
 
 from manitwin.errors import InputError
 from manitwin.formats.sniff import Sniffed, sniff
-from manitwin.pipeline.folder_listing import why_no_input
+from manitwin.pipeline.inspection import why_no_input
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import struct
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
+from manitwin.formats.isolated import Limits, ProcessCrashed, iterate_isolated, run_isolated
+from manitwin.pipeline import inspection
 from manitwin.pipeline.folder_listing import FolderListing, list_folder
 
 OBJ = "mtllib mug.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
@@ -146,12 +150,86 @@ def test_a_folder_of_twins_gives_none_of_its_files_as_inputs(tmp_path: Path) -> 
     assert listing.left[tmp_path / "out/0123/visual.glb"] == "part of a twin that manitwin built"
 
 
+IMPORTED = {
+    **dict.fromkeys(("category", "license", "attribution", "mass_kg", "center_of_mass_m", "inertia_kg_m2", "material")),
+    **dict.fromkeys(("friction_static", "friction_dynamic", "restitution")),
+    **{name: [] for name in ("captions", "functional_points", "grasp_points", "grasps", "rests", "missing", "remarks")},
+    "format": "urdf",
+    "file": "mug.urdf",
+    "name": "mug",
+    "asset_to_object": [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]],
+}
+
+
 def test_an_imported_asset_is_one_input_with_its_parts(tmp_path: Path) -> None:
-    put(tmp_path, {"mug/asset.glb": b"x", "mug/import.json": "{}", "mug/more/view.png": b"x", "cup.jpg": b"x"})
+    record = json.dumps(IMPORTED)
+    put(tmp_path, {"mug/asset.glb": b"x", "mug/import.json": record, "mug/more/view.png": b"x", "cup.jpg": b"x"})
     listing = listed(tmp_path)
     assert names(tmp_path, listing.inputs) == ["cup.jpg", "mug"]
     assert names(tmp_path, listing.parts) == ["mug/import.json", "mug/more/view.png"]
     assert listing.remarks()[0].endswith("4 files: 2 inputs (1 image, 1 imported asset), 2 files of 1 imported asset")
+
+
+@pytest.mark.parametrize("record", ["{}", "[" * 100_000, json.dumps(IMPORTED | {"name": 1e400}), "\xff"])
+def test_an_import_that_cannot_be_read_is_left_alone_and_ends_nothing(tmp_path: Path, record: str) -> None:
+    put(tmp_path, {"mug/asset.glb": b"x", "mug/import.json": record, "cup.jpg": b"x"})
+    listing = listed(tmp_path)
+    assert names(tmp_path, listing.inputs) == ["cup.jpg"]
+    assert listing.left[tmp_path / "mug/asset.glb"].startswith("an imported asset: ")
+    assert all("\n" not in reason for reason in listing.left.values())
+
+
+def test_what_is_no_regular_file_is_not_opened(tmp_path: Path) -> None:
+    put(tmp_path, {"cup.jpg": b"x", "mug.obj": "mtllib a.mtl\n", "deep/twin.json": "x"})
+    (tmp_path / "deep/twin.json").unlink()
+    for name in ("pipe.glb", "pipe", "deep/twin.json"):
+        os.mkfifo(tmp_path / name)
+    (tmp_path / "null.obj").symlink_to("/dev/null")
+    (tmp_path / "a.mtl").symlink_to("/dev/zero")
+    (tmp_path / "loop.obj").symlink_to("loop.obj")
+    listing = listed(tmp_path)
+    assert names(tmp_path, listing.inputs) == ["cup.jpg", "mug.obj"]
+
+
+def inspected_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str) -> FolderListing:
+    """List three meshes; the process that inspects them does what ``body`` says with the path of each."""
+    module = tmp_path / "module"
+    module.mkdir()
+    (module / "hostile_reader.py").write_text(f"def read(path):\n    {body}\n    return []\n")
+    monkeypatch.setenv("PYTHONPATH", f"{module}:{os.environ.get('PYTHONPATH', '')}")
+    run_isolated_anew()
+    limits = Limits(seconds=1.0, memory_bytes=1 << 30)
+
+    def names_of(meshes: Iterable[Path]) -> Iterator[list[str] | inspection.NotInspected]:
+        return (
+            inspection._found(answer, limits) for _, answer in iterate_isolated("hostile_reader:read", meshes, limits)
+        )
+
+    monkeypatch.setattr("manitwin.pipeline.folder_listing.names_of", names_of)
+    return listed(put(tmp_path / "in", {"a.obj": OBJ, "bad.obj": OBJ, "c.obj": OBJ, "photo.png": "x"}))
+
+
+def run_isolated_anew() -> None:
+    with contextlib.suppress(ProcessCrashed):
+        run_isolated("os:abort")
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("import os; path.name == 'bad.obj' and os.abort()", "longer than 1 s, or ends the process"),
+        ("import re; path.name == 'bad.obj' and re.match('(a+)+b', 'a' * 64)", "longer than 1 s, or ends the process"),
+        ("path.name == 'bad.obj' and bytearray(1 << 40)", "more than 1 GiB of memory"),
+        ("import time; path.name == 'bad.obj' and time.sleep(1e6)", "longer than 1 s"),
+    ],
+)
+def test_a_mesh_that_cannot_be_inspected_within_the_limits_is_left_alone_by_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, body: str, why: str
+) -> None:
+    listing = inspected_by(tmp_path, monkeypatch, body)
+    root = tmp_path / "in"
+    assert names(root, listing.inputs) == ["a.obj", "c.obj", "photo.png"]
+    assert list(listing.left) == [root / "bad.obj"] and why in listing.left[root / "bad.obj"]
 
 
 def test_long_lists_are_counted_by_reason_and_kept_whole(tmp_path: Path) -> None:
@@ -172,7 +250,7 @@ def test_meshes_are_not_opened_where_nothing_could_be_a_part_of_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put(tmp_path, {"a.obj": OBJ, "b.gltf": "{}", "README.md": "x", "LICENSE": "x"})
-    monkeypatch.setattr("manitwin.pipeline.folder_listing.named_files", lambda path: pytest.fail(f"{path} was opened"))
+    monkeypatch.setattr("manitwin.pipeline.folder_listing.names_of", lambda paths: pytest.fail("meshes were opened"))
     assert names(tmp_path, listed(tmp_path).inputs) == ["a.obj", "b.gltf"]
 
 

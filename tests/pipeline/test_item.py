@@ -1,6 +1,10 @@
 import dataclasses
+import os
 from pathlib import Path
 
+import pytest
+
+from manitwin.errors import InputError
 from manitwin.pipeline.item import Item, twin_id
 
 
@@ -25,3 +29,15 @@ def test_changed_texture_is_another_twin(tmp_path: Path) -> None:
     before = twin_id(Item(file=str(tmp_path / "a.obj")))
     (tmp_path / "wood grain.png").write_bytes(b"2")
     assert twin_id(Item(file=str(tmp_path / "a.obj"))) != before
+
+
+@pytest.mark.parametrize("what", ["nothing", "pipe", "device", "loop"])
+def test_a_file_that_is_another_thing_by_now_is_unreadable(tmp_path: Path, what: str) -> None:
+    path = tmp_path / "a.stl"
+    if what == "pipe":
+        os.mkfifo(path)
+    elif what != "nothing":
+        path.symlink_to("/dev/zero" if what == "device" else path)
+    with pytest.raises(InputError, match=r"a\.stl: .*; (check the path|give a file)") as caught:
+        twin_id(Item(file=str(path)))
+    assert caught.value.reason == "unreadable"

@@ -11,7 +11,7 @@ import trimesh
 
 from manitwin.config import MeshConfig
 from manitwin.engine.stage import Draft
-from manitwin.errors import InputError
+from manitwin.errors import InputError, Rejected
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.cavity import find_opening
 from manitwin.pipeline.item import Item
@@ -109,6 +109,31 @@ def test_hopeless_inputs_are_refused(shared_data: Path, tmp_path: Path, name: st
     with pytest.raises(InputError) as caught:
         _run(shared_data / "bad" / name, tmp_path)
     assert (caught.value.stage, caught.value.reason) == ("input", reason)
+
+
+DEGENERATE = {
+    "tiny": [(1e-300, 1e-300, 1e-300), 0.0],
+    "almost flat": [(0.04, 0.05, 1e-300), 0.0],
+    "denormal": [(0.04, 0.05, 4e-320), 0.0],
+    "far away": [(0.04, 0.05, 0.1), 5e11],
+    "a point": [(0.0, 0.0, 0.0), 1.0],
+    "a line": [(0.04, 0.0, 0.0), 0.0],
+    "a needle": [(9e11, 1e-9, 1e-300), 0.0],
+}
+
+
+@pytest.mark.parametrize("how", DEGENERATE)
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_surface_without_extent_is_degenerate_in_one_line(tmp_path: Path, how: str) -> None:
+    size, place = DEGENERATE[how]
+    box = trimesh.creation.box((1, 1, 1))
+    rows = "".join("v {!r} {!r} {!r}\n".format(*(np.array(v) * size + place).tolist()) for v in box.vertices)
+    faces = "".join("f {} {} {}\n".format(*(face + 1)) for face in box.faces)
+    (tmp_path / "a.obj").write_text(rows + faces)
+    with pytest.raises(Rejected) as caught:
+        _run(tmp_path / "a.obj", tmp_path, units="m")
+    assert (caught.value.stage, caught.value.reason) == ("gate", "degenerate")
+    assert caught.value.detail.startswith("a.obj: ") and caught.value.detail.isprintable()
 
 
 @pytest.mark.shared_data

@@ -17,6 +17,7 @@ from manitwin.models.generators.lift import LiftGenerator
 from manitwin.pipeline.generate import GenerateStage
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.photo import PhotoStage
+from manitwin.twin.import_record import ImportRecord
 
 SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "bottle.jpg"
 
@@ -56,6 +57,17 @@ def test_frame_of_an_animation_is_a_setting(tmp_path: Path) -> None:
     assert "used frame 1 of 2" in fields["matte"]["findings"]
 
 
-def test_text_needs_another_generator(tmp_path: Path) -> None:
-    with pytest.raises(Unsupported, match="lift cannot make a mesh from text"):
-        GenerateStage(GenerateConfig(), LiftGenerator()).run(_draft(text="a red mug"), tmp_path)
+def test_text_without_a_template_needs_another_generator(tmp_path: Path) -> None:
+    with pytest.raises(Unsupported, match="no template makes 'a red unicorn'"):
+        GenerateStage(GenerateConfig(), LiftGenerator()).run(_draft(text="a red unicorn"), tmp_path)
+
+
+def test_text_becomes_a_thing_of_known_size_mass_and_use(tmp_path: Path) -> None:
+    made = GenerateStage(GenerateConfig(), LiftGenerator()).run(_draft(text="a red mug, 10 cm tall"), tmp_path)
+    generation, (part, *_) = made["generation"], read_glb(tmp_path / "generated.glb")
+    assert generation["model"] == "template:mug" and generation["metric"] and generation["rests"]
+    assert part.visual.material.baseColorFactor[0] > 3 * part.visual.material.baseColorFactor[1]
+    known = ImportRecord.model_validate(generation["known"])
+    assert known.category == "mug" and known.source == "template:mug"
+    assert known.mass_kg == pytest.approx(sum(generation["notes"]["masses_kg"].values()), rel=1e-4)
+    assert [point.label for point in known.functional_points] == ["handle", "opening", "base"]

@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from small_arm import TOML
 
+from manitwin.assets.asset import Asset
 from manitwin.assets.read import read_asset
 from manitwin.errors import AssetError, ConfigError, ManiTwinError
-from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.robots.grippers.gripper import Gripper, load_gripper
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.load import load_robot
+from manitwin.robots.robot import Robot
 from manitwin.robots.urdf import inertial_of, origin_of, read_urdf
 
 MASS = (
@@ -60,21 +63,21 @@ joints_rad = [[0.1, 0.1], [-0.5, 0.1]]
 ARM = TOML.replace("small", "thing").replace('"lift", "roll"', '"lift"').replace("0.5, 0.0]", "0.5]")
 
 
-def read_as_robot(folder: Path) -> None:
+def read_as_robot(folder: Path) -> Robot:
     (folder / "thing.toml").write_text(ARM)
-    load_robot(str(folder / "thing.toml"))
+    return load_robot(str(folder / "thing.toml"))
 
 
-def read_as_hand(folder: Path) -> None:
+def read_as_hand(folder: Path) -> Gripper:
     (folder / "hand.toml").write_text(HAND)
-    load_gripper(str(folder / "hand.toml"))
+    return load_gripper(str(folder / "hand.toml"))
 
 
-def read_as_asset(folder: Path) -> None:
-    read_asset(folder / "thing.urdf", "urdf")
+def read_as_asset(folder: Path) -> Asset:
+    return read_asset(folder / "thing.urdf", "urdf")
 
 
-USERS: dict[str, tuple[Callable[[Path], None], type[ManiTwinError]]] = {
+USERS: dict[str, tuple[Callable[[Path], object], type[ManiTwinError]]] = {
     "robot": (read_as_robot, ConfigError),
     "hand": (read_as_hand, ConfigError),
     "asset": (read_as_asset, AssetError),
@@ -177,10 +180,15 @@ def test_spoilt_urdf_is_one_line_that_names_file_element_cause_and_remedy(
     assert "\n" not in said and "; " in said
 
 
-@pytest.mark.parametrize("user", ALL)
-def test_sound_urdf_is_read_by_all(tmp_path: Path, user: str) -> None:
+def test_sound_urdf_is_read_by_all(tmp_path: Path) -> None:
     (tmp_path / "thing.urdf").write_text(URDF)
-    USERS[user][0](tmp_path)
+    arm, hand, asset = read_as_robot(tmp_path), read_as_hand(tmp_path), read_as_asset(tmp_path)
+    assert arm.arm_joints == ("turn", "lift")
+    assert arm.velocity_limits_rad_s.tolist() == [1.0, 1.0], (
+        "half of the two rad/s in the file, as the robot's TOML says"
+    )
+    assert isinstance(hand, MultiFingerGripper) and hand.joints == ("turn", "lift")
+    assert (len(asset.visual), len(asset.collision)) == (1, 1)
 
 
 @pytest.mark.parametrize("user", ALL)

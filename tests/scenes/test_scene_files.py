@@ -28,7 +28,7 @@ def test_what_is_no_scene_says_so(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"no scene\.json"):
         read_scene(tmp_path)
     (tmp_path / SCENE).write_text("{")
-    with pytest.raises(UsageError, match="not JSON"):
+    with pytest.raises(UsageError, match="its JSON is broken"):
         read_scene(tmp_path)
     (tmp_path / SCENE).write_text(json.dumps({"schema_version": 99}))
     with pytest.raises(UsageError, match="version 99"):

@@ -64,3 +64,10 @@ def test_absolute_of_a_folder_is_a_path_and_of_a_url_the_url(tmp_path: Path, mon
     monkeypatch.chdir(tmp_path)
     assert DatasetRoot("some/set").absolute() == str(tmp_path.resolve() / "some" / "set")
     assert DatasetRoot("memory://bucket/set").absolute() == "memory://bucket/set"
+
+
+@pytest.mark.parametrize("url", ["s3://AKIA:secret@bucket/x", "ftp://me:secret@h:1/x", "simplecache::s3://a:secret@b"])
+def test_password_in_a_url_is_refused_and_not_shown(url: str) -> None:
+    with pytest.raises(UsageError, match="password or a key") as caught:
+        DatasetRoot(url)
+    assert "secret" not in str(caught.value)

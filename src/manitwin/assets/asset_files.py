@@ -53,7 +53,7 @@ class AssetFiles:
                 resolved = candidate.resolve()
                 inside = resolved.is_relative_to(root)
                 found = inside and resolved.is_file()
-            except (OSError, ValueError):  # a name that no file system can hold
+            except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
                 continue
             if found:
                 self.used.add(resolved)

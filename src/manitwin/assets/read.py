@@ -7,10 +7,13 @@ import re
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from manitwin.assets.asset import Asset, Format
 from manitwin.errors import AssetError, choose_from
+from manitwin.formats.bounded_file import open_regular
+
+if TYPE_CHECKING:
+    from manitwin.assets.asset import Asset, Format
 
 USD_SUFFIXES = frozenset({".usd", ".usda", ".usdc", ".usdz"})
 SCAN_METADATA = "metadata.pbtxt"
@@ -33,8 +36,7 @@ def detect(path: Path) -> Format:
 
     Raises AssetError where there is none, or a folder holds more than one.
     """
-    if not path.exists():
-        raise AssetError(f"{path}: no such file or folder")
+    _require_there(path)
     found = folder_format(path) if path.is_dir() else file_format(path)
     if found is not None:
         return found
@@ -45,7 +47,7 @@ def detect(path: Path) -> Format:
 
 def folder_format(folder: Path) -> Format | None:
     """Return the format of a folder that is one asset as a whole, None where it is none."""
-    names = {entry.name for entry in folder.iterdir()}
+    names = {entry.name for entry in folder.iterdir() if is_file_below(entry, folder)}
     if "twin.json" in names:
         return "twin"
     if "manipulation_annotations.json" in names or names & {"base_rescaled.glb", "base_rescaled.usdz"}:
@@ -77,7 +79,9 @@ def only_file(folder: Path) -> Path:
     Where a folder holds the same asset in several formats, URDF is taken before MJCF, SDF and USD.
     """
     for depth in ("*", "*/*"):
-        files = [file for file in sorted(folder.glob(depth)) if file.is_file() and not _hidden(file, folder)]
+        files = [
+            file for file in sorted(folder.glob(depth)) if is_file_below(file, folder) and not _hidden(file, folder)
+        ]
         found = [(file, form) for file in files if (form := file_format(file)) is not None]
         for wanted in (("urdf", "embodiedgen"), ("mjcf",), ("sdf", "gso"), ("usd",)):
             named = [file for file, form in found if form in wanted]
@@ -91,7 +95,7 @@ def only_file(folder: Path) -> Path:
 
 def robotwin_data(folder: Path) -> list[Path]:
     """Return a RoboTwin folder's model_data files, one a variant, in the order of their numbers."""
-    found = [file for file in folder.iterdir() if _ROBOTWIN_DATA.fullmatch(file.name)]
+    found = [f for f in folder.iterdir() if _ROBOTWIN_DATA.fullmatch(f.name) and is_file_below(f, folder)]
     return sorted(found, key=lambda file: (int("".join(filter(str.isdigit, file.stem)) or -1), file.name))
 
 
@@ -100,20 +104,26 @@ def _hidden(file: Path, folder: Path) -> bool:
 
 
 def _xml_format(file: Path) -> Format | None:
-    try:
-        with file.open("rb") as stream:
-            head = stream.read(_HEAD_BYTES)
-    except OSError as error:
-        raise AssetError(f"{file.name}: {error.strerror or error}; check the path") from error
-    first = _FIRST_TAG.search(re.sub(rb"<!--.*?-->", b"", head, flags=re.DOTALL))
+    with open_regular(file, AssetError) as stream:
+        head = stream.read(_HEAD_BYTES)
+    first = _FIRST_TAG.search(_without_comments(head))
     tag = first.group(1) if first else None
     if tag == b"mujoco":
         return "mjcf"
     if tag == b"sdf":
-        return "gso" if file.name == "model.sdf" and (file.parent / SCAN_METADATA).is_file() else "sdf"
+        return "gso" if file.name == "model.sdf" and is_file_below(file.parent / SCAN_METADATA, file.parent) else "sdf"
     if tag == b"robot":
         return "embodiedgen" if _MARKS.search(head) else "urdf"
     return None
+
+
+def _without_comments(xml: bytes) -> bytes:
+    kept = []
+    while (at := xml.find(b"<!--")) >= 0:
+        kept.append(xml[:at])
+        end = xml.find(b"-->", at)
+        xml = xml[end + 3 :] if end >= 0 else b""
+    return b"".join([*kept, xml])
 
 
 def read_asset(path: Path, format: Format | Literal["auto"] = "auto") -> Asset:
@@ -123,8 +133,7 @@ def read_asset(path: Path, format: Format | Literal["auto"] = "auto") -> Asset:
     """
     if format != "auto" and format not in FORMATS:
         raise AssetError(choose_from("format", format, ("auto", *FORMATS)))
-    if not path.exists():
-        raise AssetError(f"{path}: no such file or folder")
+    _require_there(path)
     chosen = detect(path) if format == "auto" else format
     reader = import_module(f"manitwin.assets.readers.{chosen}")
     asset: Asset = reader.read(path)
@@ -134,14 +143,32 @@ def read_asset(path: Path, format: Format | Literal["auto"] = "auto") -> Asset:
 def find_assets(path: Path) -> Iterator[Path]:
     """Yield every asset at or below a path, in the order of their names; hidden folders are left out.
 
-    A folder that is one asset as a whole is not looked into, and links to folders are not followed. A RoboTwin folder
-    gives its model_data files. Raises AssetError where the path is not there.
+    A folder that is one asset as a whole is not looked into; links to folders, and to files out of the folder, are not
+    followed. A RoboTwin folder gives its model_data files. Raises AssetError where the path is not there.
     """
-    if not path.exists():
-        raise AssetError(f"{path}: no such file or folder")
-    if path.is_file():
+    _require_there(path)
+    if not path.is_dir():
         yield path
         return
+    yield from _assets_below(path, path)
+
+
+def is_file_below(file: Path, folder: Path) -> bool:
+    """Tell whether a path is a regular file, no link that leads out of a folder, in a circle or nowhere."""
+    try:
+        return file.is_file() and (not file.is_symlink() or file.resolve().is_relative_to(folder.resolve()))
+    except (OSError, RuntimeError, ValueError):  # a circle of links: RuntimeError until 3.12
+        return False
+
+
+def _require_there(path: Path) -> None:
+    if not os.path.exists(path):
+        raise AssetError(f"{path}: no such file or folder")
+    if not path.is_file() and not path.is_dir():
+        raise AssetError(f"{path}: is no regular file, and only such are read; give a file or a folder")
+
+
+def _assets_below(path: Path, root: Path) -> Iterator[Path]:
     form = folder_format(path)
     if form == "robotwin":
         yield from robotwin_data(path)
@@ -152,8 +179,9 @@ def find_assets(path: Path) -> Iterator[Path]:
     with os.scandir(path) as scanned:
         entries = sorted((entry for entry in scanned if not entry.name.startswith(".")), key=lambda e: e.name)
     for entry in entries:
-        if entry.is_file() and file_format(Path(entry.path)) is not None:
-            yield Path(entry.path)
+        file = Path(entry.path)
+        if is_file_below(file, root) and file_format(file) is not None:
+            yield file
     for entry in entries:
         if entry.is_dir(follow_symlinks=False):
-            yield from find_assets(Path(entry.path))
+            yield from _assets_below(Path(entry.path), root)

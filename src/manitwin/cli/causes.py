@@ -18,6 +18,7 @@ REMEDIES = {
     "empty": "export or download it again",
     "wrong_type": "give a photo or a mesh; `manitwin import` takes what other simulators use",
     "too_small": "give a larger photo",
+    "too_large": "simplify the mesh, scale its pictures down, or raise the limits in the configuration (mesh, run)",
     "animated": "save one of its pictures as PNG, or choose one by matting.frame in the configuration",
     "no_faces": "export it with faces: points and curves have no surface",
     "not_finite": "export it again: some of its numbers are none",
@@ -160,9 +161,9 @@ def print_causes(place: str, numbers: Collection[int] = (), told: bool = False) 
 
 def causes_of(place: str, numbers: Collection[int] = ()) -> list[Cause]:
     """Return why items below a folder or URL were not accepted, the most frequent cause first; ``numbers`` empty: all items."""
-    from manitwin.engine.ledger.ledger import read_ledger
     from manitwin.engine.ledger.location import local_ledger
     from manitwin.engine.ledger.progress import read_unaccepted
+    from manitwin.engine.ledger.reading import read_ledger
     from manitwin.twin.dataset_root import DatasetRoot
 
     wanted = {str(number) for number in numbers}

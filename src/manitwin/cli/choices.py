@@ -5,6 +5,7 @@ What is written out here stands in modules that take seconds to import; a test k
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib import resources
@@ -117,21 +118,44 @@ REHEARSALS = Choices(
 )
 
 
-def count_of(what: str) -> Callable[[Any], Any]:
-    """Return the callback of a number of which at least one is asked for."""
+LARGEST_COUNT = 10**9
+LARGEST_COST_USD = 1e9
+
+
+def count_of(what: str, most: int = LARGEST_COUNT) -> Callable[[Any], Any]:
+    """Return the callback of a number of which at least one is asked for, and no more than ``most``."""
 
     def check(value: int | None) -> int | None:
         if value is not None and value < 1:
-            raise UsageError(f"{what} is {value}; give 1 or more")
+            raise UsageError(f"{what} is {_number(value)}; give 1 or more")
+        if value is not None and value > most:
+            raise UsageError(f"{what} is {_number(value)}; give at most {most}")
         return value
 
     return check
 
 
+def amount_of(option: str, most: float) -> Callable[[Any], Any]:
+    """Return the callback of an amount above 0, and no more than ``most``."""
+
+    def check(value: float | None) -> float | None:
+        if value is not None and not 0 < value <= most:  # NaN is neither
+            raise UsageError(f"{option} {value:g}: give more than 0, at most {most:g}")
+        return value
+
+    return check
+
+
+def _number(value: int) -> str:
+    return str(value) if abs(value) < 10**20 else f"about {value:.0e}" if abs(value) < 10**300 else "too large"
+
+
 def settings_file(value: Path | None) -> Path | None:
     """Return the path of a TOML file that is there; a callback."""
-    if value is not None and not value.is_file():
+    if value is not None and not os.path.exists(value):
         raise UsageError(f"{value}: not there; give a TOML file of settings")
+    if value is not None and os.path.isdir(value):
+        raise UsageError(f"{value}: is a folder; give a TOML file of settings")
     return value
 
 
@@ -140,7 +164,7 @@ def must_exist(remedy: str) -> Callable[[Any], Any]:
 
     def check(value: Any) -> Any:
         for place in [] if value is None else value if isinstance(value, list | tuple) else [value]:
-            if "://" not in str(place) and not Path(place).exists():
+            if "://" not in str(place) and not os.path.exists(place):
                 raise UsageError(f"{place}: not there; give {remedy}")
         return value
 

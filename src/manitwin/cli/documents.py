@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from manitwin.cli.console import out_console
+from manitwin.cli.console import out_console, write_json
 
 if TYPE_CHECKING:
     from manitwin.api import EpisodesReport
@@ -52,7 +52,7 @@ Json = Annotated[
 
 def print_document(document: Document) -> None:
     """Print the document of a command."""
-    sys.stdout.write(json.dumps(document, indent=1, allow_nan=False) + "\n")
+    write_json(json.dumps(document, indent=1, allow_nan=False) + "\n")
 
 
 def print_failure(error: BaseException, message: str, exit_status: int) -> None:
@@ -210,7 +210,7 @@ def _resting(pose: RestingPose) -> Document:
 
 
 def _by_state(counts: dict[str, int]) -> dict[str, int]:
-    from manitwin.engine.ledger.ledger import ITEM_STATES
+    from manitwin.engine.ledger.rows import ITEM_STATES
 
     return {state: counts.get(state, 0) for state in ITEM_STATES}
 

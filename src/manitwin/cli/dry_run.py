@@ -16,8 +16,7 @@ from manitwin.config import BuildConfig
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.engine.ledger.location import copy_ledger
 from manitwin.engine.recipe import Recipe
-from manitwin.errors import Rejected
-from manitwin.formats.image_file import check_header
+from manitwin.pipeline.inspection import NotInspected, identified
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.recipe import TwinRecipe, estimate_usd
 from manitwin.twin.dataset_root import DatasetRoot
@@ -168,7 +167,10 @@ class _Planner:
         self.seen: set[str] = set()
 
     def plan(self, item: Item) -> PlannedItem:
-        identity = self._recipe.identify(item)
+        found = identified(self._recipe, item, self._config.matting.frame)
+        if isinstance(found, NotInspected):
+            return PlannedItem(item, "", "", "would_be_rejected", str(found))
+        identity, by_header = found
         twin_id, kind = identity.item_id, identity.kind
         if twin_id in self.seen:
             return PlannedItem(item, twin_id, kind, "duplicate", "the same input as another one")
@@ -178,44 +180,33 @@ class _Planner:
         if ending is not None:
             detail = f"{ending.reason}: {ending.detail}" if ending.reason else ending.detail
             return PlannedItem(item, twin_id, kind, ending.status, detail)
-        refused = identity.rejected or _refused_by_header(item, kind, self._config)
+        refused = identity.rejected or by_header
         state: PlannedState = "to_build" if refused is None else "would_be_rejected"
         return PlannedItem(item, twin_id, kind, state, "" if refused is None else str(refused))
-
-
-def _refused_by_header(item: Item, kind: str, config: BuildConfig) -> Rejected | None:
-    if kind == "image" and item.file is not None:
-        try:
-            check_header(Path(item.file), frame=config.matting.frame)
-        except Rejected as answer:
-            return answer
-    return None
 
 
 def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:
     """Print a plan: its items, how many are in each state, and the estimates with their source."""
     for remark in plan.remarks:
-        err_console.print(remark, markup=False)
+        err_console.print(remark)
     if as_json:
         print_document(plan_document(plan, place))
         return
     for planned in plan.items[:MOST_LINES]:
-        out_console.print(_line_of(planned), markup=False)
+        out_console.print(_line_of(planned))
     if len(plan.items) > MOST_LINES:
-        out_console.print(f"... and {len(plan.items) - MOST_LINES} more (--json tells them all)", markup=False)
+        out_console.print(f"... and {len(plan.items) - MOST_LINES} more (--json tells them all)")
     counts: Counter[str] = Counter(planned.state for planned in plan.items)
     told = ", ".join(f"{counts[state]} {words}" for state, words in WORDS.items() if counts[state])
-    out_console.print(f"dry run, nothing is written: {told or 'nothing to do'}", markup=False)
+    out_console.print(f"dry run, nothing is written: {told or 'nothing to do'}")
     if counts["failed"]:
-        out_console.print(f"what failed is not tried again by itself: manitwin retry {place}", markup=False)
+        out_console.print(f"what failed is not tried again by itself: manitwin retry {place}")
     each = "; ".join(
         f"{number} {kind} of {plan.rates[kind].cpu_s:.1f} CPU-s ({plan.rates[kind].source})"
         for kind, number in plan.to_build.items()
     )
-    out_console.print(
-        f"about {timedelta(seconds=round(plan.cpu_s))} of CPU time{f': {each}' if each else ''}", markup=False
-    )
-    out_console.print(f"services charge about {plan.cost_usd:.2f} USD", markup=False)
+    out_console.print(f"about {timedelta(seconds=round(plan.cpu_s))} of CPU time{f': {each}' if each else ''}")
+    out_console.print(f"services charge about {plan.cost_usd:.2f} USD")
 
 
 def _line_of(planned: PlannedItem) -> str:

@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
-from manitwin.cli.interrupt import leave_when_interrupted
+import os
+import sys
+
+from manitwin.cli.interrupt import leave_before_teardown, leave_when_interrupted
+from manitwin.cli.machine_limits import USAGE_STATUS, too_little_memory
 
 
 def main() -> None:
-    """Import the command line and run it."""
+    """Import the command line and run it; say so where there is too little memory to import it."""
     leave_when_interrupted()
+    said = too_little_memory(sys.argv[1:])
+    if said is not None:
+        os.write(2, f"{said}\n".encode(errors="backslashreplace"))
+        sys.exit(USAGE_STATUS)
+    from manitwin.cli.main import interrupted
     from manitwin.cli.main import main as run_command_line
 
-    run_command_line()
+    try:
+        run_command_line()
+    except SystemExit as end:
+        if interrupted() and isinstance(end.code, int):
+            leave_before_teardown(end.code)
+        raise

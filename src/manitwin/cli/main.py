@@ -6,6 +6,7 @@ Exit status: 0 all accepted, 3 some rejected, 4 some unfinished and resumable, 2
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import sys
@@ -16,6 +17,7 @@ import typer
 from typer.completion import completion_init, get_completion_script
 
 from manitwin.cli import options
+from manitwin.cli.arguments import CheckedCommand, register
 from manitwin.cli.choices import SHELLS
 from manitwin.cli.commands.audit import audit
 from manitwin.cli.commands.build import build, run
@@ -32,19 +34,26 @@ from manitwin.cli.commands.render import render
 from manitwin.cli.commands.stats import stats
 from manitwin.cli.commands.status import status
 from manitwin.cli.commands.trajectories import trajectories
-from manitwin.cli.console import error_console, out_console
+from manitwin.cli.console import error_console, out_console, write_text
 from manitwin.cli.documents import CommandLineError, Json, asked_for_json, print_document, print_failure
 from manitwin.cli.interrupt import Interrupts
+from manitwin.cli.machine_limits import of_machine
 from manitwin.cli.reporting import LOG, Quiet, Verbose, reported, say_as_told
 from manitwin.cli.run_log import end_log
+from manitwin.cli.terminal import guard_terminal
 from manitwin.errors import BackendError, ManiTwinError, Unavailable
 from manitwin.formats.installation import import_remedy, installed_version, names_shared_library
+from manitwin.formats.printable import printable_line
 
 PROGRAM = "manitwin"
 COMPLETION_VARIABLE = f"_{PROGRAM.upper()}_COMPLETE"
 """Where a shell's script asks for completions instead of a command to be run: typer's convention."""
 TYPER_INTERRUPTED = 130
 """What typer returns where it caught a KeyboardInterrupt by itself."""
+LONGEST_LINE = 1500
+"""An error quotes what was given, which may be of any length: more characters are left out in the middle."""
+LASTING_CAUSES = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE})
+"""What ails the machine and not the command: what is done stays, and the same command goes on from there."""
 
 _interrupts = Interrupts()
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -52,7 +61,7 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 
 def _print_version(wanted: bool) -> None:
     if wanted:
-        out_console.print(f"{PROGRAM} {installed_version()}", markup=False)
+        out_console.print(f"{PROGRAM} {installed_version()}")
         raise typer.Exit
 
 
@@ -69,20 +78,20 @@ def _manitwin(
     _interrupts.command = context.invoked_subcommand or ""
     say_as_told(verbose, quiet)
     if context.invoked_subcommand is None:
-        out_console.print(context.get_help(), markup=False)
+        out_console.print(context.get_help(), paragraph=True)
 
 
 for watched in (build, layout, trajectories, render):
-    app.command()(reported(watched, own_log=True))
-app.command("run", hidden=True)(reported(run, own_log=True))
+    register(app, reported(watched, own_log=True))
+register(app, reported(run, own_log=True), "run", hidden=True)
 for making in (index, stats, publish, export):
-    app.command()(reported(making))
-app.command("import")(reported(import_))
+    register(app, reported(making))
+register(app, reported(import_), "import")
 for other in (status, retry, check, query, doctor, fake, prompts, audit):
-    app.command()(other)
+    register(app, other)
 
 
-@app.command()
+@app.command(cls=CheckedCommand)
 def show(
     twin: Annotated[Path, options.existing("A twin folder.", "TWIN", "a folder that manitwin build made")],
     json_: Json = False,
@@ -99,21 +108,21 @@ def show(
         print_summary(loaded, out_console)
 
 
-@app.command()
+@app.command(cls=CheckedCommand)
 def completion(
     shell: Annotated[str, SHELLS.argument(help="bash, zsh or fish.", metavar="SHELL")],
 ) -> None:
     """Print the script with which a shell completes commands, options and names."""
     script = get_completion_script(prog_name=PROGRAM, complete_var=COMPLETION_VARIABLE, shell=shell)
-    sys.stdout.write(f"{script.strip()}\n")
+    write_text(f"{script.strip()}\n")
 
 
-@app.command()
+@app.command(cls=CheckedCommand)
 def schema() -> None:
     """Print the JSON Schema of twin.json."""
     from manitwin.api import schema as record_schema
 
-    sys.stdout.write(json.dumps(record_schema(), indent=1) + "\n")
+    write_text(json.dumps(record_schema(), indent=1) + "\n")
 
 
 def _told(error: Exception) -> tuple[int, str]:
@@ -121,13 +130,25 @@ def _told(error: Exception) -> tuple[int, str]:
     path = f"{PROGRAM} {_interrupts.command}".rstrip()
     if isinstance(error, CommandLineError):
         message = getattr(error, "format_message", error.__str__)()
-        message = f"{message.removesuffix('.')}{'' if message.endswith('?') else '.'} See {path} --help"
+        message = f"{_shown(message).removesuffix('.')}{'' if message.endswith('?') else '.'} See {path} --help"
     else:
-        message = str(error)
-    status = 4 if isinstance(error, BackendError) else 2
+        message = _shown(_of_system(error) if isinstance(error, OSError) else str(error))
+    lasting = isinstance(error, OSError) and error.errno in LASTING_CAUSES
+    status = 4 if lasting or isinstance(error, BackendError) else 2
     if asked_for_json(error):
         print_failure(error, message, status)
-    return status, f"{path}: {' '.join(message.split())}"
+    return status, f"{path}: {message}"
+
+
+def _shown(message: str) -> str:
+    return printable_line(" ".join(message.split()), max_characters=LONGEST_LINE)
+
+
+def _of_system(error: OSError) -> str:
+    """Return one line of what the system refused, which nothing below this border has told in words of its own."""
+    named = os.fsdecode(error.filename) if isinstance(error.filename, str | bytes) else "a file"
+    remedy = "make room, and run the same command again" if error.errno in LASTING_CAUSES else "check the path"
+    return f"{named}: {error.strerror or error}; {remedy}"
 
 
 def _run() -> int:
@@ -146,7 +167,12 @@ def _run() -> int:
     except (CommandLineError, ManiTwinError) as error:
         LOG.debug("the error came from here", exc_info=error)
         code, line = _told(error)
-        error_console.print(line, markup=False, style="red")
+        error_console.print(line, style="red")
+        return code
+    except OSError as error:
+        LOG.debug("the error came from here", exc_info=error)
+        code, line = _told(error)
+        error_console.print(line, style="red")
         return code
     except ImportError as error:
         if not names_shared_library(error):
@@ -154,11 +180,20 @@ def _run() -> int:
             raise
         LOG.debug("the error came from here", exc_info=error)
         code, line = _told(Unavailable(f"{error}: {import_remedy(error, '')}"))
-        error_console.print(line, markup=False, style="red")
+        error_console.print(line, style="red")
         return code
-    except Exception:
-        LOG.exception("a defect in manitwin")
-        raise
+    except Exception as error:
+        found = of_machine(error)
+        if found is None:
+            LOG.exception("a defect in manitwin")
+            raise
+        LOG.error("the error came from here", exc_info=error)
+        message, code = found
+        if asked_for_json(error):
+            print_failure(error, message, code)
+        line = f"{PROGRAM} {_interrupts.command}".rstrip()
+        error_console.print(f"{line}: {printable_line(message)}", markup=False, style="red")
+        return code
 
 
 def main() -> None:
@@ -166,6 +201,7 @@ def main() -> None:
     global _interrupts
     _interrupts = Interrupts()
     _interrupts.listen()
+    guard_terminal()
     if COMPLETION_VARIABLE in os.environ:
         completion_init()
     try:
@@ -179,6 +215,11 @@ def main() -> None:
     finally:
         end_log()
     sys.exit(status)
+
+
+def interrupted() -> bool:
+    """Tell whether the command line was interrupted."""
+    return _interrupts.interrupted
 
 
 if __name__ == "__main__":

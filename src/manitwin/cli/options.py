@@ -15,6 +15,10 @@ from manitwin.cli import choices
 if TYPE_CHECKING:
     from manitwin.config import Section
 
+MOST_JOBS = 1024
+LARGEST_SEED = 2**63 - 1
+"""As in ``config``, which takes a while to import; a test keeps them the same."""
+
 Text = Annotated[
     list[str] | None, typer.Option("--text", help="A thing to make from words alone; may be repeated.", metavar="WORDS")
 ]
@@ -25,9 +29,12 @@ Attribution = Annotated[str | None, typer.Option(help="Whom to credit for the in
 Strict = Annotated[bool, typer.Option("--strict", help="A manifest column that nobody knows is an error.")]
 Jobs = Annotated[
     int | None,
-    typer.Option("--jobs", "-j", help="Processes; default: one a core.", callback=choices.count_of("jobs")),
+    typer.Option("--jobs", "-j", help="Processes; default: one a core.", callback=choices.count_of("jobs", MOST_JOBS)),
 ]
-Seed = Annotated[int | None, typer.Option(help="Seed of everything random; default: the configuration's.")]
+Seed = Annotated[
+    int | None,
+    typer.Option(help="Seed of everything random; default: the configuration's.", min=0, max=LARGEST_SEED),
+]
 Executor = Annotated[
     str, choices.EXECUTORS.option(help="local, ray for a cluster, or inline: this process, for a debugger.")
 ]
@@ -56,7 +63,12 @@ Grasper = Annotated[
     ),
 ]
 MaxCost = Annotated[
-    float | None, typer.Option("--max-cost", help="USD that services may charge in all; then stop, resumable.")
+    float | None,
+    typer.Option(
+        "--max-cost",
+        help="USD that services may charge in all; then stop, resumable.",
+        callback=choices.amount_of("--max-cost", choices.LARGEST_COST_USD),
+    ),
 ]
 RequireAgreement = Annotated[
     bool, typer.Option("--require-agreement", help="Verify only grasps that both engines hold.")

@@ -15,9 +15,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
-from rich.text import Text
 
-from manitwin.cli.console import err_console, out_console
+from manitwin.cli.console import err_console, out_console, shown_text
 from manitwin.cli.run_log import log_into
 from manitwin.engine.events import ItemEnded, StageAdvanced, StageEnded, StageEvent, StageStarted
 from manitwin.engine.ledger.location import local_log
@@ -188,7 +187,7 @@ class ShownProgress:
         total = self.progress.total or None
         table.add_row(
             ProgressBar(total, self.progress.done + self.progress.parts_done, width=BAR_WIDTH),
-            Text(self.progress.line()),
+            shown_text(self.progress.line()),
         )
         return table
 

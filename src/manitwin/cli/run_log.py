@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import re
@@ -9,6 +10,7 @@ import time
 from pathlib import Path
 
 from manitwin.errors import UsageError
+from manitwin.formats.printable import printable
 
 PACKAGE = logging.getLogger("manitwin")
 SECRET_NAMES = re.compile(r"KEY|TOKEN|SECRET|PASSWORD|CREDENTIAL", re.IGNORECASE)
@@ -18,7 +20,11 @@ HIDDEN = "***"
 
 
 class WithoutSecrets(logging.Formatter):
-    """Lines with their time in UTC, in which no key of the environment stands, nor a URL's user and password."""
+    """Lines with their time in UTC, in which no key of the environment stands, nor a URL's user and password.
+
+    Nothing in them is obeyed by a terminal that shows the file, and what follows in a record of several lines is indented: no
+    name of a file begins a line that looks like one of the log.
+    """
 
     converter = staticmethod(time.gmtime)
     default_msec_format = "%s.%03dZ"
@@ -27,11 +33,11 @@ class WithoutSecrets(logging.Formatter):
         super().__init__("%(asctime)s %(levelname)-7s %(message)s")
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return the record as text; the lines of a traceback follow its own."""
+        """Return the record as text; the lines of a traceback follow its own, indented."""
         text = CREDENTIALS_IN_URL.sub(f"{HIDDEN}@", super().format(record))
         for secret in secrets():
             text = text.replace(secret, HIDDEN)
-        return text
+        return printable(text).replace("\n", "\n    ")
 
 
 def secrets() -> list[str]:
@@ -64,10 +70,13 @@ class RunLog(logging.Handler):
         if self._file is not None:
             return
         try:
+            if os.path.exists(path) and not os.path.isfile(path):  # a pipe would be waited for
+                raise OSError(errno.EINVAL, "no regular file")
             path.parent.mkdir(parents=True, exist_ok=True)
-            self._file = logging.FileHandler(path, encoding="utf-8")
-        except OSError as error:
-            raise UsageError(f"{path}: cannot be written ({error.strerror}); give another file with --log") from error
+            self._file = logging.FileHandler(path, encoding="utf-8", errors="backslashreplace")
+        except (OSError, ValueError) as error:
+            cause = getattr(error, "strerror", None) or error
+            raise UsageError(f"{path}: cannot be written ({cause}); give another file with --log") from error
         self._file.setFormatter(self.formatter)
         for record in self._kept:
             self._file.emit(record)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from rich.console import Console
 from rich.table import Table
-from rich.text import Text
 
+from manitwin.cli.console import shown_text
 from manitwin.pipeline.quality import rehearsed_words
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import Estimate, GraspSummary, OtherGripper, SecondOpinion, TwinRecord
@@ -29,7 +29,7 @@ def print_summary(twin: Twin, console: Console) -> None:
         console.print(f"{record.rejection.stage}: {record.rejection.reason}: {record.rejection.detail}", markup=False)
     table = Table(show_header=False, box=None, pad_edge=False)
     for name, value in _rows(record):
-        table.add_row(name, Text(value))  # words of a model are no markup
+        table.add_row(shown_text(name), shown_text(value))  # words of a model
     console.print(table)
     failed = [check for check in record.quality.checks if check.passed is not True]
     for check in failed:

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-import json
+import os
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
 from manitwin.engine.ledger.ledger import Ledger
-from manitwin.engine.stage_runner import RESULT
-from manitwin.errors import TwinError
+from manitwin.engine.stage_runner import RESULT, is_whole
+from manitwin.errors import TwinError, UsageError
+from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.record import TwinRecord
-from manitwin.twin.store import RECORD, WORK, parse_record
+from manitwin.twin.store import RECORD, REMEDY, WORK, parse_record
+from manitwin.twin.wholeness import damage, foreign_files
+
+INDEX = "index"
+_FOLDER = re.compile(r"[0-9A-Za-z_-][0-9A-Za-z_.-]*")
+"""What can be the name of a twin's folder, a stage's or a result's: a ledger may be altered."""
 
 
 @dataclass(frozen=True)
@@ -23,14 +30,19 @@ class Disagreement:
     repair: Callable[[], None] | None
 
 
-def disagreements(ledger: Ledger, root: DatasetRoot, keeps_work: bool) -> Iterator[Disagreement]:
-    """Yield all that differs between a ledger that nobody else writes and the folders below the root."""
+def disagreements(
+    ledger: Ledger, root: DatasetRoot, keeps_work: bool, *, digests: bool = False
+) -> Iterator[Disagreement]:
+    """Yield all that differs between a ledger that nobody else writes and the folders below the root.
+
+    Files of finished twins are compared by their sizes, with ``digests`` by their bytes.
+    """
     yield from _interrupted(ledger)
-    yield from _ended_without_folder(ledger, root)
+    yield from _ended_without_folder(ledger, root, digests)
     yield from _folders_nobody_ended(ledger, root)
     yield from _half_folders(root)
     if keeps_work:
-        yield from _done_without_result(ledger, root)
+        yield from _done_without_result(ledger, root, digests)
     yield from _index(ledger, root)
 
 
@@ -43,47 +55,62 @@ def _interrupted(ledger: Ledger) -> Iterator[Disagreement]:
         )
 
 
-def _ended_without_folder(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
+def _ended_without_folder(ledger: Ledger, root: DatasetRoot, digests: bool) -> Iterator[Disagreement]:
     rows = ledger.connection.execute(
         "SELECT number, twin_id, state, revision FROM items WHERE state IN ('accepted', 'rejected') ORDER BY number"
     ).fetchall()
     for number, twin_id, state, revision in rows:
-        wrong = _what_is_wrong(root, twin_id, state, revision)
+        called = f"item {number}, twin {printable_line(str(twin_id), max_characters=80)}"
+        if not _FOLDER.fullmatch(str(twin_id)):
+            yield Disagreement(f"{called}: no name of a twin", partial(_reopen, ledger, number))
+            continue
+        try:
+            record = _read(root, twin_id)
+        except FileNotFoundError:
+            wrong: str | None = f"{state} in the ledger, and there is no folder"
+        except TwinError as error:
+            wrong = str(error)
+        else:
+            wrong = _what_is_wrong(root, record, state, revision, digests)
+            foreign = foreign_files(root, root.twin_name(twin_id), record)
+            if foreign and not wrong:
+                yield Disagreement(f"{called}: its folder holds {foreign}, which is not its own; remove it", None)
         if wrong:
-            yield Disagreement(f"item {number}, twin {twin_id}: {wrong}", partial(_redo, ledger, root, number, twin_id))
+            yield Disagreement(f"{called}: {wrong}", partial(_redo, ledger, root, number, twin_id))
 
 
-def _what_is_wrong(root: DatasetRoot, twin_id: str, state: str, revision: str) -> str | None:
+def _read(root: DatasetRoot, twin_id: str) -> TwinRecord:
+    """Return a twin's record, held against its revision; raises FileNotFoundError and TwinError."""
     name = f"{root.twin_name(twin_id)}/{RECORD}"
-    if not root.exists(name):
-        return f"{state} in the ledger, and there is no folder"
-    try:
-        record = parse_record(root.read_bytes(name), name)
-    except TwinError as error:
-        return str(error)
+    record = parse_record(root.read_bytes(name), name, sealed=True)
+    if record.twin_id != twin_id:
+        raise TwinError(f"{name}: of the twin {record.twin_id!r}; {REMEDY}")
+    return record
+
+
+def _what_is_wrong(root: DatasetRoot, record: TwinRecord, state: str, revision: str, digests: bool) -> str | None:
     if record.status != state:
         return f"{state} in the ledger, {record.status} in its folder"
     if record.revision != revision:
         return "its folder is of another revision than the ledger's"
-    return _lacking(root, twin_id, record)
+    return damage(root, root.twin_name(record.twin_id), record, digests=digests)
 
 
-def _lacking(root: DatasetRoot, twin_id: str, record: TwinRecord) -> str | None:
-    missing = [file for file in record.files if not root.exists(f"{root.twin_name(twin_id)}/{file}")]
-    return f"its folder lacks {', '.join(missing)}" if missing else None
-
-
-def damaged_twins(root: DatasetRoot) -> Iterator[str]:
-    """Yield what is wrong with twins of a data set that has no ledger: one line a twin that cannot be read or lacks files."""
+def damaged_twins(root: DatasetRoot, *, digests: bool = False) -> Iterator[str]:
+    """Yield what is wrong with twins of a data set that has no ledger: one line a twin that is damaged, or a foreign file."""
     for twin_id in root.twin_ids():
-        name = f"{root.twin_name(twin_id)}/{RECORD}"
+        folder = root.twin_name(twin_id)
         try:
-            lacking = _lacking(root, twin_id, parse_record(root.read_bytes(name), name))
+            record = _read(root, twin_id)
         except TwinError as error:
             yield str(error)
             continue
-        if lacking:
-            yield f"twin {twin_id}: {lacking}"
+        wrong = damage(root, folder, record, digests=digests)
+        foreign = foreign_files(root, folder, record)
+        if wrong:
+            yield f"twin {twin_id}: {wrong}; remove {folder} and build its input again"
+        elif foreign:
+            yield f"twin {twin_id}: its folder holds {foreign}, which is not its own; remove it"
 
 
 def _folders_nobody_ended(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
@@ -95,7 +122,10 @@ def _folders_nobody_ended(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagre
             # an item that was never surveyed since the folder was made will find it by itself
             (unknown,) = ledger.connection.execute("SELECT count(*) FROM items WHERE twin_id IS NULL").fetchone()
             if not unknown:
-                yield Disagreement(f"twin {twin_id}: a folder, and no item of the ledger makes it", None)
+                yield Disagreement(
+                    f"twin {twin_id}: a folder, and no item of the ledger makes it; a build with its input takes it up",
+                    None,
+                )
 
 
 def _half_folders(root: DatasetRoot) -> Iterator[Disagreement]:
@@ -112,25 +142,29 @@ def _half_folders(root: DatasetRoot) -> Iterator[Disagreement]:
             yield Disagreement(f"{name}: a twin's folder without {RECORD}", partial(root.remove, name))
 
 
-def _done_without_result(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
+def _done_without_result(ledger: Ledger, root: DatasetRoot, digests: bool) -> Iterator[Disagreement]:
     rows = ledger.connection.execute(
         "SELECT s.number, i.twin_id, s.stage, s.key FROM stages s JOIN items i USING (number)"
         " WHERE s.state = 'done' AND s.key IS NOT NULL ORDER BY s.number"
     ).fetchall()
     for number, twin_id, stage, key in rows:
-        name = f"{WORK}/{twin_id}/{stage}/{key}/{RESULT}"
-        if root.exists(name) and _is_json(root.read_bytes(name)):
+        name = f"{WORK}/{twin_id}/{stage}/{key}"
+        if all(_FOLDER.fullmatch(each) for each in (str(twin_id), stage, key)) and _is_result(root, name, digests):
             continue
         yield Disagreement(
             f"item {number}, stage {stage}: done in the ledger, and its result is not there",
-            partial(_execute, ledger, "DELETE FROM stages WHERE number = ? AND stage = ?", [(number, stage)]),
+            partial(_undo, ledger, root, number, stage, name),
         )
 
 
 def _index(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
     from manitwin.dataset.index.parts import indexed_twins  # takes a second to import
 
-    in_tables = indexed_twins(root)
+    try:
+        in_tables = indexed_twins(root)
+    except UsageError as error:
+        yield Disagreement(f"the index: {str(error).partition('; run ')[0]}", partial(_reindex, ledger, root))
+        return
     ended = dict(
         ledger.connection.execute(
             "SELECT twin_id, revision FROM items WHERE state IN ('accepted', 'rejected') AND indexed = 1"
@@ -140,9 +174,7 @@ def _index(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
     if lost:
         yield Disagreement(
             f"{len(lost)} twins are marked as indexed, and no table has them as they are ({lost[0]} ...)",
-            partial(
-                _execute, ledger, "UPDATE items SET indexed = 0 WHERE twin_id = ?", [(twin_id,) for twin_id in lost]
-            ),
+            partial(_reindex, ledger, root),
         )
     finished = {twin_id for (twin_id,) in ledger.connection.execute("SELECT twin_id FROM items")}
     strangers = sorted(in_tables.keys() - finished)
@@ -153,12 +185,38 @@ def _index(ledger: Ledger, root: DatasetRoot) -> Iterator[Disagreement]:
         )
 
 
-def _is_json(content: bytes) -> bool:
+def _is_result(root: DatasetRoot, name: str, digests: bool) -> bool:
+    if root.local is not None:
+        return is_whole(root.local / name, digests=digests)
     try:
-        json.loads(content)
-    except ValueError:
+        return bool(root.exists(f"{name}/{RESULT}") and root.read_json(f"{name}/{RESULT}"))
+    except TwinError:
         return False
-    return True
+
+
+def _undo(ledger: Ledger, root: DatasetRoot, number: int, stage: str, name: str) -> None:
+    """Forget a stage's result, so that it runs again where the item is made again."""
+    root.remove(name)
+    _execute(ledger, "DELETE FROM stages WHERE number = ? AND stage = ?", [(number, stage)])
+
+
+def _reindex(ledger: Ledger, root: DatasetRoot) -> None:
+    """Write the index again from the folders that are whole; what is open again is added by the next build."""
+    _execute(ledger, "UPDATE items SET indexed = 0", [()])
+    if next(root.twin_ids(), None) is None:
+        root.remove(INDEX)
+        return
+    ledger.indexed(indexed_again(root))
+
+
+def indexed_again(root: DatasetRoot) -> set[str]:
+    """Write the index again from the folders; returns the ids of the twins in it."""
+    from manitwin.dataset.index.parts import indexed_twins
+    from manitwin.dataset.index.rebuild import rebuild
+
+    root.remove(INDEX)
+    rebuild(root, jobs=os.cpu_count() or 1)
+    return set(indexed_twins(root))
 
 
 def _redo(ledger: Ledger, root: DatasetRoot, number: int, twin_id: str) -> None:
@@ -167,6 +225,24 @@ def _redo(ledger: Ledger, root: DatasetRoot, number: int, twin_id: str) -> None:
     ledger.reopen([number])
 
 
+def _reopen(ledger: Ledger, number: int) -> None:
+    ledger.reopen([number])
+
+
 def _execute(ledger: Ledger, statement: str, rows: list[tuple[object, ...]]) -> None:
     ledger.connection.executemany(statement, rows)
     ledger.commit()
+
+
+def index_damage(root: DatasetRoot) -> str | None:
+    """Return what is wrong with the index of a data set without a ledger; None where nothing is, or where it has none."""
+    from manitwin.dataset.index.parts import indexed_twins
+
+    if not root.exists(INDEX):
+        return None
+    try:
+        in_tables = indexed_twins(root)
+    except UsageError as error:
+        return f"the index: {str(error).partition('; run ')[0]}"
+    differ = in_tables.keys() ^ set(root.twin_ids())
+    return f"the index and the folders differ in {len(differ)} twins" if differ else None

@@ -13,6 +13,7 @@ from typing import Any, Literal, TypedDict, get_args
 from manitwin.config import RunConfig
 from manitwin.engine.driver import Driver
 from manitwin.engine.events import ItemEnded, OnStage
+from manitwin.engine.healing import heal, refuse_links
 from manitwin.engine.jobs import Executor, WorkerSetup
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.ledger.location import CONFIG, LedgerCopy, cache_folder, local_ledger
@@ -95,6 +96,7 @@ def drive(
     if executor not in EXECUTORS:
         raise UsageError(choose_from("executor", executor, EXECUTORS))
     path, remarks = local_ledger(root), [] if remarks is None else remarks
+    refuse_links(root)
     ledger, given, new = _opened_with(payloads, recipe, path)
     copy = LedgerCopy(root, path)
 
@@ -105,8 +107,9 @@ def drive(
     try:
         if len(given) > new:
             remarks.append(f"{len(given) - new} of {len(given)} items were in the data set already")
+        remarks += heal(ledger, root, recipe, given)
         root.write_bytes(CONFIG, canonical_json(configuration).encode())
-        setup = WorkerSetup(root.url, recipe, cache_folder(root), settings.keep_work)
+        setup = WorkerSetup(root.url, recipe, cache_folder(root), settings.keep_work, settings.memory_gb)
         items, opened = ledger.totals(recipe.sha256, given)
         with _executor(executor, address, setup, settings, opened) as engine:
             driver = Driver(
@@ -130,7 +133,9 @@ def _opened_with(payloads: Iterable[Payload], recipe: Recipe, path: Path) -> tup
     ledger = Ledger(path)
     try:
         ledger.restate(recipe.payload.from_json)
-        return ledger, *ledger.add_items(payloads)
+        given, new = ledger.add_items(payloads)
+        ledger.reopen(ledger.changed_since_end(given, recipe.payload.from_json))
+        return ledger, given, new
     except BaseException:
         ledger.close(remove_new=True)
         if made_folder:

@@ -264,6 +264,11 @@ class Driver:
     def _failed(self, flight: Flight, gate: Gate, failure: Failure) -> None:
         """Try again later, or soon, or no more: what a service or the disk does is not the item's fault."""
         stage, number, attempts = flight.stage, flight.number, flight.attempt(flight.stage)
+        if failure.kind == "changed":  # the next run begins it anew
+            self._flights -= 1
+            self.ledger.stage_ended(number, stage, "waiting", attempts=attempts - 1, error=failure.message)
+            self._announcer.stage_ended(flight, stage, "waiting", 0.0, failure.message)
+            return
         patient = failure.kind in ("unavailable", "rate_limited", "denied", "no_space")
         if patient or (attempts < self.settings.attempts and failure.kind != "unsupported"):
             counted = attempts - 1 if patient else attempts

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from manitwin.engine.ledger.ledger import ItemRow, ItemState
+from manitwin.engine.ledger.rows import ItemRow, ItemState
 from manitwin.engine.stage import StagePart
 from manitwin.engine.task import Task
 

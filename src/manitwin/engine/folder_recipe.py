@@ -14,6 +14,7 @@ from manitwin.engine.stage import Draft
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
 from manitwin.errors import ManiTwinError, Rejected
+from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, sha256_of_json, write_bytes_atomically
 
 
@@ -73,6 +74,14 @@ class FolderRecipe(ABC, Generic[RecordT]):
         shutil.rmtree(fresh, ignore_errors=True)
         fresh.mkdir(parents=True)
         return self.ending(self.write(draft, kind, costs, rejected, stage, fresh))
+
+    def damage(self, root: DatasetRoot, item_id: str) -> str | None:
+        """Return what is wrong with a finished folder: that it is not there."""
+        return None if root.exists(f"{self.folder_of(item_id)}/{self.record}") else f"its folder lacks {self.record}"
+
+    @abstractmethod
+    def folder_of(self, item_id: str) -> str:
+        """Return the name of an item's finished folder below the data set's root."""
 
     def ending_of(self, record: bytes) -> Ending | None:
         """Return how a finished folder ended; None where it cannot be read, or this recipe would make another one."""

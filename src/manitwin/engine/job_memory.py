@@ -6,6 +6,7 @@ import json
 from dataclasses import dataclass
 from typing import Protocol
 
+from manitwin.errors import TwinError
 from manitwin.twin.dataset_root import DatasetRoot
 
 
@@ -25,6 +26,9 @@ class JobMemory(Protocol):
         ...
 
 
+_REMEDY = "ask the service for the job and note its id there, or remove the file: the job is then paid again"
+
+
 @dataclass(frozen=True)
 class RootJobMemory:
     """One small file a request below ``name`` of a data set's root, local or at a URL."""
@@ -35,7 +39,12 @@ class RootJobMemory:
     def recall(self, request: str) -> str | None:
         """Return the job that was submitted for a request, None where there is none."""
         place = self._place(request)
-        return str(json.loads(self.root.read_bytes(place))["job_id"]) if self.root.exists(place) else None
+        if not self.root.exists(place):
+            return None
+        job_id = self.root.read_json(place, TwinError, remedy=_REMEDY).get("job_id")
+        if not isinstance(job_id, str):
+            raise TwinError(f"{self.root.full(place)}: has no job_id; {_REMEDY}")
+        return job_id
 
     def note(self, request: str, job_id: str) -> None:
         """Keep a job's id; it is there for the next process once this returns."""

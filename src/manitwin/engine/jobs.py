@@ -11,21 +11,27 @@ from manitwin.engine.recipe import Ending, Recipe
 from manitwin.engine.stage import StagePart
 from manitwin.engine.stage_runner import StageCost, StageKey, StageRun
 from manitwin.engine.task import Task
-from manitwin.errors import Rejected
+from manitwin.errors import Rejected, encodable
 
-FailureKind = Literal["unavailable", "rate_limited", "denied", "unsupported", "no_space", "error", "died", "timeout"]
+FailureKind = Literal[
+    "unavailable", "rate_limited", "denied", "unsupported", "no_space", "changed", "error", "died", "timeout"
+]
 MAKE_ROOM = "make room, then run again to go on where it stopped"
 """The remedy where a disk is full, behind what says so."""
 
 
 @dataclass(frozen=True)
 class WorkerSetup:
-    """Settings sent to every worker of a run: the data set, the recipe, and a folder for copies where the root is a URL."""
+    """Settings sent to every worker of a run: the data set, the recipe, and a folder for copies where the root is a URL.
+
+    ``memory_gb`` is how much memory a worker process may take (0: no limit, as in the process that drives the run).
+    """
 
     root_url: str
     recipe: Recipe
     cache: Path
     keep_work: bool
+    memory_gb: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -101,6 +107,9 @@ class Failure:
     retry_after_s: float | None = None
     charged_usd: float = 0.0
     trace: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "message", encodable(self.message))  # other libraries quote names of files as they are
 
 
 Job = Survey | RunStage | Finish | WriteTables

@@ -56,6 +56,10 @@ class Tables(Protocol):
         """Merge what was added in parts, once a run is at its end."""
         ...
 
+    def heal(self, root: DatasetRoot) -> bool:
+        """Remove tables that cannot be read; returns True where there are none, so that all folders are to be added."""
+        ...
+
 
 class Recipe(Protocol):
     """The stages of every kind of input, and how their results become a folder. It is sent to every worker."""
@@ -85,6 +89,11 @@ class Recipe(Protocol):
         """The type of what its tasks ask for."""
         ...
 
+    @property
+    def can_reject(self) -> bool:
+        """Whether an item may end as rejected; else what cannot be made of it is a failure."""
+        ...
+
     def folder_of(self, item_id: str) -> str:
         """Return the name of an item's finished folder below the data set's root."""
         ...
@@ -101,6 +110,10 @@ class Recipe(Protocol):
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
     ) -> Ending:
         """Write the finished folder at ``fresh``; ``stage`` is the last one that ran."""
+        ...
+
+    def damage(self, root: DatasetRoot, item_id: str) -> str | None:
+        """Return what is wrong with a finished folder, by what costs next to nothing to look at; None where nothing is."""
         ...
 
     def ending_of(self, record: bytes) -> Ending | None:

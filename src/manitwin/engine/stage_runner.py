@@ -8,12 +8,12 @@ that of a stage before it was a rehearsal server, the names of these stages.
 
 from __future__ import annotations
 
-import json
+import logging
 import os
 import resource
 import shutil
 import time
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,11 +22,16 @@ from typing import Any
 from manitwin.engine.charges import Bill, counted
 from manitwin.engine.ledger.location import cache_folder
 from manitwin.engine.stage import Draft, Stage, is_field
-from manitwin.errors import ManiTwinError
+from manitwin.errors import ManiTwinError, TwinError
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.json_file import json_number, parse_json, read_json_object
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import WORK, canonical_json, sha256_of_artifact, sha256_of_json, write_bytes_atomically
 
+RUN = logging.getLogger("manitwin.run")
 RESULT = "result.json"
+MAX_LOST_BYTES = 64
+_ANEW = "remove its folder, and the stage runs again"
 JOBS = "jobs"
 """The folder of a twin's work that remembers jobs of services, beside those of the stages."""
 LOST = "lost_usd.json"
@@ -88,31 +93,49 @@ def _digest(name: str, draft: Draft) -> str:
     return draft.digests[name]
 
 
-def run_stage(stage: Stage, draft: Draft, work: Path) -> StageRun:
+def run_stage(stage: Stage, draft: Draft, work: Path, require_same: Callable[[], None] = lambda: None) -> StageRun:
     """Bring a stage's results into the draft, from an earlier run where one with the same key is there.
 
-    Raises what the stage raises; then nothing of it is left behind. Raises ManiTwinError where a stage does not write what
+    ``require_same`` raises where what the stage has read is not any more what the key stands for. Raises what the stage
+    raises; then nothing of it is left behind. Raises ManiTwinError where a stage does not write what
     it declares: that is a defect of the stage.
     """
     key = stage_key(stage, draft)
     place = work / stage.name / key
-    reused = (place / RESULT).is_file()
+    reused = is_whole(place)
     if not reused:
-        _run_into(stage, draft, place)
+        _run_into(stage, draft, place, require_same)
     return StageRun(key, take_up(place, stage.writes, draft), reused)
 
 
 def take_up(place: Path, names: Iterable[str], draft: Draft) -> StageCost:
     """Bring what a stage wrote at ``place`` into the draft."""
-    result = json.loads((place / RESULT).read_text())
-    for name in names:
-        if is_field(name):
-            draft.fields[name] = result["fields"][name]
-        else:
-            draft.paths[name] = place / name
-        draft.digests[name] = result["digests"][name]
+    result = read_json_object(place / RESULT, TwinError, name=str(place / RESULT), remedy=_ANEW)
+    try:
+        fields = {name: result["fields"][name] for name in names if is_field(name)}
+        digests = {name: result["digests"][name] for name in names}
+        cost = StageCost(**result["cost"])
+    except (KeyError, TypeError) as error:
+        raise TwinError(f"{place / RESULT}: no result of a stage ({error}); {_ANEW}") from error
+    draft.fields.update(fields)
+    draft.digests.update(digests)
+    draft.paths.update({name: place / name for name in digests if name not in fields})
     draft.rehearsed.update(result.get("rehearsed", ()))  # results of earlier versions do not say
-    return StageCost(**result["cost"])
+    return cost
+
+
+def is_whole(place: Path, *, digests: bool = True) -> bool:
+    """Tell whether a result is there and, with ``digests``, whether its files are what was written."""
+    if not (place / RESULT).is_file():
+        return False
+    try:
+        result = read_json_object(place / RESULT, TwinError)
+        written = {name: digest for name, digest in result["digests"].items() if not is_field(name)}
+        if not all((place / name).exists() for name in written):
+            return False
+        return not digests or all(sha256_of_artifact(place / name) == digest for name, digest in written.items())
+    except (TwinError, KeyError, AttributeError, OSError):
+        return False
 
 
 def _cpu_seconds() -> float:
@@ -135,10 +158,15 @@ def _kept_bill(stage_folder: Path) -> Iterator[Bill]:
 def lost_usd(stage_folder: Path) -> float:
     """Return what was charged for attempts at a stage that came to nothing."""
     lost = stage_folder / LOST
-    return float(json.loads(lost.read_bytes())) if lost.is_file() else 0.0
+    if not lost.is_file():
+        return 0.0
+    said = parse_json(
+        read_bytes(lost, MAX_LOST_BYTES, TwinError), str(lost), TwinError, remedy="remove it: it is a sum of USD"
+    )
+    return json_number(said, str(lost))
 
 
-def _run_into(stage: Stage, draft: Draft, place: Path) -> None:
+def _run_into(stage: Stage, draft: Draft, place: Path, require_same: Callable[[], None]) -> None:
     fresh = place.with_name(f".{place.name}.{os.getpid()}")
     shutil.rmtree(fresh, ignore_errors=True)
     fresh.mkdir(parents=True)
@@ -150,6 +178,7 @@ def _run_into(stage: Stage, draft: Draft, place: Path) -> None:
             finally:
                 draft.rehearsed.update([stage.name] if bill.rehearsed else [])
         cost = {"seconds": time.perf_counter() - started, "cpu_seconds": _cpu_seconds() - cpu_started}
+        require_same()
         _check_writes(stage, fields, fresh)
         digests = {
             name: sha256_of_json(fields[name]) if is_field(name) else sha256_of_artifact(fresh / name)
@@ -208,12 +237,12 @@ class WorkFolder:
             costs[name] = take_up(self.place / name / key, writes, draft)
         return costs
 
-    def run(self, stage: Stage, draft: Draft) -> StageRun:
-        """Run a stage, or find its result, and leave it below the root."""
+    def run(self, stage: Stage, draft: Draft, require_same: Callable[[], None] = lambda: None) -> StageRun:
+        """Run a stage, or find its result, and leave it below the root; ``require_same`` as ``run_stage`` has it."""
         if self.root.local is not None:
-            return run_stage(stage, draft, self.place)
+            return run_stage(stage, draft, self.place, require_same)
         with self._shared_bill(stage.name):
-            ran = run_stage(stage, draft, self.place)
+            ran = run_stage(stage, draft, self.place, require_same)
         if not ran.reused:
             self._publish(stage.name, ran.key)
         return ran
@@ -236,6 +265,11 @@ class WorkFolder:
         """Return the stage's result where it is there already, and bring it into the draft."""
         key = stage_key(stage, draft)
         if not self.has(stage.name, key):
+            return None
+        place = self.place / stage.name / key
+        if self.root.local is not None and not is_whole(place):
+            RUN.warning("%s: damaged; the stage runs again", place)
+            shutil.rmtree(place)
             return None
         self._fetch(stage.name, key, [])
         return StageRun(key, take_up(self.place / stage.name / key, stage.writes, draft), True)

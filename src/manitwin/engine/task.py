@@ -17,6 +17,11 @@ class Payload(ABC):
     def title(self) -> str:
         """A short name for a person."""
 
+    @property
+    def modified_at(self) -> float | None:
+        """When what it names was last changed, in seconds since the epoch; None where nothing of it can change."""
+        return None
+
     def to_json(self) -> dict[str, Any]:
         """Return the fields as a ledger keeps them: the same payload gives the same ones in every version."""
         return asdict(self)

@@ -7,6 +7,7 @@ import shutil
 import time
 import traceback
 from dataclasses import replace
+from functools import partial
 
 from manitwin.config import Resource
 from manitwin.engine.charges import counted
@@ -25,13 +26,25 @@ from manitwin.engine.jobs import (
 )
 from manitwin.engine.recipe import Ending
 from manitwin.engine.stage import INPUT, Draft, Stage, StagePart
-from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, WorkFolder, lost_usd
-from manitwin.engine.task import Payload
-from manitwin.errors import AccessDenied, BackendError, ManiTwinError, RateLimited, Rejected, Unavailable, Unsupported
+from manitwin.engine.stage_runner import JOBS, StageCost, StageRun, WorkFolder, lost_usd, present_reads
+from manitwin.engine.task import Payload, Task
+from manitwin.errors import (
+    AccessDenied,
+    BackendError,
+    InputChanged,
+    ManiTwinError,
+    RateLimited,
+    Rejected,
+    TwinError,
+    Unavailable,
+    Unsupported,
+)
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import WORK
 
 NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
+TOO_LARGE = "too_large"
+"""The reason of an item for which a stage needs more memory than a worker may take; every recipe that rejects has it."""
 
 
 class Worker:
@@ -60,11 +73,17 @@ class Worker:
             return Failure("denied", _line(error))
         except Unsupported as error:
             return Failure("unsupported", _line(error))
+        except InputChanged as error:
+            return Failure("changed", " ".join(str(error).split()))
         except BackendError as error:
             return Failure("error", _line(error))
         except OSError as error:
             kind = "no_space" if error.errno in NO_SPACE else "error"
             return Failure(kind, _line(error))  # type: ignore[arg-type]
+        except MemoryError:
+            return Failure(
+                "error", f"it {too_much_memory(self.setup.memory_gb)}; raise the limit, or run fewer at a time"
+            )
         except Exception as error:
             where = traceback.extract_tb(error.__traceback__)[-1]
             said = f"{_line(error)} ({where.filename.rsplit('/', 1)[-1]}:{where.lineno})"
@@ -105,7 +124,10 @@ class Worker:
     def _ending(self, item_id: str) -> Ending | None:
         recipe = self.setup.recipe
         name = f"{recipe.folder_of(item_id)}/{recipe.record}"
-        return recipe.ending_of(self.root.read_bytes(name)) if self.root.exists(name) else None
+        try:
+            return recipe.ending_of(self.root.read_bytes(name)) if self.root.exists(name) else None
+        except TwinError:  # no file that is read: what is made takes its place
+            return None
 
     def _run(self, job: RunStage) -> StageRun | StageRejected:
         stages = self.stages(job.kind)
@@ -119,9 +141,15 @@ class Worker:
         writers = {s.name for s in stages if wanted & set(s.writes)}
         work.load(draft, [d for d in job.done if d[0] in writers], {s.name: s for s in stages}, wanted)
         started, cpu_started = time.perf_counter(), time.process_time()
+        reads_input = not present_reads(stage, draft.names())
+        require_same = partial(self._require_same, job.task) if reads_input else _nothing
         try:
-            return work.run(stage, draft)
-        except Rejected as answer:
+            return work.run(stage, draft, require_same)
+        except (Rejected, MemoryError) as error:
+            require_same()
+            if isinstance(error, MemoryError) and not self.setup.recipe.can_reject:
+                raise
+            answer = error if isinstance(error, Rejected) else too_large(job, self.setup.memory_gb)
             seconds, cpu_seconds = time.perf_counter() - started, time.process_time() - cpu_started
             cost = StageCost(seconds, cpu_seconds, lost_usd(work.place / stage.name))
             return StageRejected(answer, cost, rehearsed=stage.name in draft.rehearsed)
@@ -136,12 +164,24 @@ class Worker:
             draft.rehearsed.update([job.stage] if job.rejected.rehearsed else [])
         try:
             ending = self.setup.recipe.finish(draft, job.kind, costs, answer, job.stage, work.fresh)
+            self._require_same(job.task)
             self.root.put_folder(work.fresh, self.setup.recipe.folder_of(job.task.item_id), self.setup.recipe.record)
+        except Rejected:  # as a file of the input is gone: a finished folder has nothing to reject by itself
+            self._require_same(job.task)
+            raise
+        except InputChanged:
+            work.drop()  # nobody knows which of its results are of the bytes that the id stands for
+            raise
         finally:
             shutil.rmtree(work.fresh, ignore_errors=True)
         if not self.setup.keep_work:
             work.drop()
         return ending
+
+    def _require_same(self, task: Task) -> None:
+        """Raise InputChanged where the input is not any more what the item's id stands for."""
+        if self.setup.recipe.identify(task.payload).item_id != task.item_id:
+            raise InputChanged(f"{task.payload.title}: was changed while it was worked on; run the same command again")
 
     def _write_tables(self, job: WriteTables) -> None:
         tables = self.setup.recipe.tables
@@ -162,8 +202,30 @@ class Worker:
         return Draft(item_id, payload, self.setup.recipe.seed, jobs=jobs)
 
 
+def _nothing() -> None:
+    """Do nothing: the stage reads no input."""
+
+
+def too_much_memory(memory_gb: float) -> str:
+    """Return what is said of work that a worker's memory did not suffice for."""
+    return (
+        f"needs more than run.memory_gb = {memory_gb:g} GB of memory"
+        if memory_gb
+        else "needs more memory than there is"
+    )
+
+
+def too_large(job: RunStage, memory_gb: float) -> Rejected:
+    """Return the rejection of an item for which a stage needs more memory than a worker may take."""
+    said = f"{job.task.payload.title}: stage {job.stage} {too_much_memory(memory_gb)}"
+    return Rejected(TOO_LARGE, f"{said}; simplify the mesh or scale its pictures down, or raise run.memory_gb")
+
+
 class InlineExecutor:
-    """Do every job at once in this process: to look at a stage with a debugger, and to test what drives it."""
+    """Do every job at once in this process: to look at a stage with a debugger, and to test what drives it.
+
+    Neither ``stage_timeout_s`` nor ``memory_gb`` holds here.
+    """
 
     def __init__(self, setup: WorkerSetup, slots: int = 1):
         self._worker, self._slots = Worker(setup), slots

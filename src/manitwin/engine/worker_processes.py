@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import os
+import resource
 import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
-from multiprocessing.context import SpawnContext
+from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.synchronize import RLock
 from typing import Any
 
@@ -52,6 +53,21 @@ def one_thread_each() -> None:
     os.environ.setdefault("LP_NUM_THREADS", "0")
 
 
+def limit_memory(gigabytes: float) -> None:
+    """Bound the heap, the arrays and the stacks of this process (2^30 bytes each; 0: no limit): more is a MemoryError.
+
+    RLIMIT_DATA, which counts private writable memory (Linux 4.7 and later): RLIMIT_AS would also count the addresses that
+    libraries and drivers reserve and never fill, hundreds of gigabytes with CUDA. The hard limit stays, for programs of the
+    user that a stage starts.
+    """
+    if gigabytes:
+        _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+        wanted = int(gigabytes * (1 << 30))
+        resource.setrlimit(
+            resource.RLIMIT_DATA, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard)
+        )
+
+
 class WorkerContext(SpawnContext):
     """Spawn the workers of one pool, whose locks last as long as this context.
 
@@ -62,6 +78,19 @@ class WorkerContext(SpawnContext):
     def __init__(self) -> None:
         super().__init__()
         self._kept: list[RLock] = []
+        self._started: list[SpawnProcess] = []
+
+    def Process(self, *args: Any, **kwargs: Any) -> SpawnProcess:  # type: ignore[override]
+        """Return a new process, which ``kill`` will end."""
+        process = SpawnProcess(*args, **kwargs)
+        self._started = [*(each for each in self._started if each.is_alive()), process]
+        return process
+
+    def kill(self) -> None:
+        """End all processes that were started here, also those that are stopped (SIGSTOP) or in native code."""
+        for process in self._started:
+            if process.is_alive():
+                process.kill()
 
     def RLock(self) -> RLock:
         """Return a lock that is there until this context is gone."""

@@ -12,6 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from manitwin.errors import EpisodesError
+from manitwin.formats.parquet_file import open_parquet
 from manitwin.twin.store import file_beside
 
 OUTCOMES = (
@@ -133,15 +134,9 @@ def read_attempts(path: Path) -> Iterator[Attempt]:
 
 def read_tables(path: Path) -> Iterator[pa.Table]:
     """Yield the rows of a file, a row group at a time, with the columns of ``SCHEMA`` first."""
-    try:
-        with pq.ParquetFile(path) as file:
-            missing = [name for name in SCHEMA.names if name not in file.schema_arrow.names]
-            if missing:
-                raise EpisodesError(f"{path}: has no column {missing[0]}; run the episodes again")
-            for group in range(file.num_row_groups):
-                yield file.read_row_group(group)
-    except (OSError, pa.ArrowInvalid) as error:
-        raise EpisodesError(f"{path}: no Parquet file that can be read ({error}); run the episodes again") from error
+    with open_parquet(path, EpisodesError, schema=SCHEMA, remedy="run the episodes again", inside=path.parent) as file:
+        for group in range(file.row_groups):
+            yield file.read(SCHEMA.names, row_group=group)
 
 
 def merge_attempts(files: Iterable[Path], place: Path) -> tuple[int, int]:

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from manitwin.engine.folder_recipe import FolderRecord
 from manitwin.engine.task import Payload
 from manitwin.errors import EpisodesError, UsageError
+from manitwin.formats.json_file import read_json_object
 from manitwin.twin.store import sha256_of_json
 
 BATCHES = "batches"
@@ -139,14 +140,15 @@ class BatchRecord(FolderRecord):
     files: dict[str, str]
 
 
+_REMEDY = "run manitwin trajectories again"
+
+
 def read_batch(folder: Path) -> BatchRecord:
     """Read the record of a finished batch; raises EpisodesError where it cannot be read."""
     path = folder / BATCH_RECORD
     try:
-        return BatchRecord.model_validate_json(path.read_bytes())
+        return BatchRecord(**read_json_object(path, EpisodesError, inside=folder, name=str(path), remedy=_REMEDY))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"])) or "the whole"
-        raise EpisodesError(f"{path}: {where}: {first['msg']}; run manitwin trajectories again") from error
-    except OSError as error:
-        raise EpisodesError(f"{path}: cannot be read ({error}); run manitwin trajectories again") from error
+        raise EpisodesError(f"{path}: {where}: {first['msg']}; {_REMEDY}") from error

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 import shutil
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from manitwin.config import Resource
 from manitwin.engine.drive import RunOptions, RunReport, drive
@@ -25,6 +26,7 @@ from manitwin.engine.task import Payload
 from manitwin.episodes.batch import batch_name
 from manitwin.episodes.cameras import NamedCamera, named_cameras
 from manitwin.episodes.collect import LEROBOT, batch_folders, stored_episodes
+from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
@@ -34,10 +36,12 @@ from manitwin.episodes.settings import PicturesConfig
 from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.episodes.video import EpisodesVideo
 from manitwin.errors import EpisodesError, Rejected
+from manitwin.formats.json_file import read_json_object
+from manitwin.formats.printable import printable_line
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.furniture_pictures import lighting_of
-from manitwin.scenes.scene import Furniture, Light
+from manitwin.scenes.scene import Furniture, Light, Number
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import digests_below, sha256_of_json
@@ -63,6 +67,16 @@ class BatchDrawing(Payload):
     def from_json(cls, fields: Mapping[str, Any]) -> BatchDrawing:
         """Return the batch that a ledger keeps; those of earlier versions kept its id as a text."""
         return cls(fields["text"] if "text" in fields else fields["batch_id"])
+
+
+class _Room(BaseModel):
+    """What the facts of an episode say of its furniture and its light."""
+
+    model_config = ConfigDict(frozen=True)
+
+    furniture: Furniture
+    ambient: tuple[Number, Number, Number]
+    lights: tuple[Light, ...]
 
 
 class PicturesRecord(FolderRecord):
@@ -113,14 +127,13 @@ class EpisodeFilmsStage:
         return EpisodesVideo(folder / f"{camera.name}.mp4", width_px=size, height_px=size, codec=self.settings.codec)
 
     def _frames(self, episode: StoredEpisode, cameras: list[NamedCamera]) -> list[list[np.ndarray]]:
-        facts, size = episode.facts, self.settings.size_px
-        lights = tuple(Light(**light) for light in facts["lights"])
+        room, size = _room(episode), self.settings.size_px
         pictures: list[list[np.ndarray]] = [[] for _ in cameras]
         with EpisodeReplay(
             self._robot,
             [twin_drawable(self._source.folder(thing.twin_id)) for thing in episode.objects],
-            furniture=Furniture(**facts["furniture"]),
-            lighting=lighting_of(tuple(facts["ambient"]), lights),
+            furniture=room.furniture,
+            lighting=lighting_of(room.ambient, room.lights),
             seed=episode.attempt.seed % 2**31,
         ) as replay:
             states = replay.frames(episode.recording, cameras, width_px=size, height_px=size)
@@ -130,6 +143,17 @@ class EpisodeFilmsStage:
                 self._drawn += 1
                 tell_part(self._drawn, self._to_draw, "frames")
         return pictures
+
+
+def _room(episode: StoredEpisode) -> _Room:
+    """Return where an episode took place; raises EpisodesError for facts that do not say so."""
+    try:
+        return _Room(**episode.facts)
+    except (ValidationError, TypeError) as error:
+        first = error.errors()[0] if isinstance(error, ValidationError) else {"loc": (), "msg": str(error)}
+        where = printable_line(".".join(map(str, ("facts", *first["loc"]))), max_characters=80)
+        said = f"episode {printable_line(episode.attempt.episode_id, max_characters=80)}: {where}: {first['msg']}"
+        raise EpisodesError(f"{said}; write the episodes again") from error
 
 
 @dataclass(frozen=True)
@@ -181,13 +205,17 @@ class PicturesRecipe(FolderRecipe[PicturesRecord]):
         return Ending("accepted", record.revision, None, f"{len(record.first_frames)} episodes drawn")
 
 
+_DRAW = "run manitwin render again"
+
+
 def read_pictures(folder: Path) -> PicturesRecord:
     """Read the record of a batch's pictures; raises EpisodesError where there is none."""
     path = folder / PICTURES_RECORD
     try:
-        return PicturesRecord(**json.loads(path.read_bytes()))
-    except (OSError, ValueError) as error:
-        raise EpisodesError(f"{path}: no record of pictures ({error}); run manitwin render again") from error
+        return PicturesRecord(**read_json_object(path, EpisodesError, inside=folder, name=str(path), remedy=_DRAW))
+    except ValidationError as error:
+        said = printable_line(str(error).split("\n")[0], max_characters=120)
+        raise EpisodesError(f"{path}: no record of pictures ({said}); {_DRAW}") from error
 
 
 def draw_episodes(
@@ -228,12 +256,6 @@ def write_with_pictures(out: Path, cameras: tuple[str, ...]) -> LeRobotSummary:
 
 
 def _said(out: Path) -> dict[str, str]:
-    try:
-        said: dict[str, str] = json.loads((out / CONFIG).read_bytes())
-    except (OSError, ValueError) as error:
-        raise EpisodesError(
-            f"{out}/{CONFIG}: no episodes there ({error}); `manitwin trajectories` makes some"
-        ) from error
-    if "robot" not in said:
-        raise EpisodesError(f"{out}/{CONFIG}: not of episodes; give the folder that `manitwin trajectories` wrote")
-    return said
+    if not os.path.lexists(out / CONFIG):
+        raise EpisodesError(f"{out}/{CONFIG}: no episodes there; `manitwin trajectories` makes some")
+    return read_configuration(out)

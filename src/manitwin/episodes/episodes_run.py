@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Unpack
 
+from manitwin.config import LARGEST_COUNT
 from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.folder_recipe import FolderRecipe
-from manitwin.engine.ledger.ledger import read_ledger
 from manitwin.engine.ledger.location import CONFIG, local_ledger
+from manitwin.engine.ledger.reading import read_ledger
+from manitwin.engine.ledger.soundness import damaged
 from manitwin.engine.recipe import Ending, Identity
 from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.episodes.attempts import ATTEMPTS, read_attempts
 from manitwin.episodes.batch import BATCH_RECORD, BATCH_SCHEMA_VERSION, Batch, BatchRecord, batch_name, batches
+from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.errors import Rejected, UsageError
+from manitwin.formats.json_file import parse_json_object
 from manitwin.robots.load import load_robot
 from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.run_settings import check_settings
@@ -110,8 +113,8 @@ class EpisodesSource:
         root = DatasetRoot(place)
         path = root.absolute()
         if root.exists(SCENES) and root.exists(CONFIG):
-            said = json.loads(root.read_bytes(CONFIG))
-            if "dataset" not in said:
+            said = root.read_json(CONFIG, UsageError, remedy="make the layouts again")
+            if not isinstance(said.get("dataset"), str):
                 raise UsageError(
                     f"{place}/{CONFIG}: does not say whose twins these scenes are of; make the layouts again"
                 )
@@ -136,7 +139,7 @@ def _check_out(out: DatasetRoot, source: EpisodesSource) -> None:
     """Raise UsageError where a folder has episodes of scenes and is to get some of twins alone, or the other way."""
     if not out.exists(CONFIG):
         return
-    said = json.loads(out.read_bytes(CONFIG))
+    said = out.read_json(CONFIG, UsageError, remedy="give another folder")
     if "scenes" in said and (said["scenes"] is None) != (source.scenes is None):
         raise UsageError(
             f"{out.url}: its episodes are of {said['scenes'] or said['dataset']}; give another folder for those of"
@@ -160,8 +163,8 @@ def make_episodes(
     Raises UsageError for a place without twins or scenes, an unknown robot, an ``out`` that has episodes of
     scenes where twins are given or the other way, or made with other settings, or where another run is at work there.
     """
-    if count < 1:
-        raise UsageError(f"{count} episodes; ask for 1 or more")
+    if not 1 <= count <= LARGEST_COUNT:
+        raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
     robot, source, root = load_robot(config.robot), EpisodesSource.of(place, twins), DatasetRoot(out)
     _check_out(root, source)
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
@@ -194,11 +197,18 @@ def _batches_there(root: DatasetRoot) -> list[Batch]:
         return []
     with read_ledger(path) as ledger:
         rows = ledger.execute("SELECT item FROM items WHERE state <> 'duplicate' ORDER BY number")
-        return [Batch.from_json(json.loads(text)) for (text,) in rows]
+        return [_batch(text, path) for (text,) in rows]
+
+
+def _batch(text: str, ledger: Path) -> Batch:
+    try:
+        return Batch.from_json(parse_json_object(text, str(ledger), UsageError))
+    except (TypeError, KeyError, AttributeError) as error:
+        raise damaged(ledger, error) from error
 
 
 def retire_failing(out: Path) -> tuple[list[Retirement], int]:
     """Retire the grasps that a finished run says fail; returns them, and how many were not retired before."""
-    said = json.loads((out / CONFIG).read_bytes())
+    said = read_configuration(out)
     found = find_retirements(read_attempts(out / ATTEMPTS), failed_share=said["retire_failed_share"])
     return found, retire(TwinSource(said["dataset"]), found)

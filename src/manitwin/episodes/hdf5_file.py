@@ -16,8 +16,9 @@ from typing import Any
 
 import h5py
 import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
 
-from manitwin.episodes.attempts import attempt_from
+from manitwin.episodes.attempts import Attempt, attempt_from
 from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta
 from manitwin.episodes.stored_episode import (
     RecordedObject,
@@ -26,6 +27,9 @@ from manitwin.episodes.stored_episode import (
     to_json,
 )
 from manitwin.errors import EpisodesError
+from manitwin.formats.hdf5_file import Hdf5
+from manitwin.formats.json_file import parse_json_object
+from manitwin.formats.printable import printable_line
 from manitwin.twin.store import file_beside
 
 LIBVER = ("v110", "v110")
@@ -34,14 +38,51 @@ LIBVER = ("v110", "v110")
 EPISODE = "episode"
 """The attribute of a trajectory's group that holds what is no array, as JSON."""
 
+_REMEDY = "write the episodes again"
 EXTRA = "manitwin"
 """The group of what ManiSkill has no place for."""
+
+_NAME = r"^[0-9A-Za-z_-][0-9A-Za-z_. -]*$"
+"""What can be the name of a group in the file, and of a twin's folder."""
 
 _KINDS: dict[str, type] = {"phase": np.uint8, "target_on_support": bool, "unplanned_contact": bool}
 """All other arrays are float32."""
 
 _COMPRESSED_BYTES = 512
 """Smaller arrays are stored as they are: they would not get smaller."""
+
+
+class _Said(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class _SaidRobot(_Said):
+    name: str = Field(pattern=_NAME)
+    sha256: str
+    arm_joints: list[str] = Field(min_length=1, max_length=64)
+    finger_joints: list[str] = Field(max_length=64)
+    lower_rad: list[FiniteFloat]
+    upper_rad: list[FiniteFloat]
+    velocity_limits_rad_s: list[FiniteFloat]
+    max_opening_m: FiniteFloat
+
+
+class _SaidObject(_Said):
+    name: str = Field(pattern=_NAME)
+    twin_id: str = Field(pattern=_NAME)
+
+
+class StoredSaid(_Said):
+    """What is no array of an episode, as JSON has it: the fields of an attempt are looked at by ``attempt_from``."""
+
+    attempt: dict[str, Any]
+    robot: _SaidRobot
+    objects: list[_SaidObject] = Field(min_length=1, max_length=10_000)
+    target: int = Field(ge=0)
+    facts: dict[str, Any]
+
+
+_ATTEMPT = TypeAdapter(Attempt)
 
 
 def write_episodes(path: Path, episodes: Iterable[StoredEpisode]) -> int:
@@ -64,15 +105,16 @@ class EpisodeFile:
 
     def __init__(self, path: Path):
         self.path = path
+        self.content = Hdf5(path, EpisodesError, remedy=_REMEDY)
         try:
-            self.file = h5py.File(path, "r")
-        except OSError as error:
-            raise EpisodesError(f"{path}: no HDF5 file that can be read ({error}); write the episodes again") from error
-        self.count = len(self.file)
-        missing = next((i for i in range(self.count) if f"traj_{i}" not in self.file), None)
-        if missing is not None:
-            self.file.close()
-            raise EpisodesError(f"{path}: {self.count} groups, but no traj_{missing}; write the episodes again")
+            names = set(self.content.names())
+            self.count = len(names)
+            missing = next((i for i in range(self.count) if f"traj_{i}" not in names), None)
+            if missing is not None:
+                raise EpisodesError(f"{path}: {self.count} groups, but no traj_{missing}; {_REMEDY}")
+        except BaseException:
+            self.content.close()
+            raise
 
     def __enter__(self) -> EpisodeFile:
         return self
@@ -80,7 +122,7 @@ class EpisodeFile:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self.file.close()
+        self.content.close()
 
     def __len__(self) -> int:
         return self.count
@@ -91,20 +133,27 @@ class EpisodeFile:
     def __getitem__(self, number: int) -> StoredEpisode:
         if not 0 <= number < self.count:
             raise IndexError(f"{self.path} has {self.count} episodes, not number {number}")
-        return _read(self.file[f"traj_{number}"], f"{self.path}: traj_{number}")
+        return _read(self.content, f"traj_{number}", self.said(number), f"{self.path}: traj_{number}")
 
     def said(self, number: int) -> dict[str, Any]:
         """Return what is no array of an episode: ``attempt, robot, objects, target, facts``."""
-        return said_of(self.file[f"traj_{number}"], f"{self.path}: traj_{number}")
+        return _said(self.content.text(f"traj_{number}", EPISODE), f"{self.path}: traj_{number}")
 
 
-def said_of(group: h5py.Group, where: str) -> dict[str, Any]:
-    """Return the JSON of a trajectory's group; raises EpisodesError where it has none."""
-    if EPISODE not in group.attrs:
+def _said(content: bytes | None, where: str) -> dict[str, Any]:
+    """Return the JSON of a trajectory's group, with its fields of the right types; raises EpisodesError."""
+    if content is None:
         raise EpisodesError(
             f"{where}: no attribute {EPISODE!r}, so this package did not write it; give a file of its own"
         )
-    said: dict[str, Any] = json.loads(bytes(group.attrs[EPISODE]))
+    said = parse_json_object(content, where, EpisodesError, remedy=_REMEDY)
+    try:
+        StoredSaid.model_validate(said)
+        _ATTEMPT.validate_json(json.dumps(said["attempt"]), strict=True)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = printable_line(".".join(map(str, first["loc"])), max_characters=80)
+        raise EpisodesError(f"{where}: {place}: {first['msg']}; {_REMEDY}") from error
     return said
 
 
@@ -149,22 +198,26 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
         )
 
 
-def _read(group: h5py.Group, where: str) -> StoredEpisode:
-    said = said_of(group, where)
+def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> StoredEpisode:
     robot, objects = robot_from(said["robot"]), tuple(RecordedObject(**thing) for thing in said["objects"])
     arm = len(robot.arm_joints)
-    try:
-        # (T + 1, objects, 13): with no objects there would be no target, so there is always one
-        states = np.stack([group[f"env_states/actors/{thing.name}"][:] for thing in objects], axis=1)
-        positions, velocities = group["obs/agent/qpos"][:], group["obs/agent/qvel"][:]
-        tip, action_tip = group["obs/extra/tcp_pose"][:], group[f"{EXTRA}/action_tip_pose"][:]
-        actions = group["actions"][:]
-        extra = {
-            name: group[f"{EXTRA}/{name}"][:]
-            for name in ("phase", "finger_forces_n", "target_on_support", "unplanned_contact")
-        }
-    except KeyError as error:
-        raise EpisodesError(f"{where}: a data set is missing ({error}); write the episodes again") from error
+
+    def array(name: str, width: int | None = None) -> np.ndarray:
+        found = content.array(f"{group}/{name}")
+        if found.ndim != (1 if width is None else 2) or (width is not None and found.shape[1] != width):
+            raise EpisodesError(f"{where}: {name} has the shape {found.shape}; {_REMEDY}")
+        return found
+
+    # (T + 1, objects, 13): with no objects there would be no target, so there is always one
+    each = [array(f"env_states/actors/{thing.name}", 13) for thing in objects]
+    if len({len(states) for states in each}) != 1:
+        raise EpisodesError(f"{where}: the states of its objects are not equally many; {_REMEDY}")
+    states = np.stack(each, axis=1)
+    positions, velocities = array("obs/agent/qpos", arm + 2), array("obs/agent/qvel", arm + 2)
+    tip, action_tip = array("obs/extra/tcp_pose", 7), array(f"{EXTRA}/action_tip_pose", 7)
+    actions = array("actions", arm + 1)
+    extra = {name: array(f"{EXTRA}/{name}") for name in ("phase", "target_on_support", "unplanned_contact")}
+    extra["finger_forces_n"] = array(f"{EXTRA}/finger_forces_n", 2)
     recording = Recording(
         target=said["target"],
         joint_positions_rad=positions[:, :arm],

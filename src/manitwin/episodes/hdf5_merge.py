@@ -41,9 +41,9 @@ def merge_episodes(files: Iterable[Path], folder: Path) -> int:
             for path in files:
                 with EpisodeFile(path) as source:
                     for number in range(len(source)):
-                        said, group = source.said(number), source.file[f"traj_{number}"]
-                        steps = len(group["actions"])
-                        source.file.copy(group, target, name=f"traj_{count}")
+                        said, group = source.said(number), source.content.group(f"traj_{number}")
+                        steps = source.content.length(f"traj_{number}/actions")
+                        group.file.copy(group, target, name=f"traj_{count}")
                         write(_row(count, steps, said))
                         _note(robots, said["robot"], path)
                         longest, count = max(longest, steps), count + 1

@@ -14,6 +14,7 @@ NAMELESS = "object"
 """What a thing is called that nobody has named."""
 
 _UNSAID = re.compile(r"\b(?:unknown|unclear|unspecified|unidentified|various|none|not|n/?a)\b", re.IGNORECASE)
+_MOST_LETTERS = 1000  # of a description: patterns that look for brackets and spaces slow down with the square of it
 _PLAIN = re.compile(r"[a-z]+(?:[ -][a-z]+)*")
 _SIZES = frozenset(
     ("tiny", "small", "little", "large", "big", "long", "short", "medium-sized", "palm-sized", "hand-sized")
@@ -132,7 +133,7 @@ def _is_plural(noun: str) -> bool:
 
 def _color(text: str) -> str | None:
     """Return "dark grey and gold" of "dark grey (69 %), gold (25 %)"."""
-    pieces = [piece.strip() for piece in re.sub(r"\([^)]*\)", "", text.lower()).split(",")]
+    pieces = [piece.strip() for piece in re.sub(r"\([^)]*\)", "", text[:_MOST_LETTERS].lower()).split(",")]
     plain = [p for p in pieces if _PLAIN.fullmatch(p) and not _UNSAID.search(p) and len(p.split()) <= 3]
     return joined(plain[:_COLORS]) if plain and not _UNSAID.search(text) else None
 
@@ -161,7 +162,9 @@ def _use(text: str) -> str | None:
 
 def _part(text: str) -> str | None:
     """Return "a side handle" of "cylindrical with a side handle, flat"."""
-    found = re.search(r"\bwith ((?:an?|one|two|three|four|[a-z]+) [a-z ]+?)\s*(?:,|;|\.|$)", text.lower())
+    found = re.search(
+        r"\bwith ((?:an?|one|two|three|four|[a-z]+) [a-z ]+?)\s*(?:,|;|\.|$)", text[:_MOST_LETTERS].lower()
+    )
     if found is None or _UNSAID.search(text) or len(found[1].split()) > 5:
         return None
     return found[1]

@@ -6,6 +6,7 @@ import io
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 
 import pyarrow as pa
@@ -14,8 +15,10 @@ import pyarrow.parquet as pq
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.episodes.attempts import EXECUTION_FAILURES, Attempt
 from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.grasp_table import read_grasp_table
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import amend
+from manitwin.twin.wholeness import note_sizes
 
 GRASPS = "grasps.parquet"
 
@@ -66,13 +69,15 @@ def retire(twins: TwinSource, found: Iterable[Retirement]) -> int:
     count, revised = 0, {}
     for twin_id, grasp_ids in by_twin.items():
         folder = twins.folder(twin_id)
-        table = pq.read_table(folder / GRASPS)
+        table = read_grasp_table(folder / GRASPS)
         before = table["retired"].to_pylist()
         after = [was or grasp in grasp_ids for was, grasp in zip(before, table["grasp_id"].to_pylist(), strict=True)]
         fresh = sum(after) - sum(before)
         if fresh:
             count += fresh
-            revised[twin_id] = amend(folder, {GRASPS: _with_column(table, "retired", after)}).revision
+            revised[twin_id] = amend(
+                folder, {GRASPS: _with_column(table, "retired", after)}, partial(note_sizes, folder)
+            ).revision
     if revised and twins.root.exists(LEDGER):
         _follow(twins.root, revised)
     return count

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from manitwin.config import RunConfig, Section
+from manitwin.config import RunConfig, Section, Seed
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION
 from manitwin.scenes.settings import application_run
 
@@ -50,7 +50,7 @@ class TrajectoriesConfig(Section):
     executions failed are retired.
     """
 
-    seed: int = 0
+    seed: Seed = 0
     robot: str = "panda"
     skill: Literal["pick_place"] = "pick_place"
     others: int = Field(default=0, ge=0, le=20)

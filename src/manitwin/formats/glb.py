@@ -89,6 +89,7 @@ class _Document:
         self._chunks: list[bytes] = []
         self._length = 0
         self._known: dict[str, int] = {}
+        self._digests: dict[int, tuple[Image.Image, str]] = {}  # many materials may show one image
 
     def add(self, part: trimesh.Trimesh, name: str) -> None:
         """Append a part as a mesh of one primitive under a node of its own."""
@@ -183,7 +184,9 @@ class _Document:
         return self._known[key]
 
     def _texture(self, image: Image.Image, kind: Literal["color", "data"], with_alpha: bool) -> int:
-        digest = hashlib.sha256(image.tobytes()).hexdigest()
+        if id(image) not in self._digests:
+            self._digests[id(image)] = image, hashlib.sha256(image.tobytes()).hexdigest()
+        digest = self._digests[id(image)][1]
         key = f"texture:{kind}:{with_alpha}:{image.mode}:{image.size}:{digest}"
         if key not in self._known:
             data, mime = _encoded(_fitted(image, self._max_texture_size), kind, with_alpha)

@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import io
+import os
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from PIL import Image, ImageCms, ImageOps
 
-from manitwin.errors import InputError, choose_from
-from manitwin.formats.sniff import HEIC_NOT_READ, sniff
+from manitwin.errors import InputError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.image_frames import MAX_PICTURES, count_pictures
+from manitwin.formats.printable import printable_line
+from manitwin.formats.sniff import HEIC_NOT_READ, image_format, sniff
 
-MAX_PIXELS = 250_000_000
+MAX_PIXELS = 178_000_000  # a little below what Pillow takes for a decompression bomb
+MAX_BYTES = 1 << 30
 MIN_SIDE_PX = 32
+_MIN_SCALED_PX = 8  # a strip of fewer shows no object
+_ORIENTATION = 0x0112  # EXIF
+_CAUSE_CHARACTERS = 200
+_MEGAPIXELS = f"more than {MAX_PIXELS // 1_000_000} megapixels"
 _WIDE_GREY = ("I;16", "I;16B", "I;16L", "I;16N", "I")
 _MULTI_PICTURE = ("MPO",)  # a phone's JPEG with depth map or preview behind the photo: one photo, no animation
 
@@ -33,32 +45,48 @@ def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None 
     EXIF orientation, CMYK, embedded colour profiles, palettes and 16-bit grey are converted. ``frame`` chooses a picture of an
     animation (counted from 0). ``max_side_px`` scales a larger photo down.
 
-    Raises InputError: ``unreadable``, ``empty``, ``wrong_type``, ``too_small``, ``animated``; each names the file, the
-    cause and the remedy.
+    Raises InputError: ``unreadable``, ``too_large``, ``empty``, ``wrong_type``, ``too_small``, ``animated``; each names the
+    file, the cause and the remedy.
     """
     found = sniff(path)
     if found.kind != "image":
         raise InputError(
-            "wrong_type", f"{path.name}: is a mesh ({found.format}), not an image; give it as a mesh input"
+            "wrong_type", f"{_name(path)}: is a mesh ({found.format}), not an image; give it as a mesh input"
         )
     if found.format == "heif":
-        raise InputError("wrong_type", f"{path.name}: {HEIC_NOT_READ}")
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # the limit is checked below
-        image = _open(path)
-        findings: list[str] = []
-        with image:
-            _check_size(path, image)
-            _choose_frame(path, image, frame, findings)
-            if max_side_px is not None and image.format == "JPEG":
-                image.draft(None, (max_side_px, max_side_px))  # decodes at a half, a quarter, an eighth: never smaller
-            _decode(path, image)
-            upright = ImageOps.exif_transpose(image)
-            if image.getexif().get(0x0112, 1) not in (0, 1):
-                findings.append("turned upright as its EXIF orientation says")
-            rgb = _to_srgb(path, upright, image.info.get("icc_profile"), findings)
+        raise InputError("wrong_type", f"{_name(path)}: {HEIC_NOT_READ}")
+    try:
+        return _read(path, frame, max_side_px)
+    except MemoryError as error:
+        raise _refused(path, error) from error
+
+
+def _read(path: Path, frame: int | None, max_side_px: int | None) -> Photo:
+    findings: list[str] = []
+    with _opened(path) as image:
+        _check_size(path, image)
+        _choose_frame(path, image, frame, findings)
+        if max_side_px is not None and image.format == "JPEG":
+            image.draft(None, (max_side_px, max_side_px))  # decodes at a half, a quarter, an eighth: never smaller
+        _decode(path, image)
+        turned = _orientation(image, findings) not in (0, 1)
+        profile = image.info.get("icc_profile")
+        # a copy of hundreds of megapixels only where there is something to turn
+        upright = _upright(image, findings) if turned else image
+        if upright is not image:
+            findings.append("turned upright as its EXIF orientation says")
+        try:
+            rgb = _to_srgb(path, upright, profile, findings)
+        except ValueError as error:  # pixels beyond the palette
+            raise _refused(path, error) from error
     if max_side_px is not None and max(rgb.size) > max_side_px:
         scale = max_side_px / max(rgb.size)
+        if round(min(rgb.size) * scale) < _MIN_SCALED_PX:
+            raise InputError(
+                "too_small",
+                f"{_name(path)}: {rgb.width} x {rgb.height} pixels leave {round(min(rgb.size) * scale)} on its shorter side"
+                f" where the longer has {max_side_px}; crop it to the object",
+            )
         rgb = _scaled(rgb, (max(1, round(rgb.width * scale)), max(1, round(rgb.height * scale))))
         findings.append(f"scaled down to {rgb.width} x {rgb.height}")
     return Photo(np.asarray(rgb), tuple(findings))
@@ -73,88 +101,135 @@ def png_of(pixels: np.ndarray) -> bytes:
 
 def check_header(path: Path, *, frame: int | None = None) -> None:
     """Raise InputError for what an image's header tells already, as ``read_image`` would: its size, and an animation."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-        with _open(path) as image:
-            _check_size(path, image)
-            _choose_frame(path, image, frame, [])
+    with _opened(path) as image:
+        _check_size(path, image)
+        _choose_frame(path, image, frame, [])
 
 
-def _open(path: Path) -> Image.Image:
-    try:
-        return Image.open(path)
-    except Image.DecompressionBombError as error:  # raised at twice Pillow's own limit, before this module can look
-        raise _too_large(path) from error
-    except Exception as error:  # a decoder may raise anything on damaged bytes; the message names the cause
-        raise _damaged(path, error) from error
+@contextmanager
+def _opened(path: Path) -> Iterator[Image.Image]:
+    """Open an image, of which only the header is read; what decoders warn of is no concern of a terminal."""
+    unreadable = partial(InputError, "unreadable")
+    with open_regular(path, unreadable) as stream, warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the limits are checked below
+        if os.fstat(stream.fileno()).st_size > MAX_BYTES:
+            raise _too_large(path, f"{os.fstat(stream.fileno()).st_size} bytes are more than the limit of {MAX_BYTES}")
+        if (count_pictures(stream, image_format(stream.read(64)) or "") or 0) > MAX_PICTURES:
+            raise _too_large(path, f"more than {MAX_PICTURES} pictures in one file")
+        stream.seek(0)
+        try:
+            image = Image.open(stream)
+        except Exception as error:  # a decoder may raise anything on damaged bytes; the message names the cause
+            raise _refused(path, error) from error
+        with image:
+            yield image
 
 
 def _decode(path: Path, image: Image.Image) -> None:
     try:
         image.load()
-    except Image.DecompressionBombError as error:
-        raise _too_large(path) from error
     except Exception as error:  # as above
-        raise _damaged(path, error) from error
+        raise _refused(path, error) from error
 
 
-def _damaged(path: Path, error: Exception) -> InputError:
+def _refused(path: Path, error: Exception) -> InputError:
+    """Return what is said of an image that a decoder fails on."""
+    if isinstance(
+        error, Image.DecompressionBombError
+    ):  # raised at twice Pillow's own limit, before this module can look
+        return _too_large(path, _MEGAPIXELS)
+    if isinstance(error, MemoryError):
+        return _too_large(path, "it asks for more memory than there is")
     cause = str(error).splitlines()[0] if str(error) else type(error).__name__
     if isinstance(error, Image.UnidentifiedImageError):
         cause = "no decoder for it, or its header is damaged"
-    detail = f"{path.name}: truncated or corrupt image ({cause}); export or download it again, as PNG or JPEG"
+    cause = printable_line(cause, max_characters=_CAUSE_CHARACTERS)
+    detail = f"{_name(path)}: truncated or corrupt image ({cause}); export or download it again, as PNG or JPEG"
     return InputError("unreadable", detail)
 
 
-def _too_large(path: Path) -> InputError:
-    return InputError("unreadable", f"{path.name}: more than {MAX_PIXELS // 1_000_000} megapixels; scale it down first")
+def _too_large(path: Path, cause: str) -> InputError:
+    return InputError("too_large", f"{_name(path)}: {cause}; scale it down first")
+
+
+def _name(path: Path) -> str:
+    return printable_line(path.name, max_characters=_CAUSE_CHARACTERS)
+
+
+def _orientation(image: Image.Image, findings: list[str]) -> object:
+    """Return the orientation that EXIF states, 1 where it cannot be read: the picture itself can."""
+    try:
+        return image.getexif().get(_ORIENTATION, 1)
+    except Exception as error:  # of broken EXIF Pillow raises whatever its parsing meets
+        findings.append(f"its EXIF is broken ({type(error).__name__}) and was not read")
+        return 1
+
+
+def _upright(image: Image.Image, findings: list[str]) -> Image.Image:
+    try:
+        return ImageOps.exif_transpose(image)
+    except Exception as error:  # it also writes the other tags again, which may be broken
+        findings.append(f"its EXIF is broken ({type(error).__name__}): it was not turned")
+        return image
 
 
 def _check_size(path: Path, image: Image.Image) -> None:
     if image.width * image.height > MAX_PIXELS:
-        raise _too_large(path)
+        raise _too_large(path, _MEGAPIXELS)
     if min(image.size) < MIN_SIDE_PX:
         raise InputError(
             "too_small",
-            f"{path.name}: {image.width} x {image.height} pixels, the shorter side must have at least {MIN_SIDE_PX};"
+            f"{_name(path)}: {image.width} x {image.height} pixels, the shorter side must have at least {MIN_SIDE_PX};"
             " give a larger photo",
         )
 
 
 def _choose_frame(path: Path, image: Image.Image, frame: int | None, findings: list[str]) -> None:
-    count = 1 if image.format in _MULTI_PICTURE else getattr(image, "n_frames", 1)
+    count = 1 if image.format in _MULTI_PICTURE else _pictures(path, image)
     if count == 1:
         return
     if frame is None:
         raise InputError(
             "animated",
-            f"{path.name}: an animation or a file of {count} pictures; save one of them as PNG, or set frame in the"
+            f"{_name(path)}: an animation or a file of {count} pictures; save one of them as PNG, or set frame in the"
             f" configuration to 0..{count - 1}",
         )
     if not 0 <= frame < count:
-        raise InputError("animated", f"{path.name}: {choose_from('frame', str(frame), map(str, range(count)))}")
+        raise InputError(
+            "animated", f"{_name(path)}: has no frame {frame}; set frame in the configuration to 0..{count - 1}"
+        )
     try:
         image.seek(frame)
     except Exception as error:  # as in _open
-        raise _damaged(path, error) from error
+        raise _refused(path, error) from error
     findings.append(f"used frame {frame} of {count}")
+
+
+def _pictures(path: Path, image: Image.Image) -> int:
+    try:
+        return int(getattr(image, "n_frames", 1))
+    except Exception as error:  # as in _opened
+        raise _refused(path, error) from error
 
 
 def _to_srgb(path: Path, image: Image.Image, profile: bytes | None, findings: list[str]) -> Image.Image:
     if image.mode in _WIDE_GREY:
-        values = np.asarray(image).astype(np.int64)
+        values = np.asarray(image)
         if values.min() < 0 or values.max() > 65535:
-            raise InputError("unreadable", f"{path.name}: more than 16 bits a pixel; save it as 8-bit PNG")
+            raise InputError("unreadable", f"{_name(path)}: more than 16 bits a pixel; save it as 8-bit PNG")
         findings.append("scaled 16-bit grey to 8 bit")
-        return Image.fromarray(((values + 128) // 257).astype(np.uint8)).convert("RGB")
+        return Image.fromarray(((values.astype(np.uint32) + 128) // 257).astype(np.uint8)).convert("RGB")
     if image.mode == "F":
-        raise InputError("unreadable", f"{path.name}: floating-point pixels have no known white; save it as 8-bit PNG")
+        raise InputError(
+            "unreadable", f"{_name(path)}: floating-point pixels have no known white; save it as 8-bit PNG"
+        )
     transparent = image.mode in ("RGBA", "LA", "La", "RGBa", "PA") or "transparency" in image.info
     if profile and image.mode in ("RGB", "CMYK", "L", "RGBA"):
         image = _apply_profile(image, profile, findings)
     if image.mode == "CMYK":
         findings.append("converted from CMYK")
-    return image.convert("RGBA" if transparent else "RGB")
+    mode = "RGBA" if transparent else "RGB"
+    return image if image.mode == mode else image.convert(mode)
 
 
 def _apply_profile(image: Image.Image, profile: bytes, findings: list[str]) -> Image.Image:

@@ -1,4 +1,6 @@
-"""Calls in a process of their own: for libraries that end the whole process on some broken files, as USD's does."""
+"""Calls in a process of their own, where limits of time and memory hold: for bytes of outsiders, and for libraries that end
+the whole process on some broken files, as USD's does.
+"""
 
 from __future__ import annotations
 
@@ -7,45 +9,136 @@ import contextlib
 import os
 import pickle
 import resource
+import select
+import signal
 import struct
 import subprocess
 import sys
 import threading
+import time
 import traceback
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from importlib import import_module
-from typing import IO, Any
+from itertools import islice
+from typing import IO, Any, TypeVar
+
+from manitwin.errors import Unavailable
 
 MAX_MEMORY_BYTES = 8 << 30
 """Address space of the process, of which libraries take 2 GiB: a broken file of a kilobyte can ask for tens of them."""
+MAX_SECONDS = 1800.0
+_START_SECONDS = 120.0
+_GRACE_SECONDS = (
+    5  # between the limit that this process keeps, and the one that the kernel keeps where this process is gone
+)
 _LENGTH = struct.Struct("<Q")
 _READY = "ready"
+_NOT_STARTED = "the process in which files of others are read does not start"
+_REMEDY = "look at the limits of memory, files and processes (ulimit -a)"
+_CHUNK = 256
+_TELL_EVERY_SECONDS = 0.05
+_READ_BYTES = 1 << 20
 _workers: dict[int, _Worker] = {}
 _lock = threading.Lock()
+
+Argument = TypeVar("Argument")
+Answer = tuple[bool, Any]
+"""Whether a call returned, and what it returned or raised."""
 
 
 class ProcessCrashed(Exception):
     """A call that has ended its process."""
 
 
-def run_isolated(function: str, *arguments: Any) -> Any:
+class TookTooLong(ProcessCrashed):
+    """A call that did not end within its time; its process was ended."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The seconds that a call may take, and the address space that its process may have: libraries take part of it."""
+
+    seconds: float = MAX_SECONDS
+    memory_bytes: int = MAX_MEMORY_BYTES
+
+
+DEFAULT_LIMITS = Limits()
+
+
+def run_isolated(function: str, *arguments: Any, limits: Limits = DEFAULT_LIMITS) -> Any:
     """Return what ``package.module:function`` returns for arguments, in a worker process that is started once and again
     after a crash.
 
-    Arguments and result are pickled. Raises what the function raises, MemoryError for more than ``MAX_MEMORY_BYTES``, and
+    Arguments and result are pickled. Raises what the function raises, MemoryError for more than it may take, TookTooLong, and
     ProcessCrashed where the process has ended.
     """
     with _lock:
-        mine = os.getpid()  # a forked process must not share its parent's pipes
-        if mine not in _workers:
-            _workers[mine] = _Worker()
-        answer = _workers[mine].ask((function, arguments))
-        if answer is None:
-            _workers.pop(mine).close()
-            raise ProcessCrashed(f"{function} has ended its process")
-    returned, value = answer
+        returned, value = next(_asked(function, [arguments], limits, one_by_one=True), (False, _crashed(function)))
     if not returned:
         raise value
     return value
+
+
+def iterate_isolated(
+    function: str, arguments: Iterable[Argument], limits: Limits = DEFAULT_LIMITS
+) -> Iterator[tuple[Argument, Answer]]:
+    """Yield each argument with what ``package.module:function`` returned for it or raised, in order.
+
+    ``limits`` hold for each by itself: one that crashes, hangs or takes too much memory costs itself alone. Many at a time are
+    sent, so that 100,000 of them cost a few CPU-seconds more than in this process.
+    """
+    waiting = iter(arguments)
+    while chunk := list(islice(waiting, _CHUNK)):
+        with _lock:
+            answers = list(_asked(function, [(each,) for each in chunk], limits))
+            # of a crash nobody knows whose it was: what has no answer yet is asked for one by one
+            while len(answers) < len(chunk):
+                answers += _asked(function, [(each,) for each in chunk[len(answers) :]], limits, one_by_one=True)
+        yield from zip(chunk, answers, strict=True)
+
+
+def _asked(
+    function: str, calls: list[tuple[Any, ...]], limits: Limits, *, one_by_one: bool = False
+) -> Iterator[Answer]:
+    """Yield answers to calls until all have one, or the process ends; ``one_by_one``: then the last is of the one that did it."""
+    mine = os.getpid()  # a forked process must not share its parent's pipes
+    if mine in _workers and not _workers[mine].alive:  # killed by somebody else since the last call
+        _workers.pop(mine).end()
+    if mine not in _workers:
+        _workers[mine] = _Worker()
+    worker = _workers[mine]
+    left = len(calls)
+    error: Exception = _crashed(function)
+    try:
+        worker.send((function, calls, limits, one_by_one, _working_folder()))
+        while left:
+            answers = worker.receive(limits.seconds + (0.0 if one_by_one else _TELL_EVERY_SECONDS))
+            if answers is None:
+                break
+            left -= len(answers)
+            yield from answers
+    except TimeoutError:
+        error = TookTooLong(f"{function} took longer than {limits.seconds:g} s")
+    except BrokenPipeError:
+        pass  # as it ended before it took the call
+    finally:
+        if left:  # also where this process was interrupted: what comes later would be taken for another answer
+            _workers.pop(mine).end()
+    if left and one_by_one:
+        yield False, error
+
+
+def _working_folder() -> str | None:
+    """Return the folder that relative paths begin in, None where it is gone."""
+    try:
+        return os.getcwd()
+    except OSError:
+        return None
+
+
+def _crashed(function: str) -> ProcessCrashed:
+    return ProcessCrashed(f"{function} has ended its process")
 
 
 class _Worker:
@@ -53,34 +146,110 @@ class _Worker:
 
     def __init__(self) -> None:
         command = [sys.executable, "-P", "-m", "manitwin.formats.isolated"]
-        self._process = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL,  # what a library complains of comes as an error too
-        )
+        try:
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,  # what a library complains of comes as an error too
+                bufsize=0,
+            )
+        except OSError as error:
+            raise Unavailable(f"{_NOT_STARTED} ({error.strerror or error}); {_REMEDY}") from error
         assert self._process.stdin is not None and self._process.stdout is not None
         self._to: Any = self._process.stdin
         self._from: Any = self._process.stdout
-        atexit.register(self.close)
-        if _received(self._from) != _READY:
-            raise RuntimeError(f"the worker process does not start: {' '.join(command)}")
-
-    def ask(self, call: tuple[str, tuple[Any, ...]]) -> Any:
-        """Return the answer to a call, None where the process ended."""
+        self._unread = bytearray()
+        atexit.register(self.end)
         try:
-            _send(self._to, call)
-            return _received(self._from)
-        except BrokenPipeError:
-            return None
+            ready = self.receive(_START_SECONDS)
+        except TimeoutError:
+            ready = None
+        except BaseException:
+            self.end()
+            raise
+        if ready != _READY:
+            self.end()
+            raise Unavailable(f"{_NOT_STARTED}; {_REMEDY}")
 
-    def close(self) -> None:
-        """End the process."""
-        atexit.unregister(self.close)
+    @property
+    def alive(self) -> bool:
+        """Tell whether the process still runs."""
+        return self._process.poll() is None
+
+    def send(self, value: Any) -> None:
+        """Send a value; raises BrokenPipeError where the process has ended."""
+        data = pickle.dumps(value, protocol=pickle.HIGHEST_PROTOCOL)
+        left = memoryview(_LENGTH.pack(len(data)) + data)
+        while left:
+            left = left[self._to.write(left) :]
+
+    def receive(self, seconds: float) -> Any:
+        """Return the next value, None where the process has ended; raises TimeoutError."""
+        until = time.monotonic() + seconds
+        head = self._read(_LENGTH.size, until)
+        data = None if head is None else self._read(_LENGTH.unpack(head)[0], until)
+        return None if data is None else pickle.loads(data)
+
+    def _read(self, size: int, until: float) -> bytes | None:
+        poll = select.poll()
+        poll.register(self._from, select.POLLIN)
+        while len(self._unread) < size:
+            if not poll.poll(max(0.0, until - time.monotonic()) * 1000):
+                raise TimeoutError
+            read = os.read(self._from.fileno(), _READ_BYTES)
+            if not read:
+                return None
+            self._unread += read
+        data = bytes(self._unread[:size])
+        del self._unread[:size]
+        return data
+
+    def end(self) -> None:
+        """End the process at once."""
+        atexit.unregister(self.end)
+        self._process.kill()
         with contextlib.suppress(BrokenPipeError):  # what a crashed process has not taken is still to be written
             self._to.close()
         self._from.close()
         self._process.wait()
+
+
+def _serve() -> None:
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # nothing that a library prints may come between
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    _send(answers, _READY)
+    while (asked := _received(sys.stdin.buffer)) is not None:
+        function, calls, limits, one_by_one, folder = asked
+        if folder is not None:  # relative paths are those of who asks
+            os.chdir(folder)
+        limit_address_space(limits.memory_bytes)
+        done: list[Answer] = []
+        told = time.monotonic()
+        for arguments in calls:
+            # the kernel's: it also ends native code that never returns, in a process whose parent was killed
+            signal.setitimer(signal.ITIMER_REAL, limits.seconds + _GRACE_SECONDS)
+            done.append(_answer(function, arguments))
+            if one_by_one or time.monotonic() - told > _TELL_EVERY_SECONDS:
+                _send(answers, done)
+                done, told = [], time.monotonic()
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        if done:
+            _send(answers, done)
+
+
+def limit_address_space(memory_bytes: int) -> None:
+    """Bound the address space of this process: more is a MemoryError, or the end of it where native code asks."""
+    _, hard = resource.getrlimit(resource.RLIMIT_AS)
+    allowed = memory_bytes if hard == resource.RLIM_INFINITY else min(memory_bytes, hard)
+    resource.setrlimit(resource.RLIMIT_AS, (allowed, hard))
+
+
+def called(function: str, arguments: tuple[Any, ...]) -> Any:
+    """Return what ``package.module:function`` returns for arguments, in this process."""
+    module, _, name = function.partition(":")
+    return getattr(import_module(module), name)(*arguments)
 
 
 def _send(stream: IO[bytes], value: Any) -> None:
@@ -99,20 +268,9 @@ def _received(stream: IO[bytes]) -> Any:
     return pickle.loads(data) if len(data) == length else None
 
 
-def _serve() -> None:
-    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # nothing that a library prints may come between
-    _send(answers, _READY)
-    while (call := _received(sys.stdin.buffer)) is not None:
-        _send(answers, _answer(*call))
-
-
-def _answer(function: str, arguments: tuple[Any, ...]) -> tuple[bool, Any]:
-    """Return whether a call returned, and what it returned or raised."""
-    module, _, name = function.partition(":")
+def _answer(function: str, arguments: tuple[Any, ...]) -> Answer:
     try:
-        return True, getattr(import_module(module), name)(*arguments)
+        return True, called(function, arguments)
     except Exception as error:
         error.add_note(traceback.format_exc())
         try:

@@ -1,4 +1,7 @@
-"""JSON that others wrote: bounded, every number finite."""
+"""JSON that others wrote: bounded, no deeper than it can be read, every number finite.
+
+All JSON from outside the package is parsed here.
+"""
 
 from __future__ import annotations
 
@@ -10,23 +13,76 @@ from typing import Any
 import numpy as np
 
 from manitwin.errors import AssetError
+from manitwin.formats.bounded_file import Refusal, decode_text, read_bytes, with_remedy
+from manitwin.formats.printable import printable_line
 from manitwin.formats.xml_file import MAX_NUMBER
 
 MAX_JSON_BYTES = 64 << 20
+MEND = "mend it"
+MAX_JSON_VALUES = 5_000_000  # a value takes up to 250 bytes of memory for three of the text
+_CAUSE_CHARACTERS = 120
 
 
-def parse_json(path: Path) -> dict[str, Any]:
-    """Read a file that holds one JSON object; raises AssetError naming the file and what is wrong with it."""
+def parse_json(
+    content: bytes | str, name: str, refuse: Refusal, *, remedy: str = MEND, file_names: bool = False
+) -> Any:
+    """Return the value of a JSON text (RFC 8259) whose numbers are all finite; ``remedy`` ends what is said of a broken one.
+
+    ``file_names``: its texts may name files with bytes that are no UTF-8, as Python has them (PEP 383).
+
+    Raises what ``refuse`` makes of one line that begins with ``name``: broken or not UTF-8, nested deeper than can be read,
+    NaN, Infinity, numbers with more digits than Python converts or larger than a double, and more than ``MAX_JSON_VALUES``
+    values.
+    """
+    called = printable_line(name, max_characters=_CAUSE_CHARACTERS)
+    text = decode_text(content, name, refuse) if isinstance(content, bytes) else content
+    # each value but the first stands behind one of these; in strings they count too
+    if sum(text.count(mark) for mark in ",[{") > MAX_JSON_VALUES:
+        raise refuse(f"{called}: its JSON has more than {MAX_JSON_VALUES} values; simplify it")
     try:
-        if path.stat().st_size > MAX_JSON_BYTES:
-            raise AssetError(f"{path.name}: more than {MAX_JSON_BYTES >> 20} MiB of JSON; it is of no single object")
-        value = json.loads(path.read_bytes())
-    except OSError as error:
-        raise AssetError(f"{path.name}: {error.strerror or error}; check the path") from error
-    except (ValueError, RecursionError) as error:
-        raise AssetError(f"{path.name}: its JSON is broken ({' '.join(str(error).split())[:80]}); mend it") from error
+        value = json.loads(text, parse_float=_finite, parse_constant=_finite)
+        if not file_names and (
+            "\\ud" in text or "\\uD" in text
+        ):  # half of a surrogate pair is no text that could be written again
+            json.dumps(value, ensure_ascii=False).encode()
+        return value
+    except RecursionError as error:
+        raise refuse(f"{called}: its JSON is nested too deep to be read; {remedy}") from error
+    except ValueError as error:
+        cause = printable_line(str(error).split(";")[0], max_characters=_CAUSE_CHARACTERS)
+        raise refuse(f"{called}: its JSON is broken ({cause}); {remedy}") from error
+
+
+def parse_json_object(
+    content: bytes | str, name: str, refuse: Refusal, *, remedy: str = MEND, file_names: bool = False
+) -> dict[str, Any]:
+    """Return the object that a JSON text holds, as ``parse_json``; any other value is refused."""
+    value = parse_json(content, name, refuse, remedy=remedy, file_names=file_names)
     if not isinstance(value, dict):
-        raise AssetError(f"{path.name}: holds a JSON {type(value).__name__}, not an object")
+        called = printable_line(name, max_characters=_CAUSE_CHARACTERS)
+        raise refuse(f"{called}: holds a JSON {type(value).__name__}, not an object; {remedy}")
+    return value
+
+
+def read_json_object(
+    path: Path,
+    refuse: Refusal = AssetError,
+    *,
+    limit_bytes: int = MAX_JSON_BYTES,
+    inside: Path | None = None,
+    name: str | None = None,
+    remedy: str = MEND,
+) -> dict[str, Any]:
+    """Read a regular file of at most ``limit_bytes`` that holds one JSON object; opened as ``bounded_file.open_regular``."""
+    opened = refuse if remedy == MEND else with_remedy(refuse, remedy)
+    content = read_bytes(path, limit_bytes, opened, inside=inside, name=name)
+    return parse_json_object(content, path.name if name is None else name, refuse, remedy=remedy)
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(f"{text[:40]} is no finite number")
     return value
 
 
@@ -34,8 +90,8 @@ def json_number(value: Any, what: str) -> float:
     """Return a finite number; raises AssetError saying ``what`` it is of."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise AssetError(f"{what}: {str(value)[:40]!r} is no number")
-    if not math.isfinite(value) or abs(value) > MAX_NUMBER:
-        raise AssetError(f"{what}: {value:.3g} is no number that an object can have")
+    if abs(value) > MAX_NUMBER or not math.isfinite(value):  # an integer may be larger than any double
+        raise AssetError(f"{what}: {str(value)[:40]} is no number that an object can have")
     return float(value)
 
 

@@ -19,14 +19,26 @@ def require_writable_folder(folder: Path, what: str = "") -> None:
     try:
         for place in (folder, *folder.absolute().parents):
             if place.is_dir():
+                _require_names(folder, place)
                 _try(place, made=place != folder)
                 return
-            if place.exists():
+            if os.path.lexists(place) and not place.is_symlink():
                 raise UsageError(f"{folder}: {_named(place, folder)}a file; {remedy}")
             if place.is_symlink():
                 raise UsageError(f"{folder}: {_named(place, folder)}a link that leads nowhere; {remedy}")
     except OSError as error:
         raise UsageError(f"{folder}: cannot be written ({error.strerror or error}); {remedy}") from error
+    except ValueError as error:  # a NUL in it
+        raise UsageError(f"{folder}: no path ({error}); {remedy}") from error
+
+
+def _require_names(folder: Path, there: Path) -> None:
+    """Raise OSError where a name that is to be made is longer than its file system takes."""
+    longest = os.pathconf(there, "PC_NAME_MAX") - len(
+        ".manitwin-12345.replaced"
+    )  # what is written stands beside it first
+    if any(len(os.fsencode(name)) > longest for name in folder.absolute().parts[len(there.absolute().parts) :]):
+        raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
 
 
 def _try(place: Path, *, made: bool) -> None:

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-import json
+import os
 import re
-import zipfile
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import BinaryIO, Literal
 
 from manitwin.errors import InputError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json
+from manitwin.formats.printable import printable_line
 
 IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "avif")
 MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz")
 
 _HEAD_BYTES = 65536
+_NAME_CHARACTERS = 200
 _OBJ_KEYWORDS = frozenset(
     {"v", "vt", "vn", "vp", "f", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "cstype", "deg"}
 )
-_NUMBER = re.compile(rb"^[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$|^[+-]?(nan|inf)", re.IGNORECASE)
+_LONGEST_NUMBER = 64
 HEIC_NOT_READ = "HEIC is not read; convert it to PNG or JPEG"
 """Its only free decoder comes in wheels that bundle an encoder under the GPL."""
 _IMPORT = "an asset description; manitwin import reads it with its meshes"
@@ -53,26 +57,24 @@ def sniff(path: Path) -> Sniffed:
     Raises InputError: ``unreadable`` (no such file, or no permission), ``empty`` (zero bytes), ``wrong_type`` (neither
     an image nor a mesh).
     """
-    try:
-        size = path.stat().st_size
-        with path.open("rb") as stream:
-            head = stream.read(_HEAD_BYTES)
-    except OSError as error:
-        raise InputError("unreadable", f"{path.name}: {error.strerror or error}; check the path") from error
-    not_read = NOT_READ.get(path.suffix.lower())
-    if size == 0 and not_read is None:
-        raise InputError("empty", f"{path.name}: the file has zero bytes; export or download it again")
-    image = image_format(head)
-    if image is not None:
-        return Sniffed("image", image)
-    mesh = _mesh_format(head, size, path)
+    called = printable_line(path.name, max_characters=_NAME_CHARACTERS)
+    with open_regular(path, partial(InputError, "unreadable")) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        head = stream.read(_HEAD_BYTES)
+        not_read = NOT_READ.get(path.suffix.lower())
+        if size == 0 and not_read is None:
+            raise InputError("empty", f"{called}: the file has zero bytes; export or download it again")
+        image = image_format(head)
+        if image is not None:
+            return Sniffed("image", image)
+        mesh = _mesh_format(head, size, path.suffix.lower(), stream)
     if mesh is not None:
         return Sniffed("mesh", mesh)
     if not_read is not None:
-        raise InputError("wrong_type", f"{path.name}: {not_read}")
+        raise InputError("wrong_type", f"{called}: {not_read}")
     raise InputError(
         "wrong_type",
-        f"{path.name}: holds {_describe(head)}, neither an image ({', '.join(IMAGE_FORMATS)})"
+        f"{called}: holds {_describe(head)}, neither an image ({', '.join(IMAGE_FORMATS)})"
         f" nor a mesh ({', '.join(MESH_FORMATS)})",
     )
 
@@ -102,12 +104,12 @@ def image_format(head: bytes) -> str | None:
     return None
 
 
-def _mesh_format(head: bytes, size: int, path: Path) -> str | None:
+def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str | None:
     if head.startswith(b"glTF"):
         return "glb"
-    if re.match(rb"ply\r?\n", head):
+    if head.startswith((b"ply\n", b"ply\r\n")):
         return "ply"
-    if head.startswith(b"PK\x03\x04") and _is_usdz(path):
+    if head.startswith(b"PK\x03\x04") and _is_usdz(head):
         return "usdz"
     # a binary STL has no magic: 80 free bytes, a count, 50 bytes a triangle; its free bytes may even begin with "solid"
     if size >= 84 and size == 84 + 50 * int.from_bytes(head[80:84], "little"):
@@ -115,39 +117,43 @@ def _mesh_format(head: bytes, size: int, path: Path) -> str | None:
     text = _text(head)
     if text is None:
         # a binary STL that was cut short still has the zero padding or "STL" in its 80 free bytes
-        return "stl" if size >= 84 and path.suffix.lower() == ".stl" else None
+        return "stl" if size >= 84 and suffix == ".stl" else None
     start = text.lstrip("\ufeff \t\r\n")
     if re.match(r"solid\b", start, re.IGNORECASE) and re.search(r"\bfacet\b|\bendsolid\b", start, re.IGNORECASE):
         return "stl"
     if start.startswith("<") and re.search(r"<(\w+:)?COLLADA[\s>]", start):
         return "dae"
-    if start.startswith("{") and _is_gltf(path, start):
+    if start.startswith("{") and _is_gltf(start, size, stream):
         return "gltf"
     return "obj" if _is_obj(start, complete=size <= _HEAD_BYTES) else None
 
 
-def _is_usdz(path: Path) -> bool:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = archive.namelist()
-    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
-        # cut short: a stored archive names its first member in its first bytes
-        with path.open("rb") as stream:
-            names = [stream.read(512)[30:].split(b"\0")[0].decode("latin-1")[:256]]
-        return re.search(r"\.usd[ac]?", names[0], re.IGNORECASE) is not None
-    return bool(names) and names[0].lower().endswith((".usd", ".usda", ".usdc"))
+def _is_usdz(head: bytes) -> bool:
+    # a package's first member is its default layer (USDZ specification), and its name stands in the local header (APPNOTE 4.3.7)
+    length = int.from_bytes(head[26:28], "little")
+    name = head[30 : 30 + length].decode("latin-1").lower()
+    return name.endswith((".usd", ".usda", ".usdc"))
 
 
-def _is_gltf(path: Path, start: str) -> bool:
+def _is_gltf(start: str, size: int, stream: BinaryIO) -> bool:
     # "asset" may come last in a long file; the whole is only parsed where the head does not settle it
-    if re.search(r'"asset"\s*:', start) and re.search(r'"(accessors|meshes|nodes|buffers|scenes)"\s*:', start):
+    if _names_gltf(start):
         return True
+    if size > MAX_JSON_BYTES:
+        stream.seek(size - _HEAD_BYTES)
+        return _names_gltf(start + stream.read(_HEAD_BYTES).decode("latin-1"))
+    stream.seek(0)
     try:
-        tree = json.loads(path.read_bytes())
-    except (ValueError, RecursionError):
+        tree = parse_json(stream.read(MAX_JSON_BYTES), "", ValueError)
+    except ValueError:
         # cut short: still named by what only glTF has
         return re.search(r'"bufferViews?"\s*:', start) is not None
     return isinstance(tree, dict) and isinstance(tree.get("asset"), dict) and "version" in tree["asset"]
+
+
+def _names_gltf(text: str) -> bool:
+    tables = r'"(accessors|meshes|nodes|buffers|scenes)"\s*:'
+    return re.search(r'"asset"\s*:', text) is not None and re.search(tables, text) is not None
 
 
 def _is_obj(text: str, complete: bool) -> bool:
@@ -156,7 +162,19 @@ def _is_obj(text: str, complete: bool) -> bool:
     known = [w for w in words if w[0] in _OBJ_KEYWORDS]
     if len(known) < 0.9 * len(words):
         return False
-    return any(w[0] == "v" and len(w) >= 4 and all(_NUMBER.match(n.encode()) for n in w[1:4]) for w in known)
+    return any(w[0] == "v" and len(w) >= 4 and all(_is_number(n) for n in w[1:4]) for w in known)
+
+
+def _is_number(word: str) -> bool:
+    if len(word) > _LONGEST_NUMBER or "_" in word:
+        return False
+    if word.lstrip("+-").lower().startswith(("nan", "inf")):  # some programs write nan(ind)
+        return True
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return word.isascii()
 
 
 def _text(head: bytes) -> str | None:

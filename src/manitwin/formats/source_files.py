@@ -1,21 +1,26 @@
-"""The files that make up an input: a mesh file and the materials, buffers and textures that it names."""
+"""The files that make up an input: a mesh file and the materials, buffers and textures that it names.
+
+What is read here is read by str methods and in one pass: no pattern that could backtrack meets the bytes of others.
+"""
 
 from __future__ import annotations
 
-import io
-import json
-import mmap
+import os
 import re
-import zipfile
-from collections.abc import Iterable, Iterator
+import stat
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
+from typing import BinaryIO
 from urllib.parse import unquote
 from xml.sax.saxutils import unescape
+
+from manitwin.formats.bounded_file import open_regular, read_bytes
+from manitwin.formats.json_file import parse_json
 
 MESH_SUFFIXES = frozenset({".glb", ".gltf", ".obj", ".ply", ".stl", ".dae", ".usdz"})
 IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".gif", ".bmp", ".tif", ".tiff", ".avif"})
 MAX_TEXT_BYTES = 512 * 1024 * 1024
-_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date of a ZIP entry: equal inputs give equal archives
 _MAP_KEYWORDS = frozenset({"bump", "norm", "disp", "decal", "refl"})
 # options of texture maps and how many words each takes (MTL specification, "Options for texture map statements")
 _MAP_OPTIONS = {
@@ -24,6 +29,9 @@ _MAP_OPTIONS = {
 }  # fmt: skip
 _MAX_HEADER_BYTES = 1 << 20
 _MAX_LINE_BYTES = 1 << 13
+_BLOCK_BYTES = 1 << 20
+_MAX_NAMES = 10_000  # a mesh has fewer textures; each is looked up on the disk
+_LONGEST_NAME, _LONGEST_PATH = 255, 4096  # bytes: NAME_MAX and PATH_MAX of Linux
 _PLY_TEXTURE = "comment TextureFile "
 
 
@@ -40,9 +48,17 @@ def named_file(folder: Path, name: str) -> Path | None:
     """Return the file that a mesh in a folder means by a name, links resolved; None where it is missing or outside."""
     for spelling in spellings(name):
         path = inside_folder(folder, spelling)
-        if path is None or path.is_file():
+        if path is None or is_regular(path):
             return path
     return None
+
+
+def is_regular(path: Path) -> bool:
+    """Tell whether a path leads to a regular file: no folder, pipe, socket or device."""
+    try:
+        return stat.S_ISREG(os.stat(path).st_mode)
+    except (OSError, ValueError):  # not there, or a name that no file system can hold
+        return False
 
 
 def spellings(name: str) -> list[str]:
@@ -56,10 +72,12 @@ def inside_folder(folder: Path, name: str) -> Path | None:
     # a drive letter and a scheme both have a colon; neither is a file beside this one
     if not name or "\0" in name or name.startswith(("/", "~")) or re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", name):
         return None
+    if len(name) > _LONGEST_PATH or any(len(part) > _LONGEST_NAME for part in name.split("/")):
+        return None
     try:
         root = folder.resolve()
         target = (root / name).resolve()
-    except OSError:  # a name that no file system can hold
+    except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
         return None
     return target if target.is_relative_to(root) else None
 
@@ -67,12 +85,20 @@ def inside_folder(folder: Path, name: str) -> Path | None:
 def named_files(path: Path) -> Iterator[str]:
     """Yield the names of other files in a mesh file (textures, materials, buffers), as the mesh writes them.
 
-    Of binary formats only the header is read, of OBJ no more than its material statements are decoded.
+    Of binary formats only the header is read, of OBJ no more than its material statements are decoded. A file that cannot be
+    read, or is no regular one, names none: that is for the reader to say.
     """
     names = {".obj": _named_by_obj, ".gltf": _named_by_gltf, ".glb": _named_by_glb, ".dae": _named_by_dae,
              ".ply": _named_by_ply}.get(path.suffix.lower())  # fmt: skip
-    if names is not None and path.is_file() and path.stat().st_size > 0:
-        yield from names(path)
+    if names is not None and is_regular(path):
+        try:
+            yield from islice(names(path), _MAX_NAMES)
+        except _Unread:
+            return
+
+
+class _Unread(Exception):
+    """A file that names nothing, since it cannot be read."""
 
 
 def map_file_name(statement: str) -> str:
@@ -105,30 +131,47 @@ def _is_number(word: str) -> bool:
 
 
 def _named_by_obj(path: Path) -> Iterator[str]:
-    if path.stat().st_size > MAX_TEXT_BYTES:
-        return
     seen: set[Path] = set()
-    for library in dict.fromkeys(_material_libraries(path)):
+    with open_regular(path, _Unread) as stream:
+        if os.fstat(stream.fileno()).st_size > MAX_TEXT_BYTES:
+            return
+        libraries = dict.fromkeys(islice(_material_libraries(stream), _MAX_NAMES))
+    for library in libraries:
         yield library
         material = named_file(path.parent, library)
-        if material is not None and material not in seen and material.stat().st_size <= MAX_TEXT_BYTES:
+        if material is not None and material not in seen:
             seen.add(material)
-            yield from dict.fromkeys(_named_by_mtl(material.read_text(errors="replace")))
+            try:
+                text = read_bytes(material, MAX_TEXT_BYTES, _Unread, inside=path.parent).decode(errors="replace")
+            except _Unread:
+                continue
+            yield from dict.fromkeys(_named_by_mtl(text))
 
 
-def _material_libraries(path: Path) -> Iterator[str]:
-    with path.open("rb") as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as text:
-        at = text.find(b"mtllib")
-        while at >= 0:
-            # the statement is a line of its own; names with "mtllib" in them are none
-            start = text.rfind(b"\n", 0, at) + 1
-            end = text.find(b"\n", at)
-            end = len(text) if end < 0 else end
-            if at - start < _MAX_LINE_BYTES and end - at < _MAX_LINE_BYTES:
-                words = text[start:end].decode("utf-8", errors="replace").split(None, 1)
-                if words[0] == "mtllib" and len(words) > 1:
-                    yield words[1].strip()
-            at = text.find(b"mtllib", end)
+def _material_libraries(stream: BinaryIO) -> Iterator[str]:
+    """Yield what stands behind ``mtllib`` where that begins a line, block by block; lines longer than 8 KiB name nothing."""
+    rest = b""
+    while block := stream.read(_BLOCK_BYTES):
+        lines, _, rest = (rest + block).rpartition(b"\n")
+        if b"mtllib" in lines:
+            yield from _libraries_in(lines)
+        # of a long line it is enough to know that it does not begin here
+        rest = rest if len(rest) <= _MAX_LINE_BYTES else b"." * _MAX_LINE_BYTES
+    yield from _libraries_in(rest)
+
+
+def _libraries_in(text: bytes) -> Iterator[str]:
+    at = text.find(b"mtllib")
+    while at >= 0:
+        # the statement is a line of its own; names with "mtllib" in them are none
+        start = text.rfind(b"\n", 0, at) + 1
+        end = text.find(b"\n", at)
+        end = len(text) if end < 0 else end
+        if at - start < _MAX_LINE_BYTES and end - at < _MAX_LINE_BYTES:
+            words = text[start:end].decode("utf-8", errors="replace").split(None, 1)
+            if words[0] == "mtllib" and len(words) > 1:
+                yield words[1].strip()
+        at = text.find(b"mtllib", end)
 
 
 def _named_by_mtl(text: str) -> Iterator[str]:
@@ -139,12 +182,11 @@ def _named_by_mtl(text: str) -> Iterator[str]:
 
 
 def _named_by_gltf(path: Path) -> Iterator[str]:
-    if path.stat().st_size <= MAX_TEXT_BYTES:
-        yield from _named_by_gltf_json(path.read_bytes())
+    yield from _named_by_gltf_json(read_bytes(path, MAX_TEXT_BYTES, _Unread))
 
 
 def _named_by_glb(path: Path) -> Iterator[str]:
-    with path.open("rb") as stream:
+    with open_regular(path, _Unread) as stream:
         header = stream.read(20)  # magic, version, length; then the length and kind of the JSON chunk
         size = int.from_bytes(header[12:16], "little")
         if header[:4] == b"glTF" and header[16:20] == b"JSON" and size <= MAX_TEXT_BYTES:
@@ -154,10 +196,7 @@ def _named_by_glb(path: Path) -> Iterator[str]:
 def _named_by_gltf_json(text: bytes) -> Iterator[str]:
     if b'"uri"' not in text:
         return
-    try:
-        document = json.loads(text.decode("utf-8-sig", errors="replace").rstrip("\0 "))
-    except (ValueError, RecursionError):
-        return
+    document = parse_json(text.decode("utf-8-sig", errors="replace").rstrip("\0 "), "glTF", _Unread)
     if not isinstance(document, dict):
         return
     for key in ("buffers", "images"):
@@ -169,44 +208,31 @@ def _named_by_gltf_json(text: bytes) -> Iterator[str]:
 
 
 def _named_by_dae(path: Path) -> Iterator[str]:
-    if path.stat().st_size > MAX_TEXT_BYTES:
-        return
-    text = path.read_text(errors="replace")
-    at = text.find("<init_from")
+    data = read_bytes(path, MAX_TEXT_BYTES, _Unread)
+    at = data.find(b"<init_from")
     while at >= 0:
-        start = text.find(">", at) + 1
+        start = data.find(b">", at) + 1
         if start == 0:
             return
-        name = text[start : text.find("<", start)]
-        if not name.strip() and text.startswith("<ref>", start + len(name)):  # COLLADA 1.5
-            start += len(name) + len("<ref>")
-            name = text[start : text.find("<", start)]
-        if name.strip():
-            yield unescape(name.strip())
-        at = text.find("<init_from", start)
+        name, start = _text_at(data, start)
+        if not name and data.startswith(b"<ref>", start):  # COLLADA 1.5
+            name, start = _text_at(data, start + len(b"<ref>"))
+        if name:
+            yield unescape(name)
+        at = data.find(b"<init_from", start)
+
+
+def _text_at(data: bytes, start: int) -> tuple[str, int]:
+    """Return the text of an element that begins at ``start``, stripped, and where it ends; a longer one than a path is none."""
+    end = data.find(b"<", start)
+    end = len(data) if end < 0 else end
+    text = data[start:end].strip() if end - start <= _MAX_LINE_BYTES else b""
+    return text.decode(errors="replace").strip(), end
 
 
 def _named_by_ply(path: Path) -> Iterator[str]:
-    with path.open("rb") as stream:
+    with open_regular(path, _Unread) as stream:
         head = stream.read(_MAX_HEADER_BYTES)
     name = ply_texture(head[: head.find(b"end_header")])
     if name:
         yield name
-
-
-def pack_source(path: Path, beside: Iterable[Path] = ()) -> tuple[str, bytes]:
-    """Return the name and bytes under which a twin keeps its input.
-
-    A single file is kept byte for byte; a mesh with side files, or with others ``beside`` it in its folder, as an archive of
-    all of them, uncompressed, undated.
-    """
-    others = sorted({*side_files(path), *(other.resolve() for other in beside)})
-    suffix = path.suffix.lower()
-    if not others:
-        return f"source{suffix}", path.read_bytes()
-    buffer = io.BytesIO()
-    root = path.parent.resolve()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
-        for file in [path.resolve(), *others]:
-            archive.writestr(zipfile.ZipInfo(file.relative_to(root).as_posix(), _EPOCH), file.read_bytes())
-    return "source.zip", buffer.getvalue()

@@ -7,7 +7,7 @@ All XML of the package is parsed here.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from xml.parsers import expat
 
@@ -15,29 +15,28 @@ import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.errors import AssetError, ExportError
+from manitwin.formats.bounded_file import Refusal, read_bytes
 from manitwin.formats.markdown import one_line
 
 MAX_XML_BYTES = 64 << 20
 MAX_NUMBER = 1e9  # no length, mass or moment of an object that a gripper meets comes near
 
-Refusal = Callable[[str], Exception]
-"""Makes the error for a message: an error class of the border that reads, or a function."""
-
 
 def read_xml(
-    path: Path, tag: str, *, name: str | None = None, refusal: Refusal = AssetError, comments: bool = True
+    path: Path,
+    tag: str,
+    *,
+    name: str | None = None,
+    refusal: Refusal = AssetError,
+    comments: bool = True,
+    inside: Path | None = None,
 ) -> etree._Element:
     """Return the root element of a file, which must be ``tag``; raises ``refusal`` of what is wrong with it.
 
-    ``name`` is what messages call the file: its own name by default.
+    ``name`` is what messages call the file: its own name by default. ``inside``: a link may not lead out of this folder.
     """
     name = name or path.name
-    try:
-        if path.stat().st_size > MAX_XML_BYTES:
-            raise refusal(f"{name}: more than {MAX_XML_BYTES >> 20} MiB of XML; it is no single object")
-        data = path.read_bytes()
-    except OSError as error:
-        raise refusal(f"{name}: {error.strerror or error}; check the path") from error
+    data = read_bytes(path, MAX_XML_BYTES, refusal, inside=inside, name=name)
     return parse_xml(data, tag, name, refusal=refusal, comments=comments)
 
 

@@ -14,12 +14,14 @@ from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import Rejected
 from manitwin.formats.installation import installed_version
-from manitwin.formats.source_files import pack_source
+from manitwin.formats.packed_source import pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.pipeline.item import Item
+from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.quality import rehearsal_checks
 from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
 from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
+from manitwin.twin.wholeness import note_sizes
 
 NAME_HINT = "say what it is with --name (mug, fork, ...) or a column name"
 
@@ -51,7 +53,7 @@ def assemble(
     source = _write_source(draft, kind, fresh)
     record: dict[str, Any] = {
         "twin_id": draft.item_id,
-        "name": draft.payload.name,
+        "name": object_name(draft),
         "status": "rejected" if rejected else "accepted",
         "rejection": _rejection(rejected, rejecting_stage).model_dump() if rejected else None,
         "source": source,
@@ -71,7 +73,9 @@ def assemble(
         "host": {"machine": platform.machine(), "system": platform.system(), "python": platform.python_version()},
     }
     write_bytes_atomically(fresh / RUN, canonical_json(run).encode())
-    return seal(fresh, record)
+    sealed = seal(fresh, record)
+    note_sizes(fresh)
+    return sealed
 
 
 def _provenance(stage: Stage, draft: Draft[Item]) -> dict[str, Any]:
@@ -99,14 +103,14 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path) -> dict[str, Any]
     item = draft.payload
     if item.file is None:
         name, content = "prompt.txt", (item.text or "").encode()
+        (folder / name).write_bytes(content)
+        sha256 = hashlib.sha256(content).hexdigest()
     else:
-        beside = [] if item.given is None else [Path(item.given)]
-        name, content = pack_source(Path(item.file), beside)
-    (folder / name).write_bytes(content)
+        name, sha256 = pack_source(Path(item.file), folder, [] if item.given is None else [Path(item.given)])
     return {
         "kind": kind,
         "file": name,
-        "sha256": hashlib.sha256(content).hexdigest(),
+        "sha256": sha256,
         "prompt": item.text,
         "license": item.license or "unknown",
         "attribution": item.attribution,

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Literal, cast
 
 from manitwin.engine.drive import RunReport
-from manitwin.engine.ledger.ledger import ItemRow, read_ledger
 from manitwin.engine.ledger.location import local_ledger
 from manitwin.engine.ledger.progress import read_items
+from manitwin.engine.ledger.reading import read_ledger
+from manitwin.engine.ledger.rows import ItemRow
 from manitwin.pipeline.folder_listing import FolderListing
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot, twin_name

@@ -5,25 +5,18 @@ from __future__ import annotations
 import os
 import posixpath
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from stat import S_ISDIR, S_ISREG
 
-from manitwin.formats.sniff import HEIC_NOT_READ, NOT_READ, image_format
-from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES, named_file, named_files, spellings
+from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES, named_file, spellings
+from manitwin.pipeline.inspection import NotInspected, are_imported, are_twins, names_of, why_no_inputs
+from manitwin.pipeline.listing_remarks import listing_remarks
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH
 
-_NAMES_SHOWN = 3
 TWIN_RECORD = "twin.json"
 _NEVER_NAMED = frozenset({"", ".txt", ".md", ".pdf", ".csv", ".jsonl", ".html", ".py", ".sh", ".log"})
 """What no mesh names: a folder of meshes and such files alone is listed without opening a mesh."""
-_BY_SUFFIX = {
-    **NOT_READ,
-    **dict.fromkeys((".csv", ".jsonl"), "a manifest is read only where it is given by its own path"),
-    ".mtl": "a material library that no mesh names",
-    ".bin": "a buffer that no mesh names",
-}
 # the last word of the names that exporters give to texture maps
 _MAP_WORDS = frozenset({
     "albedo", "ambientocclusion", "ao", "alpha", "basecolor", "basecolour", "bump", "diff", "diffuse", "disp",
@@ -79,20 +72,22 @@ def list_folder(folder: Path) -> FolderListing:
     An image is a part of a mesh where the mesh names it and the reader finds it there; one that no mesh names is an input.
     """
     found = _walk(folder)
-    meshes = [name for name in found.open if _suffix(name) in MESH_SUFFIXES]
+    meshes = sorted(name for name in found.open if _suffix(name) in MESH_SUFFIXES)
     others = [name for name in found.open if _suffix(name) not in MESH_SUFFIXES]
     parts: dict[str, str] = {}
     elsewhere: set[str] = set()
+    unknown: dict[str, str] = {}
     if any(_suffix(name) not in _NEVER_NAMED for name in (*others, *found.closed)):
-        parts, elsewhere = _named_parts(folder, meshes, found)
-    left = {name: reason for name, reason in found.closed.items() if name not in parts}
-    inputs = [*found.assets, *meshes]
+        parts, elsewhere, unknown = _named_parts(folder, meshes, found)
+    left = {name: reason for name, reason in found.closed.items() if name not in parts} | unknown
+    inputs = [*found.assets, *(mesh for mesh in meshes if mesh not in unknown)]
     mesh_folders = {posixpath.dirname(name) for name in meshes}
     beside: list[str] = []
+    others = [name for name in others if name not in parts]
+    odd = [name for name in others if _suffix(name) not in IMAGE_SUFFIXES]
+    no_image = dict(zip(odd, why_no_inputs([folder / name for name in odd]), strict=True))
     for name in others:
-        if name in parts:
-            continue
-        reason = _why_left(folder, name, elsewhere, mesh_folders)
+        reason = no_image.get(name) or _why_texture(name, elsewhere, mesh_folders)
         if reason is None:
             inputs.append(name)
             beside += [name] if posixpath.dirname(name) in mesh_folders else []
@@ -113,31 +108,64 @@ def _suffix(name: str) -> str:
     return posixpath.splitext(name)[1].lower()
 
 
+@dataclass(frozen=True)
+class _Folder:
+    """A folder below the root; ``closed`` says why nothing in it is an input, ``asset`` which imported asset it is of."""
+
+    name: str
+    closed: str | None = None
+    asset: str | None = None
+
+
 def _walk(folder: Path) -> _Found:
+    """Find all files, the folders of one depth after those of another: their records are inspected together."""
     found = _Found()
-    stack: list[tuple[str, str | None, str | None]] = [("", None, None)]
-    while stack:
-        below, closed, asset = stack.pop()
-        try:
-            with os.scandir(folder / below) as scan:
-                entries = list(scan)
-        except OSError as error:
-            found.closed[below] = f"a folder that cannot be read ({error.strerror or error})"
-            continue
-        names = {entry.name for entry in entries}
-        if closed is None and asset is None and TWIN_RECORD in names and _is_twin(folder / below / TWIN_RECORD):
-            closed = "part of a twin that manitwin built"
-        if closed is None and asset is None and {IMPORT_RECORD, IMPORTED_MESH} <= names:
-            asset = below
-            found.assets.append(below)
-        for entry in entries:
-            name = posixpath.join(below, entry.name)
-            reason = "hidden" if closed is None and entry.name.startswith(".") else closed
-            if entry.is_dir(follow_symlinks=False):
-                stack.append((name, reason, asset))
-            else:
-                _sort_in(entry, name, reason, asset, found)
+    level = [_Folder("")]
+    while level:
+        scanned = [(each, entries) for each in level if (entries := _scanned(folder, each, found)) is not None]
+        level = []
+        for below, entries in _told_apart(folder, scanned, found):
+            for entry in entries:
+                name = posixpath.join(below.name, entry.name)
+                reason = "hidden" if below.closed is None and entry.name.startswith(".") else below.closed
+                if entry.is_dir(follow_symlinks=False):
+                    level.append(_Folder(name, reason, below.asset))
+                else:
+                    _sort_in(entry, name, reason, below.asset, found)
     return found
+
+
+def _scanned(folder: Path, below: _Folder, found: _Found) -> list[os.DirEntry[str]] | None:
+    try:
+        with os.scandir(folder / below.name) as scan:
+            return sorted(scan, key=lambda entry: entry.name)
+    except OSError as error:
+        found.closed[below.name] = f"a folder that cannot be read ({error.strerror or error})"
+        return None
+
+
+_Scanned = tuple[_Folder, list[os.DirEntry[str]]]
+
+
+def _told_apart(folder: Path, scanned: list[_Scanned], found: _Found) -> list[_Scanned]:
+    """Return the folders, those of twins closed and those of imported assets named as such."""
+    names = {below.name: {entry.name for entry in entries} for below, entries in scanned}
+    open_ = [below.name for below, _ in scanned if below.closed is None and below.asset is None]
+    records = [name for name in open_ if TWIN_RECORD in names[name]]
+    twins = dict(zip(records, are_twins(folder / name / TWIN_RECORD for name in records), strict=True))
+    assets = [name for name in open_ if not twins.get(name) and {IMPORT_RECORD, IMPORTED_MESH} <= names[name]]
+    wrong = dict(zip(assets, are_imported(folder / name / IMPORT_RECORD for name in assets), strict=True))
+    found.assets += [name for name in assets if wrong[name] is None]
+    told = []
+    for below, entries in scanned:
+        name = below.name
+        if twins.get(name):
+            below = _Folder(name, "part of a twin that manitwin built")
+        elif name in wrong:
+            reason = wrong[name]
+            below = _Folder(name, asset=name) if reason is None else _Folder(name, f"an imported asset: {reason}")
+        told.append((below, entries))
+    return told
 
 
 def _sort_in(entry: os.DirEntry[str], name: str, closed: str | None, asset: str | None, found: _Found) -> None:
@@ -165,21 +193,20 @@ def _no_file(entry: os.DirEntry[str]) -> str | None:
     return None if S_ISREG(mode) else "no regular file"
 
 
-def _is_twin(record: Path) -> bool:
-    try:
-        return b'"twin_id"' in record.read_bytes()
-    except OSError:  # then it is listed, and named there
-        return False
-
-
-def _named_parts(folder: Path, meshes: list[str], found: _Found) -> tuple[dict[str, str], set[str]]:
-    """Return what meshes name and the reader finds, with the mesh, and the names of what it does not find there."""
+def _named_parts(folder: Path, meshes: list[str], found: _Found) -> tuple[dict[str, str], set[str], dict[str, str]]:
+    """Return what meshes name and the reader finds, with the mesh; the names of what it does not find there; and the meshes
+    that could not be inspected, with the reason.
+    """
     root = folder.resolve()
     known = {*found.open, *found.closed} - set(meshes)
     parts: dict[str, str] = {}
     elsewhere: set[str] = set()
-    for mesh in meshes:
-        for name in _names(folder / mesh):
+    unknown: dict[str, str] = {}
+    for mesh, names in zip(meshes, names_of(folder / mesh for mesh in meshes), strict=True):
+        if isinstance(names, NotInspected):
+            unknown[mesh] = str(names)
+            continue
+        for name in names:
             file = named_file((folder / mesh).parent, name)
             paths = [] if file is None else _listed(file, root, mesh, name)
             if file is None:
@@ -187,7 +214,7 @@ def _named_parts(folder: Path, meshes: list[str], found: _Found) -> tuple[dict[s
             for path in paths:
                 if path in known:
                     parts.setdefault(path, mesh)
-    return parts, elsewhere
+    return parts, elsewhere, unknown
 
 
 def _listed(file: Path, root: Path, mesh: str, name: str) -> list[str]:
@@ -196,18 +223,8 @@ def _listed(file: Path, root: Path, mesh: str, name: str) -> list[str]:
     return [posixpath.normpath(posixpath.join(posixpath.dirname(mesh), s)) for s in spellings(name)] + resolved
 
 
-def _names(mesh: Path) -> Iterator[str]:
-    try:
-        yield from named_files(mesh)
-    except OSError:  # the reader says so of this input
-        return
-
-
-def _why_left(folder: Path, name: str, elsewhere: set[str], mesh_folders: set[str]) -> str | None:
-    image = _suffix(name) in IMAGE_SUFFIXES
-    reason = None if image else why_no_input(folder / name)
-    if reason is not None:
-        return reason
+def _why_texture(name: str, elsewhere: set[str], mesh_folders: set[str]) -> str | None:
+    """Return why an image is left alone that no mesh names where it lies; None where it is an input."""
     if posixpath.basename(name).lower() in elsewhere:
         return NOT_NAMED_HERE
     return TEXTURE_BY_NAME if is_texture_by_name(name) and _has_mesh_above(name, mesh_folders) else None
@@ -235,83 +252,6 @@ def _leave_links_to_listed(folder: Path, links: dict[str, str], inputs: list[str
         seconds.update({name: f"a link to {first}" for name in same if name != first})
     inputs[:] = [name for name in inputs if name not in seconds]
     left.update(seconds)
-
-
-def listing_remarks(
-    folder: Path,
-    inputs: tuple[Path, ...],
-    parts: dict[Path, Path],
-    left: dict[Path, str],
-    beside_meshes: tuple[Path, ...],
-) -> list[str]:
-    """Return a line of counts that add up to all files, then one a reason; none where every file is an input of its own."""
-    if not (parts or left or beside_meshes):
-        return []
-    assets = {whole for whole in parts.values() if whole.suffix.lower() not in MESH_SUFFIXES}
-    of_assets = sum(whole in assets for whole in parts.values())
-    of_meshes = len(set(parts.values()) - assets)
-    counts = [f"{_counted(len(inputs), 'input')}{_kinds(inputs, assets)}"]
-    if of_meshes:
-        textures = _counted(len(parts) - of_assets, "texture and material file", "textures and material files")
-        counts.append(f"{textures} of {_counted(of_meshes, 'mesh', 'meshes')}")
-    if assets:
-        counts.append(f"{_counted(of_assets, 'file')} of {_counted(len(assets), 'imported asset')}")
-    if left:
-        counts.append(f"{len(left)} left alone")
-    total = _counted(len(inputs) + len(parts) + len(left), "file")
-    lines = [f"{folder}: {total}: {', '.join(counts)}"]
-    if beside_meshes:
-        one = len(beside_meshes) == 1
-        lines.append(
-            f"{folder}: {_counted(len(beside_meshes), 'image')} beside a mesh, named by none,"
-            f" {'is an input' if one else 'are inputs'} of {'its' if one else 'their'} own: {_some(folder, beside_meshes)}"
-        )
-    by_reason: dict[str, list[Path]] = defaultdict(list)
-    for path, reason in left.items():
-        by_reason[reason].append(path)
-    lines += [f"{folder}: left alone: {_some(folder, paths)}: {reason}" for reason, paths in by_reason.items()]
-    return lines
-
-
-def _kinds(inputs: tuple[Path, ...], assets: set[Path]) -> str:
-    meshes = sum(path.suffix.lower() in MESH_SUFFIXES and path not in assets for path in inputs)
-    imported = sum(path in assets for path in inputs)
-    images = len(inputs) - meshes - imported
-    said = [
-        _counted(count, one, many)
-        for count, one, many in (
-            (meshes, "mesh", "meshes"),
-            (images, "image", "images"),
-            (imported, "imported asset", "imported assets"),
-        )
-        if count
-    ]
-    return f" ({', '.join(said)})" if said else ""
-
-
-def _counted(count: int, one: str, many: str = "") -> str:
-    return f"{count} {one if count == 1 else many or one + 's'}"
-
-
-def _some(folder: Path, paths: Iterable[Path]) -> str:
-    names = [str(path.relative_to(folder)) for path in paths]
-    shown = ", ".join(names[:_NAMES_SHOWN])
-    return shown if len(names) <= _NAMES_SHOWN else f"{len(names)} files ({shown}, ...)"
-
-
-def why_no_input(path: Path) -> str | None:
-    """Return why a file that has no suffix of an input is none, or None for an image under another name."""
-    known = _BY_SUFFIX.get(path.suffix.lower())
-    if known is not None:
-        return known
-    try:
-        with path.open("rb") as stream:
-            found = image_format(stream.read(64))
-    except OSError as error:
-        return f"cannot be read ({error.strerror or error})"
-    if found == "heif":
-        return HEIC_NOT_READ
-    return None if found is not None else "no image or mesh"
 
 
 def is_texture_by_name(name: str) -> bool:

@@ -20,7 +20,7 @@ class GenerateStage:
     """Write ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?",)
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 
@@ -51,5 +51,6 @@ class GenerateStage:
                 "rests": made.rests,
                 "unseen_share": made.unseen_share,
                 "notes": made.notes,
+                "known": None if made.known is None else made.known.model_dump(mode="json"),
             }
         }

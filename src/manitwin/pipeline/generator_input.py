@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from manitwin.config import BuildConfig
-from manitwin.errors import Rejected, Unavailable
-from manitwin.formats.sniff import sniff
+from manitwin.errors import Unavailable
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked
 from manitwin.models.registry import backends, create, factory
+from manitwin.pipeline.inspection import is_image
 from manitwin.pipeline.item import Item
 
 
@@ -29,11 +29,11 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
     def why(item: Item) -> str | None:
         asked, called, other = "text", f"text ({item.text!r})", "a photo"
         if item.file is not None:
-            if "image" in asked_with() or not _is_image(Path(item.file)):
+            if "image" in asked_with() or not is_image(Path(item.file)):
                 return None
             asked, called, other = "image", f"a photo ({Path(item.file).name})", "a text"
         if asked in asked_with():
-            return None
+            return _without_template(config, item.text) if item.text else None
         able = ", ".join(_generators_asked_with(asked))
         return (
             f"the generator {config.generator!r} makes no meshes of {called}; choose one that does with --generator"
@@ -41,6 +41,16 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
         )
 
     return why
+
+
+def _without_template(config: BuildConfig, text: str) -> str | None:
+    """Return why a generator that makes only some texts never makes this one, and which ones make any."""
+    generator = create("generator", config.generator, config)
+    reason = generator.why_not(text) if hasattr(generator, "why_not") else None
+    if reason is None:
+        return None
+    able = [name for name in _generators_asked_with("text") if name != generator.name]
+    return f"{reason}; --generator {', '.join(able)} make other things of a text"
 
 
 def _asked_with(generator: Any) -> frozenset[Asked]:
@@ -54,10 +64,3 @@ def _generators_asked_with(asked: str) -> list[str]:
         with suppress(Unavailable):  # of a package that is not whole: nobody can choose it now
             found += [name] if asked in _asked_with(factory("generator", name)) else []
     return found
-
-
-def _is_image(file: Path) -> bool:
-    try:
-        return sniff(file).kind == "image"
-    except Rejected:
-        return False

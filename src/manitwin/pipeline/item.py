@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import hashlib
+import os
 from dataclasses import dataclass
+from functools import partial
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, cast
 
 from manitwin.engine.task import Payload
+from manitwin.errors import InputError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.packed_source import MAX_KEPT_BYTES
+from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import side_files
-from manitwin.twin.store import sha256_of_file, sha256_of_json
+from manitwin.twin.store import sha256_of_json
 
 ID_DIGITS = 16
 """64 bits: among 100,000 twins two share an id with a probability of 3e-10."""
+
+
+_END_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -36,6 +47,14 @@ class Item(Payload):
         """The name of the file, or the begin of the text."""
         return Path(self.file).name if self.file else f"'{(self.text or '')[:40]}'"
 
+    @property
+    def modified_at(self) -> float | None:
+        """When its file was last changed (st_ctime, which nobody sets), None where it has none now."""
+        try:
+            return None if self.file is None else os.stat(self.file).st_ctime
+        except (OSError, ValueError):
+            return None
+
     def to_json(self) -> dict[str, Any]:
         """Return the fields as a ledger keeps them; of those that came later, only what is said: old rows stay equal."""
         fields = super().to_json()
@@ -46,15 +65,41 @@ def twin_id(item: Item) -> str:
     """Return the id of the twin that an item makes: a hash of the input's bytes, name, units and up axis, and of nothing else.
 
     What another tool says of an imported mesh is part of the input. Another configuration is another revision of the same twin.
+    Raises InputError ``unreadable`` where a file has gone since the input was listed, or is no regular one now.
     """
     if item.file is None:
         content: object = {"text": item.text}
     else:
         path = Path(item.file)
-        root = path.parent.resolve()
-        sides = {p.relative_to(root).as_posix(): sha256_of_file(p) for p in side_files(path)}
-        content = {"suffix": path.suffix.lower(), "sha256": sha256_of_file(path), "side_files": sides}
+        digest, root = _digest(path), path.parent.resolve()
+        sides = {p.relative_to(root).as_posix(): _digest(p) for p in side_files(path)}
+        content = {"suffix": path.suffix.lower(), "sha256": digest, "side_files": sides}
     if item.given is not None:
-        content = {"mesh": content, "given": sha256_of_file(Path(item.given))}
+        content = {"mesh": content, "given": _digest(Path(item.given))}
     identity = {"content": content, "name": item.name, "units": item.units, "up": item.up}
     return sha256_of_json(identity)[:ID_DIGITS]
+
+
+def require_readable_size(path: Path) -> None:
+    """Raise InputError ``too_large`` for a file that no reader takes."""
+    size = path.stat().st_size
+    if size > MAX_KEPT_BYTES:
+        said = f"{size} bytes are more than the limit of {MAX_KEPT_BYTES}"
+        raise InputError("too_large", f"{printable_line(path.name)}: {said}; simplify it, or scale its pictures down")
+
+
+def _digest(path: Path) -> str:
+    """Return the sha256 of a file; of one that no reader takes, that of its size, beginning and end."""
+    try:
+        with open_regular(path, partial(InputError, "unreadable")) as stream:
+            size = os.fstat(stream.fileno()).st_size
+            if size <= MAX_KEPT_BYTES:
+                return hashlib.file_digest(cast(BufferedReader, stream), "sha256").hexdigest()
+            content = stream.read(_END_BYTES)
+            stream.seek(-_END_BYTES, os.SEEK_END)
+            content += stream.read(_END_BYTES)
+            return hashlib.sha256(b"%d bytes\n" % size + content).hexdigest()
+    except OSError as error:
+        raise InputError(
+            "unreadable", f"{printable_line(path.name)}: {error.strerror or error}; copy it again"
+        ) from error

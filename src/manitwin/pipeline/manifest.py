@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
-import csv
-import json
+import os
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Literal, TextIO, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 from manitwin.engine.ledger.ledger import LEDGER
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.errors import UsageError, choose_from
+from manitwin.formats.csv_file import read_csv, read_lines
+from manitwin.formats.json_file import parse_json
 from manitwin.formats.output_folder import require_writable_folder
+from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
 from manitwin.pipeline.folder_listing import FolderListing, list_folder
+from manitwin.pipeline.inspection import imported
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported, read_import_record
+from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported
 
 MANIFEST_SUFFIXES = frozenset({".csv", ".jsonl"})
+_SHOWN_CHARACTERS, _COLUMNS_SHOWN = 60, 20
+LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file": 4095}
+"""Characters of a column: a longer name is none, and a longer text is taken by no generator."""
+_CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+"""What changes a terminal or the order of what is read, and lone surrogates; a tab and an end of line do not."""
+_LINES = re.compile(r"[\r\n\t\u2028\u2029]")
 COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution")
 
 Units = Literal["m", "cm", "mm", "auto"]
@@ -71,8 +81,10 @@ def iterate_items(
     defaults = {"units": "auto", "up": "auto", "name": None, "license": None, "attribution": None, **defaults}
     for given in inputs:
         path = Path(given)
-        if not path.exists():
-            raise UsageError(f"{given}: not there; give an image, a mesh, a folder, or a .csv or .jsonl manifest")
+        if not os.path.exists(path):
+            raise UsageError(
+                f"{shortened(str(given))}: not there; give an image, a mesh, a folder, or a .csv or .jsonl manifest"
+            )
         if path.is_dir():
             yield from _allowed(_folder_items(path, str(given), defaults, notes), str(given), refusal)
         elif path.suffix.lower() in MANIFEST_SUFFIXES:
@@ -111,8 +123,9 @@ def _manifest_items(
     line = None
     for line, row in _rows(path):
         for column in sorted(map(str, row.keys() - set(COLUMNS) - unknown.keys())):
-            near = get_close_matches(column.lower().strip(), COLUMNS, n=1, cutoff=0.6)
-            unknown[column] = f"{column!r} (did you mean {near[0]!r}?)" if near else repr(column)
+            shown = printable_line(column, max_characters=_SHOWN_CHARACTERS)
+            near = get_close_matches(shown.lower().strip(), COLUMNS, n=1, cutoff=0.6)
+            unknown[column] = f"{shown!r} (did you mean {near[0]!r}?)" if near else repr(shown)
             if strict:
                 raise UsageError(f"{path}: unknown column {unknown[column]}; valid: {', '.join(COLUMNS)}")
         where = f"{path}:{line}"
@@ -122,40 +135,29 @@ def _manifest_items(
             f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"
         )
     if unknown:
-        notes.remarks.append(f"{path}: columns not used: {', '.join(unknown[c] for c in sorted(unknown))}")
+        notes.remarks.append(f"{path}: columns not used: {_listed(unknown)}")
 
 
 def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as stream:
-            yield from _csv_rows(path, stream) if path.suffix.lower() == ".csv" else _jsonl_rows(path, stream)
-    except UnicodeDecodeError as error:
-        raise UsageError(
-            f"{path}: not UTF-8 text ({error.reason} at byte {error.start}); save the manifest as UTF-8"
-        ) from error
+    yield from read_csv(path, UsageError) if path.suffix.lower() == ".csv" else _jsonl_rows(path)
 
 
-def _csv_rows(path: Path, stream: TextIO) -> Iterator[tuple[int, dict[str, Any]]]:
-    reader = csv.DictReader(stream)
-    for row in reader:
-        if None in row:
-            raise UsageError(f"{path}:{reader.line_num}: more values than columns; quote values that hold a comma")
-        yield reader.line_num, row
-
-
-def _jsonl_rows(path: Path, stream: TextIO) -> Iterator[tuple[int, dict[str, Any]]]:
-    for number, line in enumerate(stream, 1):
+def _jsonl_rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
+    for number, line in enumerate(read_lines(path, UsageError), 1):
         if not line.strip():
             continue
-        try:
-            row = json.loads(line)
-        except json.JSONDecodeError as error:
-            raise UsageError(f"{path}:{number}: not JSON ({error.msg}); each line is one object") from error
+        row = parse_json(line, f"{path}:{number}", UsageError, file_names=True)
         if not isinstance(row, dict):
             raise UsageError(
                 f"{path}:{number}: a line is one JSON object with 'file' or 'text', not {type(row).__name__}"
             )
         yield number, row
+
+
+def _listed(unknown: dict[str, str]) -> str:
+    """Name the unknown columns, of many the first."""
+    named = [unknown[column] for column in sorted(unknown)[:_COLUMNS_SHOWN]]
+    return ", ".join([*named, "..."] if len(unknown) > _COLUMNS_SHOWN else named)
 
 
 def _item(
@@ -165,16 +167,22 @@ def _item(
         **defaults,
         **{key: str(value).strip() for key, value in row.items() if key in COLUMNS and value not in (None, "")},
     }
+    for key, value in values.items():
+        if isinstance(value, str) and (why := unusable(key, value)):
+            raise UsageError(f"{where}: {key}: {why}")
     file, text = values.get("file"), values.get("text")
     if (file is None) == (text is None):
-        columns = f"; its unknown columns: {', '.join(unknown[c] for c in sorted(unknown))}" if unknown else ""
+        columns = f"; its unknown columns: {_listed(unknown)}" if unknown else ""
         raise UsageError(f"{where}: a row has either 'file' or 'text'{columns}")
     if file is not None:
         path = Path(file) if Path(file).is_absolute() else folder / file
-        if path.is_dir() and is_imported(path):
+        if os.path.isdir(path) and is_imported(path):
             return _imported_item(path.resolve(), values)
-        if not path.is_file():
-            raise UsageError(f"{where}: {path} is not there; paths are absolute or relative to the manifest")
+        if not os.path.isfile(path):
+            what = "no file" if os.path.exists(path) else "not there"
+            raise UsageError(
+                f"{where}: {shortened(str(path))} is {what}; paths are absolute or relative to the manifest"
+            )
         file = str(path.resolve())
     for key, kind in (("units", Units), ("up", Up)):
         if values[key] not in get_args(kind):
@@ -190,15 +198,32 @@ def _item(
     )
 
 
+def unusable(key: str, value: str) -> str | None:
+    """Return why a value of a column cannot be used, None where it can; a file may have any name that there is."""
+    most = LONGEST.get(key, LONGEST["name"])
+    if len(value) > most:
+        return f"{len(value)} characters; give at most {most}"
+    if key == "file":
+        return "has a NUL character in it; check the path" if "\0" in value else None
+    if _CONTROLS.search(value) or (key in ("name", "license") and _LINES.search(value)):
+        return f"{printable_line(value, max_characters=60)!r} has control characters; give plain words"
+    return None
+
+
+def shortened(path: str) -> str:
+    """Return a path for a message: its beginning and end."""
+    return printable_line(path, max_characters=200)
+
+
 def _imported_item(folder: Path, values: dict[str, Any]) -> Item:
     """Return the item of an imported asset; unit and axes are those that the import wrote, whatever the user says."""
-    given = read_import_record(folder / IMPORT_RECORD)
+    name, license_, attribution = imported(folder / IMPORT_RECORD)
     return Item(
         file=str(folder / IMPORTED_MESH),
-        name=values["name"] or given.called,
+        name=values["name"] or name,
         units="m",
         up="y",
-        license=values["license"] or given.license,
-        attribution=values["attribution"] or given.attribution,
+        license=values["license"] or license_,
+        attribution=values["attribution"] or attribution,
         given=str(folder / IMPORT_RECORD),
     )

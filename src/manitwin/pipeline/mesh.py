@@ -8,22 +8,29 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 import trimesh
+from scipy.spatial import QhullError
 
 from manitwin.config import MeshConfig, Resource
 from manitwin.engine.stage import Draft
-from manitwin.errors import InputError
+from manitwin.errors import InputError, Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.read import MeshFile, read_mesh
 from manitwin.formats.meshes.repaired import repaired_parts
 from manitwin.formats.meshes.source import MeshLimits
 from manitwin.formats.meshes.textures import bake_transform
+from manitwin.formats.printable import printable_line
 from manitwin.geometry.canonical_frame import LengthUnit, UpChoice, choose_up, decide_unit, object_frame
+from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.geometry.repair.cascade import RepairResult, repair
 from manitwin.geometry.repair.components import connected_parts
 from manitwin.models.annotators.priors import Prior, lookup
 from manitwin.pipeline.item import Item
+from manitwin.pipeline.object_state import object_name
+from manitwin.twin.import_record import ImportRecord
 
 _GENERATED = "generated.glb"
+_LEAST_LENGTH_M = 1e-9
+_LEAST_AREA = 1e-12  # of the square of the longest side
 _TURNED_DEG = 10.0  # less is a scan that stands a little off its base, not another pose
 
 
@@ -44,21 +51,24 @@ class MeshStage:
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Write ``canonical.glb`` and ``canonical.npz`` (vertices (V, 3) m, faces (F, 3)); return ``geometry``.
 
-        Raises InputError where the file cannot be read.
+        Raises InputError where the file cannot be read, and Rejected ``degenerate`` where its surface has no extent.
         """
         generated = _GENERATED in draft.paths
-        file = read_mesh(_input_path(draft, generated), limits=self._limits())
-        prior = lookup(draft.payload.name)
+        path = _input_path(draft, generated)
+        file = read_mesh(path, limits=self._limits())
+        prior = lookup(object_name(draft))
         unit = _unit(file, draft, generated, prior)
         parts = [bake_transform(part, np.diag([unit.factor, unit.factor, unit.factor, 1.0])) for part in file.parts]
-        result = repair(_soup(parts), **self.settings.repair.model_dump())
-        chosen = choose_up(
-            result.mesh,
-            user=_said_up(draft, generated),
-            file_up=file.up,
-            stands=None if prior is None else prior.stands,
-        )
-        to_object = object_frame(np.asarray(result.mesh.vertices), chosen.rotation)
+        soup = _soup(parts)
+        _check_extent(soup, path)
+        try:
+            with np.errstate(
+                all="ignore"
+            ):  # numbers at the edge of what a double holds: what comes of them is looked at
+                result, chosen, to_object = self._solid(soup, file, _said_up(draft, generated), prior)
+        except (QhullError, np.linalg.LinAlgError) as error:
+            cause = f"its surface has no depth or precision to make a solid of ({type(error).__name__})"
+            raise _degenerate(path, cause) from error
         solid = trimesh.Trimesh(
             trimesh.transform_points(result.mesh.vertices, to_object), result.mesh.faces, process=False
         )
@@ -66,12 +76,44 @@ class MeshStage:
         (folder / "canonical.glb").write_bytes(write_glb(shown, max_texture_size=self.settings.max_texture_size))
         np.savez(folder / "canonical.npz", vertices=np.asarray(solid.vertices), faces=np.asarray(solid.faces, np.int64))
         geometry = _geometry(file, unit, chosen, result, solid)
+        known = draft.field("generation").get("known") if generated else None
+        if known is not None:
+            to_mesh = to_object @ np.diag([unit.factor] * 3 + [1.0]) @ OBJECT_TO_GLTF
+            geometry["known"] = ImportRecord.model_validate(known).moved(to_mesh).model_dump(mode="json")
         if draft.payload.given is not None:  # what else is given of the mesh has to follow it
             geometry["input_to_object"] = (to_object @ np.diag([unit.factor] * 3 + [1.0])).tolist()
         return {"geometry": geometry}
 
+    def _solid(
+        self, soup: trimesh.Trimesh, file: MeshFile, said_up: Literal["y", "z", "auto"], prior: Prior | None
+    ) -> tuple[RepairResult, UpChoice, np.ndarray]:
+        """Return the repaired solid, how it was turned, and its transform to the object frame ``(4, 4)``."""
+        result = repair(soup, **self.settings.repair.model_dump())
+        stands = None if prior is None else prior.stands
+        chosen = choose_up(result.mesh, user=said_up, file_up=file.up, stands=stands)
+        return result, chosen, object_frame(np.asarray(result.mesh.vertices), chosen.rotation)
+
     def _limits(self) -> MeshLimits:
         return MeshLimits(self.settings.max_bytes, self.settings.max_faces, self.settings.max_texture_pixels)
+
+
+def _check_extent(soup: trimesh.Trimesh, path: Path) -> None:
+    """Raise Rejected ``degenerate`` for a surface in metres that is a point, a line, or no larger than an atom."""
+    triangles = np.asarray(soup.vertices)[np.asarray(soup.faces)]
+    low = triangles.min(axis=(0, 1))
+    longest = float((triangles.max(axis=(0, 1)) - low).max())
+    if not longest >= _LEAST_LENGTH_M:
+        raise _degenerate(path, f"all of its points lie within {longest:.3g} m")
+    scaled = (triangles - low) / longest  # areas of small lengths would be rounded to zero
+    cross = np.cross(scaled[:, 1] - scaled[:, 0], scaled[:, 2] - scaled[:, 0])
+    if not float(np.linalg.norm(cross, axis=1).sum()) > _LEAST_AREA:
+        raise _degenerate(path, "its faces have no area")
+
+
+def _degenerate(path: Path, cause: str) -> Rejected:
+    return Rejected(
+        "degenerate", f"{printable_line(path.name)}: {cause}; give a mesh that encloses a volume", stage="gate"
+    )
 
 
 def _input_path(draft: Draft[Item], generated: bool) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import trimesh
@@ -59,7 +60,7 @@ def read_subject(draft: Draft[Item], *, solid: str, visual: str, metric: bool, s
     ``scale`` is how much larger these are than the canonical mesh, which the views were taken of.
     """
     return Subject(
-        name=draft.payload.name,
+        name=object_name(draft),
         solid=load_solid(draft.path(solid)),
         parts=tuple(read_glb(draft.path(visual))),
         metric=metric,
@@ -71,11 +72,31 @@ def read_subject(draft: Draft[Item], *, solid: str, visual: str, metric: bool, s
 
 
 def read_given(draft: Draft[Item]) -> ImportRecord | None:
-    """Return what an imported asset gives, moved as the mesh stage moved its mesh; None for every other input."""
+    """Return what an imported asset gives or a generator knows, moved as the mesh stage moved its mesh; None for others."""
+    known = _known(draft)
+    if known is not None:
+        return ImportRecord.model_validate(known)
     if draft.payload.given is None:
         return None
     record = read_import_record(Path(draft.payload.given))
     return record.moved(np.array(draft.field("geometry")["input_to_object"]) @ OBJECT_TO_GLTF)
+
+
+def object_name(draft: Draft[Item]) -> str | None:
+    """Return what the object is called: by the user, else by the generator that knows what it made; None: nobody says."""
+    if draft.payload.name is not None:
+        return draft.payload.name
+    known = _known(draft)
+    return None if known is None else str(known["name"])
+
+
+def _known(draft: Draft[Item]) -> dict[str, Any] | None:
+    """Return what the generator knows of the object, in the object frame once the mesh stage has left ``geometry``."""
+    if "geometry" in draft.fields:
+        known = draft.field("geometry").get("known")
+    else:
+        known = draft.field("generation").get("known") if "generation" in draft.fields else None
+    return cast(dict[str, Any] | None, known)
 
 
 def pictures(folder: Path, kind: str) -> tuple[Path, ...]:

@@ -18,7 +18,8 @@ from manitwin.geometry.mass_properties import MassProperties, shell_mass_propert
 from manitwin.models.annotators.priors import Interval, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_state import findings_of, read_subject
+from manitwin.pipeline.object_state import findings_of, object_name, read_subject
+from manitwin.twin.import_record import TEMPLATE
 from manitwin.twin.record import Estimate, OrientedBox, Physical
 
 CONFIRMED = ("measured", "user")
@@ -58,11 +59,11 @@ class PhysicalStage:
         obb_extents, obb_to_object[:3, 3] = obb_extents * scale, obb_to_object[:3, 3] * scale
         solid = trimesh.Trimesh(subject.solid.vertices * scale, subject.solid.faces, process=False)
         mass = mass_estimate(estimates, float(solid.volume))
-        self._check_size(draft.payload.name, float(obb_extents.max()), estimates.longest_axis_m)
-        self._check_mass(draft.payload.name, mass, float(solid.volume))
+        self._check_size(object_name(draft), float(obb_extents.max()), estimates.longest_axis_m)
+        self._check_mass(object_name(draft), mass, float(solid.volume))
         parts = [bake_transform(part, np.diag([scale, scale, scale, 1.0])) for part in subject.parts]
         _write_meshes(draft, folder, solid, parts, scale, self.settings.max_texture_size)
-        properties, uncertainty = spread_mass(solid, mass.value, estimates.wall_thickness_m)
+        properties, uncertainty = _known_mass(subject) or spread_mass(solid, mass.value, estimates.wall_thickness_m)
         corners = np.array([part.bounds for part in parts])
         physical = Physical(
             extents_m=(corners[:, 1].max(0) - corners[:, 0].min(0)).tolist(),
@@ -141,6 +142,15 @@ def spread_mass(solid: trimesh.Trimesh, mass_kg: float, wall_thickness_m: float 
     as_shell = shell_mass_properties(solid, mass_kg, wall_thickness_m or NOMINAL_WALL_M)
     uncertainty = float(np.linalg.norm(as_solid.center_of_mass_m - as_shell.center_of_mass_m))
     return (as_solid if wall_thickness_m is None else as_shell), uncertainty
+
+
+def _known_mass(subject: Subject) -> tuple[MassProperties, float] | None:
+    """Return the mass properties of a template's parts, which have matter of their own each; None for any other subject."""
+    known = subject.given
+    if known is None or known.format != TEMPLATE or known.center_of_mass_m is None or known.inertia_kg_m2 is None:
+        return None
+    center, inertia = np.array(known.center_of_mass_m), np.array(known.inertia_kg_m2)
+    return MassProperties(center, inertia, float(subject.solid.volume)), 0.0
 
 
 def _write_meshes(

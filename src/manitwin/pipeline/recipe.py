@@ -13,7 +13,7 @@ from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.recipe import Ending, Identity, Tables
 from manitwin.engine.stage import INPUT, Draft, PaidStage, Stage
 from manitwin.engine.stage_runner import StageCost
-from manitwin.errors import Rejected, UsageError
+from manitwin.errors import InputChanged, Rejected, UsageError
 from manitwin.formats.sniff import sniff
 from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.annotators.given import KeepsGiven
@@ -27,7 +27,7 @@ from manitwin.pipeline.gate import GateStage
 from manitwin.pipeline.generate import GenerateStage
 from manitwin.pipeline.grasps import GraspsStage
 from manitwin.pipeline.gripper_kinds import KINDS
-from manitwin.pipeline.item import Item, twin_id
+from manitwin.pipeline.item import Item, require_readable_size, twin_id
 from manitwin.pipeline.mesh import MeshStage
 from manitwin.pipeline.photo import PhotoStage
 from manitwin.pipeline.physical import PhysicalStage
@@ -39,9 +39,10 @@ from manitwin.pipeline.second_opinion import SecondOpinionStage
 from manitwin.pipeline.verify import VerifyStage
 from manitwin.pipeline.views import ViewsStage
 from manitwin.robots.grippers.gripper import Gripper, load_gripper
-from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.record import StageProvenance, TwinRecord
 from manitwin.twin.store import RECORD, parse_record, sha256_of_json
+from manitwin.twin.wholeness import size_damage
 
 RUN = logging.getLogger("manitwin.run")
 Kind = Literal["image", "text", "mesh"]
@@ -194,14 +195,26 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
         """Return the twin's folder."""
         return twin_name(item_id)
 
+    def damage(self, root: DatasetRoot, item_id: str) -> str | None:
+        """Return what is wrong with a twin's folder by the sizes of its files."""
+        return size_damage(root, twin_name(item_id))
+
     def identify(self, payload: Item) -> Identity:
         """Return the id by the input's bytes, and its kind by what they are, not by what they claim to be."""
-        identity = twin_id(payload)
         if payload.file is None:
-            return Identity(identity, "text")
+            return Identity(twin_id(payload), "text")
+        identity = None
         try:
+            identity = twin_id(payload)
+            require_readable_size(Path(payload.file))
             return Identity(identity, sniff(Path(payload.file)).kind)
-        except Rejected as answer:
+        except (OSError, Rejected) as answer:
+            if not Path(payload.file).exists():
+                raise InputChanged(
+                    f"{payload.title}: is not there any more; put it back, then run the same command again"
+                ) from answer
+            if identity is None or not isinstance(answer, Rejected):
+                raise
             return Identity(identity, _claimed_kind(payload), answer)
 
     def stages(self, kind: str) -> list[Stage]:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any, TypedDict
 
-from pydantic import ValidationError
-
-from manitwin.config import BuildConfig, load_config
+from manitwin.config import MOST_SLOTS, BuildConfig, load_config, validated
 from manitwin.engine.ledger.location import CONFIG
-from manitwin.errors import UsageError
+from manitwin.errors import ConfigError, UsageError
+from manitwin.formats.printable import printable_line
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.manifest import Notes, iterate_items, require_inputs
 from manitwin.twin.dataset_root import DatasetRoot
@@ -50,7 +49,7 @@ def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
     if quick and agree:
         raise UsageError("quick leaves the second engine out, and require-agreement asks for it; give one of them")
     max_cost_usd, record, grippers = flags.get("max_cost_usd"), flags.get("record"), flags.get("grippers")
-    if max_cost_usd is not None and max_cost_usd <= 0:
+    if max_cost_usd is not None and not 0 < max_cost_usd < inf:
         raise UsageError(f"max_cost_usd is {max_cost_usd:g}; give more than 0")
     said = {
         "seed": flags.get("seed"), "annotator": flags.get("vlm"), "generator": flags.get("generator"),
@@ -65,26 +64,30 @@ def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
     if quick:
         update["second_opinion"] = settings.second_opinion.model_copy(update={"enabled": False})
         update["robustness"] = settings.robustness.model_copy(update={"enabled": False})
-    return settings.model_copy(update=update)
+    return validated(BuildConfig, settings.model_copy(update=update).model_dump(), "the arguments")
 
 
 def _given(said: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in said.items() if value is not None}
 
 
+class NotTwins(UsageError):
+    """A folder that another command than ``build`` made: scenes, episodes, pictures."""
+
+
 def stored_config(root: DatasetRoot) -> BuildConfig:
     """Return the configuration of a data set, the defaults for a new one. Raises UsageError where it cannot be read."""
     if not root.exists(CONFIG):
         return BuildConfig()
+    place = f"{root.url}/{CONFIG}"
+    said = root.read_json(CONFIG, UsageError, remedy="give --config")
+    if "kind" in said:
+        kind = printable_line(str(said["kind"])[:40])
+        raise NotTwins(f"{root.url}: holds {kind}, not twins; give the data set that they are of")
     try:
-        said = json.loads(root.read_bytes(CONFIG))
-        if isinstance(said, dict) and "kind" in said:
-            raise UsageError(f"{root.url}: holds {said['kind']}, not twins; give the data set that they are of")
-        return BuildConfig(**{name: value for name, value in said.items() if name not in RETIRED})
-    except (ValueError, TypeError, AttributeError, ValidationError) as error:
-        raise UsageError(
-            f"{root.url}/{CONFIG}: not a configuration of this version ({str(error).splitlines()[0]}); give --config"
-        ) from error
+        return validated(BuildConfig, {name: value for name, value in said.items() if name not in RETIRED}, place)
+    except ConfigError as error:
+        raise UsageError(f"{place}: not a configuration of this version ({error}); give --config") from error
 
 
 @dataclass(frozen=True)
@@ -109,8 +112,8 @@ def request_build(
     flags: Flags,
 ) -> BuildRequest:
     """Check the arguments of ``build``; ``defaults`` hold for all inputs. Raises UsageError for wrong ones."""
-    if jobs is not None and jobs < 1:
-        raise UsageError(f"jobs is {jobs}; give 1 or more")
+    if jobs is not None and not 1 <= jobs <= MOST_SLOTS:
+        raise UsageError(f"jobs is {jobs:.6g}; give 1 to {MOST_SLOTS}")
     root, words = DatasetRoot(out), list(texts)
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
     require_inputs(root, given, words)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import hashlib
 import os
-import tomllib
 from dataclasses import dataclass
 from importlib import resources
 from importlib.metadata import PackageNotFoundError, distribution
@@ -18,6 +17,8 @@ import numpy as np
 from pydantic import BaseModel, Field, ValidationError, field_validator
 
 from manitwin.errors import ConfigError, Unavailable, UsageError, choose_from
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.toml_file import MAX_TOML_BYTES, parse_toml
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.robots.grippers.box import STRICT
 from manitwin.robots.robot import Workspace
@@ -141,11 +142,9 @@ def definition_path(name_or_path: str) -> Path:
 
 def read_definition(path: Path) -> tuple[RobotDefinition, str]:
     """Read a robot's file and its SHA-256; raises ConfigError naming the file and the key that is wrong."""
-    content = path.read_bytes()
+    content = read_bytes(path, MAX_TOML_BYTES, ConfigError, name=f"robot file {path}")
     try:
-        definition = RobotDefinition.model_validate(tomllib.loads(content.decode()))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError(f"robot file {path}: not TOML: {error}") from error
+        definition = RobotDefinition.model_validate(parse_toml(content, f"robot file {path}", ConfigError))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

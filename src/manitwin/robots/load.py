@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.errors import ConfigError
+from manitwin.formats.bounded_file import read_bytes
 from manitwin.geometry.poses import inverse
 from manitwin.robots.assembly import (
     SIDES,
@@ -23,6 +24,7 @@ from manitwin.robots.assembly import (
     settle_finger_joints,
 )
 from manitwin.robots.definition import (
+    MAX_FILE_BYTES,
     GeneratedHand,
     MergedHand,
     RobotDefinition,
@@ -84,7 +86,7 @@ def _load(path: Path) -> Robot:
     fix_other_joints(tree, definition.arm_joints + hand.finger_joints, definition.fixed_joints)
     _check_home(tree, definition)
     palm = _palm(tree, hand.finger_joints)
-    meshes = b"".join(mesh.read_bytes() for mesh in tree.collision_meshes())
+    meshes = b"".join(read_bytes(mesh, MAX_FILE_BYTES, ConfigError, name=str(mesh)) for mesh in tree.collision_meshes())
     parts = (sha256, gripper.sha256, names_in_files, hand_names_in_files, hashlib.sha256(meshes).hexdigest())
     robot = Robot(
         name=definition.name,

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from manitwin.config import Section, read_toml, validated
-from manitwin.engine.ledger.ledger import read_ledger
 from manitwin.engine.ledger.location import CONFIG, local_ledger
+from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 
@@ -34,7 +34,9 @@ def load_settings(kind: type[Application], file: Path | None, given: dict[str, A
 
 def earlier_settings(root: DatasetRoot) -> dict[str, Any]:
     """Return the configuration of the last run at a root; empty where there was none."""
-    return dict(json.loads(root.read_bytes(CONFIG))) if root.exists(CONFIG) else {}
+    return (
+        root.read_json(CONFIG, UsageError, remedy="remove it: the run writes it again") if root.exists(CONFIG) else {}
+    )
 
 
 def check_settings(root: DatasetRoot, now: Mapping[str, Any], *, free: frozenset[str], made: str) -> None:

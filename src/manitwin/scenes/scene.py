@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import AfterValidator, AllowInfNan, BaseModel, ConfigDict, Field
 
 SCENE_SCHEMA_VERSION = 1
 SCENE = "scene.json"
+
+
+MOST_METRES = 1e6
+"""No number of a scene is larger: a coordinate of 1e300 ends simulations and pictures, not with one line."""
+
+
+def _name(text: str) -> str:
+    if not text or text in (".", "..") or "/" in text or not text.isprintable() or len(text) > 200:
+        raise ValueError(f"{text[:40]!r} is no name")
+    return text
+
+
+Name = Annotated[str, AfterValidator(_name)]
+Number = Annotated[float, AllowInfNan(False), Field(ge=-MOST_METRES, le=MOST_METRES)]
+_Vector = tuple[Number, Number, Number]
 
 
 class _Record(BaseModel):
@@ -17,9 +32,9 @@ class _Record(BaseModel):
 class SurfaceBox(_Record):
     """A box of the furniture; ``material`` names a procedural texture: wood, metal, marble, cloth."""
 
-    name: str
-    center_m: tuple[float, float, float]
-    half_extents_m: tuple[float, float, float]
+    name: Name
+    center_m: _Vector
+    half_extents_m: _Vector
     material: str
 
 
@@ -29,11 +44,11 @@ class SupportRegion(_Record):
     ``clearance_m`` is the free height above it; None where nothing is above.
     """
 
-    name: str
-    center_m: tuple[float, float]
-    half_extents_m: tuple[float, float]
-    height_m: float
-    clearance_m: float | None = None
+    name: Name
+    center_m: tuple[Number, Number]
+    half_extents_m: tuple[Number, Number]
+    height_m: Number
+    clearance_m: Number | None = None
 
 
 class Furniture(_Record):
@@ -44,7 +59,7 @@ class Furniture(_Record):
     """
 
     kind: str
-    support_height_m: float
+    support_height_m: Number
     boxes: tuple[SurfaceBox, ...]
     supports: tuple[SupportRegion, ...] = ()
 
@@ -56,13 +71,13 @@ class SceneObject(_Record):
     container. ``surface`` names the support that it, or what holds it, stands on.
     """
 
-    name: str
-    twin_id: str
+    name: Name
+    twin_id: Name
     revision: str
     category: str
     placement: int | None
-    position_m: tuple[float, float, float]
-    quaternion_wxyz: tuple[float, float, float, float]
+    position_m: _Vector
+    quaternion_wxyz: tuple[Number, Number, Number, Number]
     supported_by: str | None = None
     relation: Literal["on", "in"] = "on"
     surface: str = "table"
@@ -71,41 +86,41 @@ class SceneObject(_Record):
 class Light(_Record):
     """A directional light; ``color`` is linear RGB with its strength."""
 
-    direction: tuple[float, float, float]
-    color: tuple[float, float, float]
+    direction: _Vector
+    color: _Vector
     casts_shadow: bool = False
 
 
 class SceneCamera(_Record):
     """A pinhole camera that looks from a position at a target, +Z up in the picture."""
 
-    name: str
-    position_m: tuple[float, float, float]
-    target_m: tuple[float, float, float]
-    fov_y_rad: float
+    name: Name
+    position_m: _Vector
+    target_m: _Vector
+    fov_y_rad: Number
 
 
 class SceneMeasures(_Record):
     """Measurements by physics: how far objects moved and turned as they settled, and what was left of gaps."""
 
-    max_moved_m: float
-    max_turned_rad: float
-    max_penetration_m: float
-    min_gap_m: float | None
+    max_moved_m: Number
+    max_turned_rad: Number
+    max_penetration_m: Number
+    min_gap_m: Number | None
 
 
 class SceneRecord(_Record):
     """One layout; ``robot`` is whose workspace it was sampled for."""
 
     schema_version: int
-    scene_id: str
+    scene_id: Name
     seed: int
     number: int
     robot: str | None
     clutter: str
     furniture: Furniture
     objects: tuple[SceneObject, ...]
-    ambient: tuple[float, float, float]
+    ambient: _Vector
     lights: tuple[Light, ...]
     cameras: tuple[SceneCamera, ...]
     measures: SceneMeasures

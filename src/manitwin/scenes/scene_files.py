@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-import json
+import os
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from manitwin.errors import UsageError
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
+from manitwin.formats.printable import printable_line
 from manitwin.scenes.scene import SCENE, SCENE_SCHEMA_VERSION, SceneRecord
 from manitwin.twin.store import canonical_json, write_bytes_atomically
 
@@ -31,19 +34,17 @@ def write_scene(record: SceneRecord, folder: Path) -> Path:
 def read_scene(path: Path) -> SceneRecord:
     """Read a scene file, or that of a scene's folder. Raises UsageError naming the file, the cause and the remedy."""
     file = path / SCENE if path.is_dir() else path
-    if not file.is_file():
+    if not os.path.lexists(file):
         raise UsageError(f"{path}: no {SCENE} there; give a scene that `manitwin layout` made")
-    return parse_scene(file.read_bytes(), file)
+    return parse_scene(read_bytes(file, MAX_JSON_BYTES, UsageError, inside=file.parent, name=str(file)), file)
 
 
 def parse_scene(content: bytes, path: str | Path = SCENE) -> SceneRecord:
     """Read the content of a scene file; raises UsageError naming ``path``, the cause and the remedy."""
-    try:
-        data = json.loads(content)
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: not JSON ({error}); sample the layout again") from error
-    version = data.get("schema_version") if isinstance(data, dict) else None
+    data = parse_json_object(content, str(path), UsageError, remedy="sample the layout again")
+    version = data.get("schema_version")
     if version != SCENE_SCHEMA_VERSION:
+        version = printable_line(str(version), max_characters=40)
         raise UsageError(
             f"{path}: scene version {version}, this package reads {SCENE_SCHEMA_VERSION}; sample the layout again"
         )
@@ -51,7 +52,7 @@ def parse_scene(content: bytes, path: str | Path = SCENE) -> SceneRecord:
         return SceneRecord(**data)
     except ValidationError as error:
         first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
+        where = printable_line(".".join(map(str, first["loc"])), max_characters=80)
         raise UsageError(f"{path}: {where}: {first['msg']}; sample the layout again") from error
 
 
@@ -65,7 +66,9 @@ def dataset_of(scene: Path) -> str:
     """Return the data set that a scene of a run was sampled from; raises UsageError where its folder does not say so."""
     for folder in scene.resolve().parents:
         if folder.name == SCENES and (folder.parent / CONFIG).is_file():
-            said = json.loads((folder.parent / CONFIG).read_bytes())
+            said = read_json_object(
+                folder.parent / CONFIG, UsageError, inside=folder.parent, name=f"{folder.parent}/{CONFIG}"
+            )
             if isinstance(said.get("dataset"), str):
                 return str(said["dataset"])
     raise UsageError(f"{scene}: not in a folder that `manitwin layout` wrote; say which data set it was sampled from")

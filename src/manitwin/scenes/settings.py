@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from manitwin.config import RunConfig, Section
+from manitwin.config import RunConfig, Section, Seed
 
 
 def application_run() -> RunConfig:
     """Return how an application's run works: no tables are kept of what it makes, and no results of single stages."""
     return RunConfig(index_every=0, keep_work=False)
+
+
+MOST_OBJECTS = 200
+Count = Annotated[int, Field(le=MOST_OBJECTS)]
 
 
 class LayoutSettings(Section):
@@ -25,13 +29,13 @@ class LayoutSettings(Section):
     object, ``repairs`` how many objects are sampled again before the layout is given up.
     """
 
-    objects: tuple[int, int] = (3, 12)
+    objects: tuple[Count, Count] = (3, 12)
     surface: Literal["table", "shelf", "tray"] = "table"
     clutter: Literal["sparse", "medium", "dense"] = "medium"
     min_gap_m: float | None = Field(default=None, ge=0.001, le=0.5)
     include: tuple[str, ...] = ()
-    stacked: int = Field(default=0, ge=0)
-    contained: int = Field(default=0, ge=0)
+    stacked: int = Field(default=0, ge=0, le=MOST_OBJECTS)
+    contained: int = Field(default=0, ge=0, le=MOST_OBJECTS)
     upright: bool = False
     robot: str | None = None
     workspace: tuple[float, float, float] | None = None
@@ -67,7 +71,7 @@ class LayoutSettings(Section):
 class LayoutsConfig(Section):
     """Everything that decides what layouts are made. ``pictures``: also a picture, depth, normals and ids of each camera."""
 
-    seed: int = 0
+    seed: Seed = 0
     layout: LayoutSettings = LayoutSettings()
     pictures: bool = False
     picture_px: int = Field(default=512, ge=64, le=2048)

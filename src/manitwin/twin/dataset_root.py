@@ -10,18 +10,28 @@ DATASET/
 
 from __future__ import annotations
 
+import errno
+import os
+import re
 import shutil
+import stat
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from fsspec.core import url_to_fs
 from fsspec.implementations.local import LocalFileSystem
 
-from manitwin.errors import UsageError
+from manitwin.errors import TwinError, UsageError
+from manitwin.formats.bounded_file import Refusal, read_bytes
+from manitwin.formats.json_file import MAX_JSON_BYTES, MEND, parse_json_object
 from manitwin.twin.store import RECORD, file_beside, replace_folder, write_bytes_atomically
 
 TWINS = "twins"
+_PASSWORD = re.compile(r"://[^/@\s]*:[^/@\s]*@")
+MAX_FILE_BYTES = 2 << 30
+"""Of one file of a data set: that of a scan of millions of triangles with its pictures has some hundred million."""
 
 
 def twin_name(twin_id: str) -> str:
@@ -32,10 +42,12 @@ def twin_name(twin_id: str) -> str:
 class DatasetRoot:
     """Read and write below one folder or URL; names are relative and use ``/``.
 
-    Raises UsageError for a URL whose protocol is unknown or not installed.
+    Raises UsageError for a URL whose protocol is unknown or not installed, or that holds a password.
     """
 
     def __init__(self, url: str | Path):
+        if _PASSWORD.search(str(url)):  # first of all: what comes after shows the URL, and writes it
+            raise UsageError("the URL of a data set holds a password or a key; those come from the environment only")
         try:
             self.fs, self.path = url_to_fs(str(url), use_listings_cache=False)  # others write there as well
         except (ValueError, ImportError) as error:
@@ -79,10 +91,23 @@ class DatasetRoot:
         """Tell whether a file or folder is there."""
         return bool(self.fs.exists(self.full(name)))
 
-    def read_bytes(self, name: str) -> bytes:
-        """Return a file's content; raises FileNotFoundError."""
-        content: bytes = self.fs.cat_file(self.full(name))
-        return content
+    def read_bytes(self, name: str, refuse: Refusal = TwinError, *, limit_bytes: int = MAX_FILE_BYTES) -> bytes:
+        """Return a file's content; raises FileNotFoundError.
+
+        On a local root, what is no regular file below it, or larger than the limit, raises what ``refuse`` makes of one line.
+        """
+        full = self.full(name)
+        if self.local is None:
+            content: bytes = self.fs.cat_file(full)
+            return content
+        if not os.path.lexists(full):
+            raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), full)
+        return read_bytes(Path(full), limit_bytes, refuse, inside=self.local, name=full)
+
+    def read_json(self, name: str, refuse: Refusal = TwinError, *, remedy: str = MEND) -> dict[str, Any]:
+        """Return the object that a JSON file holds; raises FileNotFoundError, and what ``refuse`` makes of one line."""
+        content = self.read_bytes(name, refuse, limit_bytes=MAX_JSON_BYTES)
+        return parse_json_object(content, self.full(name), refuse, remedy=remedy)
 
     def write_bytes(self, name: str, content: bytes) -> None:
         """Write a file whole or not at all."""
@@ -109,8 +134,10 @@ class DatasetRoot:
         self.fs.get_file(self.full(name), str(to))
 
     def remove(self, name: str) -> None:
-        """Remove a file or a whole folder; one that is not there is no error."""
-        if self.fs.exists(self.full(name)):
+        """Remove a file or a whole folder; one that is not there is no error. Of a link only the link itself goes."""
+        if self.local is not None and _is_special(self.full(name)):
+            os.unlink(self.full(name))
+        elif self.fs.exists(self.full(name)):
             self.fs.rm(self.full(name), recursive=True)
 
     def names_below(self, name: str) -> list[str]:
@@ -118,6 +145,21 @@ class DatasetRoot:
         root = self.path.rstrip("/") + "/"
         found = self.fs.find(self.full(name)) if self.fs.exists(self.full(name)) else []
         return sorted(str(path).removeprefix(root) for path in found)
+
+    def sizes_below(self, name: str) -> dict[str, int | None]:
+        """Return the sizes of all files below a folder by their names in it; None for links and what is no regular file."""
+        full = self.full(name).rstrip("/")
+        if self.local is None:
+            found = self.fs.find(full, detail=True) if self.fs.exists(full) else {}
+            return {str(path).removeprefix(f"{full}/"): int(about["size"]) for path, about in found.items()}
+        sizes: dict[str, int | None] = {}
+        for folder, folders, files in os.walk(full):
+            links = [each for each in folders if os.path.islink(os.path.join(folder, each))]
+            for each in (*files, *links):
+                path = os.path.join(folder, each)
+                about = os.lstat(path)
+                sizes[os.path.relpath(path, full)] = about.st_size if stat.S_ISREG(about.st_mode) else None
+        return sizes
 
     def put_folder(self, fresh: Path, name: str, record: str = RECORD) -> None:
         """Move a finished local folder to its name; its ``record`` goes last, and what the older one had more goes then.
@@ -159,3 +201,12 @@ class DatasetRoot:
         if not self.exists(name):
             return []
         return [PurePosixPath(path).name for path in self.fs.ls(self.full(name), detail=False)]
+
+
+def _is_special(path: str) -> bool:
+    """Tell whether a path is there and neither a file nor a folder: a link, whatever it leads to, a pipe, a device."""
+    try:
+        mode = os.lstat(path).st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from manitwin.errors import TwinError
+from manitwin.formats.parquet_file import read_parquet
 from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.twin.store import REMEDY
 
 JITTERED = ":jittered"
 JOINTS = ("pregrasp_joints_rad", "grasp_joints_rad")
@@ -86,6 +90,13 @@ class GripperRows:
     def _joints(self, name: str, order: np.ndarray) -> list[Any]:
         """Return the joints of hands with more than one, null for the others."""
         return self.proposals[name][order].tolist() if name in self.proposals else [None] * len(order)
+
+
+def read_grasp_table(path: Path) -> pa.Table:
+    """Return the rows of a twin's ``grasps.parquet`` with the columns of ``SCHEMA``; raises TwinError."""
+    if not os.path.lexists(path):
+        raise TwinError(f"{path}: missing; {REMEDY}")
+    return read_parquet(path, TwinError, schema=SCHEMA, remedy=REMEDY, inside=path.parent)
 
 
 def write_grasp_table(path: Path, parts: list[dict[str, list[Any]]]) -> None:

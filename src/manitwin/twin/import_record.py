@@ -9,10 +9,14 @@ import numpy as np
 from pydantic import Field, ValidationError
 
 from manitwin.errors import UsageError
+from manitwin.formats.json_file import read_json_object
+from manitwin.formats.printable import printable_line
 from manitwin.twin.record import Finite, Matrix3, Matrix4, Record, Vector3
 
 IMPORT_RECORD, IMPORTED_MESH = "import.json", "asset.glb"
 MAX_BYTES = 64 << 20
+TEMPLATE = "template"
+"""The format of what a template knows of the thing that it made."""
 Positive = Annotated[Finite, Field(gt=0)]
 
 
@@ -71,7 +75,7 @@ class ImportRecord(Record):
     @property
     def source(self) -> str:
         """The source, as an Estimate names it."""
-        return f"imported:{self.format}"
+        return f"template:{self.name}" if self.format == TEMPLATE else f"imported:{self.format}"
 
     @property
     def called(self) -> str:
@@ -119,13 +123,11 @@ def is_imported(folder: Path) -> bool:
 
 def read_import_record(path: Path) -> ImportRecord:
     """Read an import.json; raises UsageError naming the first thing that is wrong with it."""
+    said = read_json_object(path, UsageError, limit_bytes=MAX_BYTES, inside=path.parent, name=str(path))
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise UsageError(f"{path}: more than {MAX_BYTES >> 20} MiB; import the asset again")
-        return ImportRecord.model_validate_json(path.read_bytes())
-    except OSError as error:
-        raise UsageError(f"{path}: {error.strerror or error}; import the asset again") from error
+        return ImportRecord.model_validate(said)
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(str(part) for part in first["loc"])
-        raise UsageError(f"{path}: {place}: {first['msg']}; import the asset again") from error
+        where = printable_line(place, max_characters=120)
+        raise UsageError(f"{path}: {where}: {first['msg']}; import the asset again") from error

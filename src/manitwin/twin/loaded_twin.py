@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,16 +10,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet
+import pyarrow as pa
 import trimesh
 
-from manitwin.errors import TwinError, UsageError
+from manitwin.errors import InputError, TwinError, UsageError
+from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.glb import read_glb
+from manitwin.formats.xml_file import MAX_NUMBER
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.dataset_root import MAX_FILE_BYTES, DatasetRoot
+from manitwin.twin.grasp_table import read_grasp_table
 from manitwin.twin.record import Physical, TwinRecord
-from manitwin.twin.store import RECORD, read_record
+from manitwin.twin.store import RECORD, REMEDY, read_record
+
+MAX_HULL_BYTES = 16 << 20
 
 
 @dataclass(frozen=True)
@@ -64,14 +70,19 @@ class Twin:
     def visual(self) -> list[trimesh.Trimesh]:
         """The textured meshes, in the object frame (Z-up)."""
         self.physical  # noqa: B018  a rejected twin has no meshes: say so
-        return read_glb(self.folder / "visual.glb")
+        return read_visual(self.folder / "visual.glb")
 
     @cached_property
     def hulls(self) -> list[trimesh.Trimesh]:
         """The convex collision hulls."""
         self.physical  # noqa: B018
-        files = sorted((self.folder / "collision").glob("hull_*.obj"))
-        return [trimesh.load_mesh(path, process=False) for path in files]
+        return [_hull(path, self.folder) for path in sorted((self.folder / "collision").glob("hull_*.obj"))]
+
+    def read_bytes(self, file: str) -> bytes:
+        """Return the content of one of the twin's files; raises TwinError where it is no file of its folder."""
+        return read_bytes(
+            self.folder / file, MAX_FILE_BYTES, TwinError, inside=self.folder, name=f"{self.folder}/{file}"
+        )
 
     def rigid_body(self) -> RigidBody:
         """Return the hulls with the twin's mass properties and friction, as simulations take them."""
@@ -85,13 +96,17 @@ class Twin:
             friction_dynamic=physical.friction_dynamic.value,
         )
 
+    def grasp_table(self) -> pa.Table:
+        """Return all rows of ``grasps.parquet`` (docs/grasps.md); raises TwinError where it cannot be read."""
+        return read_grasp_table(self.folder / "grasps.parquet")
+
     def grasps(self, verified_only: bool = True, gripper: str | None = None) -> Grasps:
         """Return the grasps of a gripper (by default the one that the twin was verified with).
 
         Leaves out the unfiltered sample and the jittered controls.
         """
         self.physical  # noqa: B018
-        table = pyarrow.parquet.read_table(self.folder / "grasps.parquet").to_pydict()
+        table = self.grasp_table().to_pydict()
         wanted = gripper or (self.record.grasps.gripper if self.record.grasps else "")
         keep = [
             i
@@ -129,6 +144,35 @@ class Twin:
             visual_glb=self.folder / "visual.glb" if visual else None,
             name=self.record.twin_id,
         )
+
+
+def read_visual(path: Path) -> list[trimesh.Trimesh]:
+    """Return the parts of a twin's ``visual.glb`` in the object frame; raises TwinError."""
+    if not os.path.lexists(path):
+        raise TwinError(f"{path}: missing; {REMEDY}")
+    open_regular(path, TwinError, inside=path.parent, name=str(path)).close()
+    try:
+        parts = read_glb(path)
+    except InputError as error:
+        raise TwinError(f"{path}: cannot be read ({error.detail}); {REMEDY}") from error
+    if not all(np.isfinite(part.vertices).all() for part in parts):
+        raise TwinError(f"{path}: has vertices that are no finite numbers; {REMEDY}")
+    return parts
+
+
+def _hull(path: Path, folder: Path) -> trimesh.Trimesh:
+    """Read the vertices and triangles of a hull's OBJ, of which nothing else is looked at; raises TwinError."""
+    content = read_bytes(path, MAX_HULL_BYTES, TwinError, inside=folder, name=str(path))
+    rows = [line.split() for line in content.splitlines() if line.strip()]
+    try:
+        vertices = np.array([row[1:4] for row in rows if row[0] == b"v"], np.float64).reshape(-1, 3)
+        corners = [[word.partition(b"/")[0] for word in row[1:]] for row in rows if row[0] == b"f"]
+        faces = np.array(corners, np.int64).reshape(-1, 3) - 1
+    except (ValueError, OverflowError) as error:
+        raise TwinError(f"{path}: no hull that can be read ({str(error)[:120]}); {REMEDY}") from error
+    if not len(faces) or not (np.abs(vertices) <= MAX_NUMBER).all() or faces.min() < 0 or faces.max() >= len(vertices):
+        raise TwinError(f"{path}: no hull of finite vertices and their triangles; {REMEDY}")
+    return trimesh.Trimesh(vertices, faces, process=False)
 
 
 class TwinSource:

@@ -6,6 +6,8 @@ SI units, object frame (right-handed, +Z up, origin at the bottom centre), quate
 from __future__ import annotations
 
 import math
+import re
+from pathlib import PurePosixPath
 from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
@@ -16,14 +18,18 @@ Status = Literal["accepted", "rejected"]
 GraspType = Literal["parallel_jaw", "pinch", "power", "three_finger", "enveloping"]  # the paper's five
 Outcome = Literal["held", "collides", "unreachable", "misses", "penetrates", "drops", "unstable", "slips"]
 
+_OF_EVERY_STAGE = frozenset({"too_large"})  # any stage's process has a limit of memory
 REJECTION_REASONS: dict[str, frozenset[str]] = {
-    "input": frozenset({"unreadable", "empty", "wrong_type", "too_small", "animated", "no_faces", "not_finite"}),
-    "generate": frozenset({"no_object", "several_objects", "low_confidence_matte", "generator_failed"}),
-    "gate": frozenset({"several_objects", "not_watertight", "degenerate", "absurd_size", "poor_quality"}),
-    "physical": frozenset({"implausible_mass", "implausible_size"}),
-    "grasps": frozenset({"too_wide", "too_thin", "no_proposal"}),
-    "verify": frozenset({"none_held"}),
-    "placement": frozenset({"no_stable_pose"}),
+    stage: reasons | _OF_EVERY_STAGE
+    for stage, reasons in {
+        "input": frozenset({"unreadable", "empty", "wrong_type", "too_small", "animated", "no_faces", "not_finite"}),
+        "generate": frozenset({"no_object", "several_objects", "low_confidence_matte", "generator_failed"}),
+        "gate": frozenset({"several_objects", "not_watertight", "degenerate", "absurd_size", "poor_quality"}),
+        "physical": frozenset({"implausible_mass", "implausible_size"}),
+        "grasps": frozenset({"too_wide", "too_thin", "no_proposal"}),
+        "verify": frozenset({"none_held"}),
+        "placement": frozenset({"no_stable_pose"}),
+    }.items()
 }
 
 
@@ -33,6 +39,27 @@ def _finite(value: float) -> float:
     return value
 
 
+CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
+"""What no text of a record holds: XML, which many exports are, has no control characters, and UTF-8 no lone surrogates."""
+LARGEST_M, LARGEST_KG = 1e4, 1e6
+"""Far beyond what a gripper meets, and no trouble for the arithmetic of any simulator."""
+
+
+def _file_below(name: str) -> str:
+    parts = PurePosixPath(name).parts
+    if not parts or name.startswith("/") or ".." in parts or not name.isprintable():
+        raise ValueError(f"{name[:80]!r} is no file below the twin's folder")
+    return name
+
+
+def _folder_name(name: str) -> str:
+    if name.startswith(".") or "/" in _file_below(name):
+        raise ValueError(f"{name[:80]!r} is no name for a folder")
+    return name
+
+
+FileBelow = Annotated[str, AfterValidator(_file_below)]
+FolderName = Annotated[str, AfterValidator(_folder_name)]
 Finite = Annotated[float, AfterValidator(_finite)]
 Vector3 = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Quaternion = Annotated[list[Finite], Field(min_length=4, max_length=4)]
@@ -94,7 +121,7 @@ class Source(Record):
     """The input that the twin was made of."""
 
     kind: Literal["image", "text", "mesh"]
-    file: str
+    file: FileBelow
     sha256: str
     prompt: str | None = None
     license: str
@@ -173,6 +200,25 @@ class Physical(Record):
     center_of_mass_uncertainty_m: Finite
     inertia_kg_m2: Matrix3
     mass_distribution: Literal["solid", "shell"]
+
+    @model_validator(mode="after")
+    def _possible(self) -> Physical:
+        """Refuse what no object has: no simulator is given a negative mass, or a metre count that overflows."""
+        for name, estimate, largest in (
+            ("mass_kg", self.mass_kg, LARGEST_KG),
+            ("friction_static", self.friction_static, LARGEST_M),
+            ("friction_dynamic", self.friction_dynamic, LARGEST_M),
+            ("restitution", self.restitution, 1.0),
+        ):
+            if estimate.low < 0 or estimate.value > largest or (name == "mass_kg" and estimate.value == 0):
+                raise ValueError(f"{name} is {estimate.value:g}, which no object has")
+        if not all(0 <= side <= LARGEST_M for side in self.extents_m):
+            raise ValueError(f"extents_m are {self.extents_m}, which no object has")
+        if not all(abs(place) <= LARGEST_M for place in self.center_of_mass_m):
+            raise ValueError(f"center_of_mass_m is {self.center_of_mass_m}, which no object has")
+        if not all(abs(moment) <= LARGEST_KG * LARGEST_M for row in self.inertia_kg_m2 for moment in row):
+            raise ValueError("inertia_kg_m2 is larger than that of any object")
+        return self
 
 
 class Language(Record):
@@ -351,9 +397,9 @@ class TwinRecord(Record):
     """twin.json: everything that a person wants to read about a twin."""
 
     schema_version: int = SCHEMA_VERSION
-    twin_id: str
+    twin_id: FolderName
     revision: str
-    files: dict[str, str]
+    files: dict[FileBelow, str]
     name: str | None
     status: Status
     rejection: Rejection | None

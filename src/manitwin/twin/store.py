@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,11 +14,20 @@ from typing import Any
 from pydantic import ValidationError
 
 from manitwin.errors import TwinError
-from manitwin.twin.record import SCHEMA_VERSION, TwinRecord
+from manitwin.formats.bounded_file import open_regular, read_bytes
+from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
+from manitwin.formats.printable import printable, printable_line
+from manitwin.twin.record import CONTROLS, SCHEMA_VERSION, TwinRecord
+from manitwin.twin.twin_files import require_plain
 
 RECORD = "twin.json"
 RUN = "run.json"
 WORK = ".work"
+MAX_TWIN_FILE_BYTES = 5 << 30
+"""Its source is the largest: ``packed_source.MAX_KEPT_BYTES``, and what an archive adds."""
+REMEDY = "build the twin again"
+_SHOWN_CHARACTERS = 120
+_BLOCK_BYTES = 1 << 20
 
 
 def canonical_json(value: Any) -> str:
@@ -35,6 +44,20 @@ def sha256_of_file(path: Path) -> str:
     """Return the hex digest of a file's bytes."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def sha256_of_untrusted(path: Path, inside: Path) -> str:
+    """Return the hex digest of a regular file of a twin's size below a folder; raises TwinError for anything else."""
+    digest = hashlib.sha256()
+    with open_regular(path, TwinError, inside=inside, name=str(path)) as stream:
+        size = os.fstat(stream.fileno()).st_size
+        if size > MAX_TWIN_FILE_BYTES:
+            raise TwinError(
+                f"{path}: {size} bytes are more than a twin's file may have ({MAX_TWIN_FILE_BYTES}); {REMEDY}"
+            )
+        while block := stream.read(_BLOCK_BYTES):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 def digests_below(folder: Path) -> dict[str, str]:
@@ -108,16 +131,42 @@ def seal(folder: Path, record: dict[str, Any]) -> TwinRecord:
     """
     digests = digests_below(folder)
     record = {**record, "files": {n: d for n, d in digests.items() if n not in (RECORD, RUN)}}
-    whole = TwinRecord(**record, revision="").model_dump(mode="json")
+    whole = _plain(TwinRecord(**record, revision="").model_dump(mode="json"))
     whole["revision"] = revision_of(whole)
     write_bytes_atomically(folder / RECORD, canonical_json(whole).encode())
     return TwinRecord(**whole)
 
 
-def amend(folder: Path, files: dict[str, bytes]) -> TwinRecord:
+def _plain(value: Any) -> Any:
+    """Return a JSON value whose texts hold no control characters: a model's answer or the name of a file may."""
+    if isinstance(value, str):
+        return CONTROLS.sub(lambda found: printable(found[0]), value)
+    if isinstance(value, dict):
+        return {_plain(key): _plain(each) for key, each in value.items()}
+    return [_plain(each) for each in value] if isinstance(value, list) else value
+
+
+def _with_controls(value: Any) -> str | None:
+    """Return the beginning of a text in a JSON value that holds control characters, None where none does."""
+    left = [value]
+    while left:
+        each = left.pop()
+        if isinstance(each, str) and (found := CONTROLS.search(each)):
+            return each[max(0, found.start() - 20) : found.end() + 20]
+        if isinstance(each, dict):
+            left += [*each.keys(), *each.values()]
+        elif isinstance(each, list):
+            left += each
+    return None
+
+
+def amend(
+    folder: Path, files: dict[str, bytes], note: Callable[[dict[str, int]], None] = lambda sizes: None
+) -> TwinRecord:
     """Give a finished twin new content of some of its files: each is renamed over the old one, twin.json last.
 
-    The record gets their digests and a new revision; nothing else in it changes. A crash in between leaves a twin whose
+    The record gets their digests and a new revision; nothing else in it changes. ``note`` is told the new sizes before
+    twin.json is written. A crash in between leaves a twin whose
     digests do not match, which ``verify_record`` says. Raises TwinError where the twin has no such file.
     """
     record = read_record(folder).model_dump(mode="json")
@@ -128,7 +177,9 @@ def amend(folder: Path, files: dict[str, bytes]) -> TwinRecord:
         write_bytes_atomically(folder / name, content)
         record["files"][name] = hashlib.sha256(content).hexdigest()
     record["revision"] = revision_of(record)
-    write_bytes_atomically(folder / RECORD, canonical_json(record).encode())
+    amended = canonical_json(record).encode()
+    note({**{name: len(content) for name, content in files.items()}, RECORD: len(amended)})
+    write_bytes_atomically(folder / RECORD, amended)
     return TwinRecord(**record)
 
 
@@ -138,41 +189,42 @@ def read_record(folder: Path, verify: bool = False) -> TwinRecord:
     Raises TwinError naming the file, the cause and the remedy.
     """
     path = folder / RECORD
-    if not path.is_file():
+    if not os.path.lexists(path):
         raise TwinError(f"{folder}: no {RECORD}, so this is no finished twin; give a folder that `manitwin build` made")
-    content = path.read_bytes()
+    require_plain(folder)
+    content = read_bytes(path, MAX_JSON_BYTES, TwinError, inside=folder, name=str(path))
     record = parse_record(content, path)
     if verify:
         verify_record(folder, record)
     return record
 
 
-def parse_record(content: bytes, path: str | Path = RECORD) -> TwinRecord:
-    """Read the content of a twin.json; raises TwinError naming ``path``, the cause and the remedy."""
-    try:
-        data = json.loads(content)
-    except (json.JSONDecodeError, UnicodeDecodeError) as error:
-        raise TwinError(f"{path}: not JSON ({error}); build the twin again") from error
-    if not isinstance(data, dict) or data.get("schema_version") != SCHEMA_VERSION:
-        version = data.get("schema_version") if isinstance(data, dict) else None
-        raise TwinError(f"{path}: schema version {version}, this package reads {SCHEMA_VERSION}; build the twin again")
+def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = False) -> TwinRecord:
+    """Read the content of a twin.json, with ``sealed`` one that its revision is of; raises TwinError naming ``path``."""
+    data = parse_json_object(content, str(path), TwinError, remedy=REMEDY)
+    if data.get("schema_version") != SCHEMA_VERSION:
+        version = printable_line(str(data.get("schema_version")), max_characters=_SHOWN_CHARACTERS)
+        raise TwinError(f"{path}: schema version {version}, this package reads {SCHEMA_VERSION}; {REMEDY}")
+    if (found := _with_controls(data)) is not None:
+        raise TwinError(f"{path}: {printable_line(found)!r} holds control characters; {REMEDY}")
+    if sealed and revision_of(data) != data.get("revision"):
+        raise TwinError(f"{path}: altered since it was written (its revision does not match); {REMEDY}")
     try:
         return TwinRecord(**data)
     except ValidationError as error:
         first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise TwinError(f"{path}: {where}: {first['msg']}; build the twin again") from error
+        where = printable_line(".".join(map(str, first["loc"])), max_characters=_SHOWN_CHARACTERS)
+        raise TwinError(f"{path}: {where}: {first['msg']}; {REMEDY}") from error
 
 
 def verify_record(folder: Path, record: TwinRecord) -> None:
     """Check the revision of a folder's record and the digest of every file that it names; raises TwinError."""
-    if revision_of(json.loads((folder / RECORD).read_bytes())) != record.revision:
-        raise TwinError(
-            f"{folder / RECORD}: altered since it was written (its revision does not match); build the twin again"
-        )
+    said = read_json_object(folder / RECORD, TwinError, inside=folder, name=str(folder / RECORD), remedy=REMEDY)
+    if revision_of(said) != record.revision:
+        raise TwinError(f"{folder / RECORD}: altered since it was written (its revision does not match); {REMEDY}")
     for name, digest in record.files.items():
         path = folder / name
-        if not path.is_file():
-            raise TwinError(f"{path}: missing, though {RECORD} names it; build the twin again")
-        if sha256_of_file(path) != digest:
-            raise TwinError(f"{path}: altered since it was written (its sha256 does not match); build the twin again")
+        if not os.path.lexists(path):
+            raise TwinError(f"{path}: missing, though {RECORD} names it; {REMEDY}")
+        if sha256_of_untrusted(path, folder) != digest:
+            raise TwinError(f"{path}: altered since it was written (its sha256 does not match); {REMEDY}")

@@ -16,10 +16,12 @@ from click.testing import Result
 from made_mug import MASS_KG, clean, hulls, textured, write_twin, write_urdf
 from typer.testing import CliRunner
 
-from manitwin.assets.audit.finding import Finding
+from manitwin.assets.audit.check import audit_path
+from manitwin.assets.audit.finding import Audited, Finding
 from manitwin.assets.audit.report import explanation, json_of, sarif_of, summary, text_of
 from manitwin.assets.audit.rules import RULES
-from manitwin.assets.audit.run import Audited, audit_assets, audit_path, rule_of, select_rules
+from manitwin.assets.audit.run import audit_assets
+from manitwin.assets.audit.selection import rule_of, select_rules
 from manitwin.assets.read import read_asset
 from manitwin.cli.commands.audit import audit as audit_command
 from manitwin.errors import UsageError

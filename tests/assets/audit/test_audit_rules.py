@@ -12,9 +12,9 @@ import trimesh
 from made_mug import clean, contact, frame, moved, rim_grasps, scaled, shape, solid, textured, write_twin, write_urdf
 
 from manitwin.assets.asset import AnnotatedFrame, Asset, Contact, Inertial
+from manitwin.assets.audit.check import audit_asset, audit_path
 from manitwin.assets.audit.finding import Finding
 from manitwin.assets.audit.rules import RULES, RULES_BY_CODE
-from manitwin.assets.audit.run import audit_asset, audit_path
 from manitwin.geometry.poses import transform
 from manitwin.twin.store import RECORD
 from twin_folders import write_rejected

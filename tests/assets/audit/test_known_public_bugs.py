@@ -13,9 +13,9 @@ from made_mug import clean, contact, shape, solid, textured, write_urdf
 
 from handmade import cup, hammer
 from manitwin.assets.asset import AnnotatedFrame, Asset, Contact, Inertial
+from manitwin.assets.audit.check import audit_asset, audit_path
 from manitwin.assets.audit.finding import Finding
 from manitwin.assets.audit.rules import RULES
-from manitwin.assets.audit.run import audit_asset, audit_path
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.hulls.decomposition import convex_decomposition
 from manitwin.geometry.mass_properties import solid_mass_properties

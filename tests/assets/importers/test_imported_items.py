@@ -14,7 +14,7 @@ from manitwin.assets.importers.importer import import_assets
 from manitwin.cli.commands.import_ import import_
 from manitwin.engine.ledger.ledger import Ledger
 from manitwin.errors import UsageError
-from manitwin.formats.source_files import pack_source
+from manitwin.formats.packed_source import pack_source
 from manitwin.pipeline.item import Item, twin_id
 
 
@@ -80,10 +80,12 @@ def test_ledger_of_before_knows_its_items_again(tmp_path: Path) -> None:
 
 
 def test_source_of_an_imported_twin_has_what_was_given(tmp_path: Path) -> None:
-    folder = imported(tmp_path)
-    name, content = pack_source(folder / "asset.glb", [folder / "import.json"])
-    assert name == "source.zip" and b"import.json" in content
-    assert pack_source(folder / "asset.glb") == ("source.glb", (folder / "asset.glb").read_bytes())
+    folder, kept = imported(tmp_path), tmp_path / "kept"
+    kept.mkdir()
+    name, _ = pack_source(folder / "asset.glb", kept, [folder / "import.json"])
+    assert name == "source.zip" and b"import.json" in (kept / name).read_bytes()
+    assert pack_source(folder / "asset.glb", kept)[0] == "source.glb"
+    assert (kept / "source.glb").read_bytes() == (folder / "asset.glb").read_bytes()
 
 
 def test_broken_import_record_is_a_usage_error(tmp_path: Path) -> None:

@@ -111,7 +111,7 @@ def test_record_that_names_a_file_elsewhere_is_refused(tmp_path: Path, file: str
     record["revision"] = revision_of(record)
     parts[RECORD] = canonical_json(record).encode()
     tar = write_tar(tmp_path / "bad.tar", [member(f"{ID}.{part}", content) for part, content in parts.items()])
-    with pytest.raises(TwinError, match="no name for a file"):
+    with pytest.raises(TwinError, match=r"no name for a file|is no file below the twin's folder"):
         unpack_shard(tar, tmp_path / "out")
 
 
@@ -154,5 +154,5 @@ def test_cut_off_shard_is_refused(tmp_path: Path) -> None:
     tar.write_bytes(tar.read_bytes()[:3000])
     with pytest.raises(TwinError, match=r"download"):
         unpack_shard(tar, tmp_path / "out")
-    with pytest.raises(UsageError, match="no such file"):
+    with pytest.raises(UsageError, match=r"cannot be opened .No such file or directory.; check the path"):
         unpack_shard(tmp_path / "none.tar", tmp_path / "out")

@@ -8,14 +8,16 @@ REDIRECTED = json.loads(os.environ.get("DOCS_REDIRECTED", "{}"))
 if REDIRECTED:
     import httpx2
 
-    send = httpx2.HTTPTransport.handle_request
+    from manitwin.models.services.connections import GuardedTransport
 
-    def handle_request(self: httpx2.HTTPTransport, request: httpx2.Request) -> httpx2.Response:
+    plain = httpx2.HTTPTransport()
+
+    def handle_request(self: GuardedTransport, request: httpx2.Request) -> httpx2.Response:
         url = str(request.url)
         for documented, fake in REDIRECTED.items():
             if url == documented or url.startswith(f"{documented}/"):
                 request.url = httpx2.URL(fake + url.removeprefix(documented))
-                return send(self, request)
+                return plain.handle_request(request)
         raise AssertionError(f"a page asks {url}, which no fake stands for")
 
-    httpx2.HTTPTransport.handle_request = handle_request  # type: ignore[method-assign]
+    GuardedTransport.handle_request = handle_request  # type: ignore[method-assign]

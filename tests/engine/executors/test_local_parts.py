@@ -9,7 +9,8 @@ import pytest
 from manitwin.config import RunConfig
 from manitwin.engine.drive import drive
 from manitwin.engine.events import Announcer, StageAdvanced, StageEnded, StageEvent, StageStarted
-from manitwin.engine.executors.local import LocalExecutor, parts_noted, read_notes
+from manitwin.engine.executors.local import LocalExecutor
+from manitwin.engine.executors.stage_notes import parts_noted, read_notes
 from manitwin.engine.flight import Flight
 from manitwin.engine.jobs import Failure, RunStage, WorkerSetup
 from manitwin.engine.stage import StagePart, heard_by, tell_part

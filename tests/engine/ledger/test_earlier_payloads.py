@@ -12,7 +12,8 @@ import pytest
 
 from manitwin.config import RunConfig
 from manitwin.engine.drive import drive
-from manitwin.engine.ledger.ledger import Ledger, read_ledger
+from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.ledger.reading import read_ledger
 from manitwin.engine.task import Payload
 from manitwin.episodes.batch import Batch
 from manitwin.episodes.episode_pictures import BatchDrawing
@@ -86,10 +87,14 @@ def test_what_was_a_text_is_the_same_item_now(
 
 def test_a_run_that_was_half_done_goes_on(tmp_path: Path) -> None:
     done = tuple(RECIPE.identify(LayoutNumber(n)).item_id for n in range(2))
+    settings = RunConfig(patience_s=0)
+    drive(RECIPE, map(LayoutNumber, range(2)), DatasetRoot(tmp_path), settings, configuration={}, executor="inline")
+    for file in tmp_path.glob("ledger.*"):
+        file.unlink()
     write_earlier(tmp_path / "ledger.sqlite", ("layout 0", "layout 1", "layout 2"), done)
     opened: list[tuple[int, int]] = []
     report = drive(
-        RECIPE, map(LayoutNumber, range(4)), DatasetRoot(tmp_path), RunConfig(patience_s=0), configuration={},
+        RECIPE, map(LayoutNumber, range(4)), DatasetRoot(tmp_path), settings, configuration={},
         executor="inline", on_start=lambda items, left: opened.append((items, left)),
     )  # fmt: skip
     assert opened == [(4, 2)] and report.counts == {"accepted": 4}

@@ -10,10 +10,11 @@ from pathlib import Path
 import pytest
 
 from manitwin.engine.ledger import migrations
-from manitwin.engine.ledger.ledger import Ledger, read_ledger
+from manitwin.engine.ledger.ledger import Ledger
 from manitwin.engine.ledger.lock import is_written
 from manitwin.engine.ledger.migrations import MIGRATIONS
 from manitwin.engine.ledger.progress import read_progress, read_story
+from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.stage_order import place_in_pipeline

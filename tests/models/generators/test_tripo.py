@@ -16,7 +16,7 @@ from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.fakes.tripo import FakeTripo
 from manitwin.models.generators.tripo import URL, TripoGenerator
-from manitwin.models.services.refusal import Gone
+from manitwin.models.services.refusal import Gone, NotTaken
 
 
 @pytest.fixture(autouse=True)
@@ -77,7 +77,7 @@ def test_option_that_the_vendor_refuses_is_named(tmp_path: Path) -> None:
     fake, settings = FakeTripo(key=KEY), config(options={"texture_quality": "superb"})
     with FakeServer(fake) as server:
         ran = run(TripoGenerator.from_spec(f"@{server.url}", settings), tmp_path, settings)
-    assert type(ran.error) is BadReply and "error 1004" in str(ran.error) and "superb" in str(ran.error)
+    assert type(ran.error) is NotTaken and "error 1004" in str(ran.error) and "superb" in str(ran.error)
     assert not fake.tasks and ran.usd == 0
 
 
@@ -121,9 +121,9 @@ def test_expired_task_is_gone() -> None:
 
 
 OUTPUTS = [
-    ({"pbr_model": "P://", "model": "M://", "base_model": "B://"}, "p"),
-    ({"model": "M://", "base_model": "B://"}, "m"),
-    ({"base_model": "B://", "rendered_image": "R://"}, "b"),
+    ({"pbr_model": "P://h", "model": "M://h", "base_model": "B://h"}, "p"),
+    ({"model": "M://h", "base_model": "B://h"}, "m"),
+    ({"base_model": "B://h", "rendered_image": "R://h"}, "b"),
 ]
 
 
@@ -146,7 +146,7 @@ CODES = [
     (401, 1002, AccessDenied),
     (404, 2001, Gone),
     (200, 2001, Gone),
-    (400, 2017, BadReply),
+    (400, 2017, NotTaken),
     (429, 2000, RateLimited),
 ]
 

@@ -31,7 +31,7 @@ FIELDS = {
     *("action", "point_cloud", "grasp_threshold", "num_grasps", "topk_num_grasps"),
     *("min_grasps", "max_tries", "remove_outliers"),
 }
-CONFIG = BuildConfig(services=ServicesConfig(timeout_s=20, retries=0))
+CONFIG = BuildConfig(services=ServicesConfig(timeout_s=120, retries=0))
 BAR = trimesh.creation.box([0.04, 0.03, 0.2])
 
 

@@ -19,7 +19,7 @@ from manitwin.models.graspers.screens import PadScreen
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 
-CONFIG = BuildConfig(services=ServicesConfig(timeout_s=20, retries=0))
+CONFIG = BuildConfig(services=ServicesConfig(timeout_s=120, retries=0))
 # client-server/README.md, "Protocol Reference": what infer_object takes
 FIELDS = {"action", "point_cloud", "sweep_volume_params", "planner", "num_grasps"}
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import socket
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from hostile_services import raw_server
 from manitwin.errors import BadReply, Unavailable
 from manitwin.models.fakes.server import FakeServer, Response
 from scripted_service import KEY, Client, Script, error_of
@@ -20,13 +22,11 @@ def _download(server: FakeServer, folder: Path, url: str | None = None, **argume
 
 def test_download_is_asked_for_without_the_key(tmp_path: Path) -> None:
     data = bytes(range(256)) * 999
-    with (
-        FakeServer(Script(Response(200, data))) as store,
-        FakeServer(Script(Response(302, b"", {"Location": store.url}))) as api,
-    ):
-        _download(api, tmp_path)
+    with FakeServer(Script(Response(302, b"", {"Location": "/store"}), Response(200, data))) as server:
+        _download(server, tmp_path)
     assert (tmp_path / "made.glb").read_bytes() == data
-    for request in (*api.requests, *store.requests):
+    assert [request.path for request in server.requests] == ["/file", "/store"]
+    for request in server.requests:
         assert "authorization" not in request.headers and KEY not in str(request)
 
 
@@ -72,6 +72,22 @@ def test_length_that_is_not_announced_is_bounded_too(tmp_path: Path) -> None:
     thread.join(10)
     listener.close()
     assert type(error) is BadReply and "100000 bytes" in str(error) and not list(tmp_path.iterdir())
+
+
+def test_file_that_drips_ends_by_the_deadline(tmp_path: Path) -> None:
+    stop = threading.Event()
+
+    def drip(write: Callable[[bytes], None]) -> None:
+        write(b"HTTP/1.1 200 OK\r\nContent-Length: 100000\r\n\r\n")
+        while not stop.wait(0.05):
+            write(b"x")
+
+    with raw_server(drip) as (url, asked):
+        service = Client(url, timeout_s=0.5, retries=1).service
+        error = error_of(lambda: service.download(url, tmp_path / "m.glb"))
+        stop.set()
+    assert type(error) is BadReply and "too slowly (no whole answer within 0.5" in str(error)
+    assert len(asked) == 2 and not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("status", [401, 403, 404, 410])

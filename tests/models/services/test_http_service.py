@@ -14,17 +14,17 @@ from manitwin.config import ServicesConfig
 from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Rejected, Unavailable
 from manitwin.models.fakes.server import FakeServer, Request, Response
 from manitwin.models.services.http import FormFile, HttpService
-from manitwin.models.services.refusal import Gone, Refusal, Unanswered
+from manitwin.models.services.refusal import Gone, NotTaken, Refusal, Unanswered
 from scripted_service import KEY, OK, Client, Script, error_of
 
 STATUSES = [
     (401, AccessDenied, 1),
     (402, AccessDenied, 1),
     (403, AccessDenied, 1),
-    (400, BadReply, 1),
+    (400, NotTaken, 1),
     (404, Gone, 1),
     (410, Gone, 1),
-    (422, BadReply, 1),
+    (422, NotTaken, 1),
     (429, RateLimited, 3),
     (500, Unavailable, 3),
     (502, Unavailable, 3),

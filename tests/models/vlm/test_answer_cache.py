@@ -128,3 +128,15 @@ def test_a_models_answer_is_no_rehearsal(tmp_path: Path) -> None:
         with counted() as bill:
             Cached(Scripted(["a"]), tmp_path).ask(question())
         assert not bill.rehearsed
+
+
+def test_an_answer_that_cannot_be_kept_is_given_all_the_same(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with FakeServer(FakeOpenAi(Faults({}), KEY, answer_mug)) as server:
+        chat = cached_chat(server.url, tmp_path)
+        chat.ask(question())
+        (kept,) = tmp_path.rglob("*.json")
+        kept.unlink()
+        kept.mkdir()
+        assert chat.ask(question()).text
+    assert "the answer is not kept" in caplog.text
+    assert list(kept.parent.iterdir()) == [kept]

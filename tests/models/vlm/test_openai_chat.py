@@ -19,7 +19,8 @@ from manitwin.errors import AccessDenied, BadReply, ConfigError, RateLimited, Un
 from manitwin.models.fakes.faults import ALWAYS, Faults
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.server import FakeServer, Response
-from manitwin.models.vlm.openai_chat import OpenAiChat, completion
+from manitwin.models.services.keys import redacted
+from manitwin.models.vlm.openai_chat import OpenAiChat
 from manitwin.models.vlm.protocol import Turn
 from manitwin.models.vlm.structured import ask, probe
 from scripted_service import Script
@@ -242,7 +243,10 @@ def test_unknown_model_is_named() -> None:
     ],
 )
 def test_body_of_another_form_is_a_bad_reply(body: bytes) -> None:
-    with FakeServer(Script(Response(200, body))) as server, pytest.raises(BadReply, match="no chat completion"):
+    with (
+        FakeServer(Script(Response(200, body))) as server,
+        pytest.raises(BadReply, match=r"no chat completion|no JSON object"),
+    ):
         chat(server).ask(question())
 
 
@@ -294,9 +298,7 @@ def test_key_that_a_server_repeats_is_not_passed_on(
 def test_key_is_not_passed_on_by_half() -> None:
     secret = "sk-very-secret-0123456789"
     for before in range(150, 320):
-        with pytest.raises(BadReply) as caught:
-            completion(b"x" * before + secret.encode(), question(), "m", secret, 9)
-        assert "sk-very" not in str(caught.value)
+        assert "sk-very" not in redacted("x" * before + secret, secret)
 
 
 def test_price_of_a_server_elsewhere_has_to_be_known() -> None:

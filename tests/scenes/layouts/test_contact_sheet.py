@@ -50,6 +50,19 @@ def test_first_scenes_of_a_run_are_shown_the_same_each_time(tmp_path: Path) -> N
     assert write_contact_sheet(tmp_path / "twins", out) == 3
 
 
+@pytest.mark.parametrize("content", [b"", b"RIFF", b"hello", b"\x89PNG\r\n\x1a\n" + bytes(40)])
+def test_drawn_picture_that_cannot_be_read_is_said(content: bytes, tmp_path: Path) -> None:
+    write_things(tmp_path / "twins", (slab("box", 0.1, 0.1, 0.1),))
+    config = LayoutsConfig(layout=LayoutSettings(objects=(1, 1)))
+    make_layouts(tmp_path / "twins", tmp_path / "out", 1, config, executor="inline")
+    (scene,) = tmp_path.glob("out/scenes/*/*")
+    (scene / "pictures").mkdir()
+    (scene / "pictures/oblique_rgb.webp").write_bytes(content)
+    with pytest.raises(UsageError, match=r"oblique_rgb\.webp: no picture that can be read; remove its scene's folder"):
+        write_contact_sheet(tmp_path / "twins", tmp_path / "out")
+    assert not (tmp_path / "out" / CONTACT_SHEET).exists()
+
+
 def test_run_without_an_accepted_scene_has_no_sheet(tmp_path: Path) -> None:
     write_things(tmp_path / "twins", (slab("board", 0.5, 0.5, 0.015),))
     config = LayoutsConfig(layout=LayoutSettings(objects=(3, 3), surface="tray"))

@@ -2,16 +2,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from manitwin.errors import UsageError
+from manitwin.errors import TwinError, UsageError
 from manitwin.scenes.layouts.layouts_run import without_upright
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose, pool_of, read_pool
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.store import RECORD, seal
-from scene_twins import BOWL_HEIGHT_M, THINGS, bowl, pool_of_things, slab, write_things
+from scene_twins import BOWL_HEIGHT_M, THINGS, bowl, pool_of_things, slab, write_thing, write_things
 from twin_folders import write_rejected
 
 
@@ -74,4 +75,24 @@ def test_twins_without_an_upright_placement_that_stayed_are_named(tmp_path: Path
 
 def test_place_without_twins_says_so(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="no accepted twin"):
+        read_pool(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"placements": None}, "placements"),
+        ({"placements": [{"settled": True}]}, "placements.0.position_m"),
+        ({"status": "lost", "mesh": 3}, "mesh"),
+        ({"language": {"category": ["mug"]}}, "language.category"),
+    ],
+)
+def test_a_record_that_somebody_has_changed_is_one_line(tmp_path: Path, change: dict[str, Any], says: str) -> None:
+    identity = write_thing(tmp_path, 0, THINGS[1])
+    path = tmp_path / "twins" / identity[:2] / identity / "twin.json"
+    path.write_text(json.dumps(json.loads(path.read_bytes()) | change))
+    with pytest.raises(TwinError, match=says):
+        read_pool(tmp_path)
+    path.write_text("[" * 100_000)
+    with pytest.raises(TwinError, match="nested too deep"):
         read_pool(tmp_path)

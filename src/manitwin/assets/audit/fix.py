@@ -15,7 +15,9 @@ from manitwin.assets.asset import Asset
 from manitwin.assets.audit.convex_shapes import ConvexShapes
 from manitwin.assets.read import only_file, robotwin_data
 from manitwin.assets.readers.robotwin_data import FRAME_KEYS, read_json
-from manitwin.formats.xml_file import add, edited_document, new_element, read_xml
+from manitwin.errors import AssetError
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.xml_file import MAX_XML_BYTES, add, edited_document, new_element, read_xml
 from manitwin.twin.store import write_bytes_atomically
 
 NEARLY = 0.05
@@ -127,5 +129,5 @@ def _replace(file: Path, content: bytes) -> None:
     """Write a file whole, keeping the first version of it as ``<name>.orig``."""
     kept = file.with_name(f"{file.name}.orig")
     if not kept.exists():
-        write_bytes_atomically(kept, file.read_bytes())
+        write_bytes_atomically(kept, read_bytes(file, MAX_XML_BYTES, AssetError, inside=file.parent))
     write_bytes_atomically(file, content)

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from manitwin.assets.audit.finding import Finding, Rule
-from manitwin.assets.audit.run import Audited
+from manitwin.assets.audit.finding import Audited, Finding, Rule, RuleText
 from manitwin.formats.installation import installed_version
 from manitwin.formats.markdown import one_line
+from manitwin.formats.printable import printable_line
 
 PAGE = "docs/audit.md"
 SARIF_SCHEMA = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -29,8 +30,8 @@ def text_of(each: Audited) -> str:
     """Return the lines of one asset, empty where nothing was found and nothing fixed."""
     if not each.findings and not each.fixed:
         return ""
-    lines = [f"{each.asset}{f' ({each.format})' if each.format else ''}"]
-    lines += [f"  fixed           {said}" for said in each.fixed]
+    lines = [f"{printable_line(each.asset)}{f' ({each.format})' if each.format else ''}"]
+    lines += [f"  fixed           {printable_line(said)}" for said in each.fixed]
     lines += [f"  {finding.code} {finding.severity:<8} {one_line(finding.message)}" for finding in each.findings]
     return "\n".join(lines)
 
@@ -77,7 +78,7 @@ def _finding_json(finding: Finding) -> dict[str, Any]:
     }
 
 
-def sarif_of(audited: Sequence[Audited], rules: Sequence[Rule]) -> str:
+def sarif_of(audited: Sequence[Audited], rules: Sequence[RuleText]) -> str:
     """Return all findings as a SARIF log, with the help of every rule that was applied.
 
     Source: OASIS, Static Analysis Results Interchange Format 2.1.0, sections 3.13 (log), 3.19 (driver), 3.27 (result), 3.49
@@ -106,7 +107,7 @@ def sarif_of(audited: Sequence[Audited], rules: Sequence[Rule]) -> str:
     return json.dumps(log, indent=1, allow_nan=False, ensure_ascii=False) + "\n"
 
 
-def _rule_sarif(rule: Rule) -> dict[str, Any]:
+def _rule_sarif(rule: RuleText) -> dict[str, Any]:
     return {
         "id": rule.code,
         "name": "".join(word.capitalize() for word in rule.name.split("-")),
@@ -131,7 +132,7 @@ def _result_sarif(finding: Finding, rule_index: int) -> dict[str, Any]:
 
 def _uri(path: Path) -> str:
     """Return a path as a URI: relative as it was given, or absolute with its scheme."""
-    return path.as_uri() if path.is_absolute() else quote(path.as_posix())
+    return path.as_uri() if path.is_absolute() else quote(os.fsencode(path))
 
 
 def _plain(value: Any) -> Any:

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import hashlib
-import json
+import os
 import re
 import shutil
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from manitwin.assets.asset import Asset, Format
-from manitwin.assets.importers.record import asset_to_object, import_record, shown_parts
-from manitwin.assets.read import find_assets, read_asset, robotwin_data
+from manitwin.assets.read import find_assets, is_file_below, robotwin_data
+from manitwin.assets.within_limits import within_limits
 from manitwin.errors import AssetError, UsageError
-from manitwin.formats.glb import write_glb
-from manitwin.formats.meshes.textures import bake_transform
-from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, ImportRecord, is_imported
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.twin.import_record import ImportRecord, is_imported
 from manitwin.twin.store import replace_folder
 
-MAX_TEXTURE_SIZE = 8192
-"""Textures are kept as they are: none of the collections has larger ones."""
+if TYPE_CHECKING:
+    from manitwin.assets.asset import Format
+
+READ = "manitwin.assets.importers.conversion:read_for_import"
 
 DIGEST_DIGITS = 8
 """32 bits tell apart the few assets that share a name."""
@@ -41,32 +41,19 @@ class Imported:
     there_already: bool = False
 
 
-def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
-    """Return the files of an imported asset, by name, and its record; raises AssetError where it has no visual mesh.
-
-    ``asset.glb`` has the visual meshes in metres, Y up as glTF is; the same asset gives the same bytes.
-    """
-    to_object = asset_to_object(asset)
-    record = import_record(asset, to_object)
-    parts = [bake_transform(part, to_object) for part in shown_parts(asset)]
-    text = json.dumps(record.model_dump(mode="json"), indent=1, sort_keys=True, allow_nan=False) + "\n"
-    files = {IMPORTED_MESH: write_glb(parts, max_texture_size=MAX_TEXTURE_SIZE), IMPORT_RECORD: text.encode()}
-    return files, record
-
-
 def import_assets(paths: Iterable[Path], out: Path, *, format: Format | Literal["auto"] = "auto") -> Iterator[Imported]:
     """Import all assets at and below paths into ``out``, each into a folder of its name; yield what became of each.
 
-    An asset that cannot be read is said and left out. Nothing is written over: an asset that is there already is left as it
-    is, and another one of the same name gets a folder whose name ends in a digest of what was imported. Raises UsageError
-    for a path that is not there, and where a folder of another kind has the name.
+    An asset that cannot be read, or not within limits of time and memory, is said and left out. Nothing is written over: an
+    asset that is there already is left as it is, and another one of the same name gets a folder whose name ends in a digest
+    of what was imported. Raises UsageError for a path that is not there, and where a folder of another kind has the name.
     """
     for path in paths:
-        if not path.exists():
+        if not os.path.exists(path):
             raise UsageError(f"{path}: not there; give an asset's file or folder, or a folder of assets")
         for place in _places(path, format):
             try:
-                files, record = imported_files(read_asset(place, format))
+                files, record = within_limits(READ, place, format)
             except AssetError as error:
                 yield Imported(place, None, None, str(error))
                 continue
@@ -74,6 +61,23 @@ def import_assets(paths: Iterable[Path], out: Path, *, format: Format | Literal[
             if not there_already:
                 _write(files, folder)
             yield Imported(place, folder, record, there_already=there_already)
+
+
+def kept_words(record: ImportRecord) -> list[str]:
+    """Return in words what an import kept, besides the mesh."""
+    kept = [] if record.category is None else [record.category]
+    kept += [] if record.mass_kg is None else [f"mass {record.mass_kg:.4g} kg"]
+    kept += [] if record.friction_static is None else [f"friction {record.friction_static:.3g}"]
+    kept += [] if record.inertia_kg_m2 is None else ["inertia"]
+    for count, what in (
+        (len(record.captions), "captions"),
+        (len(record.functional_points), "functional points"),
+        (len(record.grasp_points), "grasp points"),
+        (sum(len(grasps.held) for grasps in record.grasps), "grasps"),
+        (len(record.rests), "resting poses"),
+    ):
+        kept += [f"{count} {what}"] if count else []
+    return kept
 
 
 def folder_name(record: ImportRecord) -> str:
@@ -100,9 +104,17 @@ def _folder_for(files: dict[str, bytes], out: Path, name: str) -> tuple[Path, bo
             return folder, False
         if not is_imported(folder):
             raise UsageError(f"{folder}: there already, and no imported asset; give another folder with -o")
-        if all((folder / file).is_file() and (folder / file).read_bytes() == files[file] for file in files):
+        if all(_holds(folder, file, content) for file, content in files.items()):
             return folder, True
     raise UsageError(f"{folder}: imported before and changed since; move it away, or give another folder with -o")
+
+
+def _holds(folder: Path, name: str, content: bytes) -> bool:
+    """Tell whether a file of a folder has this content: more of it is not read."""
+    file = folder / name
+    if not is_file_below(file, folder) or file.stat().st_size != len(content):
+        return False
+    return read_bytes(file, len(content), UsageError, inside=folder) == content
 
 
 def _write(files: dict[str, bytes], folder: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -20,6 +19,7 @@ MAX_FRICTION = 10.0
 """Above any coefficient of dry friction: clean metals that seize have about 5."""
 
 _UP_TO_Z = {"z": np.eye(3), "y": GLTF_TO_OBJECT[:3, :3]}
+_HEXADECIMAL = frozenset("0123456789abcdef")
 _MAX_TEXTS, _MAX_LETTERS, _MAX_POINTS = 64, 500, 64
 _OFF_M = 1e-3  # a millimetre above the table an object falls, below it a simulator throws it out
 
@@ -102,23 +102,6 @@ def _validated(asset: Asset, fields: dict[str, Any]) -> ImportRecord:
         raise AssetError(f"{asset.path.name}: {place}: {first['msg']}; mend it where it was made") from error
 
 
-def kept_words(record: ImportRecord) -> list[str]:
-    """Return in words what an import kept, besides the mesh."""
-    kept = [] if record.category is None else [record.category]
-    kept += [] if record.mass_kg is None else [f"mass {record.mass_kg:.4g} kg"]
-    kept += [] if record.friction_static is None else [f"friction {record.friction_static:.3g}"]
-    kept += [] if record.inertia_kg_m2 is None else ["inertia"]
-    for count, what in (
-        (len(record.captions), "captions"),
-        (len(record.functional_points), "functional points"),
-        (len(record.grasp_points), "grasp points"),
-        (sum(len(grasps.held) for grasps in record.grasps), "grasps"),
-        (len(record.rests), "resting poses"),
-    ):
-        kept += [f"{count} {what}"] if count else []
-    return kept
-
-
 def _numbers(asset: Asset) -> tuple[dict[str, float | None], list[str]]:
     """Return mass, friction and restitution where they can be true, and what is missing of them."""
     contact = asset.contact
@@ -176,8 +159,17 @@ def _unit(vector: np.ndarray) -> list[float] | None:
 
 def _words(name: str) -> str:
     """Return a file's or an element's name as words: no underscores, and no numbers around it."""
-    spaced = " ".join(re.sub(r"[_\-]+", " ", name).split())
-    return re.sub(r"^(\d+\s+)+|(\s+[0-9a-f]{8,}|\s+\d+)+$", "", spaced).strip() or spaced
+    words = name.replace("_", " ").replace("-", " ").split()
+    first, last = 0, len(words)
+    while first < last - 1 and words[first].isdecimal():
+        first += 1
+    while last > first + 1 and (words[last - 1].isdecimal() or _is_digest(words[last - 1])):
+        last -= 1
+    return " ".join(words[first:last])
+
+
+def _is_digest(word: str) -> bool:
+    return len(word) >= 8 and set(word) <= _HEXADECIMAL
 
 
 def _why(asset: Asset) -> str:

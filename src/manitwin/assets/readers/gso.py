@@ -11,8 +11,10 @@ import trimesh
 
 from manitwin.assets.asset import Asset
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
-from manitwin.assets.read import SCAN_METADATA
+from manitwin.assets.read import SCAN_METADATA, is_file_below
 from manitwin.assets.readers.sdf import asset_of, open_sdf
+from manitwin.errors import AssetError
+from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import decode_texture, make_part, material_of, normals_of, uv_of
 
@@ -35,9 +37,10 @@ def read(path: Path) -> Asset:
     visual = tuple(_textured(list(asset.visual), files, folder))
     metadata, category = folder / SCAN_METADATA, None
     licence, attribution = asset.license, asset.attribution
-    if metadata.is_file() and metadata.stat().st_size <= _MAX_TEXT:
+    if is_file_below(metadata, folder) and metadata.stat().st_size <= _MAX_TEXT:
         files.used.add(metadata.resolve())
-        found = _CATEGORY.search(metadata.read_text(errors="replace"))
+        content = read_bytes(metadata, _MAX_TEXT, AssetError, inside=folder)
+        found = _CATEGORY.search(content.decode("utf-8", errors="replace"))
         category = found.group(1) if found else None
         if licence is None:
             licence, attribution = LICENSE, ATTRIBUTION
@@ -57,7 +60,8 @@ def read(path: Path) -> Asset:
 
 def _textured(parts: list[trimesh.Trimesh], files: AssetFiles, folder: Path) -> list[trimesh.Trimesh]:
     """Put the model's one texture on parts that name one beside the mesh, where it is not."""
-    textures = sorted((folder / "materials" / "textures").glob("*.png"))
+    pictures = (folder / "materials" / "textures").glob("*.png")
+    textures = sorted(file for file in pictures if is_file_below(file, folder))
     bare = [p for p in parts if uv_of(p) is not None and material_of(p).baseColorTexture is None]
     absent = [name for name in files.missing if Path(name).name in {t.name for t in textures}]
     if not bare or not absent:

@@ -11,7 +11,7 @@ import numpy as np
 from manitwin.assets.asset import Asset, Contact, Inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.errors import AssetError
-from manitwin.formats.json_file import json_number, json_object, json_vector, parse_json
+from manitwin.formats.json_file import json_number, json_object, json_vector, read_json_object
 from manitwin.formats.meshes.textures import bake_transform
 from manitwin.geometry.poses import GLTF_TO_OBJECT, rotation_between, rotation_from_quaternion_wxyz, transform
 
@@ -67,7 +67,7 @@ def _annotations(folder: Path, files: AssetFiles) -> dict[str, Any]:
     file = files.find(ANNOTATIONS, [folder / ANNOTATIONS])
     if file is None:
         return {}
-    annotations = parse_json(file)
+    annotations = read_json_object(file)
     for key in sorted(annotations.keys() - _KNOWN):
         value = annotations[key]
         size = f" of {len(value)}" if isinstance(value, dict | list) else ""
@@ -131,7 +131,7 @@ def _captions(folder: Path, files: AssetFiles) -> tuple[tuple[str, ...], str | N
     file = files.find(CAPTIONS, [folder / CAPTIONS])
     if file is None:
         return (), None
-    content = parse_json(file)
+    content = read_json_object(file)
     texts: list[str] = []
     for value in content.values():
         for entry in value if isinstance(value, list) else [value]:

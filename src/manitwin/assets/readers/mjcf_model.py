@@ -15,9 +15,10 @@ from PIL import Image
 
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles, joined
 from manitwin.errors import AssetError
+from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, decode_texture
-from manitwin.formats.xml_file import MAX_NUMBER, comments_before, read_xml, xml_text
+from manitwin.formats.xml_file import MAX_NUMBER, MAX_XML_BYTES, comments_before, read_xml, xml_text
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
 _SECTIONS = frozenset({"compiler", "default", "asset", "worldbody"})
@@ -26,6 +27,7 @@ _ASSETS = frozenset({"mesh", "material", "texture"})
 _NOT_READ = ("attach", "composite", "flexcomp", "plugin", "replicate", "model")
 _WORDS = frozenset({"name", "file", "mesh", "material", "texture", "class", "childclass", "model", "user"})
 _MAX_INCLUDES = 32
+_HEAD_BYTES = 1 << 16
 _MAX_ELEMENTS = 100_000
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
 
@@ -79,7 +81,8 @@ def _put_in_includes(file: Path, root: etree._Element, files: AssetFiles) -> Non
         if found in done or len(done) > _MAX_INCLUDES:
             raise AssetError(f"{file.name}: includes {name[:80]!r} twice, or too many files")
         done.add(found)
-        tag = "mujocoinclude" if b"<mujocoinclude" in found.read_bytes()[:65536] else "mujoco"
+        head = read_bytes(found, MAX_XML_BYTES, AssetError)[:_HEAD_BYTES]
+        tag = "mujocoinclude" if b"<mujocoinclude" in head else "mujoco"
         included = read_xml(found, tag)
         parent, position = include.getparent(), include.getparent().index(include)
         parent.remove(include)
@@ -174,7 +177,7 @@ def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str
         path = _find(source, spec.texturedir, texture.file, spec, files)
         if path is not None and path.stat().st_size <= MESH_LIMITS.max_bytes:
             notes = MeshSource(path, MESH_LIMITS)
-            image = decode_texture(path.read_bytes(), path.name, notes)
+            image = decode_texture(notes.data(), path.name, notes)
             for sentence in notes.findings:
                 files.remark(sentence)
             if image is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 
 from manitwin.assets.asset import AnnotatedFrame, FrameKind
 from manitwin.errors import AssetError
-from manitwin.formats.json_file import parse_json
+from manitwin.formats.json_file import read_json_object
 
 MAX_FRAMES = 10_000
 LARGEST = 1e6  # metres, or scale: what is beyond is no object
@@ -138,7 +139,7 @@ class RobotwinData:
     def _numbers(self, key: str, value: Any) -> np.ndarray:
         try:
             numbers = np.array(value, dtype=float)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise self._broken(key, "is not made of numbers") from error
         if not np.isfinite(numbers).all() or (np.abs(numbers) > LARGEST).any():
             raise self._broken(key, "holds a number that is not finite, or beyond a million")
@@ -150,7 +151,7 @@ class RobotwinData:
 
 def read_json(file: Path) -> dict[str, Any]:
     """Read a JSON object from a file, empty where the file is not there; raises AssetError for anything else."""
-    return parse_json(file) if file.is_file() else {}
+    return read_json_object(file, inside=file.parent) if os.path.lexists(file) else {}
 
 
 def _unit(vector: np.ndarray | None) -> np.ndarray | None:

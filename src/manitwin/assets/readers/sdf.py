@@ -11,7 +11,7 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.licence_text import stated_licence, stated_or_none
-from manitwin.assets.read import only_file
+from manitwin.assets.read import is_file_below, only_file
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
 from manitwin.errors import AssetError
 from manitwin.formats.xml_file import comments_before, number, read_xml, text_of
@@ -48,12 +48,12 @@ def open_sdf(path: Path) -> SdfModel:
     """Parse an SDF and choose the object in it; raises AssetError."""
     file = path
     if path.is_dir():
-        file = path / MAIN_FILE if (path / MAIN_FILE).is_file() else only_file(path)
+        file = path / MAIN_FILE if is_file_below(path / MAIN_FILE, path) else only_file(path)
     root = read_xml(file, "sdf")
     files = AssetFiles(file.parent)
     files.used.add(file.resolve())
     config = file.parent / CONFIG_FILE
-    beside = read_xml(config, "model") if config.is_file() else None
+    beside = read_xml(config, "model", inside=config.parent) if is_file_below(config, config.parent) else None
     if beside is not None:
         files.used.add(config.resolve())
     model = _only_model(file, root, files)

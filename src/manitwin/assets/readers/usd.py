@@ -16,8 +16,9 @@ from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
 from manitwin.assets.readers.usd_layers import LayerFiles
 from manitwin.assets.readers.usd_shapes import LayeredSurfaces, StageShapes
+from manitwin.assets.within_limits import LIMITS, why_ended
 from manitwin.errors import AssetError, InputError
-from manitwin.formats.isolated import MAX_MEMORY_BYTES, ProcessCrashed, run_isolated
+from manitwin.formats.isolated import ProcessCrashed, TookTooLong, run_isolated
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 
@@ -29,13 +30,11 @@ def read(path: Path) -> Asset:
     is broken, also where the USD library crashes on it.
     """
     try:
-        asset: Asset = run_isolated("manitwin.assets.readers.usd:read_here", path.absolute())
+        asset: Asset = run_isolated("manitwin.assets.readers.usd:read_here", path.absolute(), limits=LIMITS)
+    except (TookTooLong, MemoryError) as error:
+        raise AssetError(f"{path}: {why_ended(error)}") from error
     except ProcessCrashed as error:
         raise AssetError(f"{path}: its USD is so broken that the USD library crashes on it; export it again") from error
-    except MemoryError as error:
-        raise AssetError(
-            f"{path}: it asks for more than {MAX_MEMORY_BYTES >> 30} GiB of memory; simplify it"
-        ) from error
     return asset
 
 

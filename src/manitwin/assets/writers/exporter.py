@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import pyarrow.parquet
 import trimesh
 
 from manitwin.assets.writers.format_notes import FormatNotes
@@ -45,11 +44,11 @@ class TwinContent:
         return cls(
             name=export_name(record),
             record=record,
-            visual_glb=(twin.folder / "visual.glb").read_bytes(),
+            visual_glb=twin.read_bytes("visual.glb"),
             visual=tuple(twin.visual),
             hulls=tuple((np.asarray(hull.vertices), np.asarray(hull.faces)) for hull in twin.hulls),
-            grasps=pyarrow.parquet.read_table(twin.folder / "grasps.parquet").to_pydict(),
-            source=(twin.folder / record.source.file).read_bytes(),
+            grasps=twin.grasp_table().to_pydict(),
+            source=twin.read_bytes(record.source.file),
         )
 
 

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from manitwin.cli import choices, options
-from manitwin.cli.console import err_console
+from manitwin.cli.console import err_console, write_json, write_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from manitwin.assets.audit.finding import Rule
-    from manitwin.assets.audit.run import Audited
+    from manitwin.assets.audit.finding import Audited, RuleText
 
 
 def audit(
@@ -30,7 +28,7 @@ def audit(
         str, choices.AUDIT_FORMATS.option("--format", "-f", help="text, json or sarif.", metavar="FORMAT")
     ] = "text",
     fix: Annotated[bool, typer.Option("--fix", help="Mend what is safe; old files stay beside as .orig.")] = False,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes.")] = 1,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, max=options.MOST_JOBS, help="Processes.")] = 1,
     explain: Annotated[str | None, typer.Option(help="Say what a rule is about, and stop.", metavar="CODE")] = None,
 ) -> None:
     """Find what is wrong with assets of any tool: mass, inertia, collision, scale, frames, grasps. Exit 1 on errors."""
@@ -39,13 +37,15 @@ def audit(
     if explain is None and not paths:
         raise UsageError("no PATH given: name assets or folders of them, or --explain CODE")
     from manitwin.assets.audit.report import explanation
-    from manitwin.assets.audit.run import audit_all, find_all, rule_of, select_rules
+    from manitwin.assets.audit.run import audit_all, find_all, rules_selected
     from manitwin.assets.read import VALID_ASSETS
 
     if explain is not None:
-        sys.stdout.write(explanation(rule_of(explain)) + "\n")
+        from manitwin.assets.audit.selection import rule_of
+
+        write_text(explanation(rule_of(explain)) + "\n")
         return
-    rules = select_rules((select or "").split(","), (ignore or "").split(","))
+    rules = rules_selected((select or "").split(","), (ignore or "").split(","))
     if not rules:
         raise UsageError("--select and --ignore leave no rule; leave one of them out")
     assets = find_all(paths or [])
@@ -65,14 +65,14 @@ def _write_text(each: Audited) -> None:
 
     text = text_of(each)
     if text:
-        sys.stdout.write(text + "\n")
+        write_text(text + "\n")
 
 
-def _write_end(audited: Sequence[Audited], rules: Sequence[Rule], format: str) -> None:
+def _write_end(audited: Sequence[Audited], rules: Sequence[RuleText], format: str) -> None:
     from manitwin.assets.audit.report import json_of, sarif_of, summary
 
     if format == "text":
-        sys.stdout.write(summary(audited) + "\n")
+        write_text(summary(audited) + "\n")
         return
-    sys.stdout.write(json_of(audited) if format == "json" else sarif_of(audited, rules))
-    err_console.print(summary(audited), markup=False)
+    write_json(json_of(audited) if format == "json" else sarif_of(audited, rules))
+    err_console.print(summary(audited))

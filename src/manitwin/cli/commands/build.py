@@ -75,7 +75,7 @@ Dataset = Annotated[str, typer.Option("--dataset", "--out", "-o", callback=choic
 @wraps(build)
 def run(**given: Any) -> None:
     """Do as ``build``, whose name for many inputs this was."""
-    err_console.print(RUN_RENAMED, markup=False)
+    err_console.print(RUN_RENAMED)
     build(**given)
 
 
@@ -105,7 +105,7 @@ def _watched_build(inputs: list[Path], out: str, *, lines: bool, **arguments: An
         watched.progress.stage(event)
         if getattr(event, "state", None) == "waiting" and event.stage not in waits:
             waits.add(event.stage)
-            err_console.print(f"{event.stage} waits: {event.detail}", markup=False)  # type: ignore[union-attr]
+            err_console.print(f"{event.stage} waits: {event.detail}")  # type: ignore[union-attr]
 
     def ended(result: ItemResult) -> None:
         watched.progress.ended(result.item, result.status, result.reused)
@@ -122,27 +122,25 @@ def _print_report(report: BuildReport, lines: bool) -> None:
     from manitwin.cli.run_summary import grasp_lines, summarize_grasps
 
     for remark in report.remarks:
-        err_console.print(remark, markup=False)
+        err_console.print(remark)
     if lines:
         _print_others(report)
     counted = {status: report.count(status) for status in STYLES}
     said = ", ".join(f"{count} {status}" for status, count in counted.items() if count or status != "duplicate")
-    out_console.print(f"{said}, in {report.dataset}", markup=False)
+    out_console.print(f"{said}, in {report.dataset}")
     if counted["accepted"] <= MOST_RECORDS:
         for line in grasp_lines(summarize_grasps(report.records())):
-            out_console.print(line, markup=False)
+            out_console.print(line)
     if report.run.left:
         # a build that was stopped says by itself what for: no money left, a key that is refused
         why = "" if report.run.stopped else " for a service that does not answer"
-        err_console.print(f"{report.run.left} inputs wait{why}", markup=False)
+        err_console.print(f"{report.run.left} inputs wait{why}")
     if report.run.stopped:
         print_error(f"stopped: {report.run.stopped}")
     told = len(report.run.given) == 1 and lines and not out_console.quiet
     print_causes(report.dataset, report.run.given, told=told)
     if report.open:
-        err_console.print(
-            f"manitwin status {report.dataset} says more; run the same command again to go on", markup=False
-        )
+        err_console.print(f"manitwin status {report.dataset} says more; run the same command again to go on")
 
 
 def _print_others(report: BuildReport) -> None:
@@ -152,7 +150,7 @@ def _print_others(report: BuildReport) -> None:
         _print_result(result)
     more = sum(1 for _ in others)
     if more:
-        out_console.print(f"... and {more} more that were there already (--json tells them all)", markup=False)
+        out_console.print(f"... and {more} more that were there already (--json tells them all)")
 
 
 def _print_result(result: ItemResult) -> None:
@@ -162,4 +160,4 @@ def _print_result(result: ItemResult) -> None:
     line = f"{result.status:<10} {result.item.title}: {result.detail}{again}{where}"
     # what has not been made is an error, though a person who looks on reads of it among the other inputs
     console = error_console if out_console.quiet and result.status == "unfinished" else out_console
-    console.print(line, style=STYLES[result.status], markup=False)
+    console.print(line, style=STYLES[result.status])

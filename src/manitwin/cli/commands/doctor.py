@@ -16,7 +16,7 @@ import typer
 
 from manitwin.cli import choices, options
 from manitwin.cli.console import out_console
-from manitwin.errors import ManiTwinError
+from manitwin.errors import ManiTwinError, UsageError
 from manitwin.formats.installation import missing_libraries, package_by_policy
 
 if TYPE_CHECKING:
@@ -70,8 +70,6 @@ def doctor(
     config: options.Config = None,
 ) -> None:
     """Say what is there and what is missing on this machine, or whether a served model answers."""
-    from manitwin.errors import UsageError
-
     specs = {"vlm": vlm, "generator": generator, "grasper": grasper}
     if what is None:
         given = [f"--{name}" for name, spec in specs.items() if spec is not None]
@@ -85,14 +83,15 @@ def doctor(
         wrong = "failed "
         findings = [asked(KINDS[what], specs[what] or getattr(settings, KINDS[what]), settings)]
     for finding in findings:
-        out_console.print(f"{'ok     ' if finding.ok else wrong} {finding.name}: {finding.detail}", markup=False)
+        out_console.print(f"{'ok     ' if finding.ok else wrong} {finding.name}: {finding.detail}")
     raise typer.Exit(0 if all(finding.ok for finding in findings) else 4)
 
 
 def asked(kind: str, spec: str, settings: BuildConfig) -> Examined:
     """Send one small request to the backend of a spec: what works, what it cost and how long it took.
 
-    No remembered answer is taken for one, and none is remembered. Raises ConfigError for a name that no backend has.
+    No remembered answer is taken for one, and none is remembered. Raises UsageError for a name that no backend has, and for
+    a backend that cannot be asked as it was given: its address, its key, its options.
     """
     from manitwin.engine.charges import counted
     from manitwin.models.registry import create, target
@@ -107,6 +106,8 @@ def asked(kind: str, spec: str, settings: BuildConfig) -> Examined:
             if not hasattr(backend, "probe"):
                 return Examined(spec, True, "built in, nothing to ask")
             works, ok = backend.probe(), True
+        except UsageError:
+            raise
         except ManiTwinError as error:
             works, ok = str(error), False
     seconds = time.perf_counter() - started

@@ -51,7 +51,7 @@ def export(
     done = [_export(folder, formats, out, allowed, ids) for folder in twin_folders(twins)]
     refused = done.count(False)
     line = f"{done.count(True):,} twins exported to {out}"
-    out_console.print(f"{line}, {refused:,} refused" if refused else line, markup=False)
+    out_console.print(f"{line}, {refused:,} refused" if refused else line)
     raise typer.Exit(3 if refused else 0)
 
 
@@ -74,8 +74,8 @@ def export_scenes(files: list[Path], out: Path, to: str) -> None:
 
     for file in files:
         written = export_scene(file, [name.strip() for name in to.split(",")], out)
-        out_console.print(f"{file.parent.name}: {', '.join(written)}", markup=False)
-    out_console.print(f"{len(files):,} scenes exported to {out}", markup=False)
+        out_console.print(f"{file.parent.name}: {', '.join(written)}")
+    out_console.print(f"{len(files):,} scenes exported to {out}")
 
 
 def twin_folders(given: list[str]) -> Iterator[Path]:
@@ -134,7 +134,7 @@ def _export(
             written.append(name)
         except ExportError as error:
             print_error(f"{name}: {error}")
-    out_console.print(f"{content.name}: {', '.join(written) or 'nothing'}", markup=False)
+    out_console.print(f"{content.name}: {', '.join(written) or 'nothing'}")
     return len(written) == len(formats)
 
 

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from manitwin.cli import choices
+from manitwin.cli.choices import LARGEST_COUNT
 from manitwin.cli.console import out_console
 
 
@@ -20,7 +21,9 @@ def fake(
         typer.Option(help="What is to go wrong: NAME always, NAME=2 twice; may be repeated.", metavar="FAULT"),
     ] = None,
     key: Annotated[str | None, typer.Option(help="The key that it accepts; default: one made for it.")] = None,
-    polls: Annotated[int | None, typer.Option(help="How often a job is looked at before it is done.", min=0)] = None,
+    polls: Annotated[
+        int | None, typer.Option(help="How often a job is looked at before it is done.", min=0, max=LARGEST_COUNT)
+    ] = None,
     list_faults: Annotated[bool, typer.Option("--list-faults", help="List what can go wrong, and end.")] = False,
 ) -> None:
     """Serve a rehearsal of a service on this machine until interrupted."""
@@ -30,7 +33,7 @@ def fake(
 
     if list_faults:
         for word, meaning in FAULTS.items():
-            out_console.print(f"{word:<15} {meaning}", markup=False)
+            out_console.print(f"{word:<15} {meaning}")
         return
     if name is None:
         raise UsageError(f"no service is named; give one of {', '.join(REHEARSALS)}")
@@ -45,11 +48,11 @@ def fake(
     signal.signal(signal.SIGINT, interrupted)
     try:
         with serving(name, port=port, faults=given, key=key, polls=polls) as server:
-            out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)", markup=False)
+            out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)")
             if server.key_variable is not None:
-                out_console.print(f"export {server.key_variable}={server.key}", markup=False)
-            out_console.print(f"manitwin build PHOTO -o OUT {server.option} {server.spec}", markup=False)
+                out_console.print(f"export {server.key_variable}={server.key}")
+            out_console.print(f"manitwin build PHOTO -o OUT {server.option} {server.spec}")
             stop.wait()
-        out_console.print("stopped", markup=False)
+        out_console.print("stopped")
     finally:
         signal.signal(signal.SIGINT, before)

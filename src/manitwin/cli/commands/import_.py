@@ -30,8 +30,7 @@ def import_(
 ) -> None:
     """Take assets of other tools over, keep what is annotated, and say what is missing."""
 
-    from manitwin.assets.importers.importer import import_assets
-    from manitwin.assets.importers.record import kept_words
+    from manitwin.assets.importers.importer import import_assets, kept_words
 
     done = there = failed = 0
     for imported in import_assets(paths, out, format=format):  # type: ignore[arg-type]
@@ -42,16 +41,16 @@ def import_(
             continue
         if imported.there_already:
             there += 1
-            out_console.print(f"{imported.folder.name}: imported before, left as it is", markup=False)
+            out_console.print(f"{imported.folder.name}: imported before, left as it is")
             continue
         done += 1
         record = imported.record
         kept = ", ".join(kept_words(record)) or "the mesh only"
         missing = f"; missing {', '.join(record.missing)}" if record.missing else ""
-        out_console.print(f"{imported.folder.name}: {record.format}; kept {kept}{missing}", markup=False)
+        out_console.print(f"{imported.folder.name}: {record.format}; kept {kept}{missing}")
         for remark in record.remarks:
-            out_console.print(f"  {remark}", markup=False)
+            out_console.print(f"  {remark}")
     before = f", {there} imported before" if there else ""
     then = f"; manitwin build {out} -o TWINS fills in what is missing" if done or there else ""
-    out_console.print(f"{done} imported{before}, {failed} not{then}", markup=False)
+    out_console.print(f"{done} imported{before}, {failed} not{then}")
     raise typer.Exit(3 if failed else 0)

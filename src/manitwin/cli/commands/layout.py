@@ -34,8 +34,8 @@ def layout(
     include: Annotated[
         list[str] | None, typer.Option(help="A category that must be there; may be repeated.", metavar="CATEGORY")
     ] = None,
-    stacked: Annotated[int | None, typer.Option(help="How many stand on another object.")] = None,
-    contained: Annotated[int | None, typer.Option(help="How many lie in a vessel.")] = None,
+    stacked: Annotated[int | None, typer.Option(help="How many stand on another object.", min=0, max=200)] = None,
+    contained: Annotated[int | None, typer.Option(help="How many lie in a vessel.", min=0, max=200)] = None,
     upright: Annotated[
         bool, typer.Option("--upright", help="Put down upright what has an upright placement that stayed.")
     ] = False,
@@ -71,13 +71,13 @@ def layout(
         report = make_layouts(dataset, out, count, config=settings, **options.placed(run), **watched.callbacks)
     totals = layout_totals(out)
     if settings.layout.upright and (lying := without_upright(dataset)):
-        out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}", markup=False)
+        out_console.print(f"twins that have no upright placement and lie as they rest: {len(lying)}")
     _print_totals(totals)
     if sheet and totals.accepted:
         from manitwin.scenes.layouts.previews import write_contact_sheet
 
         shown = write_contact_sheet(dataset, out)
-        out_console.print(f"{shown} of {totals.accepted} scenes in {out}/{CONTACT_SHEET}", markup=False)
+        out_console.print(f"{shown} of {totals.accepted} scenes in {out}/{CONTACT_SHEET}")
     if report.stopped:
         print_error(f"stopped: {report.stopped}")
     print_causes(out)
@@ -91,20 +91,23 @@ def layout(
 def _print_totals(totals: LayoutTotals) -> None:
     ended = totals.accepted + sum(totals.rejected.values())
     why = "".join(f", {n} {reason}" for reason, n in totals.rejected.items())
-    out_console.print(f"{totals.accepted} of {ended} layouts accepted ({totals.acceptance:.1%}){why}", markup=False)
+    out_console.print(f"{totals.accepted} of {ended} layouts accepted ({totals.acceptance:.1%}){why}")
     out_console.print(
         f"{totals.objects} objects; {totals.repaired} layouts were repaired; as they settled, objects moved at most "
         f"{1000 * totals.max_moved_m:.1f} mm and turned {degrees(totals.max_turned_rad):.1f} degrees; they overlap by at most "
         f"{1000 * totals.max_penetration_m:.2f} mm; {totals.cpu_seconds / max(1, ended):.2f} CPU-s each",
-        markup=False,
     )
 
 
 def _range(text: str) -> tuple[int, int]:
     from manitwin.errors import UsageError
+    from manitwin.scenes.settings import MOST_OBJECTS
 
     low, _, high = text.partition("..")
     try:
-        return int(low), int(high or low)
+        least, most = int(low), int(high or low)
     except ValueError:
         raise UsageError(f"--objects {text}: give LOW..HIGH, such as 3..12") from None
+    if not 1 <= least <= most <= MOST_OBJECTS:
+        raise UsageError(f"--objects {text}: give LOW..HIGH with 1 <= LOW <= HIGH <= {MOST_OBJECTS}, such as 3..12")
+    return least, most

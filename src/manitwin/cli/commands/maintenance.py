@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -9,60 +10,100 @@ import typer
 from manitwin.cli import choices, options
 from manitwin.cli.console import err_console, note_old_layout, out_console, print_error
 
+_AGAIN = "the build command with its inputs finds what is finished again, and builds the rest"
+
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from manitwin.twin.dataset_root import DatasetRoot
 
 
 def check(
     dataset: Annotated[str, typer.Argument(help="A data set: a folder or URL.", metavar="DATASET")],
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Only say what is wrong, repair nothing.")] = False,
+    digests: Annotated[
+        bool, typer.Option("--digests", help="Compare every byte of finished twins, not sizes.")
+    ] = False,
 ) -> None:
     """Prove that ledger, folders and tables of a data set agree, and put right what does not."""
     from manitwin.dataset.check import disagreements
-    from manitwin.engine.ledger.ledger import Ledger, read_ledger
+    from manitwin.engine.ledger.ledger import Ledger
     from manitwin.engine.ledger.location import local_ledger
-    from manitwin.pipeline.settings import stored_config
+    from manitwin.errors import UsageError
+    from manitwin.pipeline.settings import NotTwins, stored_config
     from manitwin.twin.dataset_root import DatasetRoot
 
     root = DatasetRoot(dataset)
-    if root.flat:
-        _check_flat(root)
-        return
     path = local_ledger(root)
-    with read_ledger(path):
-        pass  # a data set without a ledger is said to be none, and not given one
-    ledger = Ledger(path)
+    if root.flat or not _is_ledger(path, root, dry_run):
+        _check_folders(root, dry_run, digests)
+        return
     left = repaired = 0
     try:
-        for found in list(disagreements(ledger, root, stored_config(root).run.keep_work)):
+        keeps_work = stored_config(root).run.keep_work
+    except NotTwins:  # by the folders of twins, all that is finished there would be opened again
+        raise
+    except UsageError as error:
+        err_console.print(f"{error}, or remove it: the next build writes it again")
+        left, keeps_work = 1, True
+    ledger = Ledger(path)
+    try:
+        for found in list(disagreements(ledger, root, keeps_work, digests=digests)):
             if found.repair is None or dry_run:
                 left += 1
-                err_console.print(found.what, markup=False)
+                err_console.print(found.what)
             else:
                 found.repair()
                 repaired += 1
-                out_console.print(f"{found.what}: put right", markup=False)
+                out_console.print(f"{found.what}: put right")
         counts = ledger.counts()
     finally:
         ledger.close()
     states = ", ".join(f"{count} {state}" for state, count in counts.items())
     verdict = "ledger and folders agree" if not left else f"{left} things are wrong"
     again = f"; {repaired} put right, manitwin build -o {dataset} does what is open again" if repaired else ""
-    out_console.print(f"{states}: {verdict}{again}", markup=False)
+    out_console.print(f"{states}: {verdict}{again}")
     raise typer.Exit(4 if left else 0)
 
 
-def _check_flat(root: DatasetRoot) -> None:
-    """Check the twins of a folder of the old layout, which has no ledger to agree with."""
-    from manitwin.dataset.check import damaged_twins
+def _is_ledger(path: Path, root: DatasetRoot, dry_run: bool) -> bool:
+    """Tell whether a data set has a ledger that can be read; a damaged one is put aside. Raises UsageError without twins."""
+    from manitwin.engine.ledger.lock import hold_lock
+    from manitwin.engine.ledger.reading import read_ledger
+    from manitwin.engine.ledger.soundness import LedgerDamaged, put_aside
+
+    if not os.path.lexists(path) and root.has_twins:
+        out_console.print(f"{path}: no ledger; {_AGAIN}")
+        return False
+    try:
+        with read_ledger(path) as ledger:
+            ledger.execute("PRAGMA quick_check(1)").fetchone()
+        return True
+    except LedgerDamaged as error:
+        cause = str(error).partition("; ")[0]
+        if dry_run:
+            err_console.print(f"{cause}; without --dry-run it is put aside, and then {_AGAIN}")
+            return False
+        with hold_lock(path):
+            out_console.print(f"{cause}: put aside as {put_aside(path).name}; {_AGAIN}")
+        return False
+
+
+def _check_folders(root: DatasetRoot, dry_run: bool, digests: bool) -> None:
+    """Check the twins of a data set without a ledger, or of the old layout, and its index where it has one."""
+    from manitwin.dataset.check import damaged_twins, index_damage, indexed_again
 
     note_old_layout(root)
-    damaged = list(damaged_twins(root))
-    for line in damaged:
-        err_console.print(line, markup=False)
+    damaged = list(damaged_twins(root, digests=digests))
+    index = index_damage(root)
+    for line in (*damaged, *([index] if index and (dry_run or damaged) else [])):
+        err_console.print(line)
+    if index and not dry_run and not damaged:
+        indexed_again(root)
+        out_console.print(f"{index}: put right")
     verdict = f"{len(damaged)} are damaged" if damaged else "all their files are there"
-    out_console.print(f"{len(list(root.twin_ids()))} twins: {verdict}", markup=False)
-    raise typer.Exit(4 if damaged else 0)
+    out_console.print(f"{len(list(root.twin_ids()))} twins: {verdict}")
+    raise typer.Exit(4 if damaged or (index and dry_run) else 0)
 
 
 def retry(
@@ -72,8 +113,9 @@ def retry(
     reason: Annotated[str | None, typer.Option(help="Only items that ended for this reason.")] = None,
 ) -> None:
     """Open failed or rejected items again, their attempts forgotten; the next run takes them up."""
-    from manitwin.engine.ledger.ledger import Ledger, read_ledger
+    from manitwin.engine.ledger.ledger import Ledger
     from manitwin.engine.ledger.location import local_ledger
+    from manitwin.engine.ledger.reading import read_ledger
     from manitwin.errors import UsageError, choose_from
     from manitwin.twin.dataset_root import DatasetRoot
 
@@ -96,7 +138,7 @@ def retry(
         count = ledger.reopen(number for number, _ in rows)
     finally:
         ledger.close()
-    out_console.print(f"{count} items are open again; manitwin build -o {dataset} takes them up", markup=False)
+    out_console.print(f"{count} items are open again; manitwin build -o {dataset} takes them up")
 
 
 def index(
@@ -125,5 +167,5 @@ def index(
     for line in written.unreadable:
         print_error(f"left out: {line}")
     accepted, rejected, grasps = (written.rows(table) for table in ("twins", "rejections", "grasps"))
-    out_console.print(f"{accepted} accepted, {rejected} rejected, {grasps} grasps indexed in {dataset}", markup=False)
+    out_console.print(f"{accepted} accepted, {rejected} rejected, {grasps} grasps indexed in {dataset}")
     raise typer.Exit(4 if written.unreadable else 0)

@@ -27,4 +27,4 @@ def prompts(
     settings: BuildConfig = load_config(config) if config else BuildConfig()
     asked = questions_about(twin, settings, vlm)
     write_questions(asked, out)
-    out_console.print(f"{len(asked.questions)} questions in {out}: begin with README.md", markup=False)
+    out_console.print(f"{len(asked.questions)} questions in {out}: begin with README.md")

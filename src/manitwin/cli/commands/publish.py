@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from manitwin.cli import options
+from manitwin.cli.choices import LARGEST_COUNT
 from manitwin.cli.console import err_console, note_old_layout, out_console
 
 if TYPE_CHECKING:
@@ -35,8 +36,12 @@ def publish(
         bool,
         typer.Option("--with-rehearsals", help="Also twins that a rehearsal server (manitwin fake) had a part in."),
     ] = False,
-    shard_size_mb: Annotated[int, typer.Option(help="The most that a shard may have, in 10^6 bytes.")] = SHARD_SIZE_MB,
-    twins_per_shard: Annotated[int | None, typer.Option(help="The most twins of a shard; default: any number.")] = None,
+    shard_size_mb: Annotated[
+        int, typer.Option(help="The most that a shard may have, in 10^6 bytes.", min=1, max=1_000_000)
+    ] = SHARD_SIZE_MB,
+    twins_per_shard: Annotated[
+        int | None, typer.Option(help="The most twins of a shard; default: any number.", min=1, max=LARGEST_COUNT)
+    ] = None,
     twins: options.Twins = None,
     name: Annotated[str | None, typer.Option(help="What the card calls it; default: the name of OUT.")] = None,
 ) -> None:
@@ -67,8 +72,8 @@ def publish(
         on_shard=_say_shard,
     )
     for line in outcome_lines(published):
-        out_console.print(line, markup=False)
-    out_console.print(f"in {out}", markup=False)
+        out_console.print(line)
+    out_console.print(f"in {out}")
 
 
 def _publish_episodes(
@@ -85,7 +90,7 @@ def _publish_episodes(
         *_held_back_lines(published),
     ]
     for line in (*lines, f"in {out}"):
-        out_console.print(line, markup=False)
+        out_console.print(line)
 
 
 def _held_back_lines(published: Published | PublishedEpisodes) -> list[str]:
@@ -114,4 +119,4 @@ def outcome_lines(published: Published) -> list[str]:
 
 def _say_shard(done: ShardDone) -> None:
     what = "there already" if done.kept else "written"
-    err_console.print(f"{done.number}/{done.total} {done.name} {what}", markup=False)
+    err_console.print(f"{done.number}/{done.total} {done.name} {what}")

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
 import sys
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, TextIO
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from manitwin.cli import choices
-from manitwin.cli.console import note_old_layout, out_console
+from manitwin.cli.console import note_old_layout, out_console, write_json, write_text
+from manitwin.formats.printable import printable_line
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -27,6 +29,8 @@ SHOWN = {
 }
 """What a table on the screen shows where no columns are asked for; the other formats write all."""
 
+Write = Callable[[str], None]
+
 NARROWEST = 16
 """Characters that a column keeps: a twin's id."""
 
@@ -40,10 +44,22 @@ def query(
         str, choices.TABLES.option(help="twins, points, grasps, placements, rejections or stages.", metavar="NAME")
     ] = "twins",
     columns: Annotated[str | None, typer.Option(help="Columns to print, with commas between.", metavar="A,B")] = None,
-    limit: Annotated[int | None, typer.Option(help="Print at most so many rows.", metavar="N")] = None,
+    limit: Annotated[
+        int | None, typer.Option(help="Print at most so many rows.", metavar="N", min=0, max=choices.LARGEST_COUNT)
+    ] = None,
     format: Annotated[
         str, choices.QUERY_FORMATS.option("--format", "-f", help="table, csv, json or ids.", metavar="FORMAT")
     ] = "table",
+    timeout: Annotated[
+        float,
+        typer.Option(
+            help="Give up after so many seconds.", metavar="SECONDS", callback=choices.amount_of("--timeout", 1e6)
+        ),
+    ] = 60.0,
+    memory_gb: Annotated[
+        float,
+        typer.Option(help="Use so much memory at most.", metavar="GB", callback=choices.amount_of("--memory-gb", 1e5)),
+    ] = 4.0,
 ) -> None:
     """Print the rows of a data set's index that satisfy a condition, sorted by twin."""
     from manitwin.errors import UsageError
@@ -57,17 +73,17 @@ def query(
         names = list(SHOWN.get(table, ())) or None
     if format == "ids":
         names = ["twin_id"]
-    answers = Index(dataset)
+    answers = Index(dataset, timeout_s=timeout, memory_gb=memory_gb)
     note_old_layout(answers.root)
     rows = answers.select(table, where or (), columns=names, limit=limit)
     try:
-        WRITERS[format](rows, sys.stdout)
+        WRITERS[format](rows, write_json if format == "json" else write_text)
         sys.stdout.flush()
     except BrokenPipeError:  # `| head` has seen enough; Python flushes once more at its end (its manual, "SIGPIPE")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _write_table(rows: pa.Table, stream: TextIO) -> None:
+def _write_table(rows: pa.Table, write: Write) -> None:
     """Write columns side by side; a terminal's width cuts the widest ones, into a file or pipe they go whole."""
     lines = [rows.column_names, *([_shown(value) for value in row.values()] for row in rows.to_pylist())]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
@@ -76,8 +92,8 @@ def _write_table(rows: pa.Table, stream: TextIO) -> None:
         widths[widths.index(max(widths))] -= 1
     for line in lines:
         cells = (_cut(cell, width).ljust(width) for cell, width in zip(line, widths, strict=True))
-        stream.write("  ".join(cells).rstrip() + "\n")
-    stream.write(f"{len(rows)} rows\n")
+        write("  ".join(cells).rstrip() + "\n")
+    write(f"{len(rows)} rows\n")
 
 
 def _cut(cell: str, width: int) -> str:
@@ -89,33 +105,39 @@ def _shown(value: Any) -> str:
         return f"{value:.4g}"
     if isinstance(value, list):
         return json.dumps([float(f"{v:.4g}") if isinstance(v, float) else v for v in value])
-    return "" if value is None else " ".join(str(value).split())
+    return "" if value is None else printable_line(" ".join(str(value).split()))
 
 
-def _write_csv(rows: pa.Table, stream: TextIO) -> None:
+def _write_csv(rows: pa.Table, write: Write) -> None:
+    """Write RFC 4180 with what a terminal would obey escaped; --format json keeps every character."""
+    stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(rows.column_names)
     for batch in rows.to_batches(max_chunksize=4096):
         for row in batch.to_pylist():
             writer.writerow([json.dumps(value) if isinstance(value, list) else value for value in row.values()])
+        write(stream.getvalue())
+        stream.seek(0)
+        stream.truncate()
+    write(stream.getvalue())
 
 
-def _write_json(rows: pa.Table, stream: TextIO) -> None:
+def _write_json(rows: pa.Table, write: Write) -> None:
     """Write one array with one row a line, so that it can also be read line by line."""
     before = "[\n"
     for batch in rows.to_batches(max_chunksize=4096):
         for row in batch.to_pylist():
-            stream.write(before + json.dumps(row, ensure_ascii=False))
+            write(before + json.dumps(row, ensure_ascii=False))
             before = ",\n"
-    stream.write("\n]\n" if len(rows) else "[]\n")
+    write("\n]\n" if len(rows) else "[]\n")
 
 
-def _write_ids(rows: pa.Table, stream: TextIO) -> None:
+def _write_ids(rows: pa.Table, write: Write) -> None:
     for twin_id in dict.fromkeys(rows["twin_id"].to_pylist()):
-        stream.write(f"{twin_id}\n")
+        write(f"{printable_line(twin_id)}\n")
 
 
-WRITERS: dict[str, Callable[[pa.Table, TextIO], None]] = {
+WRITERS: dict[str, Callable[[pa.Table, Write], None]] = {
     "table": _write_table,
     "csv": _write_csv,
     "json": _write_json,

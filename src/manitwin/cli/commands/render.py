@@ -24,7 +24,7 @@ def render(
         ),
     ],
     cameras: Annotated[str | None, choices.CAMERAS.option(help="By commas: front, side, top, wrist.")] = None,
-    size: Annotated[int | None, typer.Option(help="Width and height of a picture in pixels.")] = None,
+    size: Annotated[int | None, typer.Option(help="Width and height of a picture in pixels.", min=64, max=2048)] = None,
     codec: Annotated[
         str | None, choices.CODECS.option(help="vp9 (plays in browsers), or mpeg4 (quicker to write).")
     ] = None,
@@ -49,14 +49,11 @@ def render(
     for each in written:
         out_console.print(
             f"{each.episodes} episodes, {each.frames} frames, {len(settings.cameras)} cameras: {episodes}/lerobot",
-            markup=False,
         )
     if report.exit_code == 4:
         if report.stopped:
             print_error(f"stopped: {report.stopped}")
         print_causes(f"{episodes}/pictures")
         if report.open:
-            err_console.print(
-                f"manitwin status {episodes}/pictures says more; run the same command again", markup=False
-            )
+            err_console.print(f"manitwin status {episodes}/pictures says more; run the same command again")
         raise typer.Exit(4)

@@ -27,7 +27,7 @@ def stats(
     note_old_layout(DatasetRoot(dataset))
     written = write_statistics(dataset, out)
     if written.text:
-        out_console.print(written.text, markup=False, soft_wrap=True)
-        out_console.print(written.page, markup=False)
+        out_console.print(written.text, paragraph=True)
+        out_console.print(written.page)
     else:
-        out_console.print(f"{written.summary}: {written.page}", markup=False)
+        out_console.print(f"{written.summary}: {written.page}")

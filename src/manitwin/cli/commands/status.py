@@ -39,10 +39,10 @@ def status(
         raise UsageError("--json prints one document, and --watch goes on; give one of them")
     from manitwin.cli.causes import group_causes
     from manitwin.cli.documents import status_document, story_document
-    from manitwin.engine.ledger.ledger import read_ledger
     from manitwin.engine.ledger.location import local_ledger
     from manitwin.engine.ledger.lock import is_written
     from manitwin.engine.ledger.progress import read_progress, read_story, read_unaccepted
+    from manitwin.engine.ledger.reading import read_ledger
     from manitwin.pipeline.stage_order import place_in_pipeline
     from manitwin.twin.dataset_root import DatasetRoot
 
@@ -69,9 +69,9 @@ def _watch(path: Path) -> None:
     """Show a ledger anew every two seconds, until interrupted."""
     from rich.live import Live
 
-    from manitwin.engine.ledger.ledger import read_ledger
     from manitwin.engine.ledger.lock import is_written
     from manitwin.engine.ledger.progress import read_progress
+    from manitwin.engine.ledger.reading import read_ledger
     from manitwin.pipeline.stage_order import place_in_pipeline
 
     def view() -> RenderableType:
@@ -91,17 +91,15 @@ def _print_causes(causes: list[Cause], dataset: str) -> None:
     """Print every cause: how many it ended, one of them, and what to do."""
     for cause in causes[:MOST_CAUSES]:
         code = f" {cause.reason}" if cause.state == "rejected" else ""
-        out_console.print(
-            f"{cause.count} {cause.state}{code}, such as item {cause.example}: {cause.message}", markup=False
-        )
+        out_console.print(f"{cause.count} {cause.state}{code}, such as item {cause.example}: {cause.message}")
         if cause.remedy:
-            out_console.print(f"  remedy: {cause.remedy}", markup=False)
+            out_console.print(f"  remedy: {cause.remedy}")
     if len(causes) > MOST_CAUSES:
-        out_console.print(f"and {len(causes) - MOST_CAUSES} more causes", markup=False)
+        out_console.print(f"and {len(causes) - MOST_CAUSES} more causes")
     if any(cause.state == "failed" for cause in causes):
-        out_console.print(f"`manitwin retry {dataset}` opens what failed again", markup=False)
+        out_console.print(f"`manitwin retry {dataset}` opens what failed again")
     if causes:
-        out_console.print(f"`manitwin status {dataset} --why {causes[0].example}` tells all of one item", markup=False)
+        out_console.print(f"`manitwin status {dataset} --why {causes[0].example}` tells all of one item")
 
 
 def _view(progress: Progress) -> RenderableType:
@@ -152,4 +150,4 @@ def _print_story(story: ItemStory) -> None:
         error = f": {row.error}" if row.error else ""
         lines.append(f"  {row.stage:<16} {row.state:<9} {row.key or '':<24}{cost}{tries}{error}")
     for line in lines:
-        out_console.print(line, markup=False)
+        out_console.print(line)

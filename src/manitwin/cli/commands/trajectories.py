@@ -36,7 +36,9 @@ def trajectories(
     ] = None,
     skill: Annotated[str | None, choices.SKILLS.option(help="What to do: pick_place.")] = None,
     twins: options.Twins = None,
-    others: Annotated[int | None, typer.Option(help="So many other objects around, where twins are given.")] = None,
+    others: Annotated[
+        int | None, typer.Option(help="So many other objects around, where twins are given.", min=0, max=20)
+    ] = None,
     retire: Annotated[
         bool, typer.Option("--retire/--no-retire", help="Retire grasps that fail, in their twins' records.")
     ] = True,
@@ -63,15 +65,15 @@ def trajectories(
             **options.placed(run), **watched.callbacks,
         )  # fmt: skip
     for remark in report.run.remarks:
-        err_console.print(remark, markup=False)
+        err_console.print(remark)
     if report.totals is None:
         _print_unfinished(report.run, out)
     else:
         for line in report.lines:
-            out_console.print(line, markup=False)
+            out_console.print(line)
         if retire:
             _print_retired(report.retired, report.newly_retired)
-        out_console.print(f"manitwin stats {out} says more", markup=False)
+        out_console.print(f"manitwin stats {out} says more")
     if json:
         print_document(trajectories_document(report, str(out), causes_of(str(out))))
     if report.totals is None:
@@ -83,11 +85,11 @@ def _print_unfinished(report: RunReport, out: Path) -> None:
         print_error(f"stopped: {report.stopped}")
     print_causes(str(out))
     if report.open:
-        err_console.print(f"manitwin status {out} says more; run the same command again to go on", markup=False)
+        err_console.print(f"manitwin status {out} says more; run the same command again to go on")
 
 
 def _print_retired(found: list[Retirement], fresh: int) -> None:
-    out_console.print(f"{len(found)} grasps fail end to end, {fresh} of them retired now", markup=False)
+    out_console.print(f"{len(found)} grasps fail end to end, {fresh} of them retired now")
     for each in found:
         what = ", ".join(f"{n} {outcome}" for outcome, n in each.outcomes.items())
-        out_console.print(f"  {each.twin_id} {each.grasp_id}: {each.failed} of {each.executed} ({what})", markup=False)
+        out_console.print(f"  {each.twin_id} {each.grasp_id}: {each.failed} of {each.executed} ({what})")

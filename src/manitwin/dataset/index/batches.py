@@ -9,7 +9,8 @@ from typing import Any, Literal
 import numpy as np
 import pyarrow as pa
 
-from manitwin.dataset.index.query import Index, grasps_of, sql_texts
+from manitwin.dataset.index.conditions import sql_texts
+from manitwin.dataset.index.query import Index, grasps_of
 from manitwin.dataset.index.rows import VISUAL, surface
 from manitwin.dataset.index.twins import local_files
 from manitwin.errors import UsageError, choose_from

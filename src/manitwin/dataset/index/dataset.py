@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, SupportsIndex, overl
 import pyarrow as pa
 
 from manitwin.dataset.index.part_list import PartList
-from manitwin.dataset.index.query import Index, grasps_of
+from manitwin.dataset.index.query import MEMORY_GB, TIMEOUT_S, Index, grasps_of
 from manitwin.dataset.index.twins import Twins, local_files
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
@@ -36,12 +36,21 @@ class Dataset(Sequence["Twin"]):
     """The accepted twins of a data set, a folder or a URL, or those of them that satisfy conditions: a sequence sorted by id.
 
     Answers come from the index; twins' folders are read when a record or twin is asked for, ``dataset[0]`` loads one, and a
-    slice is a sequence that loads none before it is asked. Raises UsageError where there is no index, and for conditions and
-    columns that cannot be used, when it is first asked; IndexError for a place that there is not.
+    slice is a sequence that loads none before it is asked. Raises UsageError where there is no index, and, when it is first
+    asked, for conditions and columns that cannot be used, or take more than ``timeout_s`` or ``memory_gb``; IndexError for a
+    place that there is not.
     """
 
-    def __init__(self, root: str | Path | DatasetRoot, *, _index: Index | None = None, _where: tuple[str, ...] = ()):
-        self._index = _index or Index(root)
+    def __init__(
+        self,
+        root: str | Path | DatasetRoot,
+        *,
+        timeout_s: float = TIMEOUT_S,
+        memory_gb: float = MEMORY_GB,
+        _index: Index | None = None,
+        _where: tuple[str, ...] = (),
+    ):
+        self._index = _index or Index(root, timeout_s=timeout_s, memory_gb=memory_gb)
         self._where = _where
         self._sorted: tuple[PartList, Twins] | None = None
 

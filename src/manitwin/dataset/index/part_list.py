@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-import json
+import os
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
 
 from manitwin.dataset.index.tables import SCHEMA_ID, TABLES
 from manitwin.errors import UsageError
+from manitwin.formats.bounded_file import Refusal, open_regular, with_remedy
+from manitwin.formats.parquet_file import check_parquet
+from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json
 
 INDEX = "index"
 PARTS = f"{INDEX}/parts.json"
+MAX_ROWS = 1 << 40
+"""Of a table, and of its files: they are read a row group at a time."""
 
 
 @dataclass(frozen=True)
@@ -60,21 +67,72 @@ def read_part_list(root: DatasetRoot) -> PartList | None:
 
     Raises UsageError for an index of other tables than this version's.
     """
+    remedy = remedy_of(root)
     try:
-        content = root.read_bytes(PARTS)
+        data = root.read_json(PARTS, refusal_of(root))
     except FileNotFoundError:
         return None
     try:
-        data = json.loads(content)
-        parts = tuple(IndexPart(**part) for part in data["parts"])
-        found = PartList(parts, data["next"], data["schema_id"])
+        parts = tuple(_part(said) for said in data["parts"])
+        found = PartList(parts, _count(data["next"]), data["schema_id"])
     except (ValueError, KeyError, TypeError) as error:
-        raise UsageError(f"{root.full(PARTS)}: cannot be read ({error}); run manitwin index {root.url}") from error
+        said = printable_line(str(error), max_characters=120)
+        raise UsageError(f"{root.full(PARTS)}: no list of an index's parts ({said}); {remedy}") from error
     if found.schema_id != SCHEMA_ID:
         raise UsageError(
             f"{root.full(PARTS)}: its tables are of another version of manitwin; run manitwin index {root.url}"
         )
     return found
+
+
+def remedy_of(root: DatasetRoot) -> str:
+    """Return what mends a damaged index."""
+    return f"run manitwin check {root.url}"
+
+
+def refusal_of(root: DatasetRoot) -> Refusal:
+    """Return what makes the error of a file that is none: its own remedy gives way to that of an index."""
+    return with_remedy(UsageError, remedy_of(root))
+
+
+def require_files(root: DatasetRoot, parts: PartList) -> None:
+    """Raise UsageError where a part's file is none that can be read whole; those of a URL are left to who reads them."""
+    if root.local is None:
+        return
+    for part in parts.parts:
+        for table, schema in TABLES.items():
+            path = Path(root.full(part.file(table)))
+            if part.rows[table] or os.path.lexists(path):
+                rows = check_parquet(
+                    path, refusal_of(root), schema=schema, remedy=remedy_of(root), inside=root.local, max_rows=MAX_ROWS
+                )
+                if rows != part.rows[table]:
+                    raise UsageError(f"{path}: {rows} rows, {PARTS} says {part.rows[table]}; {remedy_of(root)}")
+
+
+def require_regular(root: DatasetRoot, parts: PartList) -> None:
+    """Raise UsageError where a part's file is no regular one below the root; one that has gone is left to who reads it."""
+    for part in parts.parts if root.local is not None else ():
+        for table in TABLES:
+            path = Path(root.full(part.file(table)))
+            if os.path.lexists(path):
+                open_regular(path, refusal_of(root), inside=root.local, name=str(path)).close()
+
+
+def _part(said: Any) -> IndexPart:
+    part = IndexPart(**said)
+    texts = all(isinstance(each, str) for each in (part.name, part.first, part.last))
+    if not texts or not part.name.isdecimal() or not part.name.isascii() or not isinstance(part.rows, dict):
+        raise ValueError(f"a part {str(part.name)[:40]!r}")
+    if part.rows.keys() != TABLES.keys():
+        raise ValueError(f"part {part.name} has not the rows of all tables")
+    return replace(part, rows={table: _count(rows) for table, rows in part.rows.items()})
+
+
+def _count(said: Any) -> int:
+    if type(said) is not int or not 0 <= said <= MAX_ROWS:
+        raise ValueError(f"{str(said)[:40]!r} is no count")
+    return said
 
 
 def in_order_of_twins(parts: Iterable[IndexPart]) -> tuple[IndexPart, ...]:

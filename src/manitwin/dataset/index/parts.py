@@ -8,6 +8,7 @@ the list before stay until the next write.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from math import ceil, log
@@ -19,10 +20,20 @@ import pyarrow.compute as pc
 import pyarrow.dataset as pads
 from pyarrow.fs import FSSpecHandler, LocalFileSystem, PyFileSystem
 
-from manitwin.dataset.index.part_list import IndexPart, PartList, in_order_of_twins, read_part_list, sweep
+from manitwin.dataset.index.part_list import (
+    INDEX,
+    IndexPart,
+    PartList,
+    in_order_of_twins,
+    read_part_list,
+    require_files,
+    sweep,
+)
 from manitwin.dataset.index.rows import FILES, rows_of
 from manitwin.dataset.index.tables import TABLES, joined, parquet
 from manitwin.dataset.index.twins import local_files
+from manitwin.errors import UsageError
+from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
 
 MERGE_WIDTH = 8
@@ -30,6 +41,8 @@ MERGE_WIDTH = 8
 
 PART_ROWS = 1 << 20
 """Grasps of a merged part, about: 60 MB on disk, 0.6 GB of memory to sort."""
+
+LOG = logging.getLogger("manitwin.index")
 
 Files = Mapping[str, Sequence[str]]
 """The files to read of each table, as the file system names them."""
@@ -45,6 +58,19 @@ class IndexTables:
     def merge(self, root: DatasetRoot) -> None:
         """Merge all parts into few large ones."""
         compact(root)
+
+    def heal(self, root: DatasetRoot) -> bool:
+        """Remove an index that cannot be read; returns True where there is none, so that all twins are to be added."""
+        try:
+            parts = read_part_list(root)
+            if parts is None:
+                return True
+            require_files(root, parts)
+        except UsageError as error:
+            LOG.warning("the index is written anew: %s", error)
+            root.remove(INDEX)
+            return True
+        return False
 
 
 def write_part(root: DatasetRoot, ids: Iterable[str]) -> IndexPart | None:
@@ -87,6 +113,7 @@ def compact(root: DatasetRoot) -> list[IndexPart]:
 def indexed_twins(root: DatasetRoot) -> dict[str, str]:
     """Return the revision of every twin in the index by its id; empty where there is no index."""
     parts = read_part_list(root) or PartList()
+    require_files(root, parts)
     files, fs = files_of(root, parts.parts), file_system(root)
     found: dict[str, str] = {}
     for table in ("twins", "rejections") if parts.parts else ():
@@ -127,6 +154,7 @@ class _Writer:
     """The parts of an index while they change; nothing counts before ``finish``."""
 
     def __init__(self, root: DatasetRoot, before: PartList):
+        require_files(root, before)
         self.root, self.fs = root, file_system(root)
         self.parts, self.next = list(before.parts), before.next
 
@@ -167,8 +195,12 @@ def files_of(root: DatasetRoot, parts: Sequence[IndexPart]) -> Files:
 
 def read_rows(files: Files, table: str, fs: Any, *, columns: list[str] | None = None, where: Any = None) -> pa.Table:
     """Return the rows of a table's files that satisfy a pyarrow expression."""
-    source = pads.dataset(list(files[table]), schema=TABLES[table], format="parquet", filesystem=fs)
-    return source.to_table(columns=columns, filter=where)
+    try:
+        source = pads.dataset(list(files[table]), schema=TABLES[table], format="parquet", filesystem=fs)
+        return source.to_table(columns=columns, filter=where)
+    except (pa.ArrowException, OSError) as error:
+        cause = printable_line(str(error).split("\n")[0], max_characters=160)
+        raise UsageError(f"table {table} of the index cannot be read ({cause}); run manitwin check DATASET") from error
 
 
 def twin_ids(files: Files, fs: Any) -> np.ndarray:

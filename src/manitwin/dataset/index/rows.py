@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-import json
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 import trimesh
 
 from manitwin.dataset.index.tables import TABLES
 from manitwin.engine.stage_runner import StageCost
-from manitwin.errors import InputError, TwinError
-from manitwin.formats.glb import read_glb
+from manitwin.errors import AssetError, TwinError
+from manitwin.formats.json_file import json_number, read_json_object
 from manitwin.geometry.shape_descriptor import ShapeDescriptor, shape_descriptor
 from manitwin.pipeline.stage_order import place_in_pipeline
-from manitwin.twin.grasp_table import SCHEMA as GRASPS_OF_A_TWIN
+from manitwin.twin.grasp_table import read_grasp_table
+from manitwin.twin.loaded_twin import read_visual
 from manitwin.twin.record import GraspSummary, Points, TwinRecord
-from manitwin.twin.store import RECORD, RUN, read_record
+from manitwin.twin.store import RECORD, REMEDY, RUN, read_record
 
 VISUAL, GRASPS = "visual.glb", "grasps.parquet"
 FILES = (RECORD, RUN, VISUAL, GRASPS)
@@ -56,12 +56,17 @@ def _as_tables(rows: dict[str, list[_Row]]) -> dict[str, pa.Table]:
 
 def _costs(folder: Path) -> dict[str, StageCost]:
     path = folder / RUN
+    if not os.path.lexists(path):
+        raise TwinError(f"{path}: missing; {REMEDY}")
+    said = read_json_object(path, TwinError, inside=folder, name=str(path), remedy=REMEDY)
     try:
-        return {name: StageCost(**cost) for name, cost in json.loads(path.read_text())["stages"].items()}
-    except FileNotFoundError as error:
-        raise TwinError(f"{path}: missing; build the twin again") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise TwinError(f"{path}: cannot be read ({error}); build the twin again") from error
+        return {name: _cost(cost) for name, cost in said["stages"].items()}
+    except (KeyError, TypeError, AttributeError, AssetError) as error:
+        raise TwinError(f"{path}: cannot be read ({error}); {REMEDY}") from error
+
+
+def _cost(said: dict[str, Any]) -> StageCost:
+    return StageCost(**{name: json_number(value, name) for name, value in said.items()})
 
 
 def _origin(record: TwinRecord, costs: dict[str, StageCost]) -> _Row:
@@ -154,12 +159,9 @@ def _descriptor(path: Path) -> ShapeDescriptor:
 
 def surface(path: Path) -> trimesh.Trimesh:
     """Return all parts of a twin's ``visual.glb`` as one mesh without texture, in the object frame; raises TwinError."""
-    if not path.is_file():
-        raise TwinError(f"{path}: missing; build the twin again")
-    try:
-        parts = read_glb(path)
-    except InputError as error:
-        raise TwinError(f"{path}: cannot be read ({error.detail}); build the twin again") from error
+    parts = read_visual(path)
+    if not parts:
+        raise TwinError(f"{path}: has no mesh in it; {REMEDY}")
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = [np.asarray(part.faces) + start for part, start in zip(parts, starts, strict=False)]
     return trimesh.Trimesh(np.vstack([part.vertices for part in parts]), np.vstack(faces), process=False)
@@ -188,12 +190,7 @@ def _placements(record: TwinRecord) -> list[_Row]:
 
 def _grasps(path: Path, record: TwinRecord) -> pa.Table:
     """Return grasps.parquet with the twin's id and category and the number of each row, best first as in the file."""
-    try:
-        table = pq.read_table(path).select(GRASPS_OF_A_TWIN.names).cast(GRASPS_OF_A_TWIN)
-    except FileNotFoundError as error:
-        raise TwinError(f"{path}: missing; build the twin again") from error
-    except (pa.ArrowException, KeyError) as error:
-        raise TwinError(f"{path}: not the table of this version ({error}); build the twin again") from error
+    table = read_grasp_table(path)
     count = len(table)
     leading = [
         pa.array([record.twin_id] * count, pa.string()),

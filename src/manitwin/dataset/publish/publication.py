@@ -7,7 +7,6 @@ that is finished; a shard whose receipt says what is to be in it is not written 
 from __future__ import annotations
 
 import io
-import json
 import os
 import shutil
 import tempfile
@@ -18,11 +17,10 @@ from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO
 
-import pyarrow.parquet as pq
-
 from manitwin.dataset.publish.shard_plan import Shard, check_hub_limits
-from manitwin.dataset.publish.tables import SHARDS_FILE
+from manitwin.dataset.publish.tables import SHARDS, SHARDS_FILE
 from manitwin.errors import UsageError
+from manitwin.formats.parquet_file import read_parquet
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.store import canonical_json, sha256_of_file
 
@@ -30,6 +28,8 @@ SUMS = "SHA256SUMS"
 OPEN = ".publish"
 _STARTED = f"{OPEN}/started"
 _SCRATCH = "scratch-"
+_ANEW = "publish into a folder that is new or empty"
+_RECEIPT = {"shard": str, "twins": int, "bytes": int, "sha256": str, "contents_sha256": str}
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,9 @@ class Publication:
         root = self.root
         root.fs.invalidate_cache()
         if root.exists(_STARTED):
-            begun = root.read_bytes(_STARTED).decode() or TWINS.name  # an older version wrote it empty, for twins
+            begun = (
+                root.read_bytes(_STARTED, UsageError, limit_bytes=1024).decode(errors="replace") or TWINS.name
+            )  # an older version wrote it empty, for twins
             if begun != self.kind.name:
                 raise UsageError(
                     f"{root.url}: a publication of {begun} was begun there; give a folder that is new or empty"
@@ -79,13 +81,17 @@ class Publication:
         root = self.root
         if not root.exists(_STARTED):
             if self.kind == TWINS and self._is_finished():
-                for row in pq.read_table(io.BytesIO(root.read_bytes(SHARDS_FILE))).to_pylist():
+                content = io.BytesIO(root.read_bytes(SHARDS_FILE, UsageError))
+                name = root.full(SHARDS_FILE)
+                for row in read_parquet(content, UsageError, schema=SHARDS, remedy=_ANEW, name=name).to_pylist():
                     self._write_receipt(row)
             root.write_bytes(_STARTED, self.kind.name.encode())
         root.remove(SUMS)
         for name in root.names_below(OPEN):
             if name.endswith(".json") and PurePosixPath(name).parent == PurePosixPath(OPEN):
-                receipt = json.loads(root.read_bytes(name))
+                receipt = root.read_json(name, UsageError, remedy=_ANEW)
+                if {field: type(value) for field, value in receipt.items()} != _RECEIPT:
+                    raise UsageError(f"{root.full(name)}: no receipt of a shard; {_ANEW}")
                 self._receipts[receipt["shard"]] = receipt
 
     def _is_finished(self) -> bool:

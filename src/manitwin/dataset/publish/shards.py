@@ -9,7 +9,6 @@ archive that unfolds into more than it weighs, and the files keep the bytes that
 from __future__ import annotations
 
 import io
-import json
 import re
 import tarfile
 import tempfile
@@ -17,14 +16,25 @@ import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from manitwin.dataset.publish.privacy import check_part, check_source
 from manitwin.dataset.publish.shard_plan import VIEWS, Shard, ShardTwin
 from manitwin.errors import TwinError, UsageError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.json_file import parse_json_object
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.record import TwinRecord
-from manitwin.twin.store import RECORD, RUN, canonical_json, parse_record, read_record, replace_folder, revision_of
+from manitwin.twin.store import (
+    RECORD,
+    REMEDY,
+    RUN,
+    canonical_json,
+    parse_record,
+    read_record,
+    replace_folder,
+    revision_of,
+)
 
 KEY = re.compile(r"[0-9A-Za-z_-]+")
 """What can be the key of a sample and the name of a folder."""
@@ -68,7 +78,7 @@ def twin_parts(root: DatasetRoot, twin: ShardTwin) -> Iterator[tuple[str, bytes]
 def _contents(root: DatasetRoot, folder: str, names: list[str]) -> dict[str, bytes]:
     try:
         if root.local is not None:
-            return {name: (root.local / folder / name).read_bytes() for name in names}
+            return {name: root.read_bytes(f"{folder}/{name}") for name in names}
         paths = {root.full(f"{folder}/{name}"): name for name in names}
         return {paths[path]: content for path, content in root.fs.cat(list(paths)).items()}  # all at once
     except FileNotFoundError as error:
@@ -78,7 +88,7 @@ def _contents(root: DatasetRoot, folder: str, names: list[str]) -> dict[str, byt
 def _record(root: DatasetRoot, twin: ShardTwin, content: bytes) -> TwinRecord:
     place = f"{root.full(root.twin_name(twin.twin_id))}/{RECORD}"
     record = parse_record(content, place)
-    if revision_of(json.loads(content)) != record.revision:
+    if revision_of(parse_json_object(content, place, TwinError, remedy=REMEDY)) != record.revision:
         raise TwinError(f"{place}: altered since it was written; build the twin again")
     if (record.twin_id, record.revision) != (twin.twin_id, twin.revision):
         raise UsageError(f"{place}: not the revision that the index has; run manitwin index {root.url}")
@@ -89,12 +99,12 @@ def _record(root: DatasetRoot, twin: ShardTwin, content: bytes) -> TwinRecord:
 def _run(root: DatasetRoot, folder: str) -> bytes | None:
     name = f"{folder}/{RUN}"
     try:
-        run: Any = json.loads(root.read_bytes(name))
+        run = root.read_json(name, TwinError, remedy=REMEDY)
         return canonical_json({"host": {}, "stages": run["stages"]}).encode()
     except FileNotFoundError:
         return None
-    except (ValueError, KeyError, TypeError) as error:
-        raise TwinError(f"{root.full(name)}: cannot be read ({error}); build the twin again") from error
+    except (KeyError, TypeError) as error:
+        raise TwinError(f"{root.full(name)}: cannot be read ({error}); {REMEDY}") from error
 
 
 def parts_of(files: Iterable[str]) -> dict[str, list[str]]:
@@ -163,8 +173,7 @@ def unpack_shard(shard: str | Path, out: str | Path) -> list[Path]:
     does not name, altered files.
     """
     path, place = Path(shard), Path(out)
-    if not path.is_file():
-        raise UsageError(f"{shard}: no such file; give a .tar of a published data set")
+    open_regular(path, UsageError, name=str(shard)).close()
     place.mkdir(parents=True, exist_ok=True)
     folders = []
     with tempfile.TemporaryDirectory(prefix=".unpack-", dir=place) as scratch:

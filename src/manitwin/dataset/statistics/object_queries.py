@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from manitwin.dataset.index.query import sql_text
+from manitwin.dataset.index.conditions import sql_text
 from manitwin.dataset.statistics.query import Column, Query, counts, histogram, labels, summary
 from manitwin.models.annotators.priors import Prior, lookup
 

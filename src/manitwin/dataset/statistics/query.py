@@ -10,9 +10,12 @@ import duckdb
 import pyarrow as pa
 from fsspec import AbstractFileSystem
 
-from manitwin.dataset.index.query import Index, location, sql_texts
+from manitwin.dataset.index.conditions import sql_texts
+from manitwin.dataset.index.part_list import remedy_of, require_files
+from manitwin.dataset.index.query import Index, location
 from manitwin.dataset.index.tables import TABLES
 from manitwin.errors import UsageError
+from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
 
 Kind = Literal["text", "count", "number", "given", "share", "signed", "usd"]
@@ -132,19 +135,24 @@ class ReportTables:
         *,
         prelude: str = PRELUDE,
         file_system: AbstractFileSystem | None = None,
+        remedy: str = "run manitwin check DATASET",
     ):
         """Take for every table a pyarrow table, or SQL that yields it: ``read_parquet('...')``; ``prelude`` has the macros.
 
         ``file_system`` is what reads files that are not local. One thread: sums of floats then do not depend on which one
-        came first, and memory stays flat.
+        came first, and memory stays flat. ``remedy`` ends what is said of tables that cannot be read.
         """
+        self._remedy = remedy
         self.connection = duckdb.connect()
         self.connection.execute("SET threads = 1; SET preserve_insertion_order = false")
         if file_system is not None:
             self.connection.register_filesystem(file_system)
         for name, table in tables.items():
             if isinstance(table, str):
-                self.connection.execute(f"CREATE TEMP VIEW {name} AS SELECT * FROM {table}")
+                try:
+                    self.connection.execute(f"CREATE TEMP VIEW {name} AS SELECT * FROM {table}")
+                except duckdb.Error as error:
+                    raise self._unreadable(error) from error
             else:
                 self.connection.register(name, table)
         self.connection.execute(prelude)
@@ -152,12 +160,14 @@ class ReportTables:
     @classmethod
     def of_index(cls, root: DatasetRoot) -> ReportTables:
         """Open a data set's index; raises UsageError where it has none."""
-        parts = Index(root).parts.parts
+        found = Index(root).parts
+        require_files(root, found)
+        parts = found.parts
         tables: dict[str, pa.Table | str] = {}
         for name, schema in TABLES.items():
             files = [location(root, part.file(name)) for part in parts if part.rows[name]]
             tables[name] = f"read_parquet([{sql_texts(files)}])" if files else schema.empty_table()
-        return cls(tables, file_system=None if root.local is not None else root.fs)
+        return cls(tables, file_system=None if root.local is not None else root.fs, remedy=remedy_of(root))
 
     def result(self, query: Query) -> Result:
         """Run a query; floats come with 12 digits, which do not depend on how rows are spread over files.
@@ -171,7 +181,17 @@ class ReportTables:
         except (duckdb.IOException, FileNotFoundError) as error:
             line = str(error).split("\n")[0]
             raise UsageError(f"the index changed while it was read ({line}); run the same command again") from error
+        except (duckdb.Error, MemoryError) as error:
+            raise self._unreadable(error) from error
+        except RuntimeError as error:
+            if "interrupt" in str(error).lower():  # DuckDB's words for what a signal's handler raised
+                raise KeyboardInterrupt from error
+            raise
         return Result(query, [dict(zip(names, map(_rounded, row), strict=True)) for row in rows])
+
+    def _unreadable(self, error: Exception) -> UsageError:
+        line = printable_line(str(error).split("\n")[0], max_characters=160)
+        return UsageError(f"the tables cannot be read ({line}); {self._remedy}")
 
 
 def _rounded(value: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manitwin.dataset.index.query import sql_text
+from manitwin.dataset.index.conditions import sql_text
 from manitwin.dataset.statistics.query import Column, Query, counts, labels
 from manitwin.pipeline.stage_order import STAGE_ORDER
 from manitwin.twin.record import REJECTION_REASONS

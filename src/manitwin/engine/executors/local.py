@@ -2,43 +2,61 @@
 
 from __future__ import annotations
 
-import faulthandler
-import json
 import logging
 import os
 import queue
 import signal
 import tempfile
 import time
-from collections.abc import Iterator
-from concurrent.futures import CancelledError, TimeoutError
-from contextlib import contextmanager, suppress
+from concurrent.futures import CancelledError
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, TextIO
+from typing import Any
 
 from pebble import ProcessExpired, ProcessPool
 
 from manitwin.config import Resource, RunConfig
-from manitwin.engine.jobs import Failure, Job, Reply, RunStage, WorkerSetup
-from manitwin.engine.stage import StagePart, heard_by
-from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import (
-    WorkerContext,
-    die_with,
-    hidden_main_module,
-    one_thread_each,
-    spared_from_interrupts,
-)
+from manitwin.engine.executors.local_worker import LastWords, do, start
+from manitwin.engine.executors.stage_notes import EVERY_S, drop_note, read_notes
+from manitwin.engine.jobs import Failure, Job, Reply, RunStage, StageRejected, WorkerSetup
+from manitwin.engine.stage import StagePart
+from manitwin.engine.stage_runner import StageCost
+from manitwin.engine.worker import too_large
+from manitwin.engine.worker_processes import WorkerContext, hidden_main_module, spared_from_interrupts
+from manitwin.errors import Unavailable
 
 RUN = logging.getLogger("manitwin.run")
-NOTE = ".part"
-EVERY_S = 1.0
-
-_failure_told = False
 JOBS_A_PROCESS = 2000  # then a fresh one: what native code leaks stays bounded
-STACK_LINES = 12
+LONGEST_STEP_S = 5.0
+"""So much of the time since it was looked at last counts against a job at most: this process may have been stopped itself."""
+FAILED_POOLS = 5  # in a row, without an answer in between: then it is the installation, not one crash
+
+
+@dataclass
+class _Given:
+    """A job that was given to a pool, how long it has run, and whether that was too long."""
+
+    job: Job
+    future: Any
+    seconds: float = 0.0
+    late: bool = False
+
+
+@dataclass(frozen=True)
+class _Pool:
+    """A pool, and the processes that were started for it."""
+
+    processes: ProcessPool
+    context: WorkerContext
+
+    def stop(self) -> None:
+        """End all processes at once, also one that is stopped (SIGSTOP) or in native code."""
+        self.processes.stop()
+        self.context.kill()
+        self.processes.join()
 
 
 class LocalExecutor:
@@ -56,10 +74,12 @@ class LocalExecutor:
             "cpu": cpu, "gpu": settings.gpu, "vlm": settings.vlm, "generator": settings.generator
         }  # fmt: skip
         self._slots = {needs: slots if items is None else max(1, min(slots, items)) for needs, slots in wanted.items()}
-        self._pools: dict[Resource, ProcessPool] = {}
+        self._pools: dict[Resource, _Pool] = {}
+        self._given: dict[int, _Given] = {}
+        self._failed_pools = 0
         self._ended: queue.SimpleQueue[tuple[int, Reply]] = queue.SimpleQueue()
         self._stacks = tempfile.TemporaryDirectory(prefix="manitwin-")
-        self._looked_at = 0.0
+        self._looked_at, self._counted_at = 0.0, time.monotonic()
         self._main = hidden_main_module()
         self._main.__enter__()
 
@@ -77,19 +97,23 @@ class LocalExecutor:
 
     def submit(self, ticket: int, job: Job) -> None:
         """Give a job to the pool of what it needs."""
-        with spared_from_interrupts():
-            future = self._pool(job.needs).schedule(_do, args=(ticket, job), timeout=self._settings.stage_timeout_s)
-        future.add_done_callback(partial(self._hand_over, ticket))
+        given = _Given(job, self._schedule(ticket, job))
+        self._given[ticket] = given
+        given.future.add_done_callback(partial(self._hand_over, ticket, given))
 
     def ended(self, timeout_s: float) -> list[tuple[int, Reply]]:
-        """Wait for the next job that ends, and return all that have."""
+        """Wait for the next job that ends, and return all that have; end those that take too long."""
         ended = []
         try:
             ended.append(self._ended.get(timeout=timeout_s))
             while True:
                 ended.append(self._ended.get_nowait())
         except queue.Empty:
-            return ended
+            pass
+        for ticket, _ in ended:
+            self._given.pop(ticket, None)
+        self._end_overdue()
+        return ended
 
     def parts(self) -> dict[int, StagePart]:
         """Return what the workers have left beside their stacks, once a second."""
@@ -101,122 +125,94 @@ class LocalExecutor:
     def close(self) -> None:
         """Stop all processes at once."""
         for pool in self._pools.values():
+            pool.processes.stop()
+        for pool in self._pools.values():
             pool.stop()
-            pool.join()
         self._pools.clear()
         self._stacks.cleanup()
         self._main.__exit__(None, None, None)
 
-    def _pool(self, needs: Resource) -> ProcessPool:
+    def _schedule(self, ticket: int, job: Job) -> Any:
+        """Give a job to its pool; to a new one where all processes of the pool died before they had a job."""
+        while True:
+            pool = self._pool(job.needs)
+            try:
+                with spared_from_interrupts():
+                    return pool.processes.schedule(do, args=(ticket, job))
+            except RuntimeError as error:  # pebble's, of a pool that is broken
+                self._failed_pools += 1
+                if self._failed_pools >= FAILED_POOLS:
+                    raise Unavailable(
+                        "the worker processes cannot be started, or end before they get a job;"
+                        " `manitwin doctor` looks for the cause, and more memory or fewer --jobs may help"
+                    ) from error
+                RUN.warning("all worker processes of a pool have died: new ones are started")
+                self._pools = {needs: other for needs, other in self._pools.items() if other is not pool}
+                pool.stop()
+
+    def _end_overdue(self) -> None:
+        """End the jobs that have run longer than they may. Time is monotonic: no clock that is set ends or spares one."""
+        now = time.monotonic()
+        step, self._counted_at = min(now - self._counted_at, LONGEST_STEP_S), now
+        for given in list(self._given.values()):
+            if not given.late and given.future.running():
+                given.seconds += step
+                if given.seconds > self._settings.stage_timeout_s:
+                    given.late = True
+                    given.future.cancel()  # pebble ends its process
+
+    def _pool(self, needs: Resource) -> _Pool:
         needs = "cpu" if self._one_pool else needs
         if needs not in self._pools:
-            self._pools[needs] = ProcessPool(
+            context = WorkerContext()
+            processes = ProcessPool(
                 max_workers=self._slots[needs],
                 max_tasks=JOBS_A_PROCESS,
-                context=WorkerContext(),
-                initializer=_start,
+                context=context,
+                initializer=start,
                 initargs=(self._setup, self._stacks.name, os.getpid()),
             )
+            self._pools[needs] = _Pool(processes, context)
         return self._pools[needs]
 
-    def _hand_over(self, ticket: int, future: Any) -> None:
+    def _hand_over(self, ticket: int, given: _Given, future: Any) -> None:
         drop_note(Path(self._stacks.name), ticket)  # of a worker that died, or was ended as it took too long
-        self._ended.put((ticket, self._reply(future)))
+        self._ended.put((ticket, self._reply(given, future)))
 
-    def _reply(self, future: Any) -> Reply:
+    def _reply(self, given: _Given, future: Any) -> Reply:
         try:
             reply: Reply = future.result()
+            self._failed_pools = 0
             return reply
         except ProcessExpired as error:
-            return Failure("died", f"the worker process died ({_how(error.exitcode)}){self._stack(error.pid)}")
-        except TimeoutError:
+            self._failed_pools = 0  # it had a job
+            return self._died(given.job, error)
+        except CancelledError:
+            if not given.late:
+                return Failure("died", "cut off as the run was stopped")
             limit = self._settings.stage_timeout_s
             return Failure("timeout", f"took longer than run.stage_timeout_s = {limit:g} s")
-        except CancelledError:
-            return Failure("died", "cut off as the run was stopped")
+        except BrokenProcessPool:
+            return Failure("died", "all worker processes died while it waited for one; the next job starts new ones")
         except Exception as error:  # what cannot be sent back, say: the other jobs go on
             return Failure("error", " ".join(f"{type(error).__name__}: {error}".split()))
 
-    def _stack(self, pid: int | None) -> str:
-        """Return the innermost lines of where a dying process was, where it could still say so."""
-        path = Path(self._stacks.name) / f"{pid}.txt"
-        lines = path.read_text(errors="replace").splitlines() if path.is_file() else []
-        calls = [line.strip() for line in lines if line.startswith("  File")][:STACK_LINES]
-        return "; it was at " + " < ".join(calls) if calls else ""
+    def _died(self, job: Job, error: ProcessExpired) -> Reply:
+        """Say how a process ended, in one line; an item that was refused memory is too large."""
+        words = LastWords.read(Path(self._stacks.name), error.pid)
+        if words.no_memory and isinstance(job, RunStage) and self._setup.recipe.can_reject:
+            return StageRejected(too_large(job, self._setup.memory_gb), StageCost(0.0, 0.0, 0.0))
+        how = _how(error.exitcode)
+        said = f": {words.said}" if words.said else ""
+        at = f"; it was at {words.calls}" if words.calls else ""
+        limit = self._setup.memory_gb
+        memory = f"; it may take no more than run.memory_gb = {limit:g} GB" if limit and words.no_memory else ""
+        if error.exitcode == -signal.SIGKILL:
+            memory = "; it was killed from outside: where memory is short the system does so, then lower --jobs or run.memory_gb"
+        return Failure("died", f"the worker process died ({how}{said}){memory}{at}")
 
 
 def _how(exit_code: int | None) -> str:
     if exit_code is not None and exit_code < 0:
         return signal.Signals(-exit_code).name
     return f"exit code {exit_code}"
-
-
-_worker: Worker | None = None
-_stack_file: TextIO | None = None
-
-
-def _start(setup: WorkerSetup, stacks: str, driver: int) -> None:
-    global _worker, _stack_file
-    one_thread_each()
-    die_with(driver)
-    _stack_file = (Path(stacks) / f"{os.getpid()}.txt").open("w")
-    faulthandler.enable(_stack_file)
-    _worker = Worker(setup)
-
-
-def _do(ticket: int, job: Job) -> Reply:
-    assert _worker is not None and _stack_file is not None
-    if not isinstance(job, RunStage):
-        return _worker.do(job)
-    with parts_noted(Path(_stack_file.name).parent, ticket):
-        return _worker.do(job)
-
-
-@contextmanager
-def parts_noted(folder: Path, ticket: int) -> Iterator[None]:
-    """Note in a folder what the stage that runs in the ``with`` statement says of itself, under the ticket of its job."""
-    with heard_by(_Notes(folder / f"{ticket}{NOTE}")):
-        try:
-            yield
-        finally:
-            drop_note(folder, ticket)
-
-
-def read_notes(folder: Path) -> dict[int, StagePart]:
-    """Return what part of each job is done, by ticket; a job that has ended may still be among them."""
-    found = {}
-    for path in folder.glob(f"*{NOTE}"):
-        with suppress(FileNotFoundError):  # its stage has ended meanwhile
-            found[int(path.stem)] = StagePart(*json.loads(path.read_bytes()))
-    return found
-
-
-def drop_note(folder: Path, ticket: int) -> None:
-    """Remove the note of a job that has ended."""
-    (folder / f"{ticket}{NOTE}").unlink(missing_ok=True)
-
-
-class _Notes:
-    """Write down what a stage says of itself, once a second at most."""
-
-    def __init__(self, path: Path):
-        self._path, self._at = path, -EVERY_S
-
-    def __call__(self, part: StagePart) -> None:
-        if time.monotonic() - self._at < EVERY_S:
-            return
-        self._at = time.monotonic()
-        fresh = self._path.with_suffix(".fresh")
-        try:  # renamed, so that nobody reads a half, but not synced: it is of no use after a power cut
-            fresh.write_text(json.dumps([part.done, part.total, part.unit]))
-            os.replace(fresh, self._path)
-        except OSError as error:
-            _tell_once(error)
-
-
-def _tell_once(error: OSError) -> None:
-    """Log that a note was not written: the stage does its work all the same."""
-    global _failure_told
-    if not _failure_told:
-        _failure_told = True
-        RUN.warning("the progress of stages is not shown: %s", error)

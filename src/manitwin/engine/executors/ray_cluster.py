@@ -24,7 +24,7 @@ from manitwin.formats.installation import installed_version
 from manitwin.twin.dataset_root import DatasetRoot
 
 ASK_EVERY_S = 1.0
-SILENCE_S = 30.0
+SILENCE_S = 45.0
 """Then the head is taken for lost. Ray itself ends the whole process after 60 s (gcs_rpc_server_reconnect_timeout_s)."""
 CONNECT_S = 5.0
 CURRENT_CLUSTER = "ray/ray_current_cluster"  # where `ray start` notes its address, below its temporary folder

@@ -1,4 +1,4 @@
-"""Read and write a ledger."""
+"""Write a ledger, and read from it as a run goes on."""
 
 from __future__ import annotations
 
@@ -6,46 +6,23 @@ import json
 import sqlite3
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
-from manitwin.engine.ledger.lock import hold_lock, is_written, lock_file
+from manitwin.engine.ledger.lock import hold_lock, lock_file
 from manitwin.engine.ledger.migrations import migrate
+from manitwin.engine.ledger.rows import ItemState, OpenItem, StageState
+from manitwin.engine.ledger.soundness import check_whole, require_regular, sound
 from manitwin.engine.task import Payload
 from manitwin.errors import BackendError, UsageError
+from manitwin.formats.json_file import parse_json_object
 
-ItemState = Literal["open", "accepted", "rejected", "failed", "duplicate"]
-StageState = Literal["running", "done", "rejected", "waiting", "failed"]
-ITEM_STATES = ("open", "accepted", "rejected", "failed", "duplicate")
 LEDGER = "ledger.sqlite"
 
 
 class LedgerFull(BackendError):
     """The disk has no room for another row: what was not committed is lost, and found again by the next run."""
-
-
-@dataclass(frozen=True)
-class OpenItem:
-    """An item that has not ended, with the JSON of its payload and how often each of its stages was tried."""
-
-    number: int
-    payload: dict[str, Any]
-    attempts: dict[str, int]
-
-
-@dataclass(frozen=True)
-class ItemRow:
-    """One item as the ledger keeps it; ``detail`` of an open one says what it waits for."""
-
-    number: int
-    payload: dict[str, Any]
-    item_id: str
-    state: ItemState
-    reason: str | None
-    detail: str
 
 
 class Ledger:
@@ -55,23 +32,32 @@ class Ledger:
     """
 
     def __init__(self, path: Path):
-        """Open or make a ledger; raises UsageError where another run holds it."""
+        """Open or make a ledger; raises UsageError where another run holds it, LedgerDamaged for a file that is none."""
         path.parent.mkdir(parents=True, exist_ok=True)
         self.path = path
         self._lock = hold_lock(path)
-        self._new = not path.exists()
-        self.connection = sqlite3.connect(path, isolation_level=None)
-        self.connection.execute("PRAGMA journal_mode = WAL")
-        self.connection.execute(
-            "PRAGMA synchronous = NORMAL"
-        )  # a power cut may lose the last rows, which are found again
         try:
-            migrate(self.connection, str(path))
+            with sound(path):
+                require_regular(path)
+                self._new = not path.exists()
+                self.connection = sqlite3.connect(path, isolation_level=None)
+                self._open()
         except BaseException:
-            self.connection.close()
             self._lock.close()
             raise
-        self.connection.execute("BEGIN")
+
+    def _open(self) -> None:
+        try:
+            self.connection.execute("PRAGMA trusted_schema = OFF")
+            self.connection.execute("PRAGMA journal_mode = WAL")
+            # a power cut may lose the last rows, which are found again
+            self.connection.execute("PRAGMA synchronous = NORMAL")
+            migrate(self.connection, str(self.path))
+            check_whole(self.connection, self.path)
+            self.connection.execute("BEGIN")
+        except BaseException:
+            self.connection.close()
+            raise
 
     def commit(self) -> None:
         """Make everything since the last commit permanent."""
@@ -130,9 +116,9 @@ class Ledger:
         """
         rows = self.connection.execute("SELECT number, item FROM items ORDER BY number")
         first = rows.fetchone()
-        if first is None or _text(read(json.loads(first[1]))) == first[1]:
+        if first is None or _text(read(_payload(first[1]))) == first[1]:
             return
-        restated = [(_text(read(json.loads(text))), number) for number, text in (first, *rows)]
+        restated = [(_text(read(_payload(text))), number) for number, text in (first, *rows)]
         self.connection.executemany("UPDATE items SET item = ? WHERE number = ?", restated)
         self.commit()
 
@@ -161,12 +147,12 @@ class Ledger:
         rows = self.connection.execute(
             "SELECT number, item FROM items WHERE state = 'open' AND number > ? ORDER BY number LIMIT ?", (after, count)
         ).fetchall()
-        return [OpenItem(number, json.loads(text), self._attempts(number)) for number, text in rows]
+        return [OpenItem(number, _payload(text), self._attempts(number)) for number, text in rows]
 
     def payload(self, number: int) -> dict[str, Any]:
         """Return the JSON of an item's payload."""
         (text,) = self.connection.execute("SELECT item FROM items WHERE number = ?", (number,)).fetchone()
-        return dict(json.loads(text))
+        return dict(_payload(text))
 
     def _attempts(self, number: int) -> dict[str, int]:
         rows = self.connection.execute(
@@ -237,6 +223,18 @@ class Ledger:
             (state, reason, detail, recipe_sha256, time.time(), revision, revision, number),
         )
 
+    def changed_since_end(self, numbers: Iterable[int], read: Callable[[Mapping[str, Any]], Payload]) -> list[int]:
+        """Return those of the items with these numbers whose input was changed after they had ended."""
+        found = []
+        for number in numbers:
+            row = self.connection.execute(
+                "SELECT item, ended_at FROM items WHERE number = ? AND state <> 'open'", (number,)
+            ).fetchone()
+            modified_at = None if row is None else read(json.loads(row[0])).modified_at
+            if modified_at is not None and modified_at > (row[1] or 0.0):
+                found.append(number)
+        return found
+
     def reopen(self, numbers: Iterable[int]) -> int:
         """Open ended items again, their attempts forgotten; returns how many."""
         count = 0
@@ -273,6 +271,23 @@ class Ledger:
         wanted = set(given)
         return [number for (number,) in rows if not wanted or number in wanted]
 
+    def ended(self, given: Collection[int] = ()) -> list[tuple[int, str]]:
+        """Return the numbers and twin ids of accepted and rejected items: of the given ones, or of all."""
+        rows = self.connection.execute(
+            "SELECT number, twin_id FROM items WHERE state IN ('accepted', 'rejected') AND twin_id IS NOT NULL ORDER BY number"
+        )
+        wanted = set(given)
+        return [(number, twin_id) for number, twin_id in rows if not wanted or number in wanted]
+
+    def any_indexed(self) -> bool:
+        """Tell whether any twin is marked as indexed."""
+        return self.connection.execute("SELECT 1 FROM items WHERE indexed = 1 LIMIT 1").fetchone() is not None
+
+    def forget_indexed(self) -> None:
+        """Mark all twins as not indexed."""
+        self.connection.execute("UPDATE items SET indexed = 0")
+        self.commit()
+
     def not_indexed(self, count: int) -> list[str]:
         """Return ids of finished twins that no table has yet."""
         rows = self.connection.execute(
@@ -287,25 +302,9 @@ class Ledger:
         self.connection.executemany("UPDATE items SET indexed = 1 WHERE twin_id = ?", ((i,) for i in twin_ids))
 
 
+def _payload(text: str) -> dict[str, Any]:
+    return parse_json_object(text, "the ledger's item", UsageError, remedy="run manitwin check", file_names=True)
+
+
 def _text(payload: Payload) -> str:
     return json.dumps(payload.to_json(), sort_keys=True)
-
-
-@contextmanager
-def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
-    """Open a ledger for reading, also while a run writes it; raises UsageError where there is none.
-
-    Nothing is left beside one that no run writes: SQLite's reader of a write-ahead log makes files there and does not remove
-    them, so where that log holds nothing it is told to leave it alone (https://sqlite.org/uri.html, ``immutable``). What
-    watches a ledger opens it anew each time: a run that begins meanwhile is not seen through such a connection.
-    """
-    if not path.is_file():
-        raise UsageError(f"{path}: no ledger; `manitwin build INPUT... -o DATASET` makes one")
-    log = path.with_name(f"{path.name}-wal")
-    at_rest = not is_written(path) and (not log.is_file() or log.stat().st_size == 0)
-    connection = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro{'&immutable=1' if at_rest else ''}", uri=True)
-    connection.row_factory = sqlite3.Row
-    try:
-        yield connection
-    finally:
-        connection.close()

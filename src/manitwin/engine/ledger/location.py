@@ -10,7 +10,9 @@ import time
 from contextlib import closing
 from pathlib import Path
 
-from manitwin.engine.ledger.ledger import LEDGER, read_ledger
+from manitwin.engine.ledger.ledger import LEDGER
+from manitwin.engine.ledger.reading import read_ledger
+from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 
 CONFIG = "config.json"
@@ -37,7 +39,7 @@ def local_ledger(root: DatasetRoot) -> Path:
 def copy_ledger(root: DatasetRoot, copy: Path) -> None:
     """Copy the ledger that a run would take up, also while one writes it; there is no copy where there is no ledger."""
     path = ledger_path(root)
-    if path.is_file():
+    if os.path.lexists(path):
         with read_ledger(path) as source, closing(sqlite3.connect(copy)) as target:
             source.backup(target)
     elif root.local is None and root.exists(LEDGER):
@@ -47,7 +49,10 @@ def copy_ledger(root: DatasetRoot, copy: Path) -> None:
 def local_log(root: DatasetRoot) -> Path:
     """Return the path of the log of a data set's runs: beside the ledger."""
     ledger = local_ledger(root)
-    return ledger.with_name(RUN_LOG) if root.local is not None else ledger.with_suffix(".log")
+    log = ledger.with_name(RUN_LOG) if root.local is not None else ledger.with_suffix(".log")
+    if log.is_symlink() or (log.exists() and not log.is_file()):
+        raise UsageError(f"{log}: is a link or no regular file, and runs write their log there; remove it")
+    return log
 
 
 def cache_folder(root: DatasetRoot) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import stat
 from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
@@ -16,11 +17,25 @@ def lock_file(ledger: Path) -> Path:
     return ledger.with_suffix(".lock")
 
 
+def _opened(path: Path, flags: int) -> TextIO:
+    """Open a lock; a link, pipe or device in its place is refused: it would be written, or waited for."""
+    try:
+        descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+    except OSError as error:
+        if isinstance(error, FileNotFoundError):
+            raise
+        raise UsageError(f"{path}: cannot be opened ({error.strerror}); remove it where it is a link") from error
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise UsageError(f"{path}: is no regular file, and a ledger's lock is one; remove it")
+    return os.fdopen(descriptor, "r" if flags == os.O_RDONLY else "r+")
+
+
 def hold_lock(ledger: Path) -> TextIO:
     """Return the lock of a ledger, held until it is closed; raises UsageError where another run holds it."""
     path = lock_file(ledger)
     while True:
-        lock = path.open("w")
+        lock = _opened(path, os.O_RDWR | os.O_CREAT)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
@@ -35,7 +50,7 @@ def hold_lock(ledger: Path) -> TextIO:
 def is_written(ledger: Path) -> bool:
     """Tell whether a run is at work on a ledger now."""
     try:
-        lock = lock_file(ledger).open()
+        lock = _opened(lock_file(ledger), os.O_RDONLY)
     except FileNotFoundError:
         return False
     with lock:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from manitwin.engine.ledger.ledger import ITEM_STATES, ItemRow, StageState
+from manitwin.engine.ledger.rows import ITEM_STATES, ItemRow, StageState
 from manitwin.engine.stage import ASSEMBLE, INPUT
 from manitwin.errors import UsageError
 

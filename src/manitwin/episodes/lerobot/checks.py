@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from manitwin.episodes.lerobot.lerobot_format import STATISTICS, TIMESTAMP_TOLERANCE_S, arrays_of, place_of
 from manitwin.episodes.lerobot.videos import frames_of, video_facts
 from manitwin.errors import EpisodesError
+from manitwin.formats.json_file import read_json_object
+from manitwin.formats.parquet_file import read_parquet
 
 _REMEDY = "write the set again"
 _ROUNDING = 1e-6
@@ -33,6 +34,8 @@ def statistics_of(path: Path, table: pa.Table, name: str, feature: dict[str, Any
         flat = table[f"stats/{name}/{kind}"].combine_chunks()
         while pa.types.is_list(flat.type):
             flat = flat.flatten()
+        if not (pa.types.is_floating(flat.type) or pa.types.is_integer(flat.type)):
+            raise EpisodesError(f"{path}: stats/{name}/{kind} are of type {flat.type}, no numbers; {_REMEDY}")
         if flat.null_count or len(flat) != len(table) * int(np.prod(shape)):
             raise EpisodesError(f"{path}: stats/{name}/{kind} has not {shape} numbers in each row; {_REMEDY}")
         result[kind] = flat.to_numpy(zero_copy_only=False).astype(np.float64).reshape(len(table), *shape)
@@ -75,10 +78,7 @@ def checked_frames(
 
 
 def _table(path: Path, features: dict[str, dict[str, Any]]) -> pa.Table:
-    try:
-        table = pq.read_table(path)
-    except (OSError, pa.ArrowInvalid) as error:
-        raise EpisodesError(f"{path}: no Parquet file that can be read ({error}); {_REMEDY}") from error
+    table = read_parquet(path, EpisodesError, remedy=_REMEDY)
     if set(table.column_names) != set(features):
         odd = sorted(set(table.column_names) ^ set(features))
         raise EpisodesError(f"{path}: the column {odd[0]} is not in both the file and info.json; {_REMEDY}")
@@ -134,15 +134,17 @@ def _check_episode(
 
 def check_statistics(path: Path, features: dict[str, dict[str, Any]], statistics: dict[str, EpisodeStatistics]) -> None:
     """Check that stats.json has all features, and says of them what the episodes' statistics say together."""
-    try:
-        stats: dict[str, dict[str, Any]] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise EpisodesError(f"{path}: no JSON that can be read ({error}); {_REMEDY}") from error
+    stats = read_json_object(path, EpisodesError, inside=path.parent.parent, name=str(path), remedy=_REMEDY)
     for name, feature in features.items():
-        if name not in stats or set(stats[name]) != set(STATISTICS):
+        if not isinstance(stats.get(name), dict) or set(stats[name]) != set(STATISTICS):
             raise EpisodesError(f"{path}: not all statistics of {name} are there; {_REMEDY}")
         shape = _shape(feature)
-        told = {kind: np.array(value, float) for kind, value in stats[name].items()}
+        try:
+            told = {kind: np.array(value, float) for kind, value in stats[name].items()}
+        except (ValueError, TypeError) as error:
+            raise EpisodesError(
+                f"{path}: the statistics of {name} are no numbers ({str(error)[:120]}); {_REMEDY}"
+            ) from error
         wrong = [kind for kind, value in told.items() if value.shape != ((1,) if kind == "count" else shape)]
         if wrong:
             raise EpisodesError(
@@ -188,7 +190,9 @@ def _check_camera(
         try:
             file = (row[f"videos/{key}/chunk_index"], row[f"videos/{key}/file_index"])
             begin, end = row[f"videos/{key}/from_timestamp"], row[f"videos/{key}/to_timestamp"]
-        except KeyError as error:
+            if not all(type(each) is int for each in file) or not math.isfinite(begin + end):
+                raise EpisodesError(f"{root}: {where} has no numbers in its columns; {_REMEDY}")
+        except (KeyError, TypeError) as error:
             raise EpisodesError(f"{root}: {where} has no column {error}; {_REMEDY}") from error
         off = max(abs(time * info["fps"] - round(time * info["fps"])) / info["fps"] for time in (begin, end))
         if (

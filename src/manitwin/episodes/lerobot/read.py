@@ -6,7 +6,6 @@ off the grid of frames fail in the middle of a training: each is an error here t
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
+import pyarrow.compute as pc
 
 from manitwin.episodes.lerobot.checks import (
     EpisodeStatistics,
@@ -24,6 +23,7 @@ from manitwin.episodes.lerobot.checks import (
     statistics_of,
 )
 from manitwin.episodes.lerobot.lerobot_format import (
+    DATA_PATH,
     DEFAULT_FEATURES,
     EPISODES_PATH,
     INFO,
@@ -31,10 +31,14 @@ from manitwin.episodes.lerobot.lerobot_format import (
     STATS,
     TASKS,
     VERSION,
+    VIDEO_PATH,
     arrays_of,
     place_of,
 )
 from manitwin.errors import EpisodesError
+from manitwin.formats.json_file import parse_json_object, read_json_object
+from manitwin.formats.parquet_file import read_parquet
+from manitwin.formats.printable import printable_line
 
 _REMEDY = "write the set again"
 _INFO: dict[str, type] = {
@@ -43,6 +47,12 @@ _INFO: dict[str, type] = {
     **dict.fromkeys(("data_files_size_in_mb", "video_files_size_in_mb"), int),
     **dict.fromkeys(("splits", "features"), dict),
 }
+_DTYPES = frozenset(
+    {"video", "bool", "float32", "float64", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32"}
+)
+_SHOWN_CHARACTERS = 400
+_NAME_CHARACTERS = 200
+_WIDEST = 1 << 16
 _NUMBERS = (
     *("episode_index", "length", "data/chunk_index", "data/file_index", "dataset_from_index", "dataset_to_index"),
     *("meta/episodes/chunk_index", "meta/episodes/file_index"),
@@ -70,8 +80,8 @@ class LeRobotSet:
         path = self.root / self.info["data_path"].format(
             chunk_index=row["data/chunk_index"], file_index=row["data/file_index"]
         )
-        where = [("episode_index", "=", episode_index)]
-        return arrays_of(pq.read_table(path, filters=where), self.features)
+        table = read_parquet(path, EpisodesError, remedy=_REMEDY, inside=self.root)
+        return arrays_of(table.filter(pc.field("episode_index") == episode_index), self.features)
 
 
 def read_lerobot(root: Path, *, decode_videos: bool = False) -> LeRobotSet:
@@ -95,15 +105,12 @@ def read_lerobot(root: Path, *, decode_videos: bool = False) -> LeRobotSet:
 
 
 def _wrong(path: Path, cause: str) -> EpisodesError:
-    return EpisodesError(f"{path}: {cause}; {_REMEDY}")
+    return EpisodesError(f"{path}: {printable_line(cause, max_characters=_SHOWN_CHARACTERS)}; {_REMEDY}")
 
 
 def _info(root: Path) -> dict[str, Any]:
     path = root / INFO
-    try:
-        info: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise _wrong(path, f"no JSON that can be read ({error})") from error
+    info = read_json_object(path, EpisodesError, inside=root, name=str(path), remedy=_REMEDY)
     for name, kind in _INFO.items():
         if type(info.get(name)) is not kind:
             raise _wrong(path, f"{name} is {info.get(name)!r}, not of type {kind.__name__}")
@@ -111,6 +118,8 @@ def _info(root: Path) -> dict[str, Any]:
         raise _wrong(path, f"codebase_version is {info['codebase_version']}, this reads {VERSION}")
     if info["fps"] < 1 or info["total_episodes"] < 1 or info["splits"] != {"train": f"0:{info['total_episodes']}"}:
         raise _wrong(path, f"fps {info['fps']}, {info['total_episodes']} episodes, splits {info['splits']}")
+    if info["data_path"] != DATA_PATH or info.get("video_path") not in (None, VIDEO_PATH):
+        raise _wrong(path, f"data_path is {info['data_path'][:80]!r}, not {DATA_PATH}, or video_path not {VIDEO_PATH}")
     for name, feature in info["features"].items():
         _check_feature(path, name, feature)
     for name, dtype in DEFAULT_FEATURES.items():
@@ -120,12 +129,15 @@ def _info(root: Path) -> dict[str, Any]:
     return info
 
 
-def _check_feature(path: Path, name: str, feature: dict[str, Any]) -> None:
+def _check_feature(path: Path, name: str, feature: Any) -> None:
+    dtype = feature.get("dtype") if isinstance(feature, dict) else None
+    if not isinstance(dtype, str) or dtype not in _DTYPES or len(name) > _NAME_CHARACTERS:
+        raise _wrong(path, f"the feature {name[:80]!r} is {str(feature)[:80]}")
     shape: Any = feature.get("shape")
     names: Any = feature.get("names")
-    whole = isinstance(shape, list) and all(isinstance(n, int) and n > 0 for n in shape)
-    if "/" in name or "dtype" not in feature or not whole:
-        raise _wrong(path, f"the feature {name!r} is {feature}")
+    whole = isinstance(shape, list) and all(type(n) is int and 0 < n <= _WIDEST for n in shape)
+    if "/" in name or name in (".", "..") or not name.isprintable() or not whole or not isinstance(names, list | None):
+        raise _wrong(path, f"the feature {name!r} is {str(feature)[:80]}")
     if feature["dtype"] == "video":
         if len(shape) != 3 or names != ["height", "width", "channels"] or shape[2] != 3:
             raise _wrong(path, f"the video {name} has the shape {shape} and names {names}, not height, width, channels")
@@ -134,11 +146,9 @@ def _check_feature(path: Path, name: str, feature: dict[str, Any]) -> None:
 
 
 def _tasks(path: Path, total: int) -> tuple[str, ...]:
-    try:
-        table = pq.read_table(path)
-    except (OSError, pa.ArrowInvalid) as error:
-        raise _wrong(path, f"no Parquet file that can be read ({error})") from error
-    told = json.loads((table.schema.metadata or {}).get(b"pandas", b"{}"))
+    table = read_parquet(path, EpisodesError, remedy=_REMEDY)
+    said = (table.schema.metadata or {}).get(b"pandas", b"{}")
+    told = parse_json_object(said, f"{path}: pandas", EpisodesError, remedy=_REMEDY)
     if told.get("index_columns") != ["task"] or {"task", "task_index"} - set(table.column_names):
         raise _wrong(path, "its pandas index is not 'task', by which LeRobot looks tasks up")
     tasks: list[str] = table["task"].to_pylist()
@@ -155,7 +165,7 @@ def _episode_tables(root: Path) -> Iterator[tuple[Path, int, pa.Table]]:
         chunk, file = place_of(number)
         if path != root / EPISODES_PATH.format(chunk_index=chunk, file_index=file):
             raise _wrong(path, f"the {number + 1}th file of episodes should be chunk {chunk}, file {file}")
-        yield path, number, pq.read_table(path)
+        yield path, number, read_parquet(path, EpisodesError, remedy=_REMEDY, inside=root)
 
 
 def _episodes(
@@ -171,6 +181,11 @@ def _episodes(
             raise _wrong(path, f"has no column {missing[0]}")
         for name, feature in info["features"].items():
             statistics[name].append(statistics_of(path, table, name, feature))
+        for name in _NUMBERS:
+            if table.schema.field(name).type != pa.int64() or table[name].null_count:
+                raise _wrong(path, f"{name} are no whole numbers")
+        if table.schema.field("tasks").type != pa.list_(pa.string()):
+            raise _wrong(path, "tasks are no lists of texts")
         for row in table.select([name for name in table.column_names if not name.startswith("stats/")]).to_pylist():
             where = f"episode {row['episode_index']}"
             if row["episode_index"] != len(rows):

@@ -15,6 +15,7 @@ from manitwin.episodes.lerobot.feature_statistics import Statistics
 from manitwin.episodes.lerobot.lerobot_format import QUANTILES, VIDEO_PATH, place_of, video_key
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.errors import EpisodesError
+from manitwin.formats.bounded_file import open_regular, with_remedy
 
 _CODECS = {
     **dict.fromkeys(("avc1", "h264", "H264", "AVC1"), "h264"),
@@ -27,6 +28,8 @@ _SAMPLED_FRAMES = 50
 """Of an episode's pictures so many at most are looked at for statistics (lerobot: 100)."""
 
 _PIXEL_STEP = 4
+MAX_SIDE_PX = 8192
+_REMEDY = "render the pictures again"
 
 
 @dataclass(frozen=True)
@@ -56,19 +59,33 @@ class VideoFacts:
     codec: str
 
 
+def opened_film(path: Path) -> cv2.VideoCapture:
+    """Open an mp4 for decoding; raises EpisodesError for what is none.
+
+    FFmpeg goes by a file's content: what is a list of other files' names to it is not given to it.
+    """
+    with open_regular(path, with_remedy(EpisodesError, _REMEDY), inside=path.parent, name=str(path)) as stream:
+        head = stream.read(8)
+    capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG) if head[4:] == b"ftyp" else None
+    if capture is None or not capture.isOpened():
+        raise EpisodesError(f"{path}: no video that can be read; {_REMEDY}")
+    return capture
+
+
 def video_facts(path: Path) -> VideoFacts:
     """Read the header of a video; raises EpisodesError for a file that is no video."""
-    capture = cv2.VideoCapture(str(path))
+    capture = opened_film(path)
     try:
-        if not path.is_file() or not capture.isOpened():
-            raise EpisodesError(f"{path}: no video that can be read; render the pictures again")
         code = int(capture.get(cv2.CAP_PROP_FOURCC))
         name = "".join(chr((code >> 8 * i) & 255) for i in range(4))
+        height_px, width_px = (int(capture.get(each)) for each in (cv2.CAP_PROP_FRAME_HEIGHT, cv2.CAP_PROP_FRAME_WIDTH))
+        if not (0 < height_px <= MAX_SIDE_PX and 0 < width_px <= MAX_SIDE_PX):
+            raise EpisodesError(f"{path}: pictures of {width_px} x {height_px} pixels; {_REMEDY}")
         return VideoFacts(
             frames=int(capture.get(cv2.CAP_PROP_FRAME_COUNT)),
             rate_hz=float(capture.get(cv2.CAP_PROP_FPS)),
-            height_px=int(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)),
-            width_px=int(capture.get(cv2.CAP_PROP_FRAME_WIDTH)),
+            height_px=height_px,
+            width_px=width_px,
             codec=_CODECS.get(name, name.strip("\0 ").lower()),
         )
     finally:
@@ -77,7 +94,7 @@ def video_facts(path: Path) -> VideoFacts:
 
 def frames_of(path: Path) -> Iterator[np.ndarray]:
     """Yield a film's pictures, ``(height, width, 3) uint8`` BGR, as far as it can be decoded."""
-    capture = cv2.VideoCapture(str(path))
+    capture = opened_film(path)
     try:
         while (picture := capture.read()[1]) is not None:
             yield picture
@@ -186,7 +203,7 @@ class _ClipReader:
         if self._file != file or frame < self._next:
             if self._capture is not None:
                 self._capture.release()
-            self._file, self._capture, self._next = file, cv2.VideoCapture(str(file)), 0
+            self._file, self._capture, self._next = file, opened_film(file), 0
         while self._next < frame and self._capture.grab():
             self._next += 1
         read, picture = self._capture.read()

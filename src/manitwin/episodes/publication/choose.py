@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -15,7 +14,9 @@ from manitwin.episodes.attempts import Attempt
 from manitwin.episodes.batch import read_batch
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
+from manitwin.errors import UsageError
 from manitwin.twin.loaded_twin import TwinSource
+from manitwin.twin.store import RECORD, parse_record
 
 
 @dataclass(frozen=True)
@@ -113,12 +114,16 @@ def objects_of_episodes(batches: Iterable[Path]) -> Iterator[tuple[str, frozense
 
 
 def _read(source: TwinSource, twin_id: str) -> TwinInEpisodes:
-    record: dict[str, Any] = json.loads(source.record_bytes(twin_id))
+    record = parse_record(source.record_bytes(twin_id), f"{source.root.url}/{source.root.twin_name(twin_id)}/{RECORD}")
+    if record.language is None:
+        raise UsageError(
+            f"{source.root.url}: twin {twin_id} was rejected since; name the data set of the episodes (--twins)"
+        )
     return TwinInEpisodes(
         twin_id,
-        record["language"]["category"],
-        record["source"]["license"] or UNKNOWN,
-        record["source"]["attribution"],
-        record["source"]["sha256"],
-        any(stage.get("rehearsal") for stage in record["provenance"]["stages"].values()),
+        record.language.category,
+        record.source.license or UNKNOWN,
+        record.source.attribution,
+        record.source.sha256,
+        bool(record.provenance.rehearsed),
     )

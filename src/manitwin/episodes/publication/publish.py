@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import os
+import re
 from collections.abc import Iterable, Set
 from dataclasses import dataclass
 from itertools import islice, pairwise
@@ -19,6 +20,7 @@ from manitwin.dataset.publish.publication import EPISODES, Publication
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.attempts import ATTEMPTS, Success, merge_attempts, read_attempts, success_of, write_attempts
 from manitwin.episodes.collect import batch_folders, stored_episodes
+from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episode_pictures import PICTURES, batch_name, read_pictures
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip, frames_of, video_facts
@@ -28,6 +30,7 @@ from manitwin.episodes.publication.choose import Chosen, choose_episodes
 from manitwin.episodes.video import Codec, EpisodesVideo
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.formats.installation import installed_version
+from manitwin.formats.json_file import read_json_object
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 
@@ -41,10 +44,19 @@ TWINS_SCHEMA = pa.schema(
 )
 
 
+_DRAW = "run manitwin render again"
+_CAMERA = re.compile(r"[0-9A-Za-z_-]+")
+
+
 def cameras_of(episodes: Path) -> tuple[str, ...]:
     """Return the cameras that a run was drawn from; none where it was not drawn."""
     path = episodes / PICTURES / CONFIG
-    return tuple(json.loads(path.read_bytes())["cameras"]) if path.is_file() else ()
+    if not os.path.lexists(path):
+        return ()
+    cameras = read_json_object(path, EpisodesError, inside=episodes, name=str(path), remedy=_DRAW).get("cameras")
+    if not isinstance(cameras, list) or not all(isinstance(each, str) and _CAMERA.fullmatch(each) for each in cameras):
+        raise EpisodesError(f"{path}: cameras are no names; {_DRAW}")
+    return tuple(cameras)
 
 
 def films_of(episodes: Path, batches: list[Path], allowed: Set[str], scratch: Path) -> list[CameraVideos]:
@@ -168,13 +180,7 @@ def _configuration(episodes: Path) -> dict[str, Any]:
         raise UsageError(
             f"{episodes}: no {ATTEMPTS}, so this is no folder of finished episodes; run manitwin trajectories"
         )
-    try:
-        said: dict[str, Any] = json.loads((episodes / CONFIG).read_bytes())
-    except (OSError, ValueError) as error:
-        raise EpisodesError(
-            f"{episodes}/{CONFIG}: cannot be read ({error}); run manitwin trajectories again"
-        ) from error
-    return said
+    return read_configuration(episodes)
 
 
 def _write_tables(episodes: Path, chosen: Chosen, made: Path) -> int:

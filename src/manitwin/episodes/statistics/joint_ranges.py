@@ -10,6 +10,7 @@ import pyarrow as pa
 
 from manitwin.episodes.hdf5_file import EpisodeFile
 from manitwin.episodes.stored_episode import RecordedRobot, robot_from
+from manitwin.errors import EpisodesError
 
 SCHEMA = pa.schema(
     [
@@ -30,9 +31,11 @@ def joint_ranges(files: Iterable[Path]) -> pa.Table:
         with EpisodeFile(path) as file:
             for number in range(len(file)):
                 robot = robot_from(file.said(number)["robot"])
-                joints = slice(0, len(robot.arm_joints))
-                group = file.file[f"traj_{number}/obs/agent"]
-                positions, speeds = group["qpos"][:, joints], np.abs(group["qvel"][:, joints])
+                joints, group = len(robot.arm_joints), f"traj_{number}/obs/agent"
+                both = [file.content.array(f"{group}/{name}") for name in ("qpos", "qvel")]
+                if any(each.ndim != 2 or each.shape[1] < joints or not len(each) for each in both):
+                    raise EpisodesError(f"{path}: {group} has not a column for each joint; write the episodes again")
+                positions, speeds = both[0][:, :joints], np.abs(both[1][:, :joints])
                 here = np.stack([-positions.min(0), positions.max(0), speeds.max(0)])
                 kept = found.get(robot.name)
                 found[robot.name] = (robot, here if kept is None else np.maximum(kept[1], here))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from manitwin.dataset.index.query import sql_text
+from manitwin.dataset.index.conditions import sql_text
 from manitwin.dataset.statistics.query import PRELUDE as SHARES
 from manitwin.dataset.statistics.query import Column, Query, counts, histogram, labels, summary
 from manitwin.dataset.statistics.stage_queries import PAPER_COLUMNS

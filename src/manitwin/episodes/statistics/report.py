@@ -8,7 +8,7 @@ from functools import partial
 from html import unescape
 from pathlib import Path
 
-from manitwin.dataset.index.query import sql_text
+from manitwin.dataset.index.conditions import sql_text
 from manitwin.dataset.statistics.page import (
     FIGURES,
     REPORT,
@@ -20,11 +20,12 @@ from manitwin.dataset.statistics.page import (
 )
 from manitwin.dataset.statistics.query import Column, ReportTables, Result, Row
 from manitwin.dataset.statistics.style import Figure, drawing
-from manitwin.episodes.attempts import ATTEMPTS
+from manitwin.episodes.attempts import ATTEMPTS, SCHEMA
 from manitwin.episodes.statistics import figures as drawn
 from manitwin.episodes.statistics import queries as q
 from manitwin.episodes.statistics.joint_ranges import joint_ranges
 from manitwin.errors import EpisodesError
+from manitwin.formats.parquet_file import check_parquet
 
 _WIDEST, _MOST_ROWS, _BAR = 110, 20, 40
 
@@ -145,6 +146,9 @@ class EpisodeReport:
         ]
 
 
+_REMEDY = "run manitwin trajectories again"
+
+
 def episode_statistics(folder: Path) -> EpisodeReport:
     """Ask everything of a folder of episodes; raises EpisodesError where it has no table of attempts."""
     attempts = folder / ATTEMPTS
@@ -153,7 +157,8 @@ def episode_statistics(folder: Path) -> EpisodeReport:
             f"{folder}: no {ATTEMPTS}, so this is no folder of finished episodes; run manitwin trajectories"
         )
     files = sorted(folder.glob(EPISODE_FILES)) or [path for path in [folder / _MERGED] if path.is_file()]
+    check_parquet(attempts, EpisodesError, schema=SCHEMA, remedy=_REMEDY, inside=folder)
     views = {"attempts": f"read_parquet({sql_text(str(attempts))})", "joints": joint_ranges(files)}
-    tables = ReportTables(views, prelude=q.PRELUDE)
+    tables = ReportTables(views, prelude=q.PRELUDE, remedy=_REMEDY)
     title = f"Statistics of the episodes in {folder.resolve().name}"
     return EpisodeReport(title, {query.name: tables.result(query) for query in q.QUERIES})

@@ -14,12 +14,14 @@ from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.errors import InputError
-from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.source import MAX_PARTS, MeshSource
 from manitwin.formats.meshes.textures import bake_transform, color_by_corner, decode_texture, make_part, pbr_material
 from manitwin.formats.xml_file import parse_xml
 
 _REMEDY = "export it again, or as glTF 2.0"
-_MAX_PARTS = 20_000
+_MAX_BYTES = 512 << 20
+_MAX_NODES = 8_000_000
+_END_OF_ARCHIVE = b"PK\x05\x06"
 
 
 def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
@@ -29,15 +31,25 @@ def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, s
     ``animated`` (skinned meshes).
     """
     data = source.data()
+    _check_size(data, source)
     unit_m, up, skinned = _inspect(data, source)
     if skinned:
         raise source.refused("animated", "the mesh is bound to a skeleton", "apply the pose and export a still mesh")
     try:
         document = collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
-        parts = _parts(document, source)
+        with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
+            parts = _parts(document, source)
     except collada.common.DaeError as error:
         raise source.unreadable(f"its COLLADA is broken ({str(error)[:100]})", _REMEDY) from error
     return parts, unit_m, up
+
+
+def _check_size(data: bytes, source: MeshSource) -> None:
+    """Refuse what would take many times its size of memory as a tree, and an archive inside, which pycollada would open."""
+    if len(data) > _MAX_BYTES or data.count(b"<") + data.count(b"=") > _MAX_NODES:
+        raise source.too_large(f"more than {_MAX_BYTES >> 20} MiB or {_MAX_NODES} elements", "export it as glTF 2.0")
+    if _END_OF_ARCHIVE in data:
+        raise source.unreadable("it hides a ZIP archive", _REMEDY)
 
 
 def _inspect(data: bytes, source: MeshSource) -> tuple[float | None, str | None, bool]:
@@ -54,8 +66,7 @@ def _inspect(data: bytes, source: MeshSource) -> tuple[float | None, str | None,
         up = {"X_UP": "x", "Y_UP": "y", "Z_UP": "z"}.get((element.text or "").strip())
     if unit_m is not None and not (np.isfinite(unit_m) and unit_m > 0):
         unit_m = None
-    if _instances(root) > _MAX_PARTS:
-        raise source.unreadable(f"its nodes stand for more than {_MAX_PARTS} parts", "merge them before exporting")
+    source.check_parts(_instances(root))
     return unit_m, up, root.find(".//{*}instance_controller") is not None
 
 
@@ -68,7 +79,7 @@ def _instances(root: etree._Element) -> int:
     def count(element: etree._Element) -> int:
         if element not in counts:
             if element in open_nodes:
-                return _MAX_PARTS + 1  # a node inside itself
+                return MAX_PARTS + 1  # a node inside itself
             open_nodes.add(element)
             total = 1
             for child in element.iterchildren("{*}node", "{*}instance_node"):
@@ -76,7 +87,7 @@ def _instances(root: etree._Element) -> int:
                 target = child if name == "node" else nodes.get((child.get("url") or "").removeprefix("#"))
                 total += 0 if target is None else count(target)
             open_nodes.discard(element)
-            counts[element] = min(total, _MAX_PARTS + 1)
+            counts[element] = min(total, MAX_PARTS + 1)
         return counts[element]
 
     return sum(count(scene) for scene in root.iter("{*}visual_scene"))
@@ -95,8 +106,7 @@ def _parts(document: Any, source: MeshSource) -> list[trimesh.Trimesh]:
             if not isinstance(triangles, collada.triangleset.TriangleSet) or triangles.vertex_index is None:
                 source.find("points or lines in it were left out")
                 continue
-            if len(parts) >= _MAX_PARTS:
-                raise source.unreadable(f"more than {_MAX_PARTS} parts", "merge them before exporting")
+            source.check_parts(len(parts) + 1)
             faces += len(triangles.vertex_index)
             source.check_faces(faces)
             node = bound.materialnodebysymbol.get(triangles.material)
@@ -129,7 +139,7 @@ def _part(triangles: Any, material: PBRMaterial, name: str, source: MeshSource) 
         return part
     offset, data = colors[0][0], np.asarray(colors[0][4].data)
     by_corner = data[np.asarray(triangles.index)[:, :, offset], :3]
-    return color_by_corner(part, np.round(np.clip(by_corner, 0, 1) * 255).astype(np.uint8), source)
+    return color_by_corner(part, np.round(np.clip(np.nan_to_num(by_corner), 0, 1) * 255).astype(np.uint8), source)
 
 
 def _material(material: Any, textures: dict[str, Image.Image | None], source: MeshSource) -> PBRMaterial:

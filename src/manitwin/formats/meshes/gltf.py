@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
+from manitwin.errors import InputError
+from manitwin.formats.bounded_file import decode_text
+from manitwin.formats.json_file import parse_json
 from manitwin.formats.meshes.gltf_document import Accessors, GltfMaterials, split_glb, transformed_uv
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import bake_transform, color_by_corner, linear_to_srgb, make_part
+from manitwin.formats.meshes.textures import (
+    bake_transform,
+    color_by_corner,
+    linear_to_srgb,
+    make_part,
+    without_unused_vertices,
+)
 
 # required extensions that change nothing of the geometry, or that are understood here
 _KNOWN_REQUIRED = (
@@ -23,14 +32,19 @@ _KNOWN_REQUIRED = (
     "EXT_texture_webp",
     "KHR_xmp",
 )
-_MAX_PARTS = 20_000
+_NAME_CHARACTERS = 200
 
 
 def read_gltf(source: MeshSource, binary: bool) -> list[trimesh.Trimesh]:
     """Read the default scene of a glTF 2.0 document into parts in its own frame (metres, Y-up), node transforms baked.
 
-    Raises InputError: ``unreadable``, ``animated`` (skinned meshes).
+    Raises InputError: ``unreadable``, ``too_large``, ``animated`` (skinned meshes).
     """
+    with source.reading("glTF"):
+        return _scene_parts(source, binary)
+
+
+def _scene_parts(source: MeshSource, binary: bool) -> list[trimesh.Trimesh]:
     data = source.data()
     text, chunk = split_glb(data, source) if binary else (data, None)
     tree = _parse(text, source)
@@ -39,22 +53,22 @@ def read_gltf(source: MeshSource, binary: bool) -> list[trimesh.Trimesh]:
     materials = GltfMaterials(tree, accessors, source)
     reader = _Primitives(tree, accessors, materials, source)
     parts: list[trimesh.Trimesh] = []
-    faces = 0
+    faces = vertices = 0
     for mesh_index, matrix in _instances(tree, source):
         for part in reader.parts(mesh_index):
             faces += len(part.faces)
             source.check_faces(faces)
-            if len(parts) >= _MAX_PARTS:
-                raise source.unreadable(f"more than {_MAX_PARTS} parts", "merge them before exporting")
+            if vertices + len(part.vertices) > source.limits.max_vertices:
+                part = without_unused_vertices(part)
+            vertices += len(part.vertices)
+            source.check_parts(len(parts) + 1)
             parts.append(bake_transform(part, matrix))
     return parts
 
 
 def _parse(text: bytes, source: MeshSource) -> dict[str, Any]:
-    try:
-        tree = json.loads(text.decode("utf-8-sig").rstrip("\0 "))
-    except (ValueError, RecursionError) as error:
-        raise source.unreadable(f"its JSON is broken ({str(error)[:80]})", "download or export it again") from error
+    refuse = partial(InputError, "unreadable")
+    tree = parse_json(decode_text(text, source.name, refuse).rstrip("\0 "), source.name, refuse)
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
         raise source.unreadable("its JSON is no glTF document", "export it as glTF 2.0")
     return tree
@@ -109,7 +123,8 @@ def _instances(tree: dict[str, Any], source: MeshSource) -> Iterator[tuple[Any, 
             raise source.unreadable("its nodes form no tree", "export it again")
         seen.add(index)
         node = nodes[index]
-        matrix = parent @ _local_matrix(node, source)
+        with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
+            matrix = parent @ _local_matrix(node, source)
         if "mesh" in node:
             yield node["mesh"], matrix
         stack.extend((child, matrix) for child in reversed(node.get("children", [])))
@@ -134,13 +149,14 @@ class _Primitives:
     def __init__(self, tree: dict[str, Any], accessors: Accessors, materials: GltfMaterials, source: MeshSource):
         self._tree, self._accessors, self._materials, self._source = tree, accessors, materials, source
         self._parts: dict[int, list[trimesh.Trimesh]] = {}
+        self._primitives = self._face_count = self._vertex_count = 0
 
     def parts(self, index: Any) -> list[trimesh.Trimesh]:
         meshes = self._tree.get("meshes", [])
         if not isinstance(index, int) or not 0 <= index < len(meshes):
             raise self._source.unreadable(f"a node names mesh {str(index)[:20]}, which is not there", "export it again")
         if index not in self._parts:
-            name = str(meshes[index].get("name") or f"mesh_{index}")
+            name = str(meshes[index].get("name") or f"mesh_{index}")[:_NAME_CHARACTERS]
             built = [self._part(primitive, name) for primitive in meshes[index].get("primitives", [])]
             self._parts[index] = [part for part in built if part is not None]
         return self._parts[index]
@@ -156,32 +172,39 @@ class _Primitives:
         vertices = self._rows(attributes, "POSITION", 3)
         if vertices is None:
             raise self._source.unreadable("a mesh has no positions", "export it again")
-        faces = self._faces(primitive, len(vertices), mode)
+        count = len(vertices)
+        faces = self._faces(primitive, count, mode)
+        used: np.ndarray | slice = slice(None)
+        if self._vertex_count + count > self._source.limits.max_vertices:
+            # primitives may share one array of vertices, of which each uses a few
+            used, inverse = np.unique(faces, return_inverse=True)
+            faces = inverse.reshape(-1, 3)
+        vertices = vertices[used]
+        self._primitives, self._face_count = self._primitives + 1, self._face_count + len(faces)
+        self._vertex_count += len(vertices)
+        self._source.check_parts(self._primitives)
+        self._source.check_faces(self._face_count)
         info = self._materials.base_texture(primitive.get("material"))
         material = self._materials.material(primitive.get("material"))
-        uv = self._rows(attributes, f"TEXCOORD_{info.get('texCoord', 0)}", 2, len(vertices))
+        uv = self._rows(attributes, f"TEXCOORD_{info.get('texCoord', 0)}", 2, count)
         if uv is not None:
-            uv = transformed_uv(uv.astype(np.float64), info)
+            uv = transformed_uv(uv[used].astype(np.float64), info)
             uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])  # to the origin at the lower left
-        part = make_part(
-            vertices,
-            faces,
-            material=material,
-            name=name,
-            uv=uv,
-            normals=self._rows(attributes, "NORMAL", 3, len(vertices)),
-        )
-        colors = self._colors(attributes, len(vertices))
+        normals = self._rows(attributes, "NORMAL", 3, count)
+        normals = None if normals is None else normals[used]
+        part = make_part(vertices, faces, material=material, name=name, uv=uv, normals=normals)
+        colors = self._rows(attributes, "COLOR_0", 3, count)
         if colors is None or material.baseColorTexture is not None:
             return part
-        return color_by_corner(part, colors[part.faces], self._source)
+        return color_by_corner(part, _srgb_colors(colors[used])[part.faces], self._source)
 
     def _faces(self, primitive: dict[str, Any], count: int, mode: int) -> np.ndarray:
-        order = (
-            np.arange(count)
-            if "indices" not in primitive
-            else self._accessors.array(primitive["indices"])[:, 0].astype(np.int64)
-        )
+        order = np.arange(count)
+        if "indices" in primitive:
+            indices = self._accessors.array(primitive["indices"])[:, 0]
+            if indices.dtype.kind != "u":  # section 3.7.2.1
+                raise self._source.unreadable("its indices are no unsigned integers", "export it again")
+            order = indices.astype(np.int64)
         if len(order) and int(order.max()) >= count:
             raise self._source.unreadable("a face names a vertex that is not there", "export it again")
         if mode == 4:
@@ -210,11 +233,11 @@ class _Primitives:
             raise self._source.unreadable(f"{name} does not fit the mesh", "export it again")
         return rows[:, :columns]
 
-    def _colors(self, attributes: dict[str, Any], count: int) -> np.ndarray | None:
-        colors = self._rows(attributes, "COLOR_0", 3, count)
-        if colors is None:
-            return None
-        if colors.dtype.kind in "iu":  # integers that do not say normalized are meant so all the same
-            colors = colors / np.iinfo(colors.dtype).max
-        # section 3.7.2.1: COLOR_0 is linear, textures are sRGB
-        return np.round(linear_to_srgb(np.clip(colors.astype(np.float64), 0, 1)) * 255).astype(np.uint8)
+
+def _srgb_colors(colors: np.ndarray) -> np.ndarray:
+    """Return the colours ``(V, 3) uint8`` sRGB that COLOR_0 says."""
+    if colors.dtype.kind in "iu":  # integers that do not say normalized are meant so all the same
+        colors = colors / np.iinfo(colors.dtype).max
+    # section 3.7.2.1: COLOR_0 is linear, textures are sRGB
+    linear = np.clip(np.nan_to_num(colors.astype(np.float64)), 0, 1)
+    return np.round(linear_to_srgb(linear) * 255).astype(np.uint8)

@@ -12,17 +12,19 @@ from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.formats.meshes.source import MeshSource
-from manitwin.formats.meshes.textures import decode_texture, pbr_material
+from manitwin.formats.meshes.textures import Buffer, decode_texture, pbr_material
 
 # glTF 2.0, section 3.6.2.2
 _DTYPES = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
 _COLUMNS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+_NAME_CHARACTERS = 200
 _GLB_JSON, _GLB_BIN = 0x4E4F534A, 0x004E4942
 _REMEDY = "download or export it again"
+_VALUES_PER_VERTEX = 16  # position, normal, texture coordinates, colour, and its share of the indices: 13
 
 
-def split_glb(data: bytes, source: MeshSource) -> tuple[bytes, bytes | None]:
-    """Return the JSON and the binary chunk of a GLB container (glTF 2.0, section 4); raises InputError."""
+def split_glb(data: bytes, source: MeshSource) -> tuple[bytes, memoryview | None]:
+    """Return the JSON and a view of the binary chunk of a GLB container (glTF 2.0, section 4); raises InputError."""
     if len(data) < 20:
         raise source.unreadable("the GLB ends inside its header", _REMEDY)
     _, version, length = struct.unpack_from("<III", data)
@@ -30,25 +32,26 @@ def split_glb(data: bytes, source: MeshSource) -> tuple[bytes, bytes | None]:
         raise source.unreadable(f"GLB version {version}, only 2 is read", "export it as glTF 2.0")
     if length > len(data):
         raise source.unreadable(f"truncated: the GLB says {length} bytes and has {len(data)}", _REMEDY)
-    chunks: list[tuple[int, bytes]] = []
+    chunks: list[tuple[int, memoryview]] = []
     offset = 12
-    while offset + 8 <= length:
+    while offset + 8 <= length and len(chunks) < 2:  # all that a reader may look at
         size, kind = struct.unpack_from("<II", data, offset)
         if offset + 8 + size > length:
             raise source.unreadable("a GLB chunk is longer than the file", _REMEDY)
-        chunks.append((kind, data[offset + 8 : offset + 8 + size]))
+        chunks.append((kind, memoryview(data)[offset + 8 : offset + 8 + size]))
         offset += 8 + size
     if not chunks or chunks[0][0] != _GLB_JSON:
         raise source.unreadable("the GLB has no JSON chunk", _REMEDY)
-    return chunks[0][1], next((chunk for kind, chunk in chunks[1:2] if kind == _GLB_BIN), None)
+    return bytes(chunks[0][1]), next((chunk for kind, chunk in chunks[1:] if kind == _GLB_BIN), None)
 
 
 class Accessors:
     """Arrays of a glTF document by accessor index; raises InputError ``unreadable`` for whatever does not add up."""
 
-    def __init__(self, tree: dict[str, Any], binary: bytes | None, source: MeshSource):
+    def __init__(self, tree: dict[str, Any], binary: Buffer | None, source: MeshSource):
         self._tree, self._binary, self._source = tree, binary, source
-        self._buffers: dict[int, bytes] = {}
+        self._buffers: dict[int, Buffer] = {}
+        self._values = 0
         self._arrays: dict[int, np.ndarray] = {}
 
     def array(self, index: Any) -> np.ndarray:
@@ -58,7 +61,7 @@ class Accessors:
             self._arrays[position] = self._read(self._tree["accessors"][position])
         return self._arrays[position]
 
-    def view(self, index: Any) -> bytes:
+    def view(self, index: Any) -> memoryview:
         """Return the bytes of buffer view ``index``."""
         view = self._tree["bufferViews"][self._checked(index, "bufferViews")]
         start, length = self._count(view.get("byteOffset", 0)), self._count(view.get("byteLength"))
@@ -67,7 +70,7 @@ class Accessors:
             raise self._source.unreadable(
                 f"truncated: buffer view {index} ends at {start + length} of {len(data)} bytes", _REMEDY
             )
-        return data[start : start + length]
+        return memoryview(data)[start : start + length]
 
     def uri(self, uri: str, what: str) -> bytes | None:
         """Return the bytes behind a data or file URI, or None with a finding where it leads nowhere safe."""
@@ -83,11 +86,11 @@ class Accessors:
             self._source.find(f"{what} is a broken data URI; carried on without it")
             return None
 
-    def _buffer(self, index: int) -> bytes:
+    def _buffer(self, index: int) -> Buffer:
         if index not in self._buffers:
             entry = self._tree["buffers"][index]
             uri = entry.get("uri")
-            data = self._binary if uri is None and index == 0 else self.uri(str(uri), "buffer")
+            data: Buffer | None = self._binary if uri is None and index == 0 else self.uri(str(uri), "buffer")
             if data is None:
                 raise self._source.unreadable(
                     f"buffer {str(uri)[:80]!r} cannot be read",
@@ -103,13 +106,15 @@ class Accessors:
 
     def _read(self, accessor: dict[str, Any]) -> np.ndarray:
         count = self._count(accessor.get("count"))
-        if count > 6 * self._source.limits.max_faces:
-            raise self._source.unreadable(
-                f"an accessor says {count} elements, more than the limit", "simplify it, or raise the limit"
-            )
+        self._source.check_vertices(count)
         kind, columns = _DTYPES.get(accessor.get("componentType", 0)), _COLUMNS.get(accessor.get("type", ""))
         if kind is None or columns is None:
             raise self._source.unreadable("an accessor has an unknown type", "export it again as glTF 2.0")
+        # accessors may share a view, or have none: what they ask for is not what the file holds
+        self._values += count * columns
+        limit = _VALUES_PER_VERTEX * self._source.limits.max_vertices
+        if self._values > limit:
+            raise self._source.too_large(f"its accessors ask for more than {limit} numbers")
         dtype = np.dtype(kind).newbyteorder("<")
         if "bufferView" in accessor:
             values = self._strided(accessor["bufferView"], accessor.get("byteOffset", 0), count, columns, dtype)
@@ -137,7 +142,10 @@ class Accessors:
     def _patched(self, values: np.ndarray, sparse: dict[str, Any], columns: int, dtype: np.dtype) -> np.ndarray:
         count = self._count(sparse.get("count"))
         places, news = sparse.get("indices", {}), sparse.get("values", {})
-        index_type = np.dtype(_DTYPES.get(places.get("componentType", 0), np.uint32)).newbyteorder("<")
+        kind = np.dtype(_DTYPES.get(places.get("componentType", 0), np.uint32))
+        if kind.kind != "u":
+            raise self._source.unreadable("a sparse accessor has indices of a wrong type", _REMEDY)
+        index_type = kind.newbyteorder("<")
         where = self._strided(places.get("bufferView"), places.get("byteOffset", 0), count, 1, index_type)[:, 0]
         if count and int(where.max()) >= len(values):
             raise self._source.unreadable("a sparse accessor points outside its array", _REMEDY)
@@ -185,7 +193,7 @@ class GltfMaterials:
             self._source.find("metallicFactor is missing in a file written by trimesh; taken as 0 (not metal)")
             metallic = 0.0
         return pbr_material(
-            entry.get("name"),
+            None if entry.get("name") is None else str(entry["name"])[:_NAME_CHARACTERS],
             base_color=factor,
             metallic=metallic,
             roughness=float(pbr.get("roughnessFactor", 1.0)),
@@ -223,7 +231,7 @@ class GltfMaterials:
             self._source.find("a texture names an image that is not in the file; carried on without it")
             return None
         name = str(entry.get("name") or entry.get("uri", index))[:80]
-        data = self._accessors.view(entry["bufferView"]) if "bufferView" in entry else None
+        data: Buffer | None = self._accessors.view(entry["bufferView"]) if "bufferView" in entry else None
         if data is None and isinstance(entry.get("uri"), str):
             data = self._accessors.uri(entry["uri"], "texture")
         return (

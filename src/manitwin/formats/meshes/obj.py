@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import io
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import trimesh
@@ -16,6 +18,11 @@ from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.source_files import map_file_name
 
 DEFAULT_COLOR = (0.8, 0.8, 0.8)
+_MAX_PLAIN_BYTES = 64 << 20  # of a text that is held as lines; longer ones are read line by line
+_MAX_LINE = 64 << 20  # a face may have millions of corners
+_MAX_NUMBERS = 4096  # characters of a line of numbers
+_MAX_INDEX = 2**31
+_MAX_LIBRARIES, _NAME_CHARACTERS = 1000, 4096
 
 
 @dataclass
@@ -40,12 +47,13 @@ def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
 
     Raises InputError ``unreadable`` naming the line where the text is broken.
     """
-    text = source.data().decode("utf-8", errors="replace")
-    plain = plain_triangles(text)
-    if plain is not None:
-        source.check_faces(len(plain[1]))
-        return [make_part(*plain, material=pbr_material(None, base_color=DEFAULT_COLOR), name="mesh")]
-    document = _parse(text, source)
+    data = source.data()
+    if len(data) <= _MAX_PLAIN_BYTES:
+        plain = plain_triangles(data.decode("utf-8", errors="replace"))
+        if plain is not None:
+            source.check_faces(len(plain[1]))
+            return [make_part(*plain, material=pbr_material(None, base_color=DEFAULT_COLOR), name="mesh")]
+    document = _parse(data, source)
     positions = _table(document.positions, 3, "v", source)
     uv = _table(document.uv, 2, "vt", source)
     normals = _table(document.normals, 3, "vn", source)
@@ -72,41 +80,65 @@ def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
     return parts
 
 
-def _parse(text: str, source: MeshSource) -> _Document:
+def _lines(data: bytes, source: MeshSource) -> Iterator[str]:
+    """Yield the lines of a text one by one, those that end with a backslash joined with the next."""
+    stream = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
+    joined: list[str] = []
+    length = 0
+    for line in iter(partial(stream.readline, _MAX_LINE), ""):
+        length += len(line)
+        if length >= _MAX_LINE:
+            raise source.too_large(f"it has a line of more than {_MAX_LINE} characters", "export it again")
+        if line.endswith("\\\n"):
+            joined.append(line[:-2])
+            continue
+        yield " ".join([*joined, line]) if joined else line
+        joined, length = [], 0
+    if joined:
+        yield " ".join(joined)
+
+
+def _parse(data: bytes, source: MeshSource) -> _Document:
     document = _Document()
+    tables = {"v": document.positions, "vt": document.uv, "vn": document.normals}
     group: _Group | None = None
     material = ""
     corner_cache: dict[str, tuple[int, int, int]] = {}
     triangles = 0
-    for number, line in enumerate(text.replace("\\\r\n", " ").replace("\\\n", " ").splitlines(), start=1):
+    most = source.limits.max_faces
+    for number, line in enumerate(_lines(data, source), start=1):
         words = line.split(None, 1)
         if not words:
             continue
-        keyword, rest = words[0], words[1] if len(words) > 1 else ""
-        if keyword == "v":
-            document.positions.append(rest)
-        elif keyword == "vt":
-            document.uv.append(rest if len(rest.split(None, 1)) > 1 else f"{rest} 0")
-        elif keyword == "vn":
-            document.normals.append(rest)
+        keyword, rest = words[0], words[1].rstrip() if len(words) > 1 else ""
+        if keyword in tables:
+            if len(rest) > _MAX_NUMBERS:
+                raise source.unreadable(f"line {number} is too long for a {keyword!r}", "export it again")
+            if keyword == "vt" and len(rest.split(None, 1)) < 2:
+                rest = f"{rest} 0"
+            tables[keyword].append(rest)
+            source.check_vertices(len(tables[keyword]))
         elif keyword == "f":
             if group is None:
                 group = document.groups.setdefault(material, _Group())
+                source.check_parts(len(document.groups))
+            # one word more than may be: the rest of the line
+            said = rest.split(None, most + 3)
             try:
-                corners = [corner_cache.get(word) or _corner(word, document, corner_cache) for word in rest.split()]
+                corners = [corner_cache.get(word) or _corner(word, document, corner_cache) for word in said[: most + 3]]
             except ValueError as error:
                 raise source.unreadable(f"line {number} is no face: {line[:60]!r}", "export it again") from error
+            triangles += max(len(said) - 2, 1)
+            source.check_faces(triangles)
             if len(corners) < 3:
                 continue  # a point or a line written as a face
-            triangles += len(corners) - 2
-            source.check_faces(triangles)
             group.sizes.append(len(corners))
             group.corners.extend(corners)
         elif keyword == "usemtl":
-            material = rest.strip()
+            material = rest[:_NAME_CHARACTERS].strip()
             group = None
-        elif keyword == "mtllib" and rest:
-            document.libraries.append(rest.strip())
+        elif keyword == "mtllib" and rest and len(document.libraries) < _MAX_LIBRARIES:
+            document.libraries.append(rest[:_NAME_CHARACTERS].strip())
     return document
 
 
@@ -120,7 +152,7 @@ def _corner(word: str, document: _Document, cache: dict[str, tuple[int, int, int
         if text == "" and i > 0:
             continue
         value = int(text)
-        if value == 0 or value < -counts[i]:
+        if value == 0 or value < -counts[i] or value > _MAX_INDEX:
             raise ValueError(word)
         relative = relative or value < 0
         indices[i] = value - 1 if value > 0 else counts[i] + value
@@ -140,7 +172,10 @@ def _unique_corners(group: _Group, counts: tuple[int, int, int], source: MeshSou
                 "the file is cut short or broken; export it again",
             )
     # one integer a corner sorts much faster than rows
-    key = (rows[:, 0] * (counts[1] + 1) + rows[:, 1] + 1) * (counts[2] + 1) + rows[:, 2] + 1
+    key = rows[:, 0] * (counts[1] + 1) + rows[:, 1] + 1
+    if (counts[0] + 1) * (counts[1] + 1) * (counts[2] + 1) >= 2**63:
+        key = np.unique(key, return_inverse=True)[1]
+    key = key * (counts[2] + 1) + rows[:, 2] + 1
     _, first, inverse = np.unique(key, return_index=True, return_inverse=True)
     fans, _ = triangle_fans(np.asarray(group.sizes))
     return inverse[fans], rows[first]
@@ -170,8 +205,9 @@ def _vertex_colors(lines: list[str]) -> np.ndarray | None:
         colors = _numbers(lines, (3, 4, 5))
     except ValueError:
         return None
-    scale = 255.0 if np.nanmax(colors) <= 1.0 else 1.0
-    return np.clip(np.round(np.nan_to_num(colors) * scale), 0, 255).astype(np.uint8)
+    colors = np.clip(np.nan_to_num(colors), -1, 255)
+    scale = 255.0 if colors.max() <= 1.0 else 1.0
+    return np.clip(np.round(colors * scale), 0, 255).astype(np.uint8)
 
 
 def _materials(document: _Document, source: MeshSource) -> dict[str, PBRMaterial]:
@@ -198,15 +234,15 @@ def plain_triangles(text: str) -> tuple[np.ndarray, np.ndarray] | None:
     corners = [line[2:] for line in lines if line.startswith("f ")]
     if not corners or len(places) + len(corners) != len(lines):
         return None
+    # three of each in every line, and no line longer than three numbers are
+    if any(len(line) > _MAX_NUMBERS or len(line.split()) != 3 for line in (*places, *corners)):
+        return None
     try:
         vertices = np.array(" ".join(places).split(), dtype=np.float64)
         faces = np.array(" ".join(corners).split(), dtype=np.int64)
     except (ValueError, OverflowError):
         return None
-    # three of each in every line: a sum that fits by chance is told by the lines themselves
-    if len(vertices) != 3 * len(places) or len(faces) != 3 * len(corners) or not np.isfinite(vertices).all():
-        return None
-    if any(len(line.split()) != 3 for line in (*places, *corners)):
+    if not np.isfinite(vertices).all():
         return None
     if len(np.unique(faces)) != len(places) or faces.min() < 1 or faces.max() > len(places):
         return None
@@ -224,7 +260,8 @@ def read_mtl(text: str, source: MeshSource) -> dict[str, PBRMaterial]:
     for line in text.splitlines():
         keyword, _, rest = line.strip().replace("\t", " ").partition(" ")
         if keyword.lower() == "newmtl":
-            entries.append((rest.strip(), {}))
+            entries.append((rest[:_NAME_CHARACTERS].strip(), {}))
+            source.check_parts(len(entries))
         elif entries and rest and not keyword.startswith("#"):
             entries[-1][1].setdefault(keyword.lower(), rest.strip())
     for name, values in entries:

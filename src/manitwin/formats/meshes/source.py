@@ -2,11 +2,38 @@
 
 from __future__ import annotations
 
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
+from PIL import Image
+
 from manitwin.errors import InputError
-from manitwin.formats.source_files import inside_folder, spellings
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.printable import printable_line
+from manitwin.formats.source_files import inside_folder, is_regular, spellings
+
+_SIMPLIFY = "simplify it, or raise the limit"
+_MESSAGE_CHARACTERS = 400
+_MAX_FINDINGS = 100
+_TEXTURES = 8
+MAX_PARTS = 20_000
+"""Parts of one file, each with a material and a place of its own: more are no single object."""
+# broken files fail in more ways than a reader can name; none of them is a fault of this program
+_BROKEN = (
+    ValueError,
+    KeyError,
+    IndexError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    RecursionError,
+    OSError,
+    struct.error,
+)
 
 
 @dataclass(frozen=True)
@@ -21,73 +48,125 @@ class MeshLimits:
     max_texture_pixels: int = 1 << 26
     decode_textures: bool = True
 
+    @property
+    def max_vertices(self) -> int:
+        """The most vertices that so many triangles can use."""
+        return 3 * self.max_faces
+
+    @property
+    def max_total_texture_pixels(self) -> int:
+        """The most pixels of all different textures together: eight of the largest."""
+        return _TEXTURES * self.max_texture_pixels
+
 
 @dataclass
 class MeshSource:
     """A mesh file, and the only way for a reader to reach the files that it names.
 
     Names are looked up below the file's own folder and nowhere else: absolute paths, ``..``, links that lead out and
-    remote addresses are never followed. ``findings`` collects plain sentences about what was left out or assumed.
+    remote addresses are never followed, and only regular files are opened. ``findings`` collects plain sentences about what
+    was left out or assumed, ``textures`` what was decoded, by its bytes' digest.
     """
 
     path: Path
     limits: MeshLimits
     findings: list[str] = field(default_factory=list)
     bytes_read: int = 0
+    textures: dict[str, Image.Image | None] = field(default_factory=dict)
+    _texture_pixels: int = 0
+    _contents: dict[Path, bytes] = field(default_factory=dict)
+
+    @property
+    def name(self) -> str:
+        """The file's name as a message shows it."""
+        return printable_line(self.path.name, max_characters=200)
 
     def data(self) -> bytes:
-        """Return the bytes of the file itself; raises InputError ``unreadable`` where it is larger than the limit."""
-        size = self.path.stat().st_size
-        if size > self.limits.max_bytes:
-            raise self.unreadable(
-                f"{size} bytes are more than the limit of {self.limits.max_bytes}", "simplify it, or raise the limit"
-            )
-        self.bytes_read += size
-        return self.path.read_bytes()
+        """Return the bytes of the file itself; raises InputError, ``too_large`` where it is larger than the limit."""
+        unreadable, too_large = partial(InputError, "unreadable"), partial(InputError, "too_large")
+        data = read_bytes(self.path, self.limits.max_bytes, unreadable, refuse_size=too_large)
+        self.bytes_read += len(data)
+        return data
 
     def sibling(self, name: str, what: str) -> bytes | None:
         """Return the bytes of a file that the mesh names, or None with a finding; ``what`` says what it is for.
 
-        Raises InputError ``unreadable`` where all files together are larger than the limit.
+        Raises InputError ``too_large`` where all files together are larger than the limit.
         """
         for spelling in spellings(name):
             found = inside_folder(self.path.parent, spelling)
             if found is None:
                 self.find(f"{what} {_short(name)} lies outside the file's own folder and was not read")
                 return None
-            if found.is_file():
+            if is_regular(found):
                 return self._read(found)
         self.find(f"{what} {_short(name)} is not there; carried on without it")
         return None
 
     def find(self, sentence: str) -> None:
         """Note a finding once."""
-        if sentence not in self.findings:
-            self.findings.append(sentence)
+        line = printable_line(sentence, max_characters=_MESSAGE_CHARACTERS)
+        if line not in self.findings and len(self.findings) < _MAX_FINDINGS:
+            self.findings.append(line)
 
     def unreadable(self, cause: str, remedy: str) -> InputError:
         """Return the error for a file that cannot be read: it names the file, the cause and the remedy in one line."""
         return self.refused("unreadable", cause, remedy)
 
+    def too_large(self, cause: str, remedy: str = _SIMPLIFY) -> InputError:
+        """Return the error for a file that passes a limit."""
+        return self.refused("too_large", cause, remedy)
+
     def refused(self, reason: str, cause: str, remedy: str) -> InputError:
         """Return the error for a file that is refused for one of the input's reasons."""
-        return InputError(reason, f"{self.path.name}: {' '.join(cause.split())}; {remedy}")
+        cause = printable_line(" ".join(cause.split()), max_characters=_MESSAGE_CHARACTERS)
+        return InputError(reason, f"{self.name}: {cause}; {remedy}")
 
     def check_faces(self, faces: int) -> None:
-        """Raise InputError ``unreadable`` where there are more triangles than the limit."""
+        """Raise InputError ``too_large`` where there are more triangles than the limit."""
         if faces > self.limits.max_faces:
-            raise self.unreadable(
-                f"{faces} faces are more than the limit of {self.limits.max_faces}", "simplify it, or raise the limit"
-            )
+            raise self.too_large(f"{faces} faces are more than the limit of {self.limits.max_faces}")
+
+    def check_vertices(self, vertices: int) -> None:
+        """Raise InputError ``too_large`` where there are more vertices than triangles within the limit can use."""
+        if vertices > self.limits.max_vertices:
+            limit = f"{self.limits.max_vertices}, three for each of {self.limits.max_faces} faces"
+            raise self.too_large(f"{vertices} vertices are more than the limit of {limit}")
+
+    def count_texture(self, pixels: int) -> None:
+        """Count the pixels of one more texture; raises InputError ``too_large`` where all together are too many."""
+        self._texture_pixels += pixels
+        limit = self.limits.max_total_texture_pixels
+        if self.limits.decode_textures and self._texture_pixels > limit:
+            cause = f"its textures have more than {limit} pixels together"
+            raise self.too_large(cause, "scale them down, or raise the limit of one texture")
+
+    def check_parts(self, parts: int) -> None:
+        """Raise InputError ``too_large`` where there are more parts than ``MAX_PARTS``."""
+        if parts > MAX_PARTS:
+            raise self.too_large(f"it has more than {MAX_PARTS} parts", "merge them before exporting")
+
+    @contextmanager
+    def reading(self, format: str) -> Iterator[None]:
+        """Turn whatever a broken or too large file makes a reader fail with into an InputError."""
+        try:
+            yield
+        except MemoryError as error:
+            raise self.too_large("it asks for more memory than there is") from error
+        except _BROKEN as error:
+            cause = f"its {format} is broken ({type(error).__name__}: {str(error)[:80]})"
+            raise self.unreadable(cause, "export it again") from error
 
     def _read(self, found: Path) -> bytes:
-        self.bytes_read += found.stat().st_size
-        if self.bytes_read > self.limits.max_bytes:
-            raise self.unreadable(
-                f"it and the files that it names have more than {self.limits.max_bytes} bytes",
-                "simplify it, or raise the limit",
+        # each file once: many materials may name one texture
+        if found not in self._contents:
+            together = f"it and the files that it names have more than {self.limits.max_bytes} bytes"
+            left, refuse = self.limits.max_bytes - self.bytes_read, partial(InputError, "unreadable")
+            self._contents[found] = read_bytes(
+                found, left, refuse, inside=self.path.parent, refuse_size=lambda _: self.too_large(together)
             )
-        return found.read_bytes()
+            self.bytes_read += len(self._contents[found])
+        return self._contents[found]
 
 
 def _short(name: str) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
-import struct
 import warnings
 from collections.abc import Sequence
 
@@ -13,23 +13,15 @@ from PIL import Image
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from manitwin.errors import InputError
 from manitwin.formats.meshes.source import MeshSource
+
+Buffer = bytes | memoryview
 
 # what real asset packs use; decoders for other formats of Pillow are not reached from untrusted files
 TEXTURE_FORMATS = ("PNG", "JPEG", "WEBP", "BMP", "TGA", "TIFF", "GIF")
-# what Pillow's decoders raise for broken files
-_DECODER_ERRORS = (
-    OSError,
-    ValueError,
-    SyntaxError,
-    EOFError,
-    IndexError,
-    KeyError,
-    TypeError,
-    struct.error,
-    Image.DecompressionBombError,
-    Image.DecompressionBombWarning,
-)
+_MAX_UV = 1e6  # textures may repeat, but not so often
+_MAX_NORMAL = 1e6
 _MAX_ATLAS = 4096
 _CELL_SIZES = (
     8,
@@ -37,10 +29,21 @@ _CELL_SIZES = (
 )  # 8 pixels are JPEG's own block, so colours do not leak between cells; 4 are the fewest for two triangles
 
 
-def decode_texture(data: bytes, name: str, source: MeshSource) -> Image.Image | None:
-    """Decode a texture to mode RGB or RGBA, or return None with a finding where it cannot be read or is too large."""
+def decode_texture(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
+    """Decode a texture to mode RGB or RGBA, or return None with a finding where it cannot be read or is too large.
+
+    Equal bytes are decoded once. Raises InputError ``too_large`` where all textures together have too many pixels.
+    """
+    digest = hashlib.sha256(data).hexdigest()
+    if digest not in source.textures:
+        source.textures[digest] = _decoded(data, name if len(name) <= 80 else f"{name[:77]}...", source)
+    return source.textures[digest]
+
+
+def _decoded(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
     try:
         with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             warnings.simplefilter("error", Image.DecompressionBombWarning)
             image: Image.Image = Image.open(io.BytesIO(data), formats=TEXTURE_FORMATS)
             if image.width * image.height > source.limits.max_texture_pixels:
@@ -48,10 +51,13 @@ def decode_texture(data: bytes, name: str, source: MeshSource) -> Image.Image | 
                     f"texture {name!r} of {image.width} x {image.height} pixels is over the limit and was left out"
                 )
                 return None
+            source.count_texture(image.width * image.height)
             if not source.limits.decode_textures:
                 return image
             image.load()
-    except _DECODER_ERRORS as error:
+    except (InputError, MemoryError):
+        raise
+    except Exception as error:  # a decoder may raise anything on damaged bytes
         source.find(f"texture {name!r} cannot be decoded and was left out ({' '.join(str(error).split())[:100]})")
         return None
     if image.mode in ("I", "I;16", "I;16B", "I;16L"):
@@ -82,13 +88,13 @@ def pbr_material(
     return PBRMaterial(
         name=name,
         baseColorFactor=np.round(np.clip(np.nan_to_num(rgba, nan=1.0), 0, 1) * 255).astype(np.uint8),
-        metallicFactor=float(np.clip(metallic, 0, 1)),
-        roughnessFactor=float(np.clip(roughness, 0, 1)),
+        metallicFactor=float(np.clip(np.nan_to_num(metallic), 0, 1)),
+        roughnessFactor=float(np.clip(np.nan_to_num(roughness, nan=0.8), 0, 1)),
         baseColorTexture=base_color_texture,
         metallicRoughnessTexture=metallic_roughness_texture,
         normalTexture=normal_texture,
         alphaMode=alpha_mode,
-        alphaCutoff=alpha_cutoff,
+        alphaCutoff=alpha_cutoff if alpha_cutoff is None or np.isfinite(alpha_cutoff) else 0.5,
         doubleSided=double_sided,
     )
 
@@ -105,19 +111,40 @@ def make_part(
     """Build one visual part.
 
     ``vertices`` (V, 3), ``faces`` (F, 3), ``uv`` (V, 2) with the origin at the lower left as trimesh has it,
-    ``normals`` (V, 3) or None; normals that are not unit vectors are dropped.
+    ``normals`` (V, 3) or None; normals that are not unit vectors are dropped, texture coordinates that are no numbers or far
+    out become 0.
     """
     part = trimesh.Trimesh(
         vertices=np.asarray(vertices, dtype=np.float64), faces=np.asarray(faces, dtype=np.int64), process=False
     )
-    if normals is not None and len(normals) == len(vertices) and np.isfinite(normals).all():
+    if normals is not None and len(normals) == len(vertices) and (np.abs(normals) <= _MAX_NORMAL).all():
         lengths = np.linalg.norm(normals, axis=1)
         if len(lengths) and lengths.min() > 0.5:
             unit = np.asarray(normals, dtype=np.float64) / lengths[:, None]
             part.vertex_normals = unit  # type: ignore[method-assign]
-    part.visual = TextureVisuals(uv=None if uv is None else np.asarray(uv, dtype=np.float64), material=material)
+    part.visual = TextureVisuals(uv=None if uv is None else _usable_uv(uv), material=material)
     part.metadata["name"] = name
     return part
+
+
+def _usable_uv(uv: np.ndarray) -> np.ndarray:
+    uv = np.asarray(uv, dtype=np.float64)
+    usable = np.abs(uv) <= _MAX_UV  # false for NaN
+    return uv if usable.all() else np.where(usable, uv, 0.0)
+
+
+def without_unused_vertices(part: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the part with those vertices alone that its faces use, in their order."""
+    used, inverse = np.unique(part.faces, return_inverse=True)
+    normals, uv = normals_of(part), uv_of(part)
+    return make_part(
+        part.vertices[used],
+        inverse.reshape(-1, 3),
+        material=material_of(part),
+        name=part.metadata["name"],
+        uv=None if uv is None else uv[used],
+        normals=None if normals is None else normals[used],
+    )
 
 
 def material_of(part: trimesh.Trimesh) -> PBRMaterial:
@@ -144,14 +171,16 @@ def bake_transform(part: trimesh.Trimesh, matrix: np.ndarray) -> trimesh.Trimesh
     if np.allclose(matrix, np.eye(4), rtol=0, atol=0):
         return part
     linear = matrix[:3, :3]
-    determinant = float(np.linalg.det(linear))
     normals = normals_of(part)
-    if normals is not None and determinant != 0:
-        # normals go with the inverse transpose; its sign does not follow a mirror, so no flip is due here
-        normals = normals @ np.linalg.inv(linear)
-        normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+    with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
+        determinant = float(np.linalg.det(linear))
+        if normals is not None and determinant != 0:
+            # normals go with the inverse transpose; its sign does not follow a mirror, so no flip is due here
+            normals = normals @ np.linalg.inv(linear)
+            normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)[:, None]
+        vertices = part.vertices @ linear.T + matrix[:3, 3]
     return make_part(
-        part.vertices @ linear.T + matrix[:3, 3],
+        vertices,
         part.faces[:, ::-1] if determinant < 0 else part.faces,
         material=material_of(part),
         name=part.metadata["name"],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -14,25 +15,27 @@ from manitwin.formats.meshes.textures import bake_transform, color_by_corner, ma
 from manitwin.formats.meshes.triangles import triangle_fans
 from manitwin.formats.meshes.usdz_package import PreviewSurfaces, UsdzArchive
 
-_MAX_PARTS = 20_000
 _UV_NAMES = ("st", "st0", "st_0", "UVMap", "uv", "map1", "Texture_uv")
 
 
-def read_usdz(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None, MeshSource]:
+def read_usdz(
+    source: MeshSource,
+) -> tuple[list[trimesh.Trimesh], float | None, str | None, list[str], int]:
     """Read all visible meshes of a USDZ package: parts with transforms baked, unit in metres, up axis 'y' | 'z'.
 
-    To be run in a process of its own; the source comes back with what was found. A stage that does not say its unit is in
-    centimetres (USD's fallback), which is told as None. Raises InputError ``unreadable``, ``animated`` (skinned meshes,
-    value clips).
+    To be run in a process of its own: what was found, and the bytes that were read, come back too. A stage that does not say
+    its unit is in centimetres (USD's fallback), which is told as None. Raises InputError ``unreadable``, ``animated`` (skinned
+    meshes, value clips).
     """
     archive = UsdzArchive(source)
     if archive.root is None:
         raise source.unreadable("its first member is no USD layer", "pack it with usdzip")
     archive.check_layers()
     try:
-        return *_read(Usd.Stage.Open(str(source.path)), archive, source), source
+        parts, unit_m, up = _read(Usd.Stage.Open(str(source.path)), archive, source)
     except Tf.ErrorException as error:
         raise source.unreadable("its USD is broken", "export it again") from error
+    return parts, unit_m, up, source.findings, source.bytes_read
 
 
 def _read(
@@ -71,8 +74,7 @@ def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[t
         for part in mesh_parts(UsdGeom.Mesh(prim), surfaces, source):
             faces += len(part.faces)
             source.check_faces(faces)
-            if len(parts) >= _MAX_PARTS:
-                raise source.unreadable(f"more than {_MAX_PARTS} parts", "merge them before exporting")
+            source.check_parts(len(parts) + 1)
             parts.append(bake_transform(part, matrix))
     return parts
 
@@ -86,6 +88,7 @@ def mesh_parts(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, source: MeshSource
     for attribute in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr()):
         if attribute.ValueMightBeTimeVarying():
             source.find("the file is animated; its first frame was taken")
+    source.check_faces(int(np.maximum(sizes - 2, 0).sum()))
     corners, owner = triangle_fans(sizes)
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         corners = corners[:, ::-1]
@@ -128,18 +131,17 @@ def mesh_polygons(mesh: UsdGeom.Mesh, source: MeshSource) -> tuple[np.ndarray, n
     return points.reshape(-1, 3), sizes, indices
 
 
-def _subsets(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, count: int) -> list[tuple[PBRMaterial, np.ndarray]]:
-    """Return every material of the mesh with a mask ``(count,)`` of its polygons."""
+def _subsets(mesh: UsdGeom.Mesh, surfaces: PreviewSurfaces, count: int) -> Iterator[tuple[PBRMaterial, np.ndarray]]:
+    """Yield every material of the mesh with a mask ``(count,)`` of its polygons."""
     rest = np.ones(count, dtype=bool)
-    result = []
     for subset in UsdGeom.Subset.GetGeomSubsets(mesh, UsdGeom.Tokens.face, UsdShade.Tokens.materialBind):
         chosen = np.zeros(count, dtype=bool)
         members = np.asarray(_value(subset.GetIndicesAttr()) or [], dtype=np.int64)
         chosen[members[(members >= 0) & (members < count)]] = True
         chosen &= rest
         rest &= ~chosen
-        result.append((surfaces.of(subset.GetPrim()), chosen))
-    return [*result, (surfaces.of(mesh.GetPrim()), rest)]
+        yield surfaces.of(subset.GetPrim()), chosen
+    yield surfaces.of(mesh.GetPrim()), rest
 
 
 def _uv(mesh: UsdGeom.Mesh, indices: np.ndarray, points: int, polygons: int) -> np.ndarray | None:
@@ -168,7 +170,7 @@ def _display_colors(mesh: UsdGeom.Mesh, indices: np.ndarray, sizes: np.ndarray) 
     if values is None or len(values) == 0:
         return None
     linear = np.asarray(values, np.float64).reshape(-1, 3)
-    colors = np.round(np.asarray(PreviewSurfaces.to_srgb(linear)) * 255).astype(np.uint8)
+    colors = np.round(np.asarray(PreviewSurfaces.to_srgb(np.nan_to_num(linear))) * 255).astype(np.uint8)
     if len(colors) == 1:
         return np.repeat(colors, len(indices), axis=0)
     if len(colors) == len(indices):

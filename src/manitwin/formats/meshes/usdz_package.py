@@ -5,6 +5,7 @@ from __future__ import annotations
 import posixpath
 import re
 import zipfile
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,15 @@ from PIL import Image
 from pxr import Sdf, Tf, Usd, UsdShade
 from trimesh.visual.material import PBRMaterial
 
+from manitwin.errors import InputError
+from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import decode_texture, linear_to_srgb, pbr_material
 
 _LAYERS = (".usd", ".usda", ".usdc")
 _MAX_MEMBERS = 10_000
+_CENTRAL_HEADER = b"PK\x01\x02"
+_BLOCK_BYTES = 1 << 20
 
 
 class UsdzArchive:
@@ -27,9 +32,10 @@ class UsdzArchive:
         self._source = source
         size = source.path.stat().st_size
         if size > source.limits.max_bytes:
-            raise source.unreadable(
-                f"{size} bytes are more than the limit of {source.limits.max_bytes}", "simplify it, or raise the limit"
-            )
+            raise source.too_large(f"{size} bytes are more than the limit of {source.limits.max_bytes}")
+        members_said = _central_headers(source)
+        if members_said > _MAX_MEMBERS:  # before a list of them is made
+            raise source.too_large(f"{members_said} members in the archive", "pack fewer files")
         try:
             self._zip = zipfile.ZipFile(source.path)
             members = self._zip.infolist()
@@ -37,8 +43,6 @@ class UsdzArchive:
             raise source.unreadable(
                 f"truncated or broken: its archive cannot be read ({str(error)[:60]})", "download it again"
             ) from error
-        if len(members) > _MAX_MEMBERS:
-            raise source.unreadable(f"{len(members)} members in the archive", "pack fewer files")
         for member in members:
             # USDZ allows neither compression nor encryption, which leaves nothing for a ZIP bomb to do
             if (
@@ -100,6 +104,16 @@ class UsdzArchive:
                     )
             if clips:
                 raise self._source.refused("animated", "it holds value clips", "export a still mesh")
+
+
+def _central_headers(source: MeshSource) -> int:
+    """Return how often the signature of a member's entry in an archive's directory (APPNOTE 4.3.12) stands in the file."""
+    count, rest = 0, b""
+    with open_regular(source.path, partial(InputError, "unreadable")) as stream:
+        while block := stream.read(_BLOCK_BYTES):
+            count += (rest + block).count(_CENTRAL_HEADER)
+            rest = block[1 - len(_CENTRAL_HEADER) :]
+    return count
 
 
 def package_path(path: Path, member: str) -> str:

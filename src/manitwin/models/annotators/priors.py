@@ -8,7 +8,6 @@ was made.
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Iterator
 from functools import cache
 from importlib import resources
@@ -17,6 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from manitwin.errors import ManiTwinError, choose_from
+from manitwin.formats.toml_file import parse_toml
 from manitwin.geometry.parts.features import Feature
 from manitwin.geometry.parts.shape import HeadEnd
 from manitwin.twin.record import Estimate, Finite, GraspType, Record
@@ -131,7 +131,7 @@ class Prior(Form):
 
 def _read(name: str) -> dict[str, Any]:
     path = TABLES / f"{name}.toml"
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+    return parse_toml(path.read_bytes(), f"{name}.toml", ManiTwinError)
 
 
 def _domains() -> list[str]:
@@ -215,6 +215,12 @@ def _index() -> dict[str, Prior]:
                 raise ManiTwinError(f"priors: {name!r} names both {index[key].category!r} and {prior.category!r}")
             index[key] = prior
     return index
+
+
+def named(name: str) -> Prior | None:
+    """Return the prior whose category or alias a name is, whole or in the plural; None where it is no such name."""
+    index = _index()
+    return next((index[phrase] for phrase in _singulars(normalised(name)) if phrase in index), None)
 
 
 def lookup(name: str | None) -> Prior | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, ClassVar
@@ -40,7 +41,7 @@ def with_outages(faults: Faults, refusals: Mapping[str, tuple[int, Any]], answer
     return response
 
 
-class FakeVendor:
+class FakeVendor(ABC):
     """A vendor of generated meshes on this machine: an API with a key, and finished files behind links without one.
 
     ``refusals`` are the vendor's words for the faults of any web service; ``polls`` is how often a job is looked at before it
@@ -65,13 +66,13 @@ class FakeVendor:
             return Response(*self.refusals["unauthorized"])
         return with_outages(self.faults, self.refusals, lambda: self._locked(request, base_url))
 
+    @abstractmethod
     def api(self, request: Request, base_url: str) -> Response:
         """Answer a request that has the right key."""
-        raise NotImplementedError
 
+    @abstractmethod
     def seed_of(self, job: str) -> int | None:
         """Return the seed of a job's mesh; None where there is no such job."""
-        raise NotImplementedError
 
     def _locked(self, request: Request, base_url: str) -> Response:
         with self._lock:

@@ -19,7 +19,7 @@ from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError, Unsupported
 from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.vendor import VendorGenerator, checked_address, data_uri, submit_paid
-from manitwin.models.services.http import HttpService
+from manitwin.models.services.http import HttpService, origin
 from manitwin.models.services.refusal import Gone, Refusal, refusal_by_status, words_of
 
 VENDOR = "https://queue.fal.run"
@@ -107,7 +107,7 @@ class FalGenerator(VendorGenerator):
         """Return where a request stands; a complete one may be a failed one."""
         status_url, response_url = _addresses(job_id)
         status = self._service_of(status_url).get_json(status_url).get("status")
-        if status in WORKING:
+        if isinstance(status, str) and status in WORKING:
             return JobState(WORKING[status])
         if status != "COMPLETED":
             raise BadReply(f"fal: the request has the unknown status {self._service.said(str(status))!r}")
@@ -149,13 +149,12 @@ class FalGenerator(VendorGenerator):
         return self._service_of(response_url).get_json(response_url)
 
     def _service_of(self, url: str) -> HttpService:
-        asked = urlsplit(url)
+        asked = origin(url)
         for service in self._begun:
-            own = urlsplit(service.base_url)
-            if (asked.scheme, asked.netloc) == (own.scheme, own.netloc):
+            if asked is not None and asked == origin(service.base_url):
                 return service
         raise BadReply(
-            f"fal: it names {self._service.said(asked.netloc)!r} to ask next, which is not its own host; the key goes to"
+            f"fal: it names {self._service.said(urlsplit(url).netloc)!r} to ask next, which is not its own host; the key goes to"
             " no other"
         )
 

@@ -36,7 +36,7 @@ OPTIONS = {
     "2.1": ("texture", "octree_resolution", "num_inference_steps", "guidance_scale", "face_count", "num_chunks"),
 }
 SEEDS = 2**32
-MAX_ANSWER_BYTES = 1 << 30
+MAX_ANSWER_BYTES = 384 << 20  # a mesh of 288 MiB in base 64; all of it is held in memory, twice while it is read
 WORKING = {"processing": "running", "texturing": "running"}
 
 
@@ -111,8 +111,10 @@ class Hunyuan3dGenerator:
             return JobState("done")
         if status == "error":  # of forks; the servers above have no such state
             return JobState("failed", self._service.said(str(answer.get("message") or "")))
-        if status not in WORKING:
-            raise BadReply(f"hunyuan3d: job {uid} has the unknown status {self._service.said(str(status))!r}")
+        if not isinstance(status, str) or status not in WORKING:
+            raise BadReply(
+                f"hunyuan3d: job {self._service.said(uid)} has the unknown status {self._service.said(str(status))!r}"
+            )
         return JobState("running")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:

@@ -6,7 +6,6 @@ https://docs.meshy.ai/api/balance, read 2026-11. Not verified: that a PNG's alph
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -16,7 +15,7 @@ from urllib.parse import quote
 from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, Rejected
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import VendorGenerator, checked_address, data_uri, submit_paid
+from manitwin.models.generators.vendor import VendorGenerator, checked_address, data_uri, is_name, number, submit_paid
 
 VENDOR = "https://api.meshy.ai"
 KEY = "MESHY_API_KEY"
@@ -51,8 +50,8 @@ class MeshyGenerator(VendorGenerator):
 
     def probe(self) -> str:
         """Ask for the balance."""
-        balance = self._service.get_json(BALANCE).get("balance")
-        if not isinstance(balance, int | float):
+        balance = number(self._service.get_json(BALANCE).get("balance"))
+        if balance is None:
             raise BadReply("meshy: its answer about the balance has no 'balance'")
         return f"{balance:g} credits left"
 
@@ -102,7 +101,7 @@ class MeshyGenerator(VendorGenerator):
         made = [self._task(place, task) for task in tasks]
         path = folder / "generated.glb"
         self._service.download(_link(made[-1]), path, fresh_url=lambda: _link(self._task(place, tasks[-1])))
-        credits = [task["consumed_credits"] for task in made if isinstance(task.get("consumed_credits"), int | float)]
+        credits = [used for task in made if (used := number(task.get("consumed_credits"))) is not None]
         return Generated(path, self.model, {"consumed_credits": sum(credits)} if credits else {})
 
     def _refine(self, preview: Mapping[str, Any]) -> None:
@@ -126,26 +125,22 @@ class MeshyGenerator(VendorGenerator):
         self._refines[id] = found or self._submit(TEXT, body)
 
     def _refine_among_latest(self, preview: Mapping[str, Any], text: str) -> str | None:
-        since = preview.get("finished_at") or 0
+        since = number(preview.get("finished_at")) or 0
         for page in range(1, PAGES + 1):
             tasks = self._listed(page)
             for task in tasks:
-                if task.get("type") != "text-to-3d-refine" or (task.get("created_at") or 0) < since:
+                if task.get("type") != "text-to-3d-refine" or _created(task) < since:
                     continue
-                if text == (task.get("texture_prompt") or task.get("prompt")) and isinstance(task.get("id"), str):
+                if text == (task.get("texture_prompt") or task.get("prompt")) and is_name(task.get("id")):
                     return str(task["id"])
-            if len(tasks) < PAGE or any((task.get("created_at") or 0) < since for task in tasks):
+            if len(tasks) < PAGE or any(_created(task) < since for task in tasks):
                 return None
         return None
 
     def _listed(self, page: int) -> list[dict[str, Any]]:
-        answer = self._service.ask("GET", f"{TEXT}?page_num={page}&page_size={PAGE}&sort_by=-created_at")
-        try:
-            tasks = json.loads(answer)
-        except (ValueError, RecursionError) as error:
-            raise BadReply("meshy: its list of tasks is no JSON") from error
-        if not isinstance(tasks, list) or not all(isinstance(task, dict) for task in tasks):
-            raise BadReply("meshy: its list of tasks is no list")
+        tasks = self._service.get_list(f"{TEXT}?page_num={page}&page_size={PAGE}&sort_by=-created_at")
+        if not all(isinstance(task, dict) for task in tasks):
+            raise BadReply("meshy: its list of tasks has what is no task")
         return tasks
 
     def _submit(self, place: str, body: Mapping[str, Any]) -> str:
@@ -153,9 +148,13 @@ class MeshyGenerator(VendorGenerator):
 
     def _task(self, place: str, id: str) -> dict[str, Any]:
         task = self._service.get_json(f"{place}/{quote(id, safe='')}")
-        if task.get("status") not in STATES:
-            raise BadReply(f"meshy: task {id} has the unknown status {self._service.said(str(task.get('status')))!r}")
-        return task | {"id": id}
+        status, error = task.get("status"), task.get("task_error")
+        if not isinstance(status, str) or status not in STATES:
+            raise BadReply(
+                f"meshy: task {self._service.said(id)} has the unknown status {self._service.said(str(status))!r}"
+            )
+        said = self._service.said(str(error.get("message") or "")) if isinstance(error, Mapping) else ""
+        return task | {"id": id, "said": said}
 
     def _options_but(self, names: frozenset[str]) -> dict[str, Any]:
         return {name: value for name, value in self._options.items() if name not in names}
@@ -170,9 +169,11 @@ def _parts(job_id: str) -> tuple[str, str]:
 
 def _state(task: Mapping[str, Any]) -> JobState:
     state = STATES[task["status"]]
-    error = task.get("task_error")
-    said = str(error.get("message") or "") if isinstance(error, Mapping) else ""
-    return JobState(state, said[:300] or task["status"].lower() if state == "failed" else "")  # type: ignore[arg-type]
+    return JobState(state, task["said"] or task["status"].lower() if state == "failed" else "")  # type: ignore[arg-type]
+
+
+def _created(task: Mapping[str, Any]) -> float:
+    return number(task.get("created_at")) or 0
 
 
 def _link(task: Mapping[str, Any]) -> str:

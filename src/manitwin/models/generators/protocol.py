@@ -9,6 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from manitwin.config import Resource
+from manitwin.twin.import_record import ImportRecord
 
 Asked = Literal["image", "text"]
 """What a generator may be asked with."""
@@ -43,6 +44,7 @@ class Generated:
 
     ``metric``: its units are true metres. ``rests``: it stands or lies on y = 0 as such a thing does, so that its pose is kept.
     ``unseen_share``: how much of its surface the photo does not show and no model knows; None where the generator does not say.
+    ``known``: what the generator knows of the thing by construction, in the object frame (Z up) of its mesh.
     """
 
     path: Path
@@ -51,6 +53,7 @@ class Generated:
     metric: bool = False
     rests: bool = False
     unseen_share: float | None = None
+    known: ImportRecord | None = None
 
 
 class Generator(Protocol):
@@ -58,6 +61,8 @@ class Generator(Protocol):
 
     ``asked_with`` says which of the two it takes; one that does not say takes both. What it cannot take is refused before
     anything is built.
+
+    One that makes only some texts has ``why_not(text)`` too, which says why it never makes one; None where it does.
 
     ``submit`` returns a job id that survives a restart of this process wherever the generator can keep it; ``fetch`` may be
     called once ``poll`` says done and writes below ``folder``. Raises BackendError, or Rejected where the input is at fault.

@@ -19,7 +19,7 @@ from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError, choose_from
 from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import VendorGenerator
+from manitwin.models.generators.vendor import VendorGenerator, checked_address, is_name, number
 from manitwin.models.services.http import FormFile
 from manitwin.models.services.refusal import Gone, Refusal, kind_of_status, refusal_by_status
 
@@ -64,7 +64,10 @@ class RodinGenerator(VendorGenerator):
 
     def probe(self) -> str:
         """Ask for the account's credits."""
-        return f"{self._service.get_json('check_balance').get('balance')} credits left"
+        balance = number(self._service.get_json("check_balance").get("balance"))
+        if balance is None:
+            raise BadReply("rodin: its answer about the balance has no 'balance'")
+        return f"{balance:g} credits left"
 
     def submit(self, request: GenerationRequest) -> str:
         """Start a task; its id holds what another process needs to poll and to download it."""
@@ -78,7 +81,7 @@ class RodinGenerator(VendorGenerator):
         answer = self._service.post_form("rodin", fields, files, pays=True)
         jobs = answer.get("jobs")
         task, subscription = answer.get("uuid"), jobs.get("subscription_key") if isinstance(jobs, dict) else None
-        if not isinstance(task, str) or not isinstance(subscription, str):
+        if not is_name(task) or not is_name(subscription):
             raise self._service.unreadable("uuid and subscription_key", pays=True)
         return json.dumps([task, subscription])
 
@@ -107,7 +110,7 @@ class RodinGenerator(VendorGenerator):
             raise Gone("rodin: nothing is left to download of a finished task; its data is kept for 7 days")
         for file in files if isinstance(files, list) else ():
             if isinstance(file, dict) and str(file.get("name", "")).lower().endswith(f".{self._format}"):
-                return str(file.get("url"))
+                return checked_address(file.get("url"), "rodin", "model")
         raise BadReply(f"rodin: none of its files is a .{self._format}; run it again")
 
 

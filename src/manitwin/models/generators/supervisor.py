@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import resource
 import select
 import signal
 import subprocess
@@ -20,6 +21,10 @@ NOT_STARTED = 127  # what a shell says of a program that it cannot start
 
 def supervise(arguments: list[str]) -> int:
     """Run a program in a process group of its own and return its exit status (-N: ended by signal N)."""
+    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    resource.setrlimit(
+        resource.RLIMIT_DATA, (hard, hard)
+    )  # run.memory_gb is of the process that asks, not of this program
     try:
         program = subprocess.Popen(arguments, stdin=subprocess.DEVNULL, start_new_session=True)
     except OSError as error:

@@ -13,12 +13,13 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from manitwin.config import BuildConfig
 from manitwin.errors import BadReply, ConfigError
 from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import Generated, GenerationRequest, JobState
-from manitwin.models.generators.vendor import VendorGenerator
+from manitwin.models.generators.vendor import VendorGenerator, checked_address, is_name, number
 from manitwin.models.services.http import FormFile
 from manitwin.models.services.refusal import Gone, Refusal, kind_of_status, refusal_by_status
 
@@ -64,7 +65,10 @@ class TripoGenerator(VendorGenerator):
 
     def probe(self) -> str:
         """Ask for the account's credits."""
-        return f"{self._data(self._service.get_json('user/balance'), 'balance')['balance']} credits left"
+        balance = number(self._data(self._service.get_json("user/balance"), "balance")["balance"])
+        if balance is None:
+            raise BadReply("tripo: its answer about the balance has no 'balance'")
+        return f"{balance:g} credits left"
 
     def submit(self, request: GenerationRequest) -> str:
         """Upload the picture, if there is one, and start a task."""
@@ -76,7 +80,10 @@ class TripoGenerator(VendorGenerator):
             task |= {"type": "image_to_model", "file": {"type": "png", "file_token": token}}
         else:
             task |= {"type": "text_to_model", "prompt": request.text, "image_seed": seed}
-        return str(self._data(self._service.post_json("task", task, pays=True), "task_id", pays=True)["task_id"])
+        job = self._data(self._service.post_json("task", task, pays=True), "task_id", pays=True)["task_id"]
+        if not is_name(job):
+            raise self._service.unreadable("task_id", pays=True)
+        return str(job)
 
     def poll(self, job_id: str) -> JobState:
         """Return where the task stands; one that Tripo calls expired is gone."""
@@ -89,7 +96,7 @@ class TripoGenerator(VendorGenerator):
         why = [str(task[name]) for name in ("error_code", "error_msg") if task.get(name)]
         if status == "banned":
             why.append("it violates the vendor's content policy")
-        return JobState("failed", ": ".join([f"the task is {status}", *why]))
+        return JobState("failed", self._service.said(": ".join([f"the task is {status}", *why])))
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
         """Download the model; links are valid for five minutes and are asked for anew once."""
@@ -98,7 +105,7 @@ class TripoGenerator(VendorGenerator):
         return Generated(path, self.model, metric=bool(self._options.get("auto_size")))
 
     def _task(self, job_id: str) -> dict[str, Any]:
-        return self._data(self._service.get_json(f"task/{job_id}"), "status")
+        return self._data(self._service.get_json(f"task/{quote(job_id, safe='')}"), "status")
 
     def _data(self, answer: dict[str, Any], name: str, *, pays: bool = False) -> dict[str, Any]:
         data = answer.get("data")
@@ -108,10 +115,8 @@ class TripoGenerator(VendorGenerator):
 
     def _link(self, job_id: str) -> str:
         output = self._task(job_id).get("output")
-        links = [output[name] for name in LINKS if output.get(name)] if isinstance(output, dict) else []
-        if not links:
-            raise BadReply("tripo: its finished task names no model; run it again")
-        return str(links[0])
+        links = [output[name] for name in LINKS if output.get(name)] if isinstance(output, dict) else [None]
+        return checked_address(next(iter(links), None), "tripo", "model")
 
 
 def refusal_of(status: int, body: Any) -> Refusal | None:
@@ -121,7 +126,8 @@ def refusal_of(status: int, body: Any) -> Refusal | None:
         return refusal_by_status(status, body)
     message = ": ".join(str(part) for part in (f"error {code}", body.get("message"), body.get("suggestion")) if part)
     kinds = {NO_CREDIT: "denied", NO_TASK: "gone", REFUSED_INPUT: "input", TOO_MANY: "busy"}
-    kind = kinds.get(code) or (kind_of_status(status) if status >= 400 else "bad")
+    known = kinds.get(code) if isinstance(code, int) else None
+    kind = known or (kind_of_status(status) if status >= 400 else "bad")
     return Refusal(message, kind)  # type: ignore[arg-type]
 
 

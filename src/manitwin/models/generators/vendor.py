@@ -14,11 +14,12 @@ from manitwin.config import BuildConfig, Resource, ServicesConfig
 from manitwin.errors import BadReply, ConfigError
 from manitwin.formats.image_file import png_of
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked
-from manitwin.models.services.http import HttpService
+from manitwin.models.services.download import LONGEST_ADDRESS
+from manitwin.models.services.http import HttpService, origin
 from manitwin.models.services.keys import bearer, is_local, key_from_environment, split_url
 from manitwin.models.services.refusal import Refusal, refusal_by_status
 
-LONGEST_ADDRESS = 8192
+LARGEST_NUMBER = 1e15  # credits, seconds since 1970 in milliseconds
 
 
 class VendorGenerator:
@@ -133,26 +134,33 @@ def data_uri(rgba: np.ndarray) -> str:
 
 
 def submit_paid(service: HttpService, path: str, body: Mapping[str, Any], needed: tuple[str, ...]) -> dict[str, Any]:
-    """Submit a job that is paid for and return the answer, whose ``needed`` are strings.
+    """Submit a job that is paid for and return the answer, whose ``needed`` are strings that can name something.
 
     Raises Unanswered for an answer that looks like success and cannot be used: the job may have been taken, and paid for.
     """
     answer = service.post_json(path, body, pays=True)
     for name in needed:
-        if not isinstance(answer.get(name), str) or not answer[name]:
+        if not is_name(answer.get(name)):
             raise service.unreadable(name, pays=True)
     return answer
+
+
+def is_name(value: Any) -> bool:
+    """Tell whether a part of an answer can be the name of a job, or an address: a text of bounded length in one line."""
+    return isinstance(value, str) and 0 < len(value) <= LONGEST_ADDRESS and value.isprintable()
+
+
+def number(value: Any) -> float | None:
+    """Return a part of an answer that is a plain number; None for all else, and for what no account or task has."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not -LARGEST_NUMBER <= value <= LARGEST_NUMBER:
+        return None
+    return value
 
 
 def checked_address(value: Any, who: str, what: str) -> str:
     """Return an address that a reply names; raises BadReply for what cannot be one."""
     if not isinstance(value, str) or not value:
         raise BadReply(f"{who}: its answer names no {what}")
-    try:
-        usable = len(value) <= LONGEST_ADDRESS and value.isprintable() and " " not in value
-        urlsplit(value).port  # noqa: B018 - reading the port is what raises ValueError
-    except ValueError:
-        usable = False
-    if not usable:
+    if not is_name(value) or origin(value) is None:
         raise BadReply(f"{who}: what its answer names as {what} is no address")
     return value

@@ -1,8 +1,6 @@
-"""A server of grasps over ZeroMQ: one message each way, asked by one REQ socket that lives for one question.
+"""A server of grasps over ZeroMQ: one message each way, each question on a connection of its own.
 
-A REQ socket whose answer never came can neither send nor receive again (ZeroMQ guide, "Client-Side Reliability (Lazy
-Pirate Pattern)"), so every question has a socket of its own, closed with LINGER 0. A server works on one question at a
-time and keeps those of others in a queue: one that is busy does not answer.
+A server works on one question at a time and keeps those of others in a queue: one that is busy does not answer.
 
 Messages are msgpack with numpy arrays in them, as the library msgpack-numpy writes them: a map with the binary keys ``nd``,
 ``type``, ``kind``, ``shape`` and ``data``. msgpack-numpy itself calls ``pickle.loads`` on arrays of the kind ``O`` (its
@@ -20,16 +18,16 @@ from urllib.parse import urlsplit
 import msgpack
 import msgpack_numpy
 import numpy as np
-import zmq
 
 from manitwin.config import ServicesConfig
 from manitwin.engine.charges import REHEARSAL_MARK, note_rehearsal
 from manitwin.errors import BadReply, ConfigError, Unavailable
+from manitwin.models.graspers import zmtp
 from manitwin.models.services.keys import redacted, split_url
 
 DEFAULT_URL = "tcp://localhost:5556"  # the port of both servers' documentation
 CONNECT_TIMEOUT_S = 5.0
-MAX_REPLY_BYTES = 64 << 20  # 4,000 grasps are 0.3 MB
+MAX_REPLY_BYTES = 8 << 20  # 4,000 grasps are 0.3 MB, 0.6 as lists of doubles
 FIRST_PAUSE_S = 1.0
 PLAIN_KINDS = "biuf"
 """Kinds of numpy types whose bytes are the numbers themselves: bool, integers, floats."""
@@ -83,28 +81,30 @@ class GraspServer:
         raise AssertionError("the last try returns or raises")
 
     def _exchange(self, question: dict[str, Any]) -> dict[str, Any]:
-        context: zmq.Context[zmq.Socket[bytes]] = zmq.Context.instance()  # one a process, also after a fork
-        with context.socket(zmq.REQ) as socket:
-            socket.linger = 0
-            socket.immediate = 1  # a message waits for a connection instead of in a queue without one
-            socket.sndtimeo = round(1000 * min(CONNECT_TIMEOUT_S, self._services.timeout_s))
-            socket.rcvtimeo = round(1000 * self._services.timeout_s)
-            socket.maxmsgsize = MAX_REPLY_BYTES
-            try:
-                socket.connect(self.url)
-                socket.send(pack(question))
-            except zmq.Again as error:
-                raise Unavailable(f"{self.what}: nothing listens at {self.url}; start its server") from error
-            except zmq.ZMQError as error:
-                raise Unavailable(f"{self.what}: {self.url} cannot be reached: {error}") from error
-            try:
-                reply = socket.recv()
-            except zmq.ZMQError as error:
-                seconds = f"{self._services.timeout_s:g} s"
-                raise Unavailable(
-                    f"{self.what}: no answer from {self.url} within {seconds}: it is busy or stuck;"
-                    " run again later, or raise services.timeout_s"
-                ) from error
+        timeout_s = self._services.timeout_s
+        try:
+            reply = zmtp.ask(
+                self.url,
+                pack(question),
+                connect_s=CONNECT_TIMEOUT_S,
+                timeout_s=timeout_s,
+                max_bytes=MAX_REPLY_BYTES,
+            )
+        except zmtp.NotConnected as error:
+            raise Unavailable(f"{self.what}: nothing listens at {self.url}; start its server ({error})") from None
+        except zmtp.NotZmtp as error:
+            raise BadReply(
+                f"{self.what}: what answers at {self.url} cannot be used: {error}; look at what runs there"
+            ) from None
+        except TimeoutError:
+            raise Unavailable(
+                f"{self.what}: no answer from {self.url} within {timeout_s:g} s: it is busy or stuck;"
+                " run again later, or raise services.timeout_s"
+            ) from None
+        except OSError as error:
+            raise Unavailable(
+                f"{self.what}: {self.url} cut the connection ({error.strerror or error}); run again later"
+            ) from None
         return self._read(reply)
 
     def _read(self, reply: bytes) -> dict[str, Any]:
@@ -115,9 +115,14 @@ class GraspServer:
         if answer.pop(REHEARSAL_MARK, None):
             note_rehearsal()
         if "error" in answer:
-            detail = redacted(str(answer["error"]), None)
+            detail = said(answer["error"])
             raise ServerError(f"{self.what}: the server at {self.url} says: {detail}", detail)
         return answer
+
+
+def said(value: Any) -> str:
+    """Return a part of an answer as one short line that a terminal may show."""
+    return redacted(str(value), None)
 
 
 def pack(message: dict[str, Any]) -> bytes:
@@ -129,7 +134,7 @@ def unpack(data: bytes) -> dict[str, Any]:
     """Read a message; raises ValueError for what is none, or holds an array that is not of plain numbers."""
     try:
         message = msgpack.unpackb(data, raw=False, object_hook=_array_of)
-    except (msgpack.UnpackException, ValueError, TypeError, LookupError) as error:
+    except (msgpack.UnpackException, ValueError, TypeError, LookupError, ArithmeticError, SyntaxError) as error:
         raise ValueError(f"not a message of msgpack: {str(error) or type(error).__name__}") from error
     if not isinstance(message, dict):
         raise ValueError(f"not a map, but {type(message).__name__}")

@@ -14,7 +14,7 @@ from typing import Any
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import ConfigError, Unavailable
-from manitwin.models.graspers.grasp_server import GraspServer, server_url
+from manitwin.models.graspers.grasp_server import GraspServer, said, server_url
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.served_proposals import ASKED_FOR, BASE_LINK_Z_M, HANDS, ask_for_proposals, point_cloud
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, of_kind
@@ -71,13 +71,14 @@ class GraspGenGrasper:
     def probe(self) -> str:
         """Ask for the server's state; raises Unavailable where it serves another hand."""
         self._server.ask({"action": "health"})
-        return f"serves {self._hand} ({self._require(self._hand).get('model_name')})"
+        return f"serves {self._hand} ({said(self._require(self._hand).get('model_name'))})"
 
     def _require(self, hand: str) -> dict[str, Any]:
         served = self._server.ask({"action": "metadata"})
-        if served.get("gripper_name") != hand:
+        name = served.get("gripper_name")
+        if not isinstance(name, str) or name != hand:
             raise Unavailable(
-                f"{self.name}: the server at {self._server.url} serves {served.get('gripper_name')}, not {hand};"
+                f"{self.name}: the server at {self._server.url} serves {said(name)}, not {hand};"
                 f" start it with --gripper_config graspgen_{hand}.yml"
             )
         return served

@@ -18,7 +18,7 @@ import numpy as np
 
 from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply, Unavailable
-from manitwin.models.graspers.grasp_server import GraspServer, server_url
+from manitwin.models.graspers.grasp_server import GraspServer, said, server_url
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.served_proposals import ASKED_FOR, ask_for_proposals, point_cloud
 from manitwin.robots.grippers.gripper import of_kind
@@ -84,8 +84,9 @@ class GraspGenXGrasper:
         """Ask for the server's state; raises Unavailable where it is too old to be told of a gripper."""
         self._server.ask({"action": "health"})
         served = self._server.ask({"action": "metadata"})
-        if ACTION not in served.get("actions", ()):
+        actions = served.get("actions")
+        if not isinstance(actions, list) or not any(isinstance(name, str) and name == ACTION for name in actions):
             raise Unavailable(f"{self.name}: the server at {self._server.url} has no action {ACTION}; update it")
         if not isinstance(served.get("model"), dict):
             raise BadReply(f"{self.name}: the server at {self._server.url} does not say what it serves")
-        return f"serves any parallel gripper ({served['model'].get('generator_backbone')})"
+        return f"serves any parallel gripper ({said(served['model'].get('generator_backbone'))})"

@@ -19,7 +19,7 @@ import numpy as np
 from manitwin.errors import BadReply
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.graspers.grasp_server import GraspServer, ServerError
+from manitwin.models.graspers.grasp_server import GraspServer, ServerError, said
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.physics.grasp_filters import pad_contacts
 from manitwin.robots.grippers.parallel import ParallelGripper
@@ -31,6 +31,7 @@ HANDS = {"panda": "franka_panda"}
 """The hand of GraspGen that is our gripper of that name."""
 
 MAX_SKEW = 1e-2  # float32 rotations of a network are off by 1e-6; what is off by more is no rotation
+FARTHEST_M = 100.0
 ASKED_FOR = 4000  # paper, implementation details
 # What both servers say where the model yields no grasp at all: they join empty lists as if they were tensors.
 NOTHING_FOUND = "expected Tensor as element"
@@ -46,6 +47,8 @@ def gripper_poses(base_link_to_object: np.ndarray, base_link_z_m: float = 0.0) -
         raise ValueError(f"poses of the shape {poses.shape}, not (N, 4, 4)")
     if not np.isfinite(poses).all():
         raise ValueError("poses that are not finite")
+    if np.abs(poses).max(initial=0.0) > FARTHEST_M:
+        raise ValueError(f"poses of more than {FARTHEST_M:g} m")
     left, _, right = np.linalg.svd(poses[:, :3, :3])
     rotation = left @ right
     if len(poses) and (np.linalg.det(rotation).min() < 0 or np.abs(rotation - poses[:, :3, :3]).max() > MAX_SKEW):
@@ -82,13 +85,13 @@ def ask_for_proposals(
         raise
     try:
         poses = gripper_poses(np.asarray(answer["grasps"]), base_link_z_m)
-        score = np.array(answer["confidences"], dtype=float)
+        score = np.asarray(answer["confidences"]).astype(float, casting="same_kind")
         if score.shape != (len(poses),) or not np.isfinite(score).all():
             raise ValueError(f"scores of the shape {score.shape} for {len(poses)} poses, or not finite")
     except KeyError as error:
         raise BadReply(f"{server.what}: the answer has no field {error}") from error
     except (ValueError, TypeError) as error:
-        raise BadReply(f"{server.what}: the answer holds {error}") from error
+        raise BadReply(f"{server.what}: the answer holds {said(error)}") from error
     best = np.argsort(-score, kind="stable")[: request.max_proposals]
     poses, score = poses[best], score[best].clip(0, 1)
     contacts = pad_contacts(gripper, poses, RayCaster(request.solid), request.center_of_mass_m)

@@ -9,54 +9,73 @@ from urllib.parse import urljoin, urlsplit
 import httpx2
 
 from manitwin.errors import BackendError, BadReply, Unavailable
+from manitwin.models.services.addresses import ForbiddenAddress
+from manitwin.models.services.bodies import TooLarge, pieces
+from manitwin.models.services.connections import Deadline
+from manitwin.models.services.keys import redacted
 from manitwin.models.services.refusal import Gone
 
 MAX_FILE_BYTES = 1 << 30
 MAX_REDIRECTS = 5
+LEAST_BYTES_PER_S = 1 << 20  # beside the time of any request: a gigabyte may take a quarter of an hour
+LONGEST_ADDRESS = 8192
 EXPIRED = (401, 403, 404, 410)
 
 
 def download_file(
-    client: httpx2.Client, url: str, to: Path, *, name: str, max_bytes: int, schemes: Set[str]
+    client: httpx2.Client,
+    url: str,
+    to: Path,
+    *,
+    name: str,
+    max_bytes: int,
+    schemes: Set[str],
+    deadline: Deadline,
 ) -> tuple[BackendError | None, bool]:
     """Write what ``url`` leads to at ``to``; return the error or None, and whether trying again may help.
 
-    Redirects are followed within ``schemes``, never from https to http. Nothing is left at ``to`` after an error.
+    Redirects are followed within ``schemes``, never from https to http, and where the client may connect. ``deadline`` is
+    extended by what has come (LEAST_BYTES_PER_S). Nothing is left at ``to`` after an error.
     """
     part = to.with_name(f"{to.name}.part")
     try:
-        error, again = _fetched(client, url, part, name, max_bytes, schemes)
+        error, again = _fetched(client, url, part, name, max_bytes, schemes, deadline)
         if error is None:
             part.replace(to)
         return error, again
     except httpx2.RequestError as failure:
-        cut = isinstance(failure, httpx2.RemoteProtocolError | httpx2.ReadError) and part.exists()
-        if cut:
-            return BadReply(f"{name}: its file was cut short ({failure}); run it again"), True
-        where = urlsplit(url).netloc
-        return Unavailable(
-            f"{name}: {where} does not answer ({failure or type(failure).__name__}); run again later"
-        ), True
+        if part.exists() and isinstance(failure, httpx2.ReadTimeout):  # it answers, but the rest does not come
+            return BadReply(
+                f"{name}: its file comes too slowly ({failure}); run it again, or raise services.timeout_s"
+            ), True
+        if part.exists() and isinstance(failure, httpx2.RemoteProtocolError | httpx2.ReadError):
+            return BadReply(f"{name}: its file was cut short ({redacted(str(failure), None)}); run it again"), True
+        where, why = (redacted(text, None) for text in (urlsplit(url).netloc, str(failure) or type(failure).__name__))
+        return Unavailable(f"{name}: {where} does not answer ({why}); run again later"), True
+    except ForbiddenAddress as forbidden:
+        where = redacted(str(forbidden), None)
+        return BadReply(f"{name}: its file is not fetched from where it leads: {where}; ask the vendor"), False
+    except TooLarge:
+        return BadReply(f"{name}: its file is larger than {max_bytes} bytes; ask for a simpler mesh"), False
     finally:
         part.unlink(missing_ok=True)
 
 
 def _fetched(
-    client: httpx2.Client, url: str, part: Path, name: str, max_bytes: int, schemes: Set[str]
+    client: httpx2.Client, url: str, part: Path, name: str, max_bytes: int, schemes: Set[str], deadline: Deadline
 ) -> tuple[BackendError | None, bool]:
     for _ in range(MAX_REDIRECTS + 1):
         if not _is_url(url):
             return BadReply(f"{name}: the link to its file leads to what is no URL"), False
-        scheme = urlsplit(url).scheme
+        scheme = httpx2.URL(url).scheme
         if scheme not in schemes:
             return BadReply(
                 f"{name}: its file is at a {scheme or 'relative'} address; only {_or(schemes)} is read"
             ), False
-        # no compression: the length that is announced is then the length of the file
-        with client.stream("GET", url, headers={"Accept-Encoding": "identity"}) as response:
+        with client.stream("GET", url) as response:
             location = response.headers.get("Location")
             if not 300 <= response.status_code < 400 or location is None:
-                return _written(response, part, name, max_bytes)
+                return _written(response, part, name, max_bytes, deadline)
         try:
             url = urljoin(url, location)
         except ValueError:
@@ -66,7 +85,9 @@ def _fetched(
     return BadReply(f"{name}: the link to its file redirects more than {MAX_REDIRECTS} times"), False
 
 
-def _written(response: httpx2.Response, part: Path, name: str, max_bytes: int) -> tuple[BackendError | None, bool]:
+def _written(
+    response: httpx2.Response, part: Path, name: str, max_bytes: int, deadline: Deadline
+) -> tuple[BackendError | None, bool]:
     status = response.status_code
     if status in EXPIRED:
         return Gone(f"{name}: the link to its file is no longer valid (HTTP {status})"), False
@@ -75,17 +96,13 @@ def _written(response: httpx2.Response, part: Path, name: str, max_bytes: int) -
     if status != 200:
         return BadReply(f"{name}: its file cannot be had (HTTP {status})"), False
     announced = response.headers.get("Content-Length", "")
-    too_large = BadReply(f"{name}: its file is larger than {max_bytes} bytes; ask for a simpler mesh")
-    if announced.isdigit() and int(announced) > max_bytes:
-        return too_large, False
     length = 0
     with part.open("wb") as stream:
-        for chunk in response.iter_bytes():
-            length += len(chunk)
-            if length > max_bytes:
-                return too_large, False
-            stream.write(chunk)
-    if announced.isdigit() and "Content-Encoding" not in response.headers and length != int(announced):
+        for piece in pieces(response, max_bytes):
+            length += len(piece)
+            deadline.extend(len(piece) / LEAST_BYTES_PER_S)
+            stream.write(piece)
+    if announced.isdecimal() and "Content-Encoding" not in response.headers and length != int(announced):
         return BadReply(f"{name}: its file was cut short at {length} of {announced} bytes; run it again"), True
     if not length:
         return BadReply(f"{name}: its file is empty; run it again"), True
@@ -95,10 +112,10 @@ def _written(response: httpx2.Response, part: Path, name: str, max_bytes: int) -
 def _is_url(url: str) -> bool:
     try:
         urlsplit(url).port  # noqa: B018 - reading the port is what raises ValueError
-        httpx2.URL(url)
+        user = httpx2.URL(url).userinfo
     except (ValueError, httpx2.InvalidURL):
         return False
-    return url.isprintable() and " " not in url
+    return url.isprintable() and " " not in url and not user and len(url) <= LONGEST_ADDRESS
 
 
 def _or(schemes: Set[str]) -> str:

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-import json
-import ssl
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
-from urllib.parse import urljoin, urlsplit
+from urllib.parse import urlsplit
 
 import httpx2
 
 from manitwin.config import ServicesConfig
 from manitwin.engine.charges import REHEARSAL_MARK, note_rehearsal
-from manitwin.errors import BadReply, ConfigError, ManiTwinError, RateLimited
+from manitwin.errors import BadReply, ConfigError, ManiTwinError, RateLimited, Unavailable
+from manitwin.models.services.addresses import ForbiddenAddress, Reach
+from manitwin.models.services.bodies import NotJson, TooLarge, parsed, whole_body
+from manitwin.models.services.connections import MAX_CONNECT_S, Deadline, GuardedTransport
 from manitwin.models.services.download import MAX_FILE_BYTES, download_file
-from manitwin.models.services.keys import is_local, redacted
+from manitwin.models.services.keys import check_key, is_local, redacted, without_key
 from manitwin.models.services.refusal import (
     FailedRequest,
     Gone,
+    NotTaken,
     Refusal,
     Unanswered,
     error_for,
@@ -31,11 +32,18 @@ from manitwin.models.services.refusal import (
     until_answered,
 )
 
-MAX_ANSWER_BYTES = 64 << 20
-MAX_CONNECT_S = 30.0
+MAX_ANSWER_BYTES = 16 << 20
+_SHOWN_BYTES = 4_000
+_WORDS = 10_000
 
 # the connection was never made: nothing of the request has left this machine
-_NOT_SENT = (httpx2.ConnectError, httpx2.ConnectTimeout, httpx2.PoolTimeout, httpx2.UnsupportedProtocol)
+_NOT_SENT = (
+    httpx2.ConnectError,
+    httpx2.ConnectTimeout,
+    httpx2.ProxyError,
+    httpx2.PoolTimeout,
+    httpx2.UnsupportedProtocol,
+)
 # what says that a request may be made again, whatever it was: the server has not taken it
 _NOT_TAKEN = (429, 503)
 # a gateway waited in vain for what stands behind it; 500 and 502 say that the work was not done
@@ -60,6 +68,9 @@ class HttpService:
     Unavailable, Gone (a BadReply: 404 and 410) and BadReply. A request is retried ``services.retries`` times after 429 and
     5xx and where no answer came; one that ``pays`` only where it surely was not taken (no connection, 429, 503). Where it
     may have been taken (no answer, 504, an answer that cannot be read) that raises Unanswered (an Unavailable).
+
+    A request ends within ``services.timeout_s``, from the look-up of the name to the last byte; an answer has at most
+    ``max_bytes``, unpacked. No redirect is followed. What a server says is shown as one short line without the key.
     """
 
     def __init__(
@@ -74,10 +85,12 @@ class HttpService:
         refusal: Callable[[int, Any], Refusal | None] = refusal_by_status,
         sleep: Callable[[float], None] = time.sleep,
     ):
-        if key is not None and not (key.isascii() and key.isprintable() and " " not in key):
-            raise ConfigError(f"{name}: the key holds spaces or characters that no key has; copy it again")
-        if urlsplit(base_url).scheme not in ("http", "https"):
+        self._own = origin(base_url)
+        if self._own is None or self._own[0] not in ("http", "https"):
             raise ConfigError(f"{name}: {base_url!r} is no address of a web service; give http:// or https://")
+        check_key(key, base_url, f"the key of {name}")
+        _, host, port = self._own
+        self._reach = Reach(host, port, on_this_machine=is_local(base_url))
         self.name, self.base_url = name, base_url.rstrip("/")
         self._authorization, self._key = dict(authorization), key
         self._services, self._remedy, self._refusal, self._sleep = services, remedy, refusal, sleep
@@ -85,12 +98,19 @@ class HttpService:
     def __repr__(self) -> str:
         return f"HttpService({self.name!r}, {self.base_url!r})"
 
-    def get_json(self, path: str, *, max_bytes: int = MAX_ANSWER_BYTES) -> dict[str, Any]:
+    def get_json(self, path: str, *, max_bytes: int | None = None) -> dict[str, Any]:
         """Return the JSON object at ``path`` (below the base URL, or a whole address on the same host)."""
         return self._object(self.ask("GET", path, max_bytes=max_bytes))
 
+    def get_list(self, path: str) -> list[Any]:
+        """Return the JSON list at ``path``."""
+        value = self._value(self.ask("GET", path))
+        if not isinstance(value, list):
+            raise self.unreadable("list")
+        return value
+
     def post_json(
-        self, path: str, body: Mapping[str, Any], *, pays: bool = False, max_bytes: int = MAX_ANSWER_BYTES
+        self, path: str, body: Mapping[str, Any], *, pays: bool = False, max_bytes: int | None = None
     ) -> dict[str, Any]:
         """Post JSON and return the JSON object that comes back."""
         return self._object(self.ask("POST", path, body=body, pays=pays, max_bytes=max_bytes), pays)
@@ -110,9 +130,12 @@ class HttpService:
         fields: Mapping[str, str] | None = None,
         files: Sequence[FormFile] = (),
         pays: bool = False,
-        max_bytes: int = MAX_ANSWER_BYTES,
+        max_bytes: int | None = None,
     ) -> bytes:
-        """Send a request and return the bytes of its answer, retried as the class says."""
+        """Send a request and return the bytes of its answer, retried as the class says.
+
+        At most ``max_bytes`` of them, MAX_ANSWER_BYTES by itself.
+        """
         content: dict[str, Any] = {}
         if body is not None:
             content["json"] = dict(body)
@@ -121,7 +144,7 @@ class HttpService:
             parts: list[tuple[str, Any]] = [(name, (None, value)) for name, value in fields.items()]
             content["files"] = parts + [(f.field, (f.filename, f.content, f.mime)) for f in files]
         url = self._address(path)
-        attempt = partial(self._once, method, url, content, pays, max_bytes)
+        attempt = partial(self._once, method, url, content, pays, MAX_ANSWER_BYTES if max_bytes is None else max_bytes)
         return until_answered(attempt, self._services, self._sleep)
 
     def download(
@@ -162,7 +185,7 @@ class HttpService:
 
     def _address(self, path: str) -> str:
         url = path if "://" in path else f"{self.base_url}/{path.lstrip('/')}"
-        if _origin(url) != _origin(self.base_url):
+        if origin(url) != self._own:
             raise BadReply(
                 f"{self.name}: it names {self.said(urlsplit(url).netloc)!r} to ask next, which is not its own host; the key"
                 " goes to no other"
@@ -173,26 +196,35 @@ class HttpService:
         self, method: str, url: str, content: dict[str, Any], pays: bool, max_bytes: int
     ) -> bytes | FailedRequest:
         headers = {**self._authorization, "Accept": "application/json, */*"}
+        deadline = Deadline(self._services.timeout_s)
         try:
-            with self._stream(method, url, headers, content) as response:
+            with self._client(deadline) as client, client.stream(method, url, headers=headers, **content) as response:
                 status, after = response.status_code, retry_after_s(response.headers.get("Retry-After"))
-                data = _bounded(response.iter_bytes(), max_bytes)
+                data = whole_body(response, max_bytes)
         except _NOT_SENT as error:
             return FailedRequest(self._silent(error, False), again=True)
         except httpx2.RequestError as error:  # timeouts, connections cut, broken HTTP
             return FailedRequest(self._silent(error, pays), again=not pays)
-        if data is None:
+        except TooLarge:
             return FailedRequest(self.unreadable(f"end within {max_bytes} bytes", pays), again=False)
+        except ForbiddenAddress as error:
+            return FailedRequest(Unavailable(f"{self.name}: {error}; nothing was sent"), again=False)
         return self._judged(status, data, after, pays)
 
     def _judged(self, status: int, data: bytes, after: float | None, pays: bool) -> bytes | FailedRequest:
         if 300 <= status < 400:
             error: ManiTwinError = BadReply(f"{self.name}: {self.base_url} redirects; give the new address after @")
             return FailedRequest(error, again=False)
-        refusal = self._refusal(status, _parsed(data))
+        try:
+            body = parsed(data, self._key) if status >= 400 or len(data) <= MAX_ANSWER_BYTES else None
+        except NotJson:
+            body = None
+        refusal = self._refusal(status, body)
         if refusal is None:
             return data
         error = error_for(self.name, Refusal(self.said(refusal.message), refusal.kind), status, self._remedy, after)
+        if isinstance(error, NotTaken):
+            error.words = without_key(refusal.message[:_WORDS], self._key)
         if pays and status in _ANSWER_LOST:
             return FailedRequest(Unanswered(f"{error}; whether it took the job is not known"), again=False)
         retryable = refusal.kind == "busy" or (refusal.kind == "down" and (not pays or status in _NOT_TAKEN))
@@ -200,21 +232,26 @@ class HttpService:
 
     def _file(self, url: str, to: Path, max_bytes: int) -> bytes | FailedRequest:
         schemes = {"https", urlsplit(self.base_url).scheme}
-        with self._client() as client:
-            error, again = download_file(client, url, to, name=self.name, max_bytes=max_bytes, schemes=schemes)
+        deadline = Deadline(self._services.timeout_s)
+        with self._client(deadline) as client:
+            error, again = download_file(
+                client, url, to, name=self.name, max_bytes=max_bytes, schemes=schemes, deadline=deadline
+            )
         return b"" if error is None else FailedRequest(error, again)
 
-    @contextmanager
-    def _stream(
-        self, method: str, url: str, headers: Mapping[str, str], content: dict[str, Any]
-    ) -> Iterator[httpx2.Response]:
-        with self._client() as client, client.stream(method, url, headers=headers, **content) as response:
-            yield response
-
-    def _client(self) -> httpx2.Client:
+    def _client(self, deadline: Deadline) -> httpx2.Client:
         # one connection a request: one kept open may be closed by the server just as a job is submitted, and then
         # nobody knows whether it was taken
-        return http_client(self.base_url, self._services)
+        timeout_s = self._services.timeout_s
+        return httpx2.Client(
+            transport=GuardedTransport(self._reach, deadline),
+            timeout=httpx2.Timeout(timeout_s, connect=min(timeout_s, MAX_CONNECT_S)),
+            # a length that is announced is then that of the content; what is packed all the same is unpacked within bounds
+            headers={"Accept-Encoding": "identity"},
+            follow_redirects=False,
+            trust_env=False,
+            event_hooks={"response": [_note_rehearsal]},
+        )
 
     def _silent(self, error: httpx2.RequestError, pays: bool) -> ManiTwinError:
         cause = self.said(str(error)) or type(error).__name__
@@ -222,24 +259,18 @@ class HttpService:
             return Unanswered(f"{self.name}: no answer to a submit ({cause}); whether it took the job is not known")
         return error_for(self.name, Refusal(f"{self.base_url} does not answer ({cause})", "down"), None, "", None)
 
+    def _value(self, data: bytes) -> Any:
+        try:
+            return parsed(data, self._key)
+        except NotJson:
+            return None
+
     def _object(self, data: bytes, pays: bool = False) -> dict[str, Any]:
-        value = _parsed(data)
+        value = self._value(data)
         if not isinstance(value, dict):
-            raise self.unreadable(f"JSON object but {self.said(data.decode(errors='replace'))[:60]!r}", pays)
+            shown = self.said(data[:_SHOWN_BYTES].decode(errors="replace"))[:60]
+            raise self.unreadable(f"JSON object but {shown!r}", pays)
         return value
-
-
-def http_client(
-    base_url: str, services: ServicesConfig, on_request: Callable[[httpx2.Request], None] | None = None
-) -> httpx2.Client:
-    """Return a client that follows no redirect, leaves proxies out on this machine, and notes rehearsals."""
-    return httpx2.Client(
-        timeout=httpx2.Timeout(services.timeout_s, connect=min(services.timeout_s, MAX_CONNECT_S)),
-        verify=_tls(),
-        follow_redirects=False,
-        trust_env=not is_local(base_url),
-        event_hooks={"request": [on_request] if on_request else [], "response": [_note_rehearsal]},
-    )
 
 
 def _note_rehearsal(response: httpx2.Response) -> None:
@@ -248,28 +279,17 @@ def _note_rehearsal(response: httpx2.Response) -> None:
         note_rehearsal()
 
 
-@cache
-def _tls() -> ssl.SSLContext:
-    """Return the certificates that are trusted; reading them takes 34 ms, more than a request on this machine."""
-    return httpx2.create_ssl_context()
+def origin(url: str) -> tuple[str, str, int] | None:
+    """Return scheme, host and port of an address as a request to it takes them; None for what is no address of a server.
 
-
-def _parsed(data: bytes) -> Any:
+    None also where others would read another host out of it: with a user or password, with spaces or backslashes.
+    """
     try:
-        return json.loads(data)
-    except (ValueError, RecursionError):
+        own, other = httpx2.URL(url), urlsplit(url)
+        port = other.port or {"http": 80, "https": 443}.get(own.scheme, 0)
+        alike = own.port in (other.port, None) and (own.host == (other.hostname or "") or not url.isascii())
+    except (httpx2.InvalidURL, ValueError):
         return None
-
-
-def _bounded(chunks: Iterator[bytes], max_bytes: int) -> bytes | None:
-    data = bytearray()
-    for chunk in chunks:
-        data += chunk
-        if len(data) > max_bytes:
-            return None
-    return bytes(data)
-
-
-def _origin(url: str) -> tuple[str, str | None, int | None]:
-    parts = urlsplit(urljoin(url, "/"))
-    return parts.scheme, parts.hostname, parts.port or {"http": 80, "https": 443}.get(parts.scheme)
+    if not own.host or not alike or own.userinfo or not url.isprintable() or " " in url or "\\" in url:
+        return None
+    return own.scheme, own.raw_host.decode(), port

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+import base64
+import html
 import os
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 from urllib.parse import urlsplit
 
 from manitwin.errors import ConfigError, choose_from
+from manitwin.formats.printable import printable_line
 
 ADDRESS = re.compile(r"(?:^|@)([A-Za-z][A-Za-z0-9+.-]*://.*)$")
 SCHEMES = ("http", "https", "tcp")
 _EXAMPLE = "one such as http://localhost:8000/v1, or tcp://localhost:5556 of a grasp server"
 HOST = re.compile(r"[\w.:%-]+")  # names, also of other alphabets, and IPv4 and IPv6 addresses
 LOCAL_HOSTS = frozenset({"localhost", "127.0.0.1", "::1"})
+"""The names of this machine's loopback; others that resolve to it (127.0.0.2, 2130706433, localhost.example) are not taken."""
+MESSAGE_CHARACTERS = 300
+TELLING_CHARACTERS = 16  # a key of fewer may be a word ("none", "rehearsal-key"): an answer may say it by itself
+_READ_CHARACTERS = 10_000  # of what a server says, before the key is looked for in it
 
 
 def is_local(url: str) -> bool:
@@ -39,20 +47,42 @@ def _checked(url: str) -> str:
         raise ConfigError(f"{url!r}: {choose_from('scheme', parts.scheme, SCHEMES)}")
     if not HOST.fullmatch(host) or port == 0 or any(letter.isspace() for letter in url):
         raise ConfigError(f"{url!r} is no URL of a server; give {_EXAMPLE}")
+    if parts.query or parts.fragment:
+        raise ConfigError(
+            f"the URL of {host} holds a query or a fragment, and a server's has none; keys come from the environment only"
+        )
     return url.rstrip("/")
 
 
-def key_from_environment(names: Sequence[str], url: str, what: str) -> str | None:
-    """Return the first key that is set; None for a server on this machine without one.
+def key_from_environment(names: Sequence[str], url: str, what: str, *, own_server: bool = False) -> str | None:
+    """Return the first key that is set, having checked that it may go to ``url``.
 
-    Raises ConfigError naming the variables where a key is missing.
+    None for a server on this machine without one, and for one of the user's (``own_server``) that is reached by plain http,
+    where a key could not go. Raises ConfigError naming the variables where a key is missing, or may not be sent.
     """
     for name in names:
         if os.environ.get(name):
+            check_key(os.environ[name], url, name)
             return os.environ[name]
-    if is_local(url):
+    if is_local(url) or (own_server and urlsplit(url).scheme == "http"):
         return None
     raise ConfigError(f"{what} needs a key: set {' or '.join(names)} in the environment")
+
+
+def check_key(key: str | None, url: str, name: str) -> None:
+    """Check a key and where it would go: over https only, or to this machine by its own name.
+
+    Raises ConfigError, in which the key does not appear; ``name`` is what the key, or its service, is called.
+    """
+    if key is None:
+        return
+    if not (key.isascii() and key.isprintable() and " " not in key):
+        raise ConfigError(f"{name} holds spaces or characters that no key has; copy it again")
+    if urlsplit(url).scheme != "https" and not is_local(url):
+        raise ConfigError(
+            f"{name}: a key goes over https only, or to this machine itself ({', '.join(sorted(LOCAL_HOSTS))}); {url} is"
+            " neither. Give an https:// address, or unset the key for a server that asks for none"
+        )
 
 
 def bearer(key: str | None) -> dict[str, str]:
@@ -61,6 +91,23 @@ def bearer(key: str | None) -> dict[str, str]:
 
 
 def redacted(text: str, key: str | None) -> str:
-    """Return one line of at most 300 characters in which the key does not appear."""
-    line = " ".join(text.split())
-    return (line.replace(key, "***") if key else line)[:300]
+    """Return what a server said as one line of at most 300 characters, without the key and without control characters.
+
+    What is longer ends with three dots.
+    """
+    line = " ".join(text[:_READ_CHARACTERS].split())
+    line = printable_line(_spelled(key).sub("***", line) if key else line)
+    return line if len(line) <= MESSAGE_CHARACTERS else f"{line[: MESSAGE_CHARACTERS - 3]}..."
+
+
+def without_key(text: str, key: str | None) -> str:
+    """Return a text of any length without the key, if that is long enough not to be a word."""
+    return _spelled(key).sub("***", text) if key and len(key) >= TELLING_CHARACTERS else text
+
+
+@lru_cache(maxsize=8)
+def _spelled(key: str) -> re.Pattern[str]:
+    """Return what finds a key as it is, or as URLs, HTML, JSON (also in JSON) and base 64 write it, in any case."""
+    each = "".join(rf"(?:{re.escape(c)}|%{ord(c):02x}|\\{{1,8}}u00{ord(c):02x}|\\{{1,8}}{re.escape(c)})" for c in key)
+    whole = {html.escape(key), base64.b64encode(key.encode()).decode().rstrip("=")}
+    return re.compile("|".join([each, *map(re.escape, sorted(whole))]), re.IGNORECASE)

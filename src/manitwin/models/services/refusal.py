@@ -12,6 +12,9 @@ from manitwin.config import ServicesConfig
 from manitwin.errors import AccessDenied, BadReply, ManiTwinError, RateLimited, Rejected, Unavailable
 
 FIRST_WAIT_S = 1.0
+LONGEST_RETRY_AFTER_S = 86_400.0  # who asks for more is not waited for by anybody
+MOST_RETRY_AFTER_CHARACTERS = 64
+_DEEPEST_WORDS = 4
 
 AnswerT = TypeVar("AnswerT")
 
@@ -20,6 +23,17 @@ Kind = Literal["denied", "busy", "down", "gone", "input", "bad"]
 
 class Gone(BadReply):
     """A service no longer has, or does not know, what it is asked for: a job, a file."""
+
+
+class NotTaken(BadReply):
+    """A request that a service does not understand (400, 422); ``words`` are what it says of it, without the key."""
+
+    def __init__(self, message: str, words: str = ""):
+        super().__init__(message)
+        self.words = words
+
+    def __reduce__(self) -> tuple[type, tuple[str, str]]:
+        return type(self), (str(self), self.words)
 
 
 class Unanswered(Unavailable):
@@ -42,14 +56,12 @@ class Refusal:
 class FailedRequest:
     """A request that came to nothing: whether it may be made again, and after how long where the server says so.
 
-    ``error`` is raised where it may not, or no tries are left; ``words`` are what the server said of a request that it could
-    not take.
+    ``error`` is raised where it may not, or no tries are left.
     """
 
     error: ManiTwinError
     again: bool
     wait_s: float | None = None
-    words: str = ""
 
 
 def until_answered(
@@ -92,15 +104,18 @@ def kind_of_status(status: int) -> Kind:
     return "down" if status >= 500 else "bad"
 
 
-def words_of(body: Any) -> str:
+def words_of(body: Any, deepest: int = _DEEPEST_WORDS) -> str:
     """Return the message of an error body: ``message``, ``error``, ``detail`` or ``text``, nested or not."""
     if isinstance(body, str):
         return body
+    if deepest == 0:
+        return ""
     if isinstance(body, list):
-        return "; ".join(filter(None, map(words_of, body[:3])))
+        return "; ".join(filter(None, (words_of(part, deepest - 1) for part in body[:3])))
     if not isinstance(body, dict):
         return ""
-    found = [words_of(body.get(name)) for name in ("error", "message", "msg", "detail", "text", "suggestion")]
+    names = ("error", "message", "msg", "detail", "text", "suggestion")
+    found = [words_of(body.get(name), deepest - 1) for name in names]
     return ": ".join(dict.fromkeys(filter(None, found)))
 
 
@@ -115,17 +130,23 @@ def error_for(name: str, refusal: Refusal, status: int | None, remedy: str, afte
         return Unavailable(f"{what}; run again later")
     if refusal.kind == "input":
         return Rejected("generator_failed", what, "generate")
+    if status in (400, 422):
+        return NotTaken(what, refusal.message)
     return (Gone if refusal.kind == "gone" else BadReply)(what)
 
 
 def retry_after_s(value: str | None) -> float | None:
-    """Read a Retry-After header, seconds or a date (RFC 9110, section 10.2.3); None without one that can be read."""
-    if value is None:
+    """Read a Retry-After header, seconds or a date (RFC 9110, section 10.2.3); None without one that can be read.
+
+    At most a day: it stands for all that is too long to wait.
+    """
+    if value is None or len(value) > MOST_RETRY_AFTER_CHARACTERS:
         return None
-    if value.strip().isdigit():
-        return float(value)
+    value = value.strip()
+    if value.isascii() and value.isdecimal():
+        return min(float(value), LONGEST_RETRY_AFTER_S)
     try:
-        until = parsedate_to_datetime(value)
-    except ValueError:
+        left = (parsedate_to_datetime(value).astimezone(UTC) - datetime.now(UTC)).total_seconds()
+    except (ValueError, TypeError, IndexError, OverflowError, OSError):  # dates before or after all calendars
         return None
-    return max((until.astimezone(UTC) - datetime.now(UTC)).total_seconds(), 0.0)
+    return min(max(left, 0.0), LONGEST_RETRY_AFTER_S)

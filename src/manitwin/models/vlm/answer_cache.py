@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import tempfile
 from hashlib import sha256
 from pathlib import Path
 
 from manitwin.engine.charges import counted, note_rehearsal
+from manitwin.errors import BadReply
+from manitwin.formats.json_file import read_json_object
 from manitwin.models.vlm.client import Around, ChatClient
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage, question_digest
+
+RUN = logging.getLogger("manitwin.run")
+_MAX_BYTES = 16 << 20
 
 
 def default_folder() -> Path:
@@ -41,7 +47,12 @@ class Cached(Around):
         if kept is None:
             with counted() as bill:
                 reply = self.inner.ask(question, turns)
-            _write(path, reply, bill.rehearsed)
+            try:
+                _write(path, reply, bill.rehearsed)
+            except OSError as error:  # the answer is there, and paid for
+                RUN.warning(
+                    "%s: the answer is not kept (%s); look at the folder and the disk", path, error.strerror or error
+                )
             return reply
         reply, rehearsed = kept
         if rehearsed:
@@ -59,15 +70,17 @@ class Cached(Around):
 
 
 def _read(path: Path) -> tuple[Reply, bool] | None:
+    if not os.path.lexists(path):
+        return None
     try:
-        kept = json.loads(path.read_bytes())
-        text, model, (read, written) = kept["text"], kept["model"], kept["tokens"]
-        rehearsed = bool(kept.get("rehearsal"))
-    except FileNotFoundError:
+        kept = read_json_object(path, BadReply, limit_bytes=_MAX_BYTES)
+    except BadReply:  # cut by a crash of the machine, or altered: as good as none
         return None
-    except (ValueError, LookupError, TypeError):  # cut by a crash of the machine: as good as none
+    text, model, tokens = kept.get("text"), kept.get("model"), kept.get("tokens")
+    counts = isinstance(tokens, list) and len(tokens) == 2 and all(type(n) is int and 0 <= n < 10**12 for n in tokens)
+    if not isinstance(text, str) or not isinstance(model, str) or not isinstance(tokens, list) or not counts:
         return None
-    return Reply(text, Usage(read, written), model), rehearsed
+    return Reply(text, Usage(*tokens), model), bool(kept.get("rehearsal"))
 
 
 def _write(path: Path, reply: Reply, rehearsed: bool) -> None:
@@ -77,4 +90,8 @@ def _write(path: Path, reply: Reply, rehearsed: bool) -> None:
     handle, part = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
     with os.fdopen(handle, "w", encoding="utf-8") as stream:
         json.dump(marked, stream)
-    os.replace(part, path)
+    try:
+        os.replace(part, path)
+    except OSError:
+        os.unlink(part)
+        raise

@@ -8,18 +8,17 @@ Contract: https://docs.claude.com/en/api/messages and https://docs.claude.com/en
 from __future__ import annotations
 
 import base64
-import json
 import re
 import time
 from collections.abc import Callable
 from typing import Any
 
 from manitwin.config import ServicesConfig, VlmConfig
-from manitwin.errors import BadReply, ConfigError
+from manitwin.errors import ConfigError
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import bearer
-from manitwin.models.services.refusal import Refusal, refusal_by_status
-from manitwin.models.vlm.client import Completion, ServedChat
+from manitwin.models.services.refusal import NotTaken, Refusal, refusal_by_status
+from manitwin.models.vlm.client import Completion, ServedChat, counted_tokens
 from manitwin.models.vlm.openai_dialect import instructions_with_schema, titled_schema
 from manitwin.models.vlm.prices import estimated_usage
 from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn, Usage
@@ -80,8 +79,8 @@ class AnthropicMessages(ServedChat):
         while True:
             try:
                 answer = self._service.post_json("v1/messages", self._body(question, turns))
-            except BadReply as error:
-                if not self._does_without(str(error)):
+            except NotTaken as error:
+                if not self._does_without(error.words):
                     raise
             else:
                 return self._completion(answer, question).paid(self.price, self._who)
@@ -89,7 +88,7 @@ class AnthropicMessages(ServedChat):
     def _does_without(self, complaint: str) -> bool:
         words = complaint.lower()
         # a schema that it refuses is another matter: that is this package's fault, and to be seen
-        if not re.search(r"\(http 4(00|22)\)", words) or "format.schema:" in words:
+        if "format.schema:" in words:
             return False
         if self._temperature_taken and "temperature" in words:
             self._temperature_taken = False
@@ -118,14 +117,15 @@ class AnthropicMessages(ServedChat):
         return body
 
     def _completion(self, answer: dict[str, Any], question: Question) -> Completion:
-        try:
-            text = "".join(block["text"] for block in answer["content"] if block["type"] == "text")
-            stopped = answer["stop_reason"]
-        except (LookupError, TypeError) as error:
-            said = self._service.said(json.dumps(answer))
-            raise BadReply(
-                f"{self._who}: its answer is no message ({type(error).__name__}: {error}): {said!r}"
-            ) from None
+        blocks = answer.get("content")
+        if not isinstance(blocks, list) or not all(isinstance(block, dict) for block in blocks):
+            raise self._service.unreadable("list of blocks in 'content': it is no message")
+        texts = [block.get("text") for block in blocks if block.get("type") == "text"]
+        if not all(isinstance(text, str) for text in texts):
+            raise self._service.unreadable("text in its blocks: it is no message")
+        text, stopped = "".join(map(str, texts)), answer.get("stop_reason")
+        if not isinstance(stopped, str):
+            raise self._service.unreadable("'stop_reason': it is no message")
         usage = _usage(answer.get("usage")) or estimated_usage(question, text)
         model = self._service.said(str(answer.get("model") or ""))
         return Completion(text, usage, model, self._fault(stopped))
@@ -160,9 +160,8 @@ def _block(part: str | Picture) -> dict[str, Any]:
 def _usage(counted: Any) -> Usage | None:
     if not isinstance(counted, dict):
         return None
-    # tokens of a prompt cache are counted apart; this package asks for none
-    read = [counted.get(f"{kind}input_tokens") or 0 for kind in ("", "cache_creation_", "cache_read_")]
-    written = counted.get("output_tokens")
-    if isinstance(written, int) and all(isinstance(n, int) for n in read):
-        return Usage(sum(read), written)
-    return None
+    # tokens of a prompt cache are counted apart, or not at all; this package asks for none
+    cached = [counted.get(f"cache_{kind}_input_tokens") for kind in ("creation", "read")]
+    read = [counted_tokens(count) for count in (counted.get("input_tokens"), *(count or 0 for count in cached))]
+    written, whole = counted_tokens(counted.get("output_tokens")), [count for count in read if count is not None]
+    return Usage(sum(whole), written) if written is not None and len(whole) == len(read) else None

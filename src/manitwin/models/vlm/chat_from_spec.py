@@ -53,7 +53,8 @@ def _served(
         )
     url = url or default_url
     key_name = KEY_OF_HOST.get(urlsplit(url).hostname or "", KEY_OF_OTHERS)
-    key = key_from_environment((key_name,), url, f"{kind.name}:{argument}")
+    own_server = key_name == KEY_OF_OTHERS
+    key = key_from_environment((key_name,), url, f"{kind.name}:{argument}", own_server=own_server)
     chat: ChatClient = kind(model, url, key, config.vlm, config.services, key_name=key_name)
     if config.services.cache:
         chat = Cached(chat, default_folder())

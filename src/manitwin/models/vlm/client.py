@@ -4,13 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from manitwin.config import ServicesConfig, VlmConfig
 from manitwin.engine.charges import charge
 from manitwin.errors import BadReply
 from manitwin.models.vlm.prices import TokenPrice, token_price
 from manitwin.models.vlm.protocol import ChatModel, Question, Reply, Turn, Usage
+
+MOST_TOKENS = 100_000_000
+"""More than any question or answer has: what a server counts beyond is no count."""
+MOST_CHARACTERS = 1 << 20
+"""Of an answer that is read; ``vlm.max_tokens`` of 4,096 make about 16,000."""
+
+
+def counted_tokens(value: Any) -> int | None:
+    """Return the tokens that a server counted; None for what is no count (negative, a text, more than MOST_TOKENS)."""
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST_TOKENS:
+        return None
+    return value
 
 
 class ChatClient(ChatModel, Protocol):
@@ -91,4 +103,8 @@ class Completion:
             raise BadReply(f"{who}: its answer is empty; ask again, or choose another model")
         if self.fault is not None:
             raise BadReply(f"{who}: {self.fault}")
+        if len(self.text) > MOST_CHARACTERS:
+            raise BadReply(
+                f"{who}: its answer has more than {MOST_CHARACTERS} characters; ask again, or choose another model"
+            )
         return Reply(self.text, self.usage, self.model)

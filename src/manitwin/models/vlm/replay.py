@@ -7,6 +7,7 @@ rehearsal answered has ``"rehearsal": true`` as well, and is a rehearsal wheneve
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -17,9 +18,14 @@ from typing import Any, BinaryIO
 
 from manitwin.engine.charges import counted, note_rehearsal
 from manitwin.errors import BadReply, ConfigError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.json_file import parse_json
+from manitwin.formats.printable import printable_line
 from manitwin.models.vlm.client import Around, ChatClient, Forgetful
 from manitwin.models.vlm.prices import FREE, TokenPrice
 from manitwin.models.vlm.protocol import Question, Reply, Turn, Usage, question_digest
+
+_LONGEST_LINE = 16 << 20
 
 
 class Replay:
@@ -34,22 +40,17 @@ class Replay:
     def __init__(self, path: Path):
         self.path, self._replies, self._rehearsed = path, dict[str, Reply](), dict[str, bool]()
         models = set[str]()
-        try:
-            with path.open("rb") as stream:
-                for line in _lines(stream, path):
-                    models.add(line["model"])
-                    self._replies[line["key"]] = Reply(line["text"], Usage(*line["tokens"]), line["answered_by"])
-                    self._rehearsed[line["key"]] = bool(line.get("rehearsal"))
-        except OSError as error:
-            raise ConfigError(
-                f"{path}: the record cannot be read ({error.strerror}); give a file that was recorded"
-            ) from None
+        with open_regular(path, ConfigError, name=str(path)) as stream:
+            for line in _lines(stream, path):
+                models.add(line["model"])
+                self._replies[line["key"]] = Reply(line["text"], Usage(*line["tokens"]), line["answered_by"])
+                self._rehearsed[line["key"]] = bool(line.get("rehearsal"))
         if not models:
             raise ConfigError(
                 f"{path}: no answer is in it; what is built already is not asked again: record into a new folder"
             )
         if len(models) != 1:
-            found = ", ".join(sorted(models))
+            found = printable_line(", ".join(sorted(models)), max_characters=200)
             raise ConfigError(
                 f"{path}: a record is of one model, this one of {found}; record each to a file of its own"
             )
@@ -141,9 +142,12 @@ def _locked(path: Path) -> Iterator[BinaryIO]:
     """Open a record to read and to add to, for this process alone."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        if os.path.exists(path) and not os.path.isfile(path):
+            raise OSError(errno.EINVAL, "no regular file")
         handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
-    except OSError as error:
-        raise ConfigError(f"{path}: the record cannot be written ({error.strerror}); choose another file") from None
+    except (OSError, ValueError) as error:
+        cause = getattr(error, "strerror", None) or error
+        raise ConfigError(f"{path}: the record cannot be written ({cause}); choose another file") from None
     with os.fdopen(handle, "r+b") as stream:
         fcntl.flock(stream, fcntl.LOCK_EX)  # closing flushes, then unlocks
         yield stream
@@ -152,15 +156,21 @@ def _locked(path: Path) -> Iterator[BinaryIO]:
 def _lines(stream: BinaryIO, path: Path) -> Iterator[dict[str, Any]]:
     """Yield the whole lines from here on; one without an end was cut by a crash, and is none."""
     number = 0
-    while (line := stream.readline()).endswith(b"\n"):
+    while (line := stream.readline(_LONGEST_LINE + 1)).endswith(b"\n"):
         number += 1
-        try:
-            value = json.loads(line)
-            read, written = value["tokens"]
-            texts = [value[name] for name in ("key", "model", "text", "answered_by")]
-            if not all(isinstance(text, str) for text in texts) or not isinstance(read + written, int):
-                raise TypeError("a field of another type")
-        except (ValueError, LookupError, TypeError) as error:
-            said = f"{path}: line {number} is no recorded answer ({type(error).__name__}: {error}); record it again"
-            raise ConfigError(said) from None
+        value = parse_json(line, f"{path}: line {number}", ConfigError)
+        if not _is_answer(value):
+            raise ConfigError(f"{path}: line {number} is no recorded answer; record it again")
         yield value
+    if len(line) > _LONGEST_LINE:
+        raise ConfigError(f"{path}: line {number + 1} has more than {_LONGEST_LINE} bytes; it is no recorded answer")
+
+
+def _is_answer(value: Any) -> bool:
+    """Tell whether a value of a line is of the form that ``Recorded`` writes."""
+    if not isinstance(value, dict) or not all(
+        isinstance(value.get(name), str) for name in ("key", "model", "text", "answered_by")
+    ):
+        return False
+    tokens = value.get("tokens")
+    return isinstance(tokens, list) and len(tokens) == 2 and all(type(n) is int and 0 <= n < 10**12 for n in tokens)

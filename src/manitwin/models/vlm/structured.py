@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,16 +15,20 @@ from pydantic import BaseModel, ValidationError
 
 from manitwin.errors import BadReply
 from manitwin.formats.image_file import png_of
+from manitwin.models.services.bodies import MOST_LEVELS, levels
 from manitwin.models.vlm.client import Forgetful
 from manitwin.models.vlm.protocol import ChatModel, Picture, Question, Turn
 from manitwin.models.vlm.strict_schema import strict_schema
 
 T = TypeVar("T", bound=BaseModel)
 MAX_COMPLAINTS = 12
+MOST_STARTS = 1000  # braces of a text at which an object is looked for: each may be read to the end of the text in vain
 # models that think aloud put that before the answer: Qwen, DeepSeek
-_THINKING = re.compile(r"<think>.*?</think>", re.DOTALL)
-_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]+")
-_FENCED = re.compile(r"```[a-zA-Z]*\s*\n(.*?)```", re.DOTALL)
+_THINKING, _THOUGHT = "<think>", "</think>"
+# control characters, those that turn the direction of writing (Unicode's Bidi_Control), and halves of pairs of UTF-16
+_CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ufeff\ud800-\udfff]+")
+_FENCE = "```"
+_AFTER_FENCE = re.compile(r"[a-zA-Z]*[^\S\n]*\n")
 PROBE_PX = 256
 
 
@@ -106,9 +111,36 @@ def json_object_in(text: str) -> dict[str, Any]:
 
     Control characters inside strings are taken (xgrammar lets them through under ``maxLength``) and become spaces: what a
     model writes ends on terminals. Of several objects the last one counts: models correct themselves in that order. Raises
-    ValueError saying what is wrong.
+    ValueError saying what is wrong. The time that it takes grows with the length of the text, whatever is in it.
     """
-    return {key: _readable(value) for key, value in _object_in(_THINKING.sub("", text).strip()).items()}
+    found = _object_in(_without_thinking(text).strip())
+    if levels(found) > MOST_LEVELS:
+        raise ValueError(f"it is nested deeper than {MOST_LEVELS} levels")
+    return {_readable(key): _readable(value) for key, value in found.items()}
+
+
+def _without_thinking(text: str) -> str:
+    kept, at = [], 0
+    while (start := text.find(_THINKING, at)) >= 0 and (end := text.find(_THOUGHT, start)) >= 0:
+        kept.append(text[at:start])
+        at = end + len(_THOUGHT)
+    return "".join(kept) + text[at:]
+
+
+def _fenced(text: str) -> list[str]:
+    """Return what stands in code fences, in order."""
+    found, at = [], 0
+    while (start := text.find(_FENCE, at)) >= 0:
+        head = _AFTER_FENCE.match(text, start + len(_FENCE))
+        if head is None:
+            at = start + 1
+            continue
+        end = text.find(_FENCE, head.end())
+        if end < 0:
+            break
+        found.append(text[head.end() : end])
+        at = end + len(_FENCE)
+    return found
 
 
 def _readable(value: Any) -> Any:
@@ -116,12 +148,11 @@ def _readable(value: Any) -> Any:
         return _CONTROL.sub(" ", value)
     if isinstance(value, list):
         return [_readable(part) for part in value]
-    return {key: _readable(part) for key, part in value.items()} if isinstance(value, dict) else value
+    return {_readable(key): _readable(part) for key, part in value.items()} if isinstance(value, dict) else value
 
 
 def _object_in(text: str) -> dict[str, Any]:
-    fenced = _FENCED.findall(text)
-    for candidate in (text, *reversed(fenced)):
+    for candidate in (text, *reversed(_fenced(text))):
         value = _parsed(candidate)
         if isinstance(value, dict):
             return value
@@ -130,8 +161,10 @@ def _object_in(text: str) -> dict[str, Any]:
         return found[-1]
     try:
         value = _DECODER.decode(text)
-    except (ValueError, RecursionError) as error:
-        raise ValueError(f"it is no JSON: {error}") from None
+    except RecursionError:
+        raise ValueError("it is no JSON that can be read: it is nested too deep") from None
+    except ValueError as error:
+        raise ValueError(f"it is no JSON: {str(error).split(';')[0]}") from None
     raise ValueError(f"it is a JSON {type(value).__name__}, not an object")
 
 
@@ -139,7 +172,12 @@ def _not_finite(word: str) -> float:
     raise ValueError(f"{word} is no JSON number")
 
 
-_DECODER = json.JSONDecoder(strict=False, parse_constant=_not_finite)
+def _finite(digits: str) -> float:
+    value = float(digits)
+    return value if math.isfinite(value) else _not_finite(digits[:40])
+
+
+_DECODER = json.JSONDecoder(strict=False, parse_constant=_not_finite, parse_float=_finite)
 
 
 def _parsed(text: str) -> Any:
@@ -150,8 +188,9 @@ def _parsed(text: str) -> Any:
 
 
 def _objects(text: str) -> Iterator[dict[str, Any]]:
-    start = text.find("{")
-    while start >= 0:
+    start, left = text.find("{"), MOST_STARTS
+    while start >= 0 and left:
+        left -= 1
         try:
             value, end = _DECODER.raw_decode(text, start)
         except (ValueError, RecursionError):

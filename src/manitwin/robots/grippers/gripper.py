@@ -7,7 +7,6 @@ X the closing direction. The finger on +X is the first one.
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Callable
 from importlib import resources
 from pathlib import Path
@@ -16,6 +15,8 @@ from typing import Any, Protocol, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from manitwin.errors import UsageError, choose_from
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.toml_file import MAX_TOML_BYTES, parse_toml
 from manitwin.robots.grippers.box import PlacedBox
 from manitwin.robots.grippers.multi_finger import load_multi_finger
 from manitwin.robots.grippers.parallel import ParallelGripper
@@ -124,11 +125,8 @@ def load_gripper(name_or_path: str) -> Gripper:
         if name_or_path not in shipped_grippers():
             raise UsageError(choose_from("gripper", name_or_path, shipped_grippers()))
         path = _shipped_folder() / f"{name_or_path}.toml"
-    content = path.read_bytes()
-    try:
-        data = tomllib.loads(content.decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise UsageError(f"gripper file {path}: not TOML: {error}") from error
+    content = read_bytes(path, MAX_TOML_BYTES, UsageError, name=f"gripper file {path}")
+    data = parse_toml(content, f"gripper file {path}", UsageError)
     kind = data.pop("kind", None)
     if kind not in KINDS:
         raise UsageError(f"gripper file {path}: {choose_from('kind', str(kind), KINDS)}")

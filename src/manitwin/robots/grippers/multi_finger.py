@@ -13,6 +13,8 @@ import numpy as np
 from pydantic import BaseModel, TypeAdapter
 
 from manitwin.errors import ConfigError, UsageError
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.xml_file import MAX_XML_BYTES
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.robots.grippers.box import STRICT, Box, PlacedBox
 from manitwin.robots.links import Link, link_poses, links_of
@@ -163,7 +165,8 @@ def load_multi_finger(data: dict[str, Any], folder: Path) -> MultiFingerGripper:
     _check(file, links)
     rotation = rotation_from_quaternion_wxyz(np.array(file.root_to_gripper.quaternion_wxyz))
     described = {field.name: getattr(file, field.name) for field in fields(_Described)}
-    described["sha256"] = hashlib.sha256(file.sha256.encode() + path.read_bytes()).hexdigest()
+    content = read_bytes(path, MAX_XML_BYTES, UsageError, name=str(path))
+    described["sha256"] = hashlib.sha256(file.sha256.encode() + content).hexdigest()
     root_to_gripper = transform(rotation, np.array(file.root_to_gripper.position_m))
     return MultiFingerGripper(**described, root_to_gripper=root_to_gripper, links=links)
 

@@ -6,14 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Unpack
 
+from manitwin.config import LARGEST_COUNT
 from manitwin.engine.drive import RunOptions, RunReport, drive
-from manitwin.engine.ledger.ledger import read_ledger
 from manitwin.engine.ledger.location import local_ledger
+from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.scenes.layouts.layouts_recipe import LayoutNumber, LayoutsRecipe
 from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.run_settings import check_settings, earlier_settings
-from manitwin.scenes.scene import SCENE
+from manitwin.scenes.scene import SCENE, SceneRecord
 from manitwin.scenes.scene_files import parse_scene, scene_name
 from manitwin.scenes.settings import LayoutsConfig
 from manitwin.twin.dataset_root import DatasetRoot
@@ -55,8 +56,8 @@ def make_layouts(
     Raises UsageError for a data set without twins, categories that it has not, scenes of other settings at ``out``, or where
     another run is at work there.
     """
-    if count < 1:
-        raise UsageError(f"{count} layouts; ask for 1 or more")
+    if not 1 <= count <= LARGEST_COUNT:
+        raise UsageError(f"{count:.6g} layouts; ask for 1 or more, at most {LARGEST_COUNT}")
     place = DatasetRoot(dataset).absolute()
     pool = pool_of(place)
     for category in config.layout.include:
@@ -97,6 +98,14 @@ def accepted_scenes(out: str | Path) -> list[str]:
         return [row[0] for row in ledger.execute("SELECT twin_id FROM items WHERE state = 'accepted' ORDER BY number")]
 
 
+def _scene(root: DatasetRoot, scene_id: str) -> SceneRecord:
+    name = f"{scene_name(scene_id)}/{SCENE}"
+    try:
+        return parse_scene(root.read_bytes(name, UsageError), root.full(name))
+    except FileNotFoundError as error:
+        raise UsageError(f"{root.full(name)}: gone; run manitwin layout again, which makes it again") from error
+
+
 def layout_totals(out: str | Path) -> LayoutTotals:
     """Add up what the ledger and the scenes say."""
     root = DatasetRoot(out)
@@ -106,7 +115,7 @@ def layout_totals(out: str | Path) -> LayoutTotals:
         )
         rejected = {str(reason): int(count) for reason, count in rows}
         (cpu_seconds,) = ledger.execute("SELECT coalesce(sum(cpu_seconds), 0) FROM stages").fetchone()
-    scenes = [parse_scene(root.read_bytes(f"{scene_name(each)}/{SCENE}"), each) for each in accepted_scenes(out)]
+    scenes = [_scene(root, each) for each in accepted_scenes(out)]
     return LayoutTotals(
         accepted=len(scenes),
         rejected=rejected,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
@@ -10,13 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from pydantic import BaseModel, ValidationError
 
-from manitwin.errors import UsageError
+from manitwin.errors import TwinError, UsageError
+from manitwin.formats.json_file import parse_json_object
 from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.hull_distance import ConvexParts
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.twin.loaded_twin import TwinSource
+from manitwin.twin.record import Placement
+from manitwin.twin.store import RECORD, REMEDY
 
 KEPT_BODIES = 256
 
@@ -122,10 +125,12 @@ class Pool:
 def read_pool(dataset: str | Path, cache: Path | None = None) -> Pool:
     """Read the records of a data set's, or a flat folder's, accepted twins that have a placement that stayed.
 
-    ``cache`` is a local folder for the twins of a data set at a URL. Raises UsageError for a place without any.
+    ``cache`` is a local folder for the twins of a data set at a URL. Raises UsageError for a place without any, TwinError for a
+    record that is none.
     """
     source = TwinSource(dataset, cache)
-    twins = [twin for twin in (_pool_twin(source.record_bytes(name)) for name in source.twin_ids()) if twin is not None]
+    read = (_pool_twin(source.record_bytes(twin_id), f"{dataset}: {twin_id}/{RECORD}") for twin_id in source.twin_ids())
+    twins = [twin for twin in read if twin is not None]
     if not twins:
         raise UsageError(f"{dataset}: no accepted twin that stays where it is set down; give the folder of a build")
     return Pool(twins, lambda twin_id: source.twin(twin_id).rigid_body())
@@ -137,22 +142,51 @@ def pool_of(dataset: str, cache: str | None = None) -> Pool:
     return read_pool(dataset, None if cache is None else Path(cache))
 
 
-def _pool_twin(content: bytes) -> PoolTwin | None:
-    record = json.loads(content)  # not validated: of a hundred thousand records that would take minutes
-    if record["status"] != "accepted":
+class _Hulls(BaseModel):
+    keeps_opening: bool | None = None
+
+
+class _Mesh(BaseModel):
+    hulls: _Hulls
+
+
+class _Language(BaseModel):
+    category: str
+
+
+class _Standing(BaseModel):
+    """What the pool wants of an accepted record: to validate all of a hundred thousand of them would take minutes."""
+
+    twin_id: str
+    revision: str
+    placements: list[Placement]
+    mesh: _Mesh
+    language: _Language
+
+
+def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
+    data = parse_json_object(content, name, TwinError, remedy=REMEDY)
+    if data.get("status") == "rejected":
         return None
+    try:
+        record = _Standing.model_validate(data)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))[:80]
+        raise TwinError(f"{name}: no record of a twin ({where}: {first['msg']}); {REMEDY}") from error
     poses = tuple(
         StandingPose(
             number,
-            transform(rotation_from_quaternion_wxyz(np.array(each["quaternion_wxyz"])), np.array(each["position_m"])),
-            each["probability"],
-            each["collision_radius_m"],
-            each["upright"],
+            transform(rotation_from_quaternion_wxyz(np.array(each.quaternion_wxyz)), np.array(each.position_m)),
+            each.probability,
+            each.collision_radius_m,
+            each.upright,
         )
-        for number, each in enumerate(record["placements"])
-        if each["settled"]
+        for number, each in enumerate(record.placements)
+        if each.settled
     )
     if not poses:
         return None
-    vessel = record["mesh"]["hulls"]["keeps_opening"] is True
-    return PoolTwin(record["twin_id"], record["revision"], record["language"]["category"], poses, vessel)
+    return PoolTwin(
+        record.twin_id, record.revision, record.language.category, poses, record.mesh.hulls.keeps_opening is True
+    )

@@ -7,14 +7,16 @@ import json
 import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from tempfile import TemporaryDirectory
 
 import cv2
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from manitwin.errors import UsageError
+from manitwin.errors import InputError, UsageError
 from manitwin.formats.glb import read_glb
+from manitwin.formats.image_file import read_image
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.render.cameras import Camera, look_at
 from manitwin.render.false_colors import depth_picture, id_color, ids_picture
@@ -145,13 +147,25 @@ def contact_sheet(pictures: Sequence[tuple[str, np.ndarray]]) -> Image.Image:
     return page
 
 
+def _read_picture(root: DatasetRoot, name: str) -> np.ndarray:
+    """Return a picture of a scene, ``(H, W, 3) uint8``; raises UsageError for one that cannot be read."""
+    with TemporaryDirectory() as scratch:
+        copy = Path(scratch) / PurePosixPath(name).name
+        copy.write_bytes(root.read_bytes(name, UsageError))
+        try:
+            return read_image(copy).pixels[..., :3]
+        except InputError as error:
+            again = "remove its scene's folder and run manitwin layout again, which makes it again"
+            raise UsageError(f"{root.full(name)}: no picture that can be read; {again}") from error
+
+
 def _picture(root: DatasetRoot, source: TwinSource, scene_id: str) -> np.ndarray:
     """Return a scene from its oblique camera, ``(TILE_PX, TILE_PX, 3) uint8``."""
     folder = scene_name(scene_id)
     drawn = f"{folder}/{PICTURES}{CAMERA}_rgb.webp"
     if root.exists(drawn):
-        with Image.open(io.BytesIO(root.read_bytes(drawn))) as image:
-            return np.asarray(image.convert("RGB").resize((TILE_PX, TILE_PX), Image.Resampling.LANCZOS))
+        rgb = Image.fromarray(_read_picture(root, drawn))
+        return np.asarray(rgb.resize((TILE_PX, TILE_PX), Image.Resampling.LANCZOS))
     scene = parse_scene(root.read_bytes(f"{folder}/{SCENE}"), scene_id)
     camera = tuple(each for each in scene.cameras if each.name == CAMERA)
     frames, _ = scene_pictures(

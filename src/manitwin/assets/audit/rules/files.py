@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,7 +11,7 @@ import numpy as np
 from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.errors import TwinError
-from manitwin.twin.store import RECORD, verify_record
+from manitwin.twin.store import RECORD, sha256_of_untrusted, verify_record
 
 LARGEST_COORDINATE_M = 1e6
 """Beyond it nothing can be measured in double precision."""
@@ -23,7 +22,7 @@ _PICTURES = frozenset({".png", ".jpg", ".jpeg", ".webp"})
 
 
 def unreadable(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Say nothing: what could be measured could be read. ``audit.run`` raises this for what could not."""
+    """Say nothing: what could be measured could be read. ``audit.check`` raises this for what could not."""
     yield from ()
 
 
@@ -62,7 +61,7 @@ def duplicates(measured: MeasuredAsset) -> Iterator[Complaint]:
     for paths in by_size.values():
         seen: dict[str, Path] = {}
         for path in paths if len(paths) > 1 else ():
-            digest = hashlib.sha256(path.read_bytes()).hexdigest()
+            digest = sha256_of_untrusted(path, path.parent)
             if digest in seen:
                 yield Complaint(f"{path.name} is the same file as {seen[digest].name}", file=path)
             seen.setdefault(digest, path)

@@ -27,7 +27,7 @@ _NOT_THE_OBJECT = re.compile(
     re.IGNORECASE,
 )
 _LENGTH = re.compile(
-    r"(\d+(?:\.\d+)?)\s*-?\s*(mm|millimet(?:er|re)s?|cm|centimet(?:er|re)s?|m|met(?:er|re)s?|inch(?:es)?)\b",
+    r"(?<!\d)(\d++(?:\.\d++)?)\s*+(?:-\s*+)?(mm|millimet(?:er|re)s?|cm|centimet(?:er|re)s?|m|met(?:er|re)s?|inch(?:es)?)\b",
     re.IGNORECASE,
 )
 _METRES = {"mm": 0.001, "mi": 0.001, "cm": 0.01, "ce": 0.01, "m": 1.0, "me": 1.0, "in": 0.0254}

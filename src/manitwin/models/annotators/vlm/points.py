@@ -31,7 +31,7 @@ CONTRADICTED = 0.5
 
 _FUNCTIONAL_STREAM, _GRASP_STREAM = 0, 1
 _NUMBER_SAID = re.compile(
-    r"\b(markers?|points?|ids?|numbers?|dots?)((?:\s*(?:,|and|or|#|no\.?)?\s*\d+\b)+)", re.IGNORECASE
+    r"\b(markers?|points?|ids?|numbers?|dots?)((?:\s*(?:(?:,|and|or|#|no\.?)\s*)?\d+\b)+)", re.IGNORECASE
 )
 
 

@@ -9,6 +9,7 @@ from importlib import resources
 from pathlib import Path
 
 from manitwin.errors import ConfigError, choose_from
+from manitwin.formats.bounded_file import read_text
 from manitwin.models.vlm.protocol import Picture
 
 PLACEHOLDERS: dict[str, frozenset[str]] = {
@@ -21,6 +22,7 @@ PLACEHOLDERS: dict[str, frozenset[str]] = {
 """The prompts that there are, and what is put in for ``{placeholder}`` in each."""
 
 PICTURES = "{pictures}"
+_MAX_BYTES = 1 << 20
 
 _PLACEHOLDER = re.compile(r"\{([a-z_]+)\}")
 _FORM = re.compile(r"version: (\S+)\n+# Instructions\n(.*)\n# Question\n(.*)", re.DOTALL)
@@ -61,7 +63,7 @@ def load_prompts(folder: Path | None) -> dict[str, Prompt]:
         for path in sorted(folder.glob("*.md")):
             if path.stem not in PLACEHOLDERS:
                 raise ConfigError(f"{path}: {choose_from('prompt', path.stem, PLACEHOLDERS)}")
-            texts[path.stem] = path.read_text(encoding="utf-8")
+            texts[path.stem] = read_text(path, _MAX_BYTES, ConfigError, name=str(path))
     return {name: _parse(name, text) for name, text in texts.items()}
 
 

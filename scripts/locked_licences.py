@@ -1,0 +1,241 @@
+"""Print the licence of every locked package, as an SPDX expression, and where it is stated; fail where one is not allowed.
+
+``make licences``. A licence is read from the metadata of the installed wheel. Where the metadata name none, or a family of
+licences only ("BSD"), it was read from the licence file in the wheel, and stands in ``READ`` with that file's name. A package
+of which neither is known is an error, and so is a licence that nobody has allowed.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from pathlib import Path
+
+from packaging.licenses import InvalidLicenseExpression, canonicalize_license_expression
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).resolve().parent.parent
+LOCK = ROOT / "requirements.lock"
+
+ALLOWED = frozenset(
+    (
+        "0BSD",
+        "Apache-2.0",
+        "BSD-2-Clause",
+        "BSD-3-Clause",
+        "BSL-1.0",
+        "CC0-1.0",
+        "CNRI-Python",
+        "ISC",
+        "LGPL-2.1-or-later",
+        "LGPL-3.0-only",
+        "LGPL-3.0-or-later",
+        "LicenseRef-BSD",
+        "LicenseRef-matplotlib",
+        "LicenseRef-Public-Domain",
+        "LicenseRef-TOST-1.0",
+        "MIT",
+        "MIT-0",
+        "MIT-CMU",
+        "MPL-2.0",
+        "PSF-2.0",
+        "Qhull",
+        "Zlib",
+    )
+)
+"""What a locked package may be under: permissive licences, and those with a copyleft that ends at their own files."""
+
+SAID = {
+    "3-clause bsd license": "BSD-3-Clause",
+    "apache 2.0": "Apache-2.0",
+    "apache license 2.0": "Apache-2.0",
+    "apache software license": "Apache-2.0",
+    "bsd 2-clause license": "BSD-2-Clause",
+    "bsd 3-clause license": "BSD-3-Clause",
+    "isc license": "ISC",
+    "isc license (iscl)": "ISC",
+    "mit license": "MIT",
+    "mozilla public license 2.0 (mpl 2.0)": "MPL-2.0",
+    "psf": "PSF-2.0",
+}
+"""Names in metadata that mean one licence. "BSD" and "LGPL" are not among them: each is a family."""
+
+READ = {
+    "alabaster": ("BSD-3-Clause", "LICENSE.rst"),
+    "antlr4-python3-runtime": ("BSD-3-Clause", "antlr4/Parser.py"),
+    "cmeel-qhull": ("Qhull", "licenses/qhull/COPYING.txt"),
+    "comm": ("BSD-3-Clause", "licenses/LICENSE"),
+    "contourpy": ("BSD-3-Clause", "LICENSE"),
+    "cycler": ("BSD-3-Clause", "LICENSE"),
+    "docutils": ("LicenseRef-Public-Domain AND BSD-2-Clause AND BSD-3-Clause", "licenses/COPYING.rst"),
+    "embreex": ("BSD-2-Clause", "licenses/LICENSE"),
+    "ipython-pygments-lexers": ("BSD-3-Clause", "LICENSE"),
+    "itsdangerous": ("BSD-3-Clause", "LICENSE.txt"),
+    "jinja2": ("BSD-3-Clause", "licenses/LICENSE.txt"),
+    "jupyter-client": ("BSD-3-Clause", "licenses/LICENSE"),
+    "kiwisolver": ("BSD-3-Clause", "licenses/LICENSE"),
+    "matplotlib": ("LicenseRef-matplotlib", "LICENSE"),
+    "mpmath": ("BSD-3-Clause", "LICENSE"),
+    "msgpack-numpy": ("BSD-3-Clause", "LICENSE.md"),
+    "nbclient": ("BSD-3-Clause", "licenses/LICENSE"),
+    "nbformat": ("BSD-3-Clause", "licenses/LICENSE"),
+    "nest-asyncio2": ("BSD-2-Clause", "licenses/LICENSE"),
+    "pebble": ("LGPL-3.0-only", "licenses/LICENSE"),
+    "prompt-toolkit": ("BSD-3-Clause", "licenses/LICENSE"),
+    "pycollada": ("BSD-3-Clause", "licenses/COPYING"),
+    "pyopengl": ("LicenseRef-BSD", "METADATA"),
+    "pyperclip": ("BSD-3-Clause", "licenses/LICENSE.txt"),
+    "python-dateutil": ("Apache-2.0 OR BSD-3-Clause", "LICENSE"),
+    "s3fs": ("BSD-3-Clause", "licenses/LICENSE.txt"),
+    "scipy": ("BSD-3-Clause", "LICENSE.txt"),
+    "sphinxcontrib-applehelp": ("LicenseRef-BSD", "METADATA"),
+    "sphinxcontrib-devhelp": ("LicenseRef-BSD", "METADATA"),
+    "sphinxcontrib-htmlhelp": ("LicenseRef-BSD", "METADATA"),
+    "sphinxcontrib-jsmath": ("BSD-2-Clause", "licenses/LICENCE.rst"),
+    "sphinxcontrib-qthelp": ("LicenseRef-BSD", "METADATA"),
+    "sphinxcontrib-serializinghtml": ("LicenseRef-BSD", "METADATA"),
+    "sympy": ("BSD-3-Clause", "licenses/LICENSE"),
+    "traitlets": ("BSD-3-Clause", "licenses/LICENSE"),
+    "transforms3d": ("BSD-3-Clause", "LICENSE"),
+}
+"""Licences read by a person, each with the file of the wheel that states it.
+
+``LicenseRef-BSD``: the classifier says BSD, and the wheel has no text that says of how many clauses. ``LicenseRef-matplotlib``:
+matplotlib's own, modelled on the PSF's. docutils' emacs mode, under the GPL, is not in its wheel. The wheel of Pebble names
+the LGPL and carries the text of version 3.
+"""
+
+ELSEWHERE = {
+    "appnope": "BSD-2-Clause",
+    "colorama": "BSD-3-Clause",
+    "httpx2-jsfetch": "BSD-3-Clause",
+    "pywin32": "PSF-2.0",
+    "tzdata": "Apache-2.0",
+}
+"""Packages that are locked for other systems (macOS, Windows, browsers) and not installed on Linux, by their wheels at PyPI."""
+
+CARRIED = {
+    "docutils": "the text of the GPL, in its licences; the file under it is not in the wheel",
+    "jrl-cmakemodules": "files of CMake under the LGPL, which are run when others are built",
+    "lxml": "iconv under the LGPL-2.1",
+    "matplotlib": "FreeType, under its own licence or the GPL-2.0, by choice",
+    "mujoco": "Eigen, of which a few files are under the LGPL-2.1; a parser made by Bison, with its exception",
+    "mujoco-core": "Eigen, of which a few files are under the LGPL-2.1; a parser made by Bison, with its exception",
+    "mujoco-studio": "Eigen, of which a few files are under the LGPL-2.1; a parser made by Bison, with its exception",
+    "numpy": "libgfortran under the GPL-3.0 with the GCC runtime exception, libquadmath under the LGPL-2.1",
+    "opencv-python": "FFmpeg under the LGPL-2.1 and Qt 5 under the LGPL-3.0, as shared libraries",
+    "pebble": "its own licence",
+    "pillow": "FreeType, under its own licence or the GPL-2.0, by choice; of XZ, liblzma alone, which is not under the GPL",
+    "pyarrow": "nothing under the GPL; the exception of LLVM's licence names it",
+    "pyopengl": "GLE for Windows, under its own licence or the GPL, by choice",
+    "scipy": "libgfortran under the GPL-3.0 with the GCC runtime exception, libquadmath under the LGPL-2.1",
+    "setuptools": "autocommand under the LGPL-3.0, among what it brings",
+}
+"""Wheels whose licence files hold the text, or name, of the GPL or the LGPL, and what that is of."""
+
+
+TEXTS = ("", ".txt", ".md", ".rst")
+
+
+@dataclass(frozen=True)
+class Licence:
+    """What a package is under: ``expression`` is None where nothing says it, ``source`` is the file that says it."""
+
+    name: str
+    version: str
+    expression: str | None
+    source: str
+
+    @property
+    def not_allowed(self) -> list[str]:
+        """Licences of the expression that nobody has allowed; of a choice (OR), one that is allowed is enough."""
+        if self.expression is None:
+            return ["unknown"]
+        return [
+            part.strip("() ")
+            for part in re.split(r"\bAND\b", self.expression)
+            if not any(choice.strip("() ") in ALLOWED for choice in re.split(r"\bOR\b", part))
+        ]
+
+
+def locked(text: str) -> list[tuple[str, str]]:
+    """Return name and version of each locked package; a name stands twice where versions differ between Pythons."""
+    return [
+        (name.lower(), version) for name, version in re.findall(r"^([A-Za-z0-9._-]+)==([^\s;\\]+)", text, re.MULTILINE)
+    ]
+
+
+def stated(package: Distribution) -> str | None:
+    """Return the licence that the metadata of a wheel name as one expression, or None."""
+    metadata = package.metadata
+    expression = metadata.get("License-Expression")
+    if expression:
+        return str(canonicalize_license_expression(expression))
+    classifiers = [
+        str(line).rsplit(" :: ", 1)[-1]
+        for line in metadata.get_all("Classifier") or []
+        if line.startswith("License ::")
+    ]
+    for said in (metadata.get("License"), classifiers[0] if len(classifiers) == 1 else None):
+        try:
+            if said:
+                return SAID.get(said.strip().lower()) or str(canonicalize_license_expression(said.strip()))
+        except InvalidLicenseExpression:
+            continue
+    return None
+
+
+def licences(lock: str) -> Iterator[Licence]:
+    """Yield the licence of each locked package."""
+    for name, version in locked(lock):
+        try:
+            package = distribution(name)
+        except PackageNotFoundError:
+            yield Licence(name, version, ELSEWHERE.get(name), "PyPI; not of this system")
+            continue
+        if name in READ:
+            expression, source = READ[name]
+            yield Licence(name, version, expression, source)
+        else:
+            yield Licence(name, version, stated(package), "METADATA")
+
+
+def licence_texts(package: Distribution) -> Iterator[tuple[str, str]]:
+    """Yield name and text of each licence file of an installed wheel."""
+    for file in package.files or []:
+        name = str(file)
+        if re.search(r"licen[cs]e|copying|notice", name, re.IGNORECASE) and file.suffix.lower() in TEXTS:
+            yield name, Path(str(package.locate_file(file))).read_text(errors="replace")
+
+
+def carries_copyleft(text: str) -> bool:
+    """Say whether a licence text is the GPL's or LGPL's, or puts something under one of them."""
+    return bool(
+        re.search(r"GNU\s+(LESSER |LIBRARY |AFFERO )?GENERAL PUBLIC LICENSE\s+Version \d", text, re.IGNORECASE)
+        or re.search(r"\bL?GPL(v|-| )?[23](\.\d)?\b(?! \(\"Combined)", text)
+    )
+
+
+def main() -> None:
+    lock = Path(sys.argv[1]) if len(sys.argv) > 1 else LOCK
+    found = list(licences(lock.read_text(encoding="utf-8")))
+    for licence in found:
+        carried = f"; carries {CARRIED[licence.name]}" if licence.name in CARRIED and licence.name != "pebble" else ""
+        print(f"{licence.name} {licence.version}: {licence.expression or 'unknown'} ({licence.source}){carried}")
+    bad = [licence for licence in found if licence.not_allowed]
+    names = {canonicalize_name(licence.name) for licence in found}
+    print(f"\n{len(found)} locked versions of {len(names)} packages, {len(found) - len(bad)} under an allowed licence")
+    for licence in bad:
+        print(
+            f"not allowed: {licence.name}: {', '.join(licence.not_allowed)}; read its licence, then add it to READ or ALLOWED "
+            "of scripts/locked_licences.py, or take another package",
+            file=sys.stderr,
+        )
+    sys.exit(1 if bad else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""Read one asset and hold rules against it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from manitwin.assets.asset import Asset
+from manitwin.assets.audit.finding import Audited, Complaint, Finding, Rule
+from manitwin.assets.audit.measured import MeasuredAsset
+from manitwin.assets.audit.rules import RULES_BY_CODE
+from manitwin.assets.read import read_asset
+from manitwin.errors import AssetError, TwinError
+from manitwin.twin.store import RECORD, read_record
+
+STOPS = ("FIL005", "FIL006")
+"""Where one of these holds there is nothing to measure."""
+
+
+def audit_asset(asset: Asset, rules: Sequence[Rule]) -> list[Finding]:
+    """Hold rules against an asset, in their order; one whose geometry cannot be measured gets that finding only."""
+    measured = MeasuredAsset(asset)
+    broken = [code for code in STOPS if measured.complaints(RULES_BY_CODE[code].check)]
+    if broken:
+        rules = [rule for rule in rules if rule.code in broken]
+    return [_finding(rule, asset.path, complaint) for rule in rules for complaint in measured.complaints(rule.check)]
+
+
+def audit_path(path: Path, rules: Sequence[Rule], fix: bool = False) -> Audited:
+    """Read an asset and hold rules against it; with ``fix``, mend what is safe first. Never raises for an asset's sake."""
+    try:
+        asset = read_asset(path)
+        findings = audit_asset(asset, rules)
+        done: list[str] = []
+        if fix:
+            done = _mend(asset, findings)
+            if done:
+                asset = read_asset(path)
+                findings = audit_asset(asset, rules)
+    except AssetError as error:
+        return _unread(path, str(error), rules)
+    except MemoryError:
+        return _unread(path, f"{path.name}: needs more memory than there is", rules)
+    return Audited(str(path), asset.format, tuple(findings), tuple(done))
+
+
+def _mend(asset: Asset, findings: Sequence[Finding]) -> list[str]:
+    by_code = dict.fromkeys(RULES_BY_CODE[finding.code].fix for finding in findings)
+    done = [fix(asset) for fix in by_code if fix is not None]
+    return [said for said in done if not said.startswith("not fixed")]
+
+
+def _unread(path: Path, cause: str, rules: Sequence[Rule]) -> Audited:
+    code = "FIL008" if _is_rejected_twin(path) else "FIL001"
+    findings = [
+        Finding(rule.code, rule.severity, str(path), " ".join(cause.split()), path)
+        for rule in rules
+        if rule.code == code
+    ]
+    return Audited(str(path), "twin" if code == "FIL008" else None, tuple(findings))
+
+
+def _is_rejected_twin(path: Path) -> bool:
+    folder = path.parent if path.name == RECORD else path
+    try:
+        return (folder / RECORD).is_file() and read_record(folder).status == "rejected"
+    except TwinError:
+        return False
+
+
+def _finding(rule: Rule, path: Path, complaint: Complaint) -> Finding:
+    return Finding(rule.code, rule.severity, str(path), complaint.message, complaint.file, complaint.values)
+
+
+def audit_by_codes(path: Path, codes: Sequence[str], fix: bool) -> Audited:
+    """Audit an asset in a process with limits, to which rules go by their codes."""
+    return audit_path(path, [RULES_BY_CODE[code] for code in codes], fix)

@@ -1,0 +1,35 @@
+"""What is imported of an asset: a mesh in metres and a record, as bytes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Literal
+
+from manitwin.assets.asset import Asset, Format
+from manitwin.assets.importers.record import asset_to_object, import_record, shown_parts
+from manitwin.assets.read import read_asset
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.textures import bake_transform
+from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, ImportRecord
+
+MAX_TEXTURE_SIZE = 8192
+"""Textures are kept as they are: none of the collections has larger ones."""
+
+
+def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
+    """Return the files of an imported asset, by name, and its record; raises AssetError where it has no visual mesh.
+
+    ``asset.glb`` has the visual meshes in metres, Y up as glTF is; the same asset gives the same bytes.
+    """
+    to_object = asset_to_object(asset)
+    record = import_record(asset, to_object)
+    parts = [bake_transform(part, to_object) for part in shown_parts(asset)]
+    text = json.dumps(record.model_dump(mode="json"), indent=1, sort_keys=True, allow_nan=False) + "\n"
+    files = {IMPORTED_MESH: write_glb(parts, max_texture_size=MAX_TEXTURE_SIZE), IMPORT_RECORD: text.encode()}
+    return files, record
+
+
+def read_for_import(place: Path, format: Format | Literal["auto"]) -> tuple[dict[str, bytes], ImportRecord]:
+    """Read an asset and return what is imported of it, in a process with limits; raises AssetError."""
+    return imported_files(read_asset(place, format))

@@ -1,0 +1,61 @@
+"""What every command does with its arguments before it looks at any: none may be of a length or kind that nothing can take."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import typer
+from typer.core import TyperCommand
+
+from manitwin.errors import UsageError
+
+PLACES = frozenset(
+    {"inputs", "paths", "twins", "twin", "dataset", "source", "episodes", "out", "config", "record", "log"}
+)
+"""The parameters, of whatever command, that name files, folders or URLs."""
+LONGEST_PLACE = 4095
+"""Bytes: PATH_MAX of Linux without its end (``limits.h``)."""
+LONGEST_TEXT = 100_000
+"""Characters: less than what Linux takes for one argument (``MAX_ARG_STRLEN``)."""
+
+
+class CheckedCommand(TyperCommand):
+    """A command whose texts and places are looked at before they are converted; of numbers their own types say the range."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the command line; raises UsageError for an argument that is empty, too long, or no text."""
+        given, _, _ = self.make_parser(ctx).parse_args(args=list(args))
+        for parameter in self.params:
+            values = given.get(parameter.name or "")
+            for value in values if isinstance(values, list | tuple) else [values]:
+                if isinstance(value, str):
+                    check_text(_called(parameter), value, place=parameter.name in PLACES)
+        return super().parse_args(ctx, args)
+
+
+def check_text(called: str, value: str, *, place: bool) -> None:
+    """Raise UsageError, naming the parameter, for a value that no command takes; ``place``: it names a file or folder."""
+    if "\0" in value:
+        raise UsageError(f"{called}: has a NUL character in it; give it without")
+    if len(value) > LONGEST_TEXT:
+        raise UsageError(f"{called}: {len(value)} characters; give at most {LONGEST_TEXT}")
+    if not place:
+        return
+    if not value.strip():
+        raise UsageError(f"{called}: is empty; give a path, such as . for this folder")
+    try:
+        length = len(os.fsencode(value))
+    except UnicodeEncodeError as error:
+        raise UsageError(f"{called}: {value!r} is no name that a file can have; check the path") from error
+    if length > LONGEST_PLACE:
+        raise UsageError(f"{called}: {value[:40]!r}... has {length} bytes; a path has at most {LONGEST_PLACE}")
+
+
+def _called(parameter: Any) -> str:
+    return str(parameter.opts[0] if parameter.param_type_name == "option" else parameter.metavar or parameter.name)
+
+
+def register(app: typer.Typer, function: Any, name: str | None = None, *, hidden: bool = False) -> None:
+    """Make a function a command whose arguments are checked."""
+    app.command(name, cls=CheckedCommand, hidden=hidden)(function)

@@ -1,0 +1,75 @@
+"""The worker process on this machine, which does jobs, and the reading of one that died."""
+
+from __future__ import annotations
+
+import faulthandler
+import os
+import signal
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+from manitwin.engine.executors.stage_notes import parts_noted
+from manitwin.engine.jobs import Job, Reply, RunStage, WorkerSetup
+from manitwin.engine.worker import Worker
+from manitwin.engine.worker_processes import die_with, limit_memory, one_thread_each
+from manitwin.formats.printable import printable_line
+
+STACK_LINES = 12
+SAID_CHARACTERS = 200
+READ_BYTES = 1 << 16
+NO_MEMORY = ("bad_alloc", "out of memory", "cannot allocate memory", "memory allocation of")
+"""How C++, LLVM and the GNU and Rust libraries put it when memory was refused, in lower case."""
+
+_worker: Worker | None = None
+_stack_file: TextIO | None = None
+
+
+def start(setup: WorkerSetup, stacks: str, driver: int) -> None:
+    """Prepare this process: it dies with its driver, at once when it is told to, and within its limit of memory."""
+    global _worker, _stack_file
+    one_thread_each()
+    die_with(driver)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)  # pebble's own handler waits for native code to return
+    _stack_file = (Path(stacks) / f"{os.getpid()}.txt").open("a")
+    faulthandler.enable(_stack_file)
+    # what native code says before it ends the process is kept for the driver, and does not come between its lines
+    sys.stderr = os.fdopen(os.dup(2), "w", buffering=1, errors="backslashreplace")
+    os.dup2(_stack_file.fileno(), 2)
+    limit_memory(setup.memory_gb)
+    _worker = Worker(setup)
+
+
+def do(ticket: int, job: Job) -> Reply:
+    """Return the job's answer."""
+    assert _worker is not None and _stack_file is not None
+    os.ftruncate(_stack_file.fileno(), 0)  # of the jobs before, which were survived
+    if not isinstance(job, RunStage):
+        return _worker.do(job)
+    with parts_noted(Path(_stack_file.name).parent, ticket):
+        return _worker.do(job)
+
+
+@dataclass(frozen=True)
+class LastWords:
+    """What a dying process left: what native code said last, its innermost calls, and whether memory was refused to it."""
+
+    said: str = ""
+    calls: str = ""
+    no_memory: bool = False
+
+    @classmethod
+    def read(cls, stacks: Path, pid: int | None) -> LastWords:
+        """Read what a process left in the folder of stacks: nothing where it was just killed."""
+        path = stacks / f"{pid}.txt"
+        if not path.is_file():
+            return cls()
+        with path.open("rb") as stream:
+            lines = stream.read(READ_BYTES).decode("utf-8", errors="replace").splitlines()
+        calls = [line.strip() for line in lines if line.startswith("  File")][:STACK_LINES]
+        begin = next((i for i, line in enumerate(lines) if line.startswith("Fatal Python error")), len(lines))
+        said = [line for line in lines[:begin] if line.strip()]
+        no_memory = any(words in line.lower() for line in said for words in NO_MEMORY)
+        last = printable_line(said[-1], max_characters=SAID_CHARACTERS) if said else ""
+        return cls(last, " < ".join(calls), no_memory)

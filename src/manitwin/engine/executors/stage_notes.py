@@ -1,0 +1,69 @@
+"""What a stage says of itself while it runs, as a small file that its worker writes and the driver reads."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from manitwin.engine.stage import StagePart, heard_by
+
+RUN = logging.getLogger("manitwin.run")
+NOTE = ".part"
+EVERY_S = 1.0
+
+_failure_told = False
+
+
+@contextmanager
+def parts_noted(folder: Path, ticket: int) -> Iterator[None]:
+    """Note in a folder what the stage that runs in the ``with`` statement says of itself, under the ticket of its job."""
+    with heard_by(_Notes(folder / f"{ticket}{NOTE}")):
+        try:
+            yield
+        finally:
+            drop_note(folder, ticket)
+
+
+def read_notes(folder: Path) -> dict[int, StagePart]:
+    """Return what part of each job is done, by ticket; a job that has ended may still be among them."""
+    found = {}
+    for path in folder.glob(f"*{NOTE}"):
+        with suppress(FileNotFoundError):  # its stage has ended meanwhile
+            found[int(path.stem)] = StagePart(*json.loads(path.read_bytes()))
+    return found
+
+
+def drop_note(folder: Path, ticket: int) -> None:
+    """Remove the note of a job that has ended."""
+    (folder / f"{ticket}{NOTE}").unlink(missing_ok=True)
+
+
+class _Notes:
+    """Write down what a stage says of itself, once a second at most."""
+
+    def __init__(self, path: Path):
+        self._path, self._at = path, -EVERY_S
+
+    def __call__(self, part: StagePart) -> None:
+        if time.monotonic() - self._at < EVERY_S:
+            return
+        self._at = time.monotonic()
+        fresh = self._path.with_suffix(".fresh")
+        try:  # renamed, so that nobody reads a half, but not synced: it is of no use after a power cut
+            fresh.write_text(json.dumps([part.done, part.total, part.unit]))
+            os.replace(fresh, self._path)
+        except OSError as error:
+            _tell_once(error)
+
+
+def _tell_once(error: OSError) -> None:
+    """Log that a note was not written: the stage does its work all the same."""
+    global _failure_told
+    if not _failure_told:
+        _failure_told = True
+        RUN.warning("the progress of stages is not shown: %s", error)

@@ -1,0 +1,106 @@
+"""Is a file a ledger? SQLite opens regular files alone, and what is no ledger ends in one line with its remedy."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+from manitwin.engine.ledger.migrations import migrate
+from manitwin.errors import UsageError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.printable import printable_line
+
+_OF_THE_DISK = frozenset(
+    {sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED}
+    | {sqlite3.SQLITE_NOMEM, sqlite3.SQLITE_INTERRUPT, sqlite3.SQLITE_CANTOPEN}
+)
+"""SQLite's codes for what is no fault of the file."""
+
+REMEDY = "manitwin check DATASET puts it aside, and the same build with its inputs then finds all finished twins again"
+
+
+class LedgerDamaged(UsageError):
+    """A ledger that cannot be read: nothing is lost with it that the folders and the inputs do not have."""
+
+
+def damaged(path: Path, cause: object) -> LedgerDamaged:
+    """Return the one line about a ledger that cannot be read."""
+    said = printable_line(str(cause), max_characters=120)
+    remedy = REMEDY.replace("DATASET", str(path.parent))
+    return LedgerDamaged(f"{path}: no ledger that can be read ({said}); {remedy}")
+
+
+@contextmanager
+def sound(path: Path) -> Iterator[None]:
+    """Turn SQLite's errors about a damaged file into LedgerDamaged, those about the disk into UsageError."""
+    try:
+        yield
+    except sqlite3.DatabaseError as error:
+        code = getattr(error, "sqlite_errorcode", None)
+        if code is not None and code & 0xFF in _OF_THE_DISK:
+            raise UsageError(f"{path}: {error}; mend the disk or its permissions, and try again") from error
+        raise damaged(path, error) from error
+    except (UnicodeDecodeError, sqlite3.InterfaceError) as error:
+        raise damaged(path, error) from error
+
+
+def require_regular(path: Path) -> None:
+    """Raise LedgerDamaged where a ledger, or what SQLite keeps beside it, is no regular file, or a link out of its folder."""
+
+    def refuse(line: str) -> LedgerDamaged:
+        return damaged(path, line.split(";")[0])
+
+    for each in (path, *beside(path)):
+        if os.path.lexists(each):
+            open_regular(each, refuse, inside=path.parent).close()
+
+
+def beside(path: Path) -> tuple[Path, Path]:
+    """Return the files that SQLite keeps beside a database in write-ahead mode."""
+    return path.with_name(f"{path.name}-wal"), path.with_name(f"{path.name}-shm")
+
+
+def check_whole(connection: sqlite3.Connection, path: Path) -> None:
+    """Raise LedgerDamaged where pages are damaged, or tables and columns are not those of this version; it is migrated."""
+    (said,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+    if said != "ok":
+        raise damaged(path, said)
+    check_tables(connection, path)
+
+
+def check_tables(connection: sqlite3.Connection, path: Path) -> None:
+    """Raise LedgerDamaged where tables and columns are not those of this version: views and triggers are none of ours."""
+    with closing(sqlite3.connect(":memory:")) as ours:
+        migrate(ours, ":memory:")
+        for what, of in (("tables", _objects), ("columns", _columns)):
+            if of(connection) != of(ours):
+                raise damaged(path, f"its {what} are not those of a ledger")
+
+
+def _objects(connection: sqlite3.Connection) -> set[tuple[str, str]]:
+    rows = connection.execute("SELECT type, name FROM sqlite_master WHERE name NOT LIKE 'sqlite_%'")
+    return {(kind, name) for kind, name in rows}
+
+
+def _columns(connection: sqlite3.Connection) -> list[tuple[str, ...]]:
+    rows = connection.execute(
+        "SELECT t.name, c.name, c.type FROM sqlite_master t, pragma_table_info(t.name) c WHERE t.type = 'table'"
+        " AND t.name NOT LIKE 'sqlite_%' ORDER BY 1, 2"
+    )
+    return [tuple(row) for row in rows]
+
+
+def put_aside(path: Path) -> Path:
+    """Rename a damaged ledger and what SQLite keeps beside it, out of the way of the next; returns its new place."""
+    place, number = path.with_name(f"{path.name}.damaged"), 1
+    while os.path.lexists(place):
+        number += 1
+        place = path.with_name(f"{path.name}.damaged.{number}")
+    for each in beside(path):
+        if os.path.lexists(each):  # of no use without the ledger, and taken for the next one's
+            os.unlink(each)
+    os.rename(path, place)
+    return place

@@ -1,0 +1,48 @@
+"""CSV that others wrote: its quotes closed, its values and rows bounded. All CSV from outside the package is parsed here."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from manitwin.formats.bounded_file import Refusal, open_regular
+from manitwin.formats.printable import printable_line
+
+MAX_LINE_BYTES = 1 << 20
+
+
+def read_csv(path: Path, refuse: Refusal, *, name: str | None = None) -> Iterator[tuple[int, dict[str, Any]]]:
+    """Yield the rows of a CSV file (RFC 4180) with a header, as the number of the line where each ends and its values.
+
+    A row is read as it is asked for. Raises what ``refuse`` makes of one line that names file and line: not UTF-8, a quote
+    that is not closed, a value of more than csv's 128 KiB, a line of more than ``MAX_LINE_BYTES``, more values than columns.
+    """
+    called = name or str(path)
+    reader = csv.DictReader(read_lines(path, refuse, name=called), strict=True)
+    try:
+        for row in reader:
+            if None in row:
+                raise refuse(f"{called}:{reader.line_num}: more values than columns; quote values that hold a comma")
+            yield reader.line_num, row
+    except csv.Error as error:
+        cause = printable_line(str(error), max_characters=120)
+        remedy = "close its quotes, and write a quote in a value twice"
+        raise refuse(f"{called}:{reader.line_num}: not CSV ({cause}); {remedy}") from error
+
+
+def read_lines(path: Path, refuse: Refusal, *, name: str | None = None) -> Iterator[str]:
+    """Yield the lines of a regular file of UTF-8 text with their ends; one of more than ``MAX_LINE_BYTES`` is refused."""
+    called = name or str(path)
+    with open_regular(path, refuse, name=called) as stream:
+        number = 0
+        while line := stream.readline(MAX_LINE_BYTES + 1):
+            number += 1
+            if len(line) > MAX_LINE_BYTES:
+                raise refuse(f"{called}:{number}: a line of more than {MAX_LINE_BYTES} bytes; split it into rows")
+            try:
+                yield line.decode("utf-8-sig" if number == 1 else "utf-8")
+            except UnicodeDecodeError as error:
+                cause = f"{error.reason} at byte {stream.tell() - len(line) + error.start}"
+                raise refuse(f"{called}: not UTF-8 text ({cause}); save it as UTF-8") from error

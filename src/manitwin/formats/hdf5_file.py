@@ -1,0 +1,172 @@
+"""HDF5 that others wrote: a regular file whose groups and arrays lie in it, of plain numbers, and no larger than a limit.
+
+An HDF5 file may lead out of itself by external and soft links, by arrays that are kept in other files and by virtual ones of
+other files' parts; it may ask for a filter that HDF5 loads as a plugin, hold references and objects of Python, and say of an
+array that it has 2^50 numbers of which none was written. Nothing of that is followed, loaded or made.
+Source: the HDF5 1.14 reference, "Property Lists" and "Filters"; h5py's low-level API.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from manitwin.formats.bounded_file import Refusal, open_regular, with_remedy
+from manitwin.formats.printable import printable_line
+
+MAX_ARRAY_BYTES = 1 << 30
+MAX_TEXT_BYTES = 16 << 20
+MAX_OBJECTS = 100_000
+_DEPTH = 16
+_FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+"""Those that are part of every HDF5 library: others are looked for in HDF5_PLUGIN_PATH and loaded."""
+
+_DEFLATE_RATIO = 1100
+"""Deflate makes no more than 1,032 bytes of one."""
+
+_FAILURES = (OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError, AttributeError)
+"""What h5py raises for files that are none, cut off or altered."""
+
+
+@contextmanager
+def open_hdf5(path: Path, refuse: Refusal, *, remedy: str, inside: Path | None = None) -> Iterator[Hdf5]:
+    """Open a regular HDF5 file for reading; raises what ``refuse`` makes of one line, which ends in the remedy."""
+    opened = Hdf5(path, refuse, remedy=remedy, inside=inside)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+class Hdf5:
+    """An open file: arrays and texts by their paths in it, each looked at before it is read."""
+
+    def __init__(self, path: Path, refuse: Refusal, *, remedy: str, inside: Path | None = None):
+        self._called, self._refuse, self._remedy = printable_line(str(path)), refuse, remedy
+        open_regular(path, with_remedy(refuse, remedy), inside=inside, name=str(path)).close()
+        with self._failures(""):
+            self.file = h5py.File(path, "r")
+
+    def close(self) -> None:
+        """Close it."""
+        self.file.close()
+
+    def names(self, group: str = "/") -> list[str]:
+        """Return the names in a group."""
+        with self._failures(group):
+            found = self._object(group)
+            if not isinstance(found, h5py.Group):
+                raise self._wrong(group, "is no group")
+            if len(found) > MAX_OBJECTS:
+                raise self._wrong(group, f"{len(found)} objects are more than the limit of {MAX_OBJECTS}")
+            return list(found)
+
+    def has(self, path: str) -> bool:
+        """Tell whether a path is there."""
+        try:
+            self._object(path)
+        except KeyError:
+            return False
+        return True
+
+    def text(self, path: str, attribute: str) -> bytes | None:
+        """Return the bytes of an attribute of one text, None where it is not there."""
+        with self._failures(path):
+            found = self._object(path)
+            if attribute not in found.attrs:
+                return None
+            about = found.attrs.get_id(attribute)
+            if about.dtype.kind != "S" or about.shape != () or about.dtype.itemsize > MAX_TEXT_BYTES:
+                raise self._wrong(path, f"the attribute {attribute} is no text of at most {MAX_TEXT_BYTES} bytes")
+            return bytes(found.attrs[attribute])
+
+    def array(self, path: str) -> np.ndarray:
+        """Return an array of numbers."""
+        with self._failures(path):
+            content: np.ndarray = self._array(path)[()]
+            return content
+
+    def length(self, path: str) -> int:
+        """Return the length of an array's first axis."""
+        with self._failures(path):
+            return int(self._array(path).shape[0])
+
+    def group(self, path: str) -> h5py.Group:
+        """Return a group in which all is as this module reads it: it can be copied as it is."""
+        with self._failures(path):
+            found = self._object(path)
+            seen: set[int] = set()
+            self._look_through(found, path, seen, 0)
+            return found
+
+    def _look_through(self, group: Any, path: str, seen: set[int], depth: int) -> None:
+        if not isinstance(group, h5py.Group):
+            raise self._wrong(path, "is no group")
+        if depth > _DEPTH:
+            raise self._wrong(path, "its groups are nested too deep")
+        for name in self.names(path):
+            inner = f"{path}/{name}"
+            found = self._object(inner)
+            address = h5py.h5o.get_info(found.id).addr
+            if address in seen or len(seen) > MAX_OBJECTS:
+                raise self._wrong(inner, "is there twice, or leads back to a group that it is in")
+            seen.add(address)
+            for attribute in found.attrs:
+                self.text(inner, attribute)
+            if isinstance(found, h5py.Dataset):
+                self._array(inner)
+            else:
+                self._look_through(found, inner, seen, depth + 1)
+
+    def _object(self, path: str) -> Any:
+        """Return an object by hard links alone."""
+        found: Any = self.file
+        for part in filter(None, path.split("/")):
+            if not isinstance(found, h5py.Group):
+                raise KeyError(path)
+            link = found.get(part, getlink=True)
+            if link is None:
+                raise KeyError(path)
+            if not isinstance(link, h5py.HardLink):
+                raise self._wrong(path, "is a link, and only what lies in the file is read")
+            found = found[part]
+        return found
+
+    def _array(self, path: str) -> h5py.Dataset:
+        found = self._object(path)
+        if not isinstance(found, h5py.Dataset):
+            raise self._wrong(path, "is no array")
+        kind, shape, made = found.dtype, found.shape, found.id.get_create_plist()
+        if kind.kind not in "biuf" or kind.hasobject or kind.subdtype is not None or shape is None:
+            raise self._wrong(path, f"is of type {kind}, not of numbers")
+        if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
+            raise self._wrong(path, "is kept in other files, and only what lies in this one is read")
+        filters = {made.get_filter(number)[0] for number in range(made.get_nfilters())}
+        if filters - _FILTERS:
+            raise self._wrong(path, f"has the filter {min(filters - _FILTERS)}, and no plugin is loaded; use gzip")
+        size, chunk = math.prod(shape) * kind.itemsize, math.prod(found.chunks or ()) * kind.itemsize
+        if max(size, chunk) > MAX_ARRAY_BYTES:
+            raise self._wrong(path, f"{max(size, chunk)} bytes are more than the limit of {MAX_ARRAY_BYTES}")
+        if size > found.id.get_storage_size() * _DEFLATE_RATIO:
+            raise self._wrong(path, f"says {size} bytes, and {found.id.get_storage_size()} were written")
+        return found
+
+    def _wrong(self, path: str, cause: str) -> Exception:
+        return self._refuse(f"{self._called}: {printable_line(path, max_characters=80)}: {cause}; {self._remedy}")
+
+    @contextmanager
+    def _failures(self, path: str) -> Iterator[None]:
+        try:
+            yield
+        except _FAILURES as error:
+            said = printable_line(" ".join(str(error).split()), max_characters=160)
+            where = f"{printable_line(path, max_characters=80)}: " if path else ""
+            raise self._refuse(
+                f"{self._called}: {where}no HDF5 file that can be read ({type(error).__name__}: {said}); {self._remedy}"
+            ) from error

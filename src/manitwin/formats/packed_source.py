@@ -1,0 +1,70 @@
+"""An input as a twin keeps it: one file byte for byte, or an archive of all its files; copied block by block."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import shutil
+import zipfile
+from collections.abc import Iterable
+from functools import partial
+from pathlib import Path
+
+from manitwin.errors import InputError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.printable import printable_line
+from manitwin.formats.source_files import side_files
+
+MAX_KEPT_BYTES = 4 << 30
+"""An input of more bytes is told and not kept: readers refuse it, and a sparse file would fill the disk."""
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date of a ZIP entry: equal inputs give equal archives
+_BLOCK_BYTES = 1 << 20
+
+
+def pack_source(path: Path, folder: Path, beside: Iterable[Path] = ()) -> tuple[str, str]:
+    """Write into a folder what a twin keeps of its input; return the name there and its sha256.
+
+    A single file is kept byte for byte; a mesh with side files, or with others ``beside`` it in its folder, as an archive of
+    all of them, uncompressed, undated. Of more than ``MAX_KEPT_BYTES`` a text says the names and sizes. Raises InputError
+    ``unreadable`` for a file that is gone or no regular one.
+    """
+    others = sorted({*side_files(path), *(other.resolve() for other in beside)})
+    root = path.parent.resolve()
+    files = {_name_in(root, file, path.name): file for file in (path.resolve(), *others)}
+    sizes = {called: _size(file) for called, file in files.items()}
+    if sum(sizes.values()) > MAX_KEPT_BYTES:
+        name = "source.txt"
+        lines = [f"{printable_line(called)}: {size} bytes, not kept\n" for called, size in sizes.items()]
+        (folder / name).write_text("".join(lines), encoding="utf-8")
+    elif not others:
+        name = f"source{path.suffix.lower()}"
+        with _opened(path) as stream, (folder / name).open("wb") as kept:
+            shutil.copyfileobj(stream, kept, _BLOCK_BYTES)
+    else:
+        name = "source.zip"
+        with zipfile.ZipFile(folder / name, "w", zipfile.ZIP_STORED) as archive:
+            for called, file in files.items():
+                _add(archive, file, called)
+    with (folder / name).open("rb") as stream:
+        return name, hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _add(archive: zipfile.ZipFile, file: Path, name: str) -> None:
+    entry = zipfile.ZipInfo(name, _EPOCH)
+    with _opened(file) as stream:
+        entry.file_size = os.fstat(stream.fileno()).st_size  # above 2 GiB its header has another form
+        with archive.open(entry, "w") as kept:
+            shutil.copyfileobj(stream, kept, _BLOCK_BYTES)
+
+
+_opened = partial(open_regular, refuse=partial(InputError, "unreadable"))
+
+
+def _size(file: Path) -> int:
+    with _opened(file) as stream:
+        return os.fstat(stream.fileno()).st_size
+
+
+def _name_in(root: Path, file: Path, name: str) -> str:
+    """Return a file's path below the input's folder; of an input that is a link out of it, the link's name."""
+    return file.relative_to(root).as_posix() if file.is_relative_to(root) else name

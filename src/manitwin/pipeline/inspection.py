@@ -1,0 +1,172 @@
+"""What a build has to know of its inputs before anything is made of them, found out in a process with limits of its own.
+
+The functions that begin with ``read_`` run there; nothing else of the driver opens an input. This module imports little: the
+process imports it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from manitwin.errors import InputChanged, Rejected, UsageError
+from manitwin.formats.bounded_file import open_regular, read_bytes
+from manitwin.formats.isolated import Limits, ProcessCrashed, iterate_isolated, run_isolated
+from manitwin.formats.sniff import HEIC_NOT_READ, NOT_READ, image_format, sniff
+from manitwin.formats.source_files import named_files
+
+if TYPE_CHECKING:
+    from manitwin.engine.recipe import Identity, Recipe
+    from manitwin.pipeline.item import Item
+
+LIMITS = Limits(seconds=10.0, memory_bytes=4 << 30)
+"""Of the inspection of one file: a mesh of 500 MB takes 2 s and the memory of its text."""
+MAX_NAMES = 10_000
+MAX_RECORD_BYTES = 64 << 20
+_THIS = __name__
+_BY_SUFFIX = {
+    **NOT_READ,
+    **dict.fromkeys((".csv", ".jsonl"), "a manifest is read only where it is given by its own path"),
+    ".mtl": "a material library that no mesh names",
+    ".bin": "a buffer that no mesh names",
+}
+
+
+WHOLE = Limits(seconds=300.0, memory_bytes=4 << 30)
+"""Of reading a whole input once, for its digest: 4 GiB from a disk of 15 MB/s."""
+
+
+class NotInspected(Exception):
+    """An input that could not be looked at within the limits, or at all; its text is the reason why it is left alone."""
+
+
+def names_of(meshes: Iterable[Path]) -> Iterator[list[str] | NotInspected]:
+    """Yield the names of other files that each mesh file names, or why nobody can tell."""
+    return (_found(answer) for _, answer in iterate_isolated(f"{_THIS}:read_names", meshes, LIMITS))
+
+
+def why_no_inputs(files: Collection[Path]) -> list[str | None]:
+    """Return of each file that has no suffix of an input why it is none, None for an image under another name."""
+    known = {file: _BY_SUFFIX.get(file.suffix.lower()) for file in files}
+    unknown = [file for file, reason in known.items() if reason is None]
+    for file, answer in iterate_isolated(f"{_THIS}:read_whether_image", unknown, LIMITS):
+        found = _found(answer)
+        known[file] = str(found) if isinstance(found, NotInspected) else found
+    return [known[file] for file in files]
+
+
+def why_no_input(file: Path) -> str | None:
+    """Return why a file that has no suffix of an input is none, None for an image under another name."""
+    return why_no_inputs([file])[0]
+
+
+def are_twins(records: Iterable[Path]) -> Iterator[bool]:
+    """Yield of each file called twin.json whether it is a twin's record."""
+    for _, answer in iterate_isolated(f"{_THIS}:read_whether_twin", records, LIMITS):
+        yield _found(answer) is True  # what cannot be read is listed, and named there
+
+
+def are_imported(records: Iterable[Path]) -> Iterator[str | None]:
+    """Yield of each import.json why the asset cannot be taken, None where it can."""
+    for _, answer in iterate_isolated(f"{_THIS}:read_import", records, LIMITS):
+        found = _found(answer)
+        yield str(found) if isinstance(found, NotInspected) else None
+
+
+def imported(record: Path) -> tuple[str, str | None, str | None]:
+    """Return name, licence and attribution of an imported asset; raises UsageError."""
+    found = inspected("read_import", record)
+    if isinstance(found, NotInspected):
+        raise UsageError(f"{record}: {found}")
+    name, license_, attribution = found
+    return name, license_, attribution
+
+
+def is_image(file: Path) -> bool:
+    """Tell whether a file holds an image; what cannot be inspected is none."""
+    return inspected("read_kind", file) == "image"
+
+
+def identified(recipe: Recipe, item: Item, frame: int | None) -> tuple[Identity, Rejected | None] | NotInspected:
+    """Return an input's identity, and why an image is refused by its header; ``frame`` chooses a picture of an animation."""
+    found: tuple[Identity, Rejected | None] | NotInspected
+    found = inspected("read_identity", recipe, item, frame, limits=WHOLE)
+    return found
+
+
+def inspected(function: str, *arguments: Any, limits: Limits = LIMITS) -> Any:
+    """Return what a function of this module returns in the process with limits; NotInspected where it does not."""
+    try:
+        return run_isolated(f"{_THIS}:{function}", *arguments, limits=limits)
+    except (Rejected, UsageError, InputChanged, NotInspected, ProcessCrashed, MemoryError) as error:
+        return _found((False, error), limits)
+
+
+def _found(answer: tuple[bool, Any], limits: Limits = LIMITS) -> Any:
+    returned, value = answer
+    if returned:
+        return value
+    if isinstance(value, ProcessCrashed):
+        seconds = f"it takes longer than {limits.seconds:g} s, or ends the process that does"
+        return NotInspected(f"could not be inspected ({seconds}); export it again, or leave it out")
+    if isinstance(value, MemoryError):
+        memory = f"it takes more than {limits.memory_bytes >> 30} GiB of memory"
+        return NotInspected(f"could not be inspected ({memory}); make it smaller, or leave it out")
+    if isinstance(value, Rejected):
+        return NotInspected(value.detail)
+    if isinstance(value, NotInspected | UsageError | InputChanged):
+        return NotInspected(str(value))
+    raise value
+
+
+def read_identity(recipe: Recipe, item: Item, frame: int | None) -> tuple[Identity, Rejected | None]:
+    """Return an input's identity, and why an image is refused by its header; raises InputError, and InputChanged of one gone."""
+    from manitwin.formats.image_file import check_header  # takes 0.1 CPU-s
+
+    identity = recipe.identify(item)
+    try:
+        if identity.kind == "image" and item.file is not None:
+            check_header(Path(item.file), frame=frame)
+    except Rejected as answer:
+        return identity, answer
+    return identity, None
+
+
+def read_names(mesh: Path) -> list[str]:
+    """Return the names of other files in a mesh file; none where it cannot be read, which its reader will say."""
+    try:
+        return list(islice(named_files(mesh), MAX_NAMES))
+    except OSError:
+        return []
+
+
+def read_whether_image(file: Path) -> str | None:
+    """Return None for an image under another name, else why the file is no input."""
+    with open_regular(file, NotInspected) as stream:
+        try:
+            found = image_format(stream.read(64))
+        except OSError as error:
+            raise NotInspected(f"cannot be read ({error.strerror or error})") from error
+    if found == "heif":
+        return HEIC_NOT_READ
+    return None if found is not None else "no image or mesh"
+
+
+def read_whether_twin(record: Path) -> bool:
+    """Tell whether a file is a twin's record."""
+    return b'"twin_id"' in read_bytes(record, MAX_RECORD_BYTES, NotInspected)
+
+
+def read_import(record: Path) -> tuple[str, str | None, str | None]:
+    """Return name, licence and attribution of an imported asset; raises UsageError."""
+    from manitwin.twin.import_record import read_import_record  # takes 0.5 CPU-s
+
+    given = read_import_record(record)
+    return given.called, given.license, given.attribution
+
+
+def read_kind(file: Path) -> str:
+    """Return the kind of an input by its bytes; raises InputError."""
+    return sniff(file).kind

@@ -1,0 +1,133 @@
+"""Is a finished twin's folder as it was written? By the sizes of its files, which cost next to nothing, or by their digests.
+
+The sizes stand in run.json (``bytes``), which no revision depends on. Of twins without them (written by earlier versions, or
+unpacked from a publication) the files whose own first or last bytes tell where they end are looked at.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Iterator, Mapping
+from hashlib import sha256
+from pathlib import Path
+from types import MappingProxyType
+
+from manitwin.errors import TwinError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.json_file import read_json_object
+from manitwin.formats.printable import printable_line
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.record import TwinRecord
+from manitwin.twin.store import RECORD, REMEDY, RUN, canonical_json, write_bytes_atomically
+
+BYTES = "bytes"
+_MOST_NAMED = 3
+_PNG_END = b"IEND\xaeB`\x82"
+
+
+def note_sizes(folder: Path, changed: Mapping[str, int] = MappingProxyType({})) -> None:
+    """Write the sizes of all files of a twin's folder into its run.json; ``changed`` has those that are about to be."""
+    run = read_json_object(folder / RUN, TwinError, inside=folder, name=str(folder / RUN), remedy=REMEDY)
+    found = {name: size for name, size in DatasetRoot(folder).sizes_below("").items() if size is not None}
+    sizes = {name: size for name, size in {**found, **changed}.items() if name != RUN}
+    write_bytes_atomically(folder / RUN, canonical_json({**run, BYTES: sizes}).encode())
+
+
+def noted_sizes(root: DatasetRoot, folder: str) -> dict[str, int] | None:
+    """Return the sizes that a twin's run.json has, None where it has none; raises TwinError where it cannot be read."""
+    try:
+        said = root.read_json(f"{folder}/{RUN}", TwinError, remedy=REMEDY).get(BYTES)
+    except FileNotFoundError as error:
+        raise TwinError(f"{root.full(folder)}: lacks {RUN}; {REMEDY}") from error
+    if said is None:
+        return None
+    if not isinstance(said, dict) or not all(type(size) is int and size >= 0 for size in said.values()):
+        raise TwinError(f"{root.full(folder)}/{RUN}: {BYTES} are no sizes of files; {REMEDY}")
+    return dict(said)
+
+
+def size_damage(root: DatasetRoot, folder: str) -> str | None:
+    """Return what is wrong with a folder by the sizes in its run.json alone; None too where it has none."""
+    try:
+        sizes = noted_sizes(root, folder)
+    except TwinError as error:
+        return str(error)
+    if sizes is None:
+        return None if root.exists(f"{folder}/{RECORD}") else f"its folder lacks {RECORD}"
+    return _differences(root.sizes_below(folder), sizes)
+
+
+def damage(root: DatasetRoot, folder: str, record: TwinRecord, *, digests: bool) -> str | None:
+    """Return what is wrong with the files of a twin by their sizes, with ``digests`` by every byte; None where nothing is."""
+    found = root.sizes_below(folder)
+    try:
+        sizes = noted_sizes(root, folder)
+    except TwinError as error:
+        return str(error)
+    missing = _named(record.files.keys() - found.keys())
+    if missing:
+        return f"its folder lacks {missing}"
+    wrong = _differences(found, {} if sizes is None else sizes)
+    if wrong is None and sizes is None:
+        wrong = next(filter(None, (_cut(root, f"{folder}/{name}", found[name]) for name in sorted(record.files))), None)
+    if wrong is None and digests:
+        wrong = next(_altered(root, folder, record), None)
+    return wrong
+
+
+def foreign_files(root: DatasetRoot, folder: str, record: TwinRecord) -> str | None:
+    """Return what lies in a twin's folder and is none of its files; None where nothing does."""
+    return _named(root.sizes_below(folder).keys() - record.files.keys() - {RECORD, RUN})
+
+
+def _differences(found: Mapping[str, int | None], sizes: Mapping[str, int]) -> str | None:
+    missing = _named(sizes.keys() - found.keys())
+    if missing:
+        return f"its folder lacks {missing}"
+    for name, size in sorted(sizes.items()):
+        if found[name] is None:
+            return f"{printable_line(name)} is no regular file"
+        if found[name] != size:
+            return f"{printable_line(name)} has {found[name]} bytes, {size} were written"
+    return None
+
+
+def _cut(root: DatasetRoot, name: str, size: int | None) -> str | None:
+    """Tell of a file that its own first or last bytes show to be cut off; of a URL none is looked into."""
+    called = printable_line(name.rpartition("/")[2])
+    if not size:
+        return f"{called} is no regular file" if size is None else f"{called} is empty"
+    if root.local is None:
+        return None
+    path = Path(root.full(name))
+    with open_regular(path, TwinError, inside=root.local, name=str(path)) as stream:
+        head = stream.read(12)
+        stream.seek(-min(size, 8), os.SEEK_END)
+        tail = stream.read(8)
+    whole = {
+        ".parquet": head[:4] == tail[4:] == b"PAR1",
+        ".glb": len(head) == 12 and struct.unpack("<I", head[8:])[0] == size,
+        ".webp": len(head) == 12 and struct.unpack("<I", head[4:8])[0] + 8 == size,
+        ".png": tail == _PNG_END,
+    }
+    return None if whole.get(path.suffix, True) else f"{called} is cut off or no {path.suffix[1:]} file"
+
+
+def _altered(root: DatasetRoot, folder: str, record: TwinRecord) -> Iterator[str]:
+    for name, digest in sorted(record.files.items()):
+        try:
+            content = root.read_bytes(f"{folder}/{name}")
+        except TwinError as error:
+            yield str(error)
+            continue
+        if sha256(content).hexdigest() != digest:
+            yield f"{printable_line(name)} is not what was written (its sha256 differs)"
+
+
+def _named(names: set[str]) -> str | None:
+    """Return the first of some names, and how many more there are."""
+    if not names:
+        return None
+    first = [printable_line(name, max_characters=80) for name in sorted(names)[:_MOST_NAMED]]
+    return ", ".join(first) + (f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else "")

@@ -1,0 +1,50 @@
+"""Recorded episodes that somebody has changed: HDF5, LeRobot, tables of attempts and records of batches."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+from fuzz_target import Case, target
+from lerobot_sets import written
+from synthetic_episodes import attempt, episode
+
+from manitwin.episodes.attempts import read_attempts, success_of, write_attempts
+from manitwin.episodes.hdf5_file import EpisodeFile, checked, write_episodes
+from manitwin.episodes.lerobot.read import read_lerobot
+
+
+def hdf5(folder: Path) -> None:
+    write_episodes(folder / "episodes.h5", (episode(i, steps=4) for i in range(2)))
+    with h5py.File(folder / "linked.h5", "w") as file, h5py.File(folder / "episodes.h5", "r") as other:
+        for name in other:
+            other.copy(name, file)
+        first = file["traj_0"]
+        name = next(key for key in first if isinstance(first[key], h5py.Dataset))
+        del first[name]
+        first[name] = h5py.ExternalLink("../fuzz-outside", "/x")
+
+
+def read_hdf5(case: Case) -> None:
+    with EpisodeFile(case.file) as file:
+        for number in range(len(file)):
+            file.said(number)
+            checked(file[number])
+
+
+def lerobot(folder: Path) -> None:
+    written(folder / "set", 2)
+
+
+def read_set(case: Case) -> None:
+    for each in read_lerobot(case.folder / "set").episodes:
+        assert each is not None
+
+
+def attempts(folder: Path) -> None:
+    write_attempts(folder / "attempts.parquet", [attempt(i) for i in range(5)])
+
+
+target("hdf5", hdf5, read_hdf5)
+target("lerobot", lerobot, read_set, files=("*.json", "*.parquet", "*.jsonl"), weight=0.5)
+target("attempts", attempts, lambda case: success_of(read_attempts(case.file)))

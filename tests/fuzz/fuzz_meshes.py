@@ -1,0 +1,243 @@
+"""Mesh files of seven formats: the reader of meshes, and what a build does with a file before it."""
+
+from __future__ import annotations
+
+import io
+import json
+import tempfile
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from fuzz_target import Case, target
+from PIL import Image
+from trimesh.visual import TextureVisuals
+
+from handmade import visual
+from manitwin.errors import InputError
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.read import read_mesh
+from manitwin.formats.packed_source import pack_source
+from manitwin.pipeline.folder_listing import list_folder
+from manitwin.pipeline.item import Item, twin_id
+
+USDA = """#usda 1.0
+(
+    defaultPrim = "root"
+    metersPerUnit = 0.01
+    upAxis = "Z"
+)
+def Xform "root"
+{
+    def Mesh "square" (prepend apiSchemas = ["MaterialBindingAPI"])
+    {
+        int[] faceVertexCounts = [4]
+        int[] faceVertexIndices = [0, 1, 2, 3]
+        point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+        texCoord2f[] primvars:st = [(0, 0), (1, 0), (1, 1), (0, 1)] (interpolation = "faceVarying")
+        double3 xformOp:translate = (5, 0, 0)
+        uniform token[] xformOpOrder = ["xformOp:translate"]
+        rel material:binding = </root/skin>
+    }
+    def Material "skin"
+    {
+        token outputs:surface.connect = </root/skin/surface.outputs:surface>
+        def Shader "surface"
+        {
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:diffuseColor.connect = </root/skin/texture.outputs:rgb>
+            float inputs:roughness = 0.25
+            token outputs:surface
+        }
+        def Shader "texture"
+        {
+            uniform token info:id = "UsdUVTexture"
+            asset inputs:file = @skin.png@
+            float3 outputs:rgb
+        }
+    }
+}
+"""
+
+
+def read(case: Case) -> None:
+    """Read a mesh as a build does, and look whether what was read can be worked with."""
+    for part in read_mesh(case.file).parts:
+        assert np.isfinite(part.vertices).all()
+        assert len(part.faces) == 0 or 0 <= part.faces.min() <= part.faces.max() < len(part.vertices)
+
+
+def survey(case: Case) -> None:
+    """Find the files that a mesh names, make its id, and pack it with them, as the survey of a build does."""
+    list_folder(case.folder)
+    try:
+        item = Item(str(case.file))
+        twin_id(item)
+        with tempfile.TemporaryDirectory() as folder:
+            pack_source(case.file, Path(folder))
+    except InputError:
+        pass  # a file that cannot be opened ends as a rejection
+
+
+def picture(format: str = "PNG") -> bytes:
+    stream = io.BytesIO()
+    pixels = np.kron(
+        np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 0]]], np.uint8), np.ones((8, 8, 1), np.uint8)
+    )
+    Image.fromarray(pixels).save(stream, format)
+    return stream.getvalue()
+
+
+def textured() -> trimesh.Trimesh:
+    box = visual(
+        trimesh.creation.box([0.04, 0.06, 0.1]),
+        baseColorFactor=[255, 255, 255, 255],
+        baseColorTexture=Image.open(io.BytesIO(picture())),
+    )
+    uv = np.random.default_rng(0).random((len(box.vertices), 2))
+    box.visual = TextureVisuals(uv=uv, material=box.visual.material)
+    box.metadata["name"] = "box"
+    return box
+
+
+def glb(folder: Path) -> None:
+    (folder / "plain.glb").write_bytes(
+        write_glb([visual(trimesh.creation.icosphere(1), baseColorFactor=[1, 2, 3, 255])])
+    )
+    (folder / "textured.glb").write_bytes(write_glb([textured()]))
+    scene = trimesh.Scene([trimesh.creation.box(), trimesh.creation.cylinder(0.1, 1, sections=8)])
+    (folder / "scene.glb").write_bytes(scene.export(file_type="glb"))
+
+
+def gltf(folder: Path) -> None:
+    for name, content in trimesh.Scene([textured(), trimesh.creation.box()]).export(file_type="gltf").items():
+        (folder / name).write_bytes(content)
+    document = json.loads((folder / "model.gltf").read_bytes())
+    document["accessors"][0]["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": 0, "componentType": 5125},
+        "values": {"bufferView": 1},
+    }
+    document["nodes"][-1] |= {"rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0, 2.0, 1.0], "children": []}
+    (folder / "more.gltf").write_text(json.dumps(document))
+
+
+def obj(folder: Path) -> None:
+    (folder / "skin.png").write_bytes(picture())
+    (folder / "box.mtl").write_text(
+        "newmtl skin\nKd 0.8 0.1 0.1\nd 1.0\nNs 20\nmap_Kd -s 1 1 1 skin.png\nnewmtl b\nTr 0\n"
+    )
+    box = trimesh.creation.box()
+    lines = [
+        "mtllib box.mtl",
+        "o box",
+        "usemtl skin",
+        *(f"v {x} {y} {z}" for x, y, z in box.vertices),
+        "vt 0 0",
+        "vt 1 0",
+        "vn 0 0 1",
+    ]
+    lines += [f"f {a + 1}/1/1 {b + 1}/2/1 {c + 1}/1/1" for a, b, c in box.faces[:6]]
+    lines += ["usemtl b", *(f"f {a - 8} {b - 8} {c - 8}" for a, b, c in box.faces[6:]), "f 1 2 3 4", "s off", "l 1 2"]
+    (folder / "box.obj").write_text("\n".join(lines) + "\n")
+    (folder / "hull.obj").write_text(box.export(file_type="obj"))
+
+
+def ply(folder: Path) -> None:
+    ball = trimesh.creation.icosphere(1)
+    ball.visual.vertex_colors = np.random.default_rng(0).integers(0, 255, (len(ball.vertices), 4))
+    (folder / "ascii.ply").write_bytes(ball.export(file_type="ply", encoding="ascii"))
+    (folder / "binary.ply").write_bytes(ball.export(file_type="ply", encoding="binary"))
+    (folder / "skin.png").write_bytes(picture())
+    head = "ply\nformat ascii 1.0\ncomment TextureFile skin.png\nelement vertex 4\n" + "".join(
+        f"property float {c}\n" for c in "xyzst"
+    )
+    head += "element face 2\nproperty list uchar int vertex_indices\nproperty list uchar float texcoord\nend_header\n"
+    rows = "0 0 0 0 0\n1 0 0 1 0\n1 1 0 1 1\n0 1 0 0 1\n4 0 1 2 3 8 0 0 1 0 1 1 0 1\n3 0 1 2 6 0 0 1 0 1 1\n"
+    (folder / "texture.ply").write_text(head + rows)
+    big = head.replace("ascii", "binary_big_endian").encode() + np.arange(20, dtype=">f4").tobytes()
+    faces = b"\x03" + np.array([0, 1, 2], ">i4").tobytes() + b"\x06" + np.zeros(6, ">f4").tobytes()
+    (folder / "big.ply").write_bytes(big + faces + faces)
+
+
+def stl(folder: Path) -> None:
+    ball = trimesh.creation.icosphere(1)
+    (folder / "binary.stl").write_bytes(ball.export(file_type="stl"))
+    (folder / "ascii.stl").write_text(trimesh.creation.box().export(file_type="stl_ascii"))
+
+
+def dae(folder: Path) -> None:
+    (folder / "t.png").write_bytes(picture())
+    (folder / "square.dae").write_text(DAE)
+    scene = trimesh.Scene([trimesh.creation.box(), trimesh.creation.icosphere(1)])
+    (folder / "scene.dae").write_bytes(trimesh.exchange.dae.export_collada(list(scene.geometry.values())))
+
+
+def usdz(folder: Path) -> None:
+    with zipfile.ZipFile(folder / "text.usdz", "w") as archive:
+        archive.writestr("a.usda", USDA)
+        archive.writestr("skin.png", picture())
+    from pxr import Sdf
+
+    Sdf.Layer.CreateAnonymous(".usda").ImportFromString(USDA)
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    layer.ImportFromString(USDA)
+    layer.Export(str(folder / "a.usdc"))
+    with zipfile.ZipFile(folder / "crate.usdz", "w") as archive:
+        archive.write(folder / "a.usdc", "a.usdc")
+        archive.writestr("skin.png", picture())
+    (folder / "a.usdc").unlink()
+
+
+def meshes(folder: Path) -> None:
+    for make in (glb, gltf, obj, ply, dae):
+        (folder / make.__name__).mkdir()
+        make(folder / make.__name__)
+
+
+DAE = """<?xml version="1.0" encoding="utf-8"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="inch" meter="0.0254"/><up_axis>Z_UP</up_axis></asset>
+<library_images><image id="i"><init_from>t.png</init_from></image></library_images>
+<library_effects><effect id="e"><profile_COMMON>
+<newparam sid="surface"><surface type="2D"><init_from>i</init_from></surface></newparam>
+<newparam sid="sampler"><sampler2D><source>surface</source></sampler2D></newparam>
+<technique sid="common"><lambert><diffuse><texture texture="sampler" texcoord="UV"/></diffuse></lambert></technique>
+</profile_COMMON></effect></library_effects>
+<library_materials><material id="m"><instance_effect url="#e"/></material></library_materials>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 1 0 0 1 1 0 0 1 0</float_array><technique_common>
+<accessor source="#pa" count="4" stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+</accessor></technique_common></source>
+<source id="t"><float_array id="ta" count="8">0 0 1 0 1 1 0 1</float_array><technique_common>
+<accessor source="#ta" count="4" stride="2"><param name="S" type="float"/><param name="T" type="float"/></accessor>
+</technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<polylist count="1" material="s"><input semantic="VERTEX" source="#v" offset="0"/>
+<input semantic="TEXCOORD" source="#t" offset="1" set="0"/><vcount>4</vcount><p>0 0 1 1 2 2 3 3</p></polylist>
+</mesh></geometry></library_geometries>
+<library_nodes><node id="leaf"><instance_geometry url="#g"/></node></library_nodes>
+<library_visual_scenes><visual_scene id="scene">
+<node id="n"><scale>1 1 -1</scale><translate>0 0 3</translate><rotate>0 0 1 90</rotate>
+<instance_geometry url="#g"><bind_material><technique_common>
+<instance_material symbol="s" target="#m"/></technique_common></bind_material></instance_geometry></node>
+<node id="k"><matrix>1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1</matrix><instance_node url="#leaf"/></node>
+</visual_scene></library_visual_scenes><scene><instance_visual_scene url="#scene"/></scene></COLLADA>
+"""
+
+target("glb", glb, read, shared=("meshes/*.glb", "bad/*.glb"))
+target(
+    "gltf",
+    gltf,
+    lambda case: read(case if case.file.suffix == ".gltf" else Case(case.folder, case.folder / "model.gltf")),
+    files=("*.gltf", "*.bin", "*.png"),
+)
+target("obj", obj, read, files=("*.obj",), shared=("bad/*.obj",))
+target("mtl", obj, lambda case: read_mesh(case.folder / "box.obj"), files=("*.mtl", "*.png"))
+target("ply", ply, read, files=("*.ply",))
+target("stl", stl, read, shared=("bad/*.stl",))
+target("dae", dae, read, files=("*.dae",), weight=0.5)
+target("usdz", usdz, read, weight=0.3)
+target("survey", meshes, survey, named=True, files=("*.gltf", "*.glb", "*.obj", "*.mtl", "*.ply", "*.dae"))
