@@ -157,8 +157,8 @@ def test_open_container_seen_from_above_is_rejected_not_filled() -> None:
 
 
 def test_text_is_refused_with_a_remedy() -> None:
-    with pytest.raises(Unsupported, match="another generator"):
-        LiftGenerator().submit(GenerationRequest(None, "a red mug", None, seed=0))
+    with pytest.raises(Unsupported, match="no template makes"):
+        LiftGenerator().submit(GenerationRequest(None, "a red unicorn", None, seed=0))
 
 
 def _lifted_photo(path: Path) -> Lifted:

@@ -1,4 +1,4 @@
-"""The built-in generator ``lift``: one matted photo to a closed textured mesh, without weights."""
+"""The built-in generator ``lift``: a matted photo, or the words for a thing of a known category, to a closed mesh."""
 
 from __future__ import annotations
 
@@ -14,13 +14,20 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.config import Resource
-from manitwin.errors import Unavailable, Unsupported
+from manitwin.errors import Unavailable, Unsupported, UsageError
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
+from manitwin.geometry.solids.shapes import SolidError
 from manitwin.models.generators.lift.lifting import Lifted, hint_from_name, lift
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
-from manitwin.models.generators.protocol import Asked, Generated, GenerationRequest, JobState
+from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.known import known_of
+from manitwin.models.generators.templates.made import make, visual_parts
+from manitwin.models.generators.templates.template import Template
+from manitwin.models.generators.templates.text import Wanted, read_text
+from manitwin.twin.import_record import ImportRecord
 
 ROUGHNESS = 0.6
 
@@ -29,35 +36,60 @@ ROUGHNESS = 0.6
 class _Job:
     glb: bytes
     notes: dict[str, Any]
-    unseen_share: float
+    unseen_share: float | None
+    known: ImportRecord | None = None
 
 
 class LiftGenerator:
-    """Lift a silhouette to a solid: revolution, box or inflation.
+    """Lift a silhouette to a solid (revolution, box or inflation), or build the template that a text names.
 
-    It sees one side only and no depth: a stand-in for tests, demonstrations and machines without a GPU, not to be compared
-    with learned generators. ``submit`` does all the work; jobs live as long as this object.
+    Of a photo it sees one side only and no depth: a stand-in for tests, demonstrations and machines without a GPU, not to
+    be compared with learned generators. ``submit`` does all the work; jobs live as long as this object.
     """
 
     name = "lift"
     model: str | None = None
     needs: Resource = "cpu"
-    asked_with: frozenset[Asked] = frozenset({"image"})
+    asked_with: frozenset[Asked] = IMAGE_OR_TEXT
     usd_per_job = 0.0
 
     def __init__(self) -> None:
         self._jobs: dict[str, _Job] = {}
 
+    def why_not(self, text: str) -> str | None:
+        """Return why no template makes what a text asks for; None where one does."""
+        try:
+            make(*_template_and_wish(text), np.random.default_rng(0))
+        except (UsageError, SolidError) as error:
+            return str(error)
+        return None
+
     def submit(self, request: GenerationRequest) -> str:
-        """Make the mesh; raises Unsupported for a text, Rejected for what ``lift`` cannot make."""
+        """Make the mesh; raises Unsupported for a text that no template makes, Rejected for what ``lift`` cannot make."""
         if request.rgba is None:
-            raise Unsupported(
-                f"lift cannot make a mesh from text ({request.text!r}); give a photo, or choose another generator"
-            )
+            return self._from_text(request.text or "", request.seed)
         digest = hashlib.sha256(np.ascontiguousarray(request.rgba).tobytes() + (request.name or "").encode())
         job_id = digest.hexdigest()[:16]
         lifted = lift(request.rgba, hint_from_name(request.name))
         self._jobs[job_id] = _Job(write_glb([textured_part(lifted)]), lifted.notes, unseen_share(lifted.surface))
+        return job_id
+
+    def _from_text(self, text: str, seed: int) -> str:
+        job_id = hashlib.sha256(f"{seed} {text}".encode()).hexdigest()[:16]
+        try:
+            template, wanted = _template_and_wish(text)
+            made = make(template, wanted, np.random.default_rng(seed))
+        except (UsageError, SolidError) as error:
+            raise Unsupported(str(error)) from error
+        notes = {
+            "primitive": f"template:{made.category}",
+            "category": made.category,
+            "measures": {name: round(value, 6) for name, value in made.measures.items()},
+            "materials": {part: look.material for part, look in made.looks.items()},
+            "masses_kg": {part: round(mass, 6) for part, mass in made.masses_kg.items()},
+            "unused_words": list(wanted.unused),
+        }
+        self._jobs[job_id] = _Job(write_glb(visual_parts(made)), notes, None, known_of(made, text))
         return job_id
 
     def poll(self, job_id: str) -> JobState:
@@ -74,8 +106,20 @@ class LiftGenerator:
         path = folder / "lift.glb"
         path.write_bytes(job.glb)
         return Generated(
-            path=path, model=str(job.notes["primitive"]), notes=job.notes, rests=True, unseen_share=job.unseen_share
+            path=path,
+            model=str(job.notes["primitive"]),
+            notes=job.notes,
+            metric=job.known is not None,
+            rests=True,
+            unseen_share=job.unseen_share,
+            known=job.known,
         )
+
+
+def _template_and_wish(text: str) -> tuple[Template, Wanted]:
+    templates = load_templates()
+    wanted = read_text(text, templates)
+    return templates[wanted.category], wanted
 
 
 def textured_part(lifted: Lifted) -> trimesh.Trimesh:

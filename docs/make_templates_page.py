@@ -1,0 +1,73 @@
+"""Write docs/templates.md from the templates themselves, so that the page cannot be out of date.
+
+python docs/make_templates_page.py            writes the page
+python docs/make_templates_page.py --check    exits 1 where the page differs
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.looks import COLORS, MATERIALS, SHADES
+from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.template import Template
+from manitwin.models.generators.templates.text import DIRECTIONS, RELATIVE, Wanted
+
+PAGE = Path(__file__).parent / "templates.md"
+INTRODUCTION = """# Things from a sentence: the templates
+
+```sh
+manitwin build --text "a red ceramic mug, 9 cm" --text "a hammer with a yellow handle" --quick -o twins
+```
+
+The built-in generator `lift` makes the categories below from words alone: no GPU, no key, nothing downloaded. Each is a
+template: measures within the interval that such things have, parts with a name, a material and a density each, and places
+whose use is known by construction. So size, mass, centre of mass and inertia follow from the parts, and functional points are on
+the right part; their source is `template:CATEGORY`. What is not here is refused at once, with the nearest categories and the
+[generators](generators.md) that make other things of a text.
+
+- **What it is**: one of the names below, or another word for it that the [priors](priors.md) know. The last noun counts: a mug
+  rack is no mug.
+- **How it looks**: colours and materials before or after the name are those of the whole; behind *with*, of a part:
+  `a small blue mug with a wooden handle`. What the text does not say is drawn from the seed.
+- **How large it is**: `9 cm` is the longest extent; `9 cm tall`, `wide`, `long` is that direction. Inches and feet are read
+  too. A size that no such thing has is refused. `small` and `large` choose within the usual sizes.
+- **What it is made of** decides the mass: the volume of each part times its density; of a closed container, with its contents.
+
+This page is written by `python docs/make_templates_page.py`.
+"""
+
+
+def row(template: Template) -> str:
+    """Return the row of one template: its names, parts, and what is known of it."""
+    made = make(template, Wanted(template.category), np.random.default_rng(0))
+    points = ", ".join(dict.fromkeys(point.label for point in made.points))
+    names = ", ".join((template.category, *template.names))
+    return f"| {names} | {', '.join(made.mesh.names)} | {points} |"
+
+
+def page() -> str:
+    """Return the page."""
+    templates = load_templates().values()
+    parts = [INTRODUCTION]
+    for group in ("kitchen", "tools", "electronics", "personal", "office", "household"):
+        rows = [row(template) for template in templates if template.group == group]
+        head = f"## {group.capitalize()} ({len(rows)})\n\n| names | parts | known points |\n|---|---|---|\n"
+        parts.append(head + "\n".join(rows) + "\n")
+    parts.append(
+        "## Words\n\n"
+        f"Colours: {', '.join(sorted(COLORS))}; before them {', '.join(sorted(SHADES))}.\n\n"
+        f"Materials: {', '.join(sorted(MATERIALS))}.\n\n"
+        f"Directions: {', '.join(sorted(DIRECTIONS))}. Sizes: {', '.join(sorted(RELATIVE))}.\n"
+    )
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--check"]:
+        sys.exit(int(PAGE.read_text() != page()))
+    PAGE.write_text(page())

@@ -1,0 +1,1 @@
+"""Closed solids by construction: shapes, sweeps and unions of named parts."""

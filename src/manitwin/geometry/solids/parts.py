@@ -1,0 +1,101 @@
+"""Unions of named parts: one closed surface, each of whose faces knows the part that it is of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from manifold3d import Manifold
+
+from manitwin.geometry.solids.shapes import checked
+
+
+@dataclass(frozen=True)
+class PartedMesh:
+    """A closed mesh in metres: ``vertices (V, 3)``, ``faces (F, 3)`` wound outward, ``part (F,)`` an index into ``names``."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    part: np.ndarray
+    names: tuple[str, ...]
+
+    def faces_of(self, name: str) -> np.ndarray:
+        """Return the numbers of a part's faces."""
+        return np.nonzero(self.part == self.names.index(name))[0]
+
+
+@dataclass
+class Assembly:
+    """Parts put together one after another: what is added joins, what is cut away leaves walls of a name of their own.
+
+    Of two parts that overlap the surface is the outer one's; each keeps its name through every later step.
+    """
+
+    _solid: Manifold = field(default_factory=Manifold)
+    _names: dict[int, str] = field(default_factory=dict)
+    _regions: list[tuple[str, str, Callable[[np.ndarray], np.ndarray]]] = field(default_factory=list)
+    _volumes: list[tuple[str, Manifold]] = field(default_factory=list)
+
+    def add(self, name: str, solid: Manifold) -> Assembly:
+        """Join a solid, whose surface is the part ``name``; where it lies inside of others it adds nothing."""
+        own = self._named(name, solid)
+        before = self._solid
+        self._solid = before + own
+        self._volumes.append((name, own - before))
+        return self
+
+    def cut(self, name: str, solid: Manifold) -> Assembly:
+        """Cut a solid out; the walls that this leaves are the part ``name``."""
+        own = self._named(name, solid)
+        self._solid = self._solid - own
+        self._volumes = [(part, volume - own) for part, volume in self._volumes]
+        return self
+
+    def region(self, name: str, of: str, where: Callable[[np.ndarray], np.ndarray]) -> Assembly:
+        """Give the faces of part ``of`` whose centre is ``where`` (centres ``(N, 3)`` to bool ``(N,)``) another name."""
+        self._regions.append((name, of, where))
+        return self
+
+    def moved(self, offset_m: tuple[float, float, float]) -> Assembly:
+        """Return the assembly somewhere else, its regions still given in the frame before."""
+        shift = np.array(offset_m)
+        moved_regions = [(name, of, _shifted(where, shift)) for name, of, where in self._regions]
+        volumes = [(name, solid.translate(offset_m)) for name, solid in self._volumes]
+        return Assembly(self._solid.translate(offset_m), dict(self._names), moved_regions, volumes)
+
+    def lowest_m(self) -> float:
+        """Return the height of the lowest point."""
+        return float(self._solid.bounding_box()[2])
+
+    def solids(self) -> list[tuple[str, Manifold]]:
+        """Return what each part adds to the union, less what was cut, as solids that do not overlap."""
+        return [(name, solid) for name, solid in self._volumes if not solid.is_empty()]
+
+    def mesh(self) -> PartedMesh:
+        """Return the union as a mesh; raises SolidError where nothing is left of it."""
+        mesh = checked(self._solid, "assembly").to_mesh()
+        vertices = np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3]
+        faces = np.asarray(mesh.tri_verts, dtype=np.int64)
+        merged = np.arange(len(vertices))
+        merged[np.asarray(mesh.merge_from_vert, dtype=np.int64)] = np.asarray(mesh.merge_to_vert, dtype=np.int64)
+        faces = merged[faces]
+        names = list(dict.fromkeys([*self._names.values(), *(name for name, _, _ in self._regions)]))
+        part = np.zeros(len(faces), dtype=np.int64)
+        starts = np.asarray(mesh.run_index, dtype=np.int64) // 3
+        for original, start, end in zip(mesh.run_original_id, starts[:-1], starts[1:], strict=True):
+            part[start:end] = names.index(self._names[int(original)])
+        centers = vertices[faces].mean(axis=1)
+        for name, of, where in self._regions:
+            part[(part == names.index(of)) & where(centers)] = names.index(name)
+        used, faces_used = np.unique(faces, return_inverse=True)
+        return PartedMesh(vertices[used], faces_used.reshape(-1, 3), part, tuple(names))
+
+    def _named(self, name: str, solid: Manifold) -> Manifold:
+        own = solid.as_original()
+        self._names[own.original_id()] = name
+        return own
+
+
+def _shifted(where: Callable[[np.ndarray], np.ndarray], shift: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda centers: where(centers - shift)

@@ -1,0 +1,129 @@
+"""Closed solids: bodies of revolution, rounded boxes, prisms, ellipsoids.
+
+Metres, Z up. Curves are cut into chords of at most ``CHORD_ERROR`` of their radius, with a least and a largest number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+from manifold3d import CrossSection, FillRule, JoinType, Manifold
+
+from manitwin.errors import ManiTwinError
+
+SIDES = 48
+"""Chords of a full circle: their area is 0.3 % less than the circle's."""
+CORNER_SIDES = 16
+
+Point = tuple[float, float]
+
+
+class SolidError(ManiTwinError):
+    """Measures that give no closed solid."""
+
+
+def box(x_m: float, y_m: float, z_m: float, *, radius_m: float = 0.0) -> Manifold:
+    """Return a box on the plane z = 0, centred in x and y, all of its edges rounded by ``radius_m``."""
+    radius_m = min(radius_m, 0.499 * min(x_m, y_m, z_m))
+    if radius_m <= 0:
+        return checked(Manifold.cube((x_m, y_m, z_m), True).translate((0, 0, z_m / 2)), "box")
+    ball = Manifold.sphere(radius_m, CORNER_SIDES)
+    centers = product(*((-extent / 2 + radius_m, extent / 2 - radius_m) for extent in (x_m, y_m, z_m)))
+    solid = Manifold.batch_hull([ball.translate(center) for center in centers])
+    return checked(solid.translate((0, 0, z_m / 2)), "box")
+
+
+def prism(outline: CrossSection, height_m: float, *, radius_m: float = 0.0, top: float = 1.0) -> Manifold:
+    """Return an outline in x and y raised from z = 0, its upper and lower edges rounded by ``radius_m``.
+
+    ``top`` scales the outline towards the upper end about the origin; only a prism without rounding may have it.
+    """
+    if radius_m <= 0:
+        return checked(outline.extrude(height_m, 0, 0.0, (top, top)), "prism")
+    radius_m = min(radius_m, 0.499 * height_m)
+    angles = np.linspace(0.0, np.pi / 2, 5)
+    # prisms inside each other, the narrowest the highest: solids that overlap join surely, those that only touch may not
+    slabs = []
+    for angle in (angles[:-1] + angles[1:]) / 2:
+        inset, low = radius_m * (1 - np.sin(angle)), radius_m * (1 - np.cos(angle))
+        inner = outline.offset(-inset, JoinType.Round, 2.0, CORNER_SIDES)
+        slabs.append(inner.extrude(height_m - 2 * low + 2e-6).translate((0, 0, low - 1e-6)))
+    slabs.append(outline.extrude(height_m - 2 * radius_m).translate((0, 0, radius_m)))
+    slabs.append(outline.offset(-radius_m, JoinType.Round, 2.0, CORNER_SIDES).extrude(height_m))
+    return checked(union(slabs), "prism")
+
+
+def polygon(points: Sequence[Point] | np.ndarray, *, radius_m: float = 0.0) -> CrossSection:
+    """Return a filled polygon ``(K, 2)`` in metres, its convex and concave corners rounded by ``radius_m``."""
+    outline = CrossSection([np.asarray(points, dtype=float)], FillRule.NonZero)
+    if radius_m > 0:
+        outline = outline.offset(-radius_m, JoinType.Round, 2.0, CORNER_SIDES)
+        outline = outline.offset(2 * radius_m, JoinType.Round, 2.0, CORNER_SIDES)
+        outline = outline.offset(-radius_m, JoinType.Round, 2.0, CORNER_SIDES)
+    return outline
+
+
+def rectangle(x_m: float, y_m: float, *, radius_m: float = 0.0) -> CrossSection:
+    """Return a rectangle about the origin with rounded corners."""
+    radius_m = min(radius_m, 0.499 * min(x_m, y_m))
+    if radius_m <= 0:
+        return CrossSection.square((x_m, y_m), True)
+    inner = CrossSection.square((x_m - 2 * radius_m, y_m - 2 * radius_m), True)
+    return inner.offset(radius_m, JoinType.Round, 2.0, CORNER_SIDES)
+
+
+def lathe(profile: Sequence[Point] | np.ndarray, *, sides: int = SIDES) -> Manifold:
+    """Return the solid of a profile ``(K, 2)`` of (radius, z), closed along the axis, turned about Z."""
+    points = [(max(0.0, float(r)), float(z)) for r, z in profile]
+    first, last = points[0], points[-1]
+    points = [*([(0.0, first[1])] if first[0] > 0 else []), *points, *([(0.0, last[1])] if last[0] > 0 else [])]
+    return checked(CrossSection([np.array(points)], FillRule.NonZero).revolve(sides), "lathe")
+
+
+def cylinder(radius_m: float, height_m: float, *, top_radius_m: float | None = None, sides: int = SIDES) -> Manifold:
+    """Return a cylinder or frustum that stands on z = 0."""
+    top = radius_m if top_radius_m is None else top_radius_m
+    return checked(Manifold.cylinder(height_m, radius_m, top, sides), "cylinder")
+
+
+def ellipsoid(x_m: float, y_m: float, z_m: float, *, sides: int = SIDES) -> Manifold:
+    """Return an ellipsoid with these full extents about the origin."""
+    return checked(Manifold.sphere(0.5, sides).scale((x_m, y_m, z_m)), "ellipsoid")
+
+
+def torus(ring_radius_m: float, tube_radius_m: float, *, sides: int = SIDES) -> Manifold:
+    """Return a ring about Z, centred at the origin."""
+    circle = CrossSection.circle(tube_radius_m, CORNER_SIDES).translate((ring_radius_m, 0))
+    return checked(circle.revolve(sides), "torus")
+
+
+def union(solids: Sequence[Manifold]) -> Manifold:
+    """Return the union of solids."""
+    from manifold3d import OpType
+
+    return Manifold.batch_boolean(list(solids), OpType.Add)
+
+
+def rounded(profile: Sequence[Point], radius_m: float, *, steps: int = 4) -> list[Point]:
+    """Return an open profile with its inner corners cut to arcs of at most ``radius_m``, quadratic in their tangents."""
+    points = [np.array(p, dtype=float) for p in profile]
+    out = [points[0]]
+    for before, corner, after in zip(points[:-2], points[1:-1], points[2:], strict=True):
+        arms = [before - corner, after - corner]
+        lengths = [float(np.linalg.norm(arm)) for arm in arms]
+        cut = min(radius_m, 0.45 * min(lengths))
+        if cut <= 0:
+            out.append(corner)
+            continue
+        start, end = (corner + arm / length * cut for arm, length in zip(arms, lengths, strict=True))
+        out += [(1 - t) ** 2 * start + 2 * t * (1 - t) * corner + t**2 * end for t in np.linspace(0, 1, steps + 1)]
+    return [(float(r), float(z)) for r, z in [*out, points[-1]]]
+
+
+def checked(solid: Manifold, what: str) -> Manifold:
+    """Return a solid; raises SolidError where it is empty or no closed surface."""
+    if solid.is_empty() or solid.volume() <= 0:
+        raise SolidError(f"{what}: its measures give no solid; give others")
+    return solid

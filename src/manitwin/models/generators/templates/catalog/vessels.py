@@ -1,0 +1,201 @@
+"""Open vessels to eat and drink from: mugs, glasses, bowls, plates, jugs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.geometry.solids.shapes import box, cylinder, lathe, polygon, prism, rounded
+from manitwin.geometry.solids.sweep import arc, tube
+from manitwin.models.generators.templates.catalog.vessel import bulge, ear, hollowed, shell
+from manitwin.models.generators.templates.template import Model, template
+
+
+@template("mug")
+def mug(*, height_m: float, width: float, wall_m: float, taper: float, handle: float) -> Model:
+    """Build a mug: ``width`` over height, ``taper`` of the foot's radius, ``handle`` reaching out by a share of the height."""
+    model, radius = Model(), 0.5 * width * height_m
+    profile = rounded([(0.8 * taper * radius, 0), (taper * radius, 0.03 * height_m), (radius, height_m)], 0.008)
+    return hollowed(
+        model,
+        profile,
+        wall_m,
+        1.4 * wall_m,
+        ear(model, 0.985 * radius, 0.8 * height_m, 0.25 * height_m, handle * height_m, 0.011),
+    )
+
+
+@template("cup")
+def cup(*, height_m: float, width: float, wall_m: float, taper: float) -> Model:
+    """Build a cup without a handle."""
+    radius = 0.5 * width * height_m
+    profile = rounded([(0.92 * taper * radius, 0), (taper * radius, 0.03 * height_m), (radius, height_m)], 0.004)
+    return hollowed(Model(), profile, wall_m, 1.5 * wall_m)
+
+
+@template("glass")
+def glass(*, height_m: float, width: float, wall_m: float, taper: float) -> Model:
+    """Build a tumbler with a thick floor."""
+    radius = 0.5 * width * height_m
+    profile = rounded([(0.9 * taper * radius, 0), (taper * radius, 0.03 * height_m), (radius, height_m)], 0.004)
+    return hollowed(Model(), profile, wall_m, 4 * wall_m)
+
+
+@template("wine glass")
+def wine_glass(*, height_m: float, width: float, stem: float, wall_m: float, foot: float) -> Model:
+    """Build a wine glass: ``stem`` is the share of its height below the bowl, ``foot`` the foot's over the bowl's width."""
+    model, h, r = Model(), height_m, 0.5 * width * height_m
+    low = stem * h
+    bowl = bulge(
+        [(0.004, low), (0.6 * r, low + 0.06 * h), (r, low + 0.22 * h), (0.95 * r, low + 0.38 * h), (0.76 * r, h)]
+    )
+    outer, inner = shell(bowl, wall_m, 0.012)
+    base = lathe(
+        rounded([(foot * r, 0), (foot * r, 0.002), (0.35 * r, 0.008), (0.0042, 0.03), (0.0042, low + 0.002)], 0.01)
+    )
+    model.add("stem", base).add("bowl", outer).cut("inside", inner)
+    model.region("foot", "stem", lambda centers: centers[:, 2] < 0.02)
+    for part in ("bowl", "inside"):
+        model.region("rim", part, lambda centers: centers[:, 2] > 0.97 * h)
+    model.point("opening", "opening", "rim", (0.0, 0.0, h), (0.0, 0.0, 1.0))
+    model.point("stem", "surface", "stem", (0.0, -0.0042, 0.6 * low), (0.0, -1.0, 0.0))
+    return model.point("foot", "face", "foot", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
+
+
+def _bowl(width_m: float, height: float, wall_m: float, foot: float) -> Model:
+    radius, high = 0.5 * width_m, height * width_m
+    turn = np.linspace(0.0, np.pi / 2, 12)
+    side = zip(radius * (foot + (1 - foot) * np.sin(turn)), high * (0.06 + 0.94 * (1 - np.cos(turn))), strict=True)
+    profile = [(foot * radius, 0.0), *((float(r), float(z)) for r, z in side)]
+    return hollowed(Model(), profile, wall_m, 0.06 * high + wall_m)
+
+
+@template("bowl")
+def bowl(*, width_m: float, height: float, wall_m: float, foot: float) -> Model:
+    """Build a bowl on a foot: ``height`` and ``foot`` over the width."""
+    return _bowl(width_m, height, wall_m, foot)
+
+
+@template("mixing bowl")
+def mixing_bowl(*, width_m: float, height: float, wall_m: float, foot: float) -> Model:
+    """Build a deep bowl with a thin wall."""
+    return _bowl(width_m, height, wall_m, foot)
+
+
+@template("pet bowl")
+def pet_bowl(*, width_m: float, height: float, wall_m: float, flare: float) -> Model:
+    """Build a bowl that is broader at its foot by ``flare`` than at its rim."""
+    radius, high = 0.5 * width_m, height * width_m
+    model = Model()
+    outer = lathe(rounded([(radius, 0.0), (radius, 0.004), (radius / flare, high)], 0.006))
+    inside = rounded([(0, 2 * wall_m), (0.72 * radius / flare, 2 * wall_m), (radius / flare - wall_m, high)], 0.012)
+    top = radius / flare
+    between = (0.5 * (0.93 * top + 0.25 * radius + 0.75 * top), 0.75 * high)  # midway from one wall to the other
+    hollow = lathe([(0.72 * top + 3 * wall_m, -1e-3), (radius - 2 * wall_m, -1e-3), between])
+    hollow = hollow - lathe(
+        [(0, -2e-3), (0.72 * top + 2 * wall_m, -2e-3), (between[0] - 1e-3, between[1]), (0, between[1])]
+    )
+    model.add("body", outer).cut("inside", lathe([*inside, (inside[-1][0], high + 0.01)])).cut("underside", hollow)
+    for part in ("body", "inside"):
+        model.region("rim", part, lambda centers: centers[:, 2] > 0.95 * high)
+    return model.point("opening", "opening", "rim", (0.0, 0.0, high), (0.0, 0.0, 1.0))
+
+
+def _flat(width_m: float, height: float, wall_m: float, well: float) -> Model:
+    radius, high = 0.5 * width_m, height * width_m
+    profile = rounded([(well * radius, 0.0), ((well + 0.11) * radius, 0.25 * high), (radius, high)], 0.012)
+    return hollowed(Model(), profile, wall_m, wall_m)
+
+
+@template("plate")
+def plate(*, width_m: float, height: float, wall_m: float, well: float) -> Model:
+    """Build a plate: ``well`` is the share of its radius that is flat."""
+    return _flat(width_m, height, wall_m, well)
+
+
+@template("saucer")
+def saucer(*, width_m: float, height: float, wall_m: float, well: float) -> Model:
+    """Build a saucer."""
+    return _flat(width_m, height, wall_m, well)
+
+
+@template("pitcher")
+def pitcher(*, height_m: float, width: float, wall_m: float, neck: float, spout: float) -> Model:
+    """Build a jug with an ear towards +X and a spout towards -X."""
+    model, h, r = Model(), height_m, 0.5 * width * height_m
+    profile = bulge([(0.8 * r, 0), (0.98 * r, 0.18 * h), (r, 0.38 * h), (neck * r, 0.8 * h), (0.95 * neck * r, h)])
+    profile = [(0.7 * r, 0.0), *profile[1:]]
+    lip_x = 0.95 * neck * r + spout * h
+    outline = [(-0.3 * r, -0.42 * r), (-lip_x, -0.05 * r), (-lip_x, 0.05 * r), (-0.3 * r, 0.42 * r)]
+    beak = prism(polygon(outline, radius_m=0.003), 0.16 * h).translate((0, 0, 0.84 * h))
+    slope = polygon(
+        [(-0.8 * neck * r, 0.8 * h), (-lip_x - 0.01, 0.975 * h), (-lip_x - 0.01, 0.7 * h), (-0.8 * neck * r, 0.7 * h)]
+    )
+    beak = beak - prism(slope, 2 * r).rotate((90, 0, 0)).translate((0, r, 0))
+    channel = [(0.0, -0.33 * r), (-lip_x - 0.002, -0.02 * r), (-lip_x - 0.002, 0.02 * r), (0.0, 0.33 * r)]
+    groove = prism(polygon(channel), 0.2 * h).translate((0, 0, 0.9 * h))
+    outer, inner = shell(profile, wall_m, 1.5 * wall_m)
+    model.add("body", outer).add("spout", beak)
+    name, handle = ear(model, 0.9 * r, 0.86 * h, 0.3 * h, 0.42 * r, 0.014)
+    model.add(name, handle, "handle").cut("inside", inner).cut("inside", groove)
+    for part in ("body", "inside"):
+        model.region("rim", part, lambda centers: (centers[:, 2] > 0.97 * h) & (centers[:, 0] > -0.9 * neck * r))
+    model.point("opening", "opening", "rim", (0.0, 0.0, h), (0.0, 0.0, 1.0))
+    return model.point("spout", "tip", "spout", (-lip_x, 0.0, 0.97 * h), (-1.0, 0.0, 0.0))
+
+
+@template("teapot")
+def teapot(*, height_m: float, width: float, spout: float, wall_m: float) -> Model:
+    """Build a round teapot with its lid on: the spout towards -X reaches out by a share of the height."""
+    model, h, r = Model(), 0.82 * height_m, 0.5 * width * height_m * 0.8
+    profile = bulge([(0.6 * r, 0), (0.95 * r, 0.25 * h), (r, 0.5 * h), (0.8 * r, 0.82 * h), (0.45 * r, h)])
+    reach = r + spout * height_m
+    path = arc([(-0.7 * r, 0, 0.3 * h), (-1.15 * r, 0, 0.42 * h), (-0.85 * reach, 0, 0.8 * h), (-reach, 0, 1.02 * h)])
+    thick = np.linspace(0.24 * r, 0.115 * r, len(path))
+    outer, inner = shell(profile, wall_m, 1.5 * wall_m)
+    model.add("body", outer).add("spout", tube(path, thick, flatten=0.9))
+    name, handle = ear(model, 0.92 * r, 0.8 * h, 0.3 * h, 0.55 * r, 0.012)
+    model.add(name, handle, "handle").cut("inside", inner)
+    model.cut("inside", tube(path, np.maximum(thick - wall_m, 0.002), flatten=0.9))
+    lid = lathe(
+        rounded(
+            [
+                (0.5 * r, 0.985 * h),
+                (0.5 * r, 1.01 * h),
+                (0.2 * r, 1.08 * h),
+                (0.08 * r, 1.11 * h),
+                (0.15 * r, height_m),
+                (0, height_m * 1.04),
+            ],
+            0.008,
+        )
+    )
+    model.add("lid", lid, "lid")
+    model.point("spout", "tip", "spout", (-reach, 0.0, 1.02 * h), (-0.8, 0.0, 0.6))
+    return model.point("lid", "surface", "lid", (0.0, 0.0, 1.04 * height_m), (0.0, 0.0, 1.0))
+
+
+@template("serving tray")
+def tray(*, length_m: float, width: float, height_m: float, wall_m: float) -> Model:
+    """Build an open rectangular tray."""
+    model, across = Model(), width * length_m
+    inner = box(length_m - 2 * wall_m, across - 2 * wall_m, 2 * height_m, radius_m=0.003)
+    model.add("body", box(length_m, across, height_m, radius_m=0.004)).cut("inside", inner.translate((0, 0, wall_m)))
+    for part in ("body", "inside"):
+        model.region("rim", part, lambda centers: centers[:, 2] > 0.9 * height_m)
+    model.point("opening", "opening", "rim", (0.0, 0.0, height_m), (0.0, 0.0, 1.0))
+    return model.point("surface", "face", "inside", (0.0, 0.0, wall_m), (0.0, 0.0, 1.0))
+
+
+@template("measuring cup")
+def measuring_cup(*, height_m: float, width: float, wall_m: float, handle: float) -> Model:
+    """Build a straight measuring cup with an ear and a small spout towards -X."""
+    model, radius = Model(), 0.5 * width * height_m
+    profile = rounded([(0.82 * radius, 0), (0.86 * radius, 0.03 * height_m), (radius, height_m)], 0.006)
+    lip = cylinder(0.25 * radius, 0.1 * height_m, top_radius_m=0.32 * radius).translate(
+        (-0.85 * radius, 0, 0.9 * height_m)
+    )
+    grip = ear(model, 0.98 * radius, 0.88 * height_m, 0.25 * height_m, handle * height_m, 0.011)
+    model.point("spout", "tip", "spout", (-1.17 * radius, 0.0, height_m), (-1.0, 0.0, 0.0))
+    model = hollowed(model, profile, wall_m, 1.5 * wall_m, grip, ("spout", lip))
+    groove = cylinder(0.25 * radius - wall_m, 0.2 * height_m, top_radius_m=0.39 * radius - wall_m)
+    return model.cut("inside", groove.translate((-0.85 * radius, 0, 0.91 * height_m)))

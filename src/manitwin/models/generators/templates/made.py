@@ -1,0 +1,149 @@
+"""Make what a text asks for: measures drawn within the category's intervals, scaled to the stated size, dressed in looks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from manifold3d import Manifold
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.errors import UsageError
+from manitwin.formats.meshes.textures import srgb_to_linear
+from manitwin.formats.meshes.triangles import with_creased_normals
+from manitwin.geometry.solids.parts import PartedMesh
+from manitwin.models.annotators.priors import lookup
+from manitwin.models.generators.templates.looks import Look, look_of
+from manitwin.models.generators.templates.template import KnownPoint, Template
+from manitwin.models.generators.templates.text import Wanted, Wish
+
+LEAST_WALL_M = 0.0008
+SIZE_MARGIN = 2.0
+"""A stated size beyond the category's interval by more than this factor is taken for a mistake."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """A thing from a template: its mesh with parts, looks by part, known points, measures, masses by part (kg).
+
+    ``solids`` are what the parts add, without overlap, with their density (kg/m^3)."""
+
+    category: str
+    mesh: PartedMesh
+    looks: dict[str, Look]
+    points: tuple[KnownPoint, ...]
+    measures: dict[str, float]
+    solids: list[tuple[Manifold, float]]
+    masses_kg: dict[str, float]
+
+
+def make(template: Template, wanted: Wanted, rng: np.random.Generator) -> Made:
+    """Make one thing of a template; raises UsageError for a size that no such thing has or a part that it has not."""
+    looks_by_slot = _looks(template, wanted, rng)
+    measures = template.drawn(rng)
+    if "wall_m" in measures:
+        measures["wall_m"] = max(LEAST_WALL_M, measures["wall_m"] * next(iter(looks_by_slot.values())).wall)
+    model = template.build(**measures)
+    mesh = model.assembly.mesh()
+    _check_parts(template, wanted, mesh)
+    scale = _scale(template, wanted, mesh)
+    looks = {part: looks_by_slot[model.slots[part] or next(iter(template.slots))] for part in mesh.names}
+    for part, wish in wanted.wishes.items():
+        if part in looks and part not in template.slots:
+            looks[part] = wish.of(looks[part])
+    densities = {part: template.contents_kg_m3.get(part, look.density_kg_m3) for part, look in looks.items()}
+    solids = [(part, solid.scale((scale, scale, scale))) for part, solid in model.assembly.solids()]
+    masses: dict[str, float] = {}
+    for part, solid in solids:
+        masses[part] = masses.get(part, 0.0) + densities[part] * float(solid.volume())
+    return Made(
+        template.category,
+        PartedMesh(mesh.vertices * scale, mesh.faces, mesh.part, mesh.names),
+        looks,
+        tuple(_scaled(point, scale) for point in model.points),
+        {name: value * (scale if template.measures[name].unit == "m" else 1.0) for name, value in measures.items()},
+        [(solid, densities[part]) for part, solid in solids],
+        masses,
+    )
+
+
+def visual_parts(made: Made) -> list[trimesh.Trimesh]:
+    """Return a mesh a look with its PBR material, in the object frame; parts of one look are one mesh."""
+    by_look: dict[Look, list[str]] = {}
+    for part in made.mesh.names:
+        by_look.setdefault(made.looks[part], []).append(part)
+    parts = []
+    for look, names in by_look.items():
+        faces = made.mesh.faces[np.isin(made.mesh.part, [made.mesh.names.index(name) for name in names])]
+        if not len(faces):
+            continue
+        used, compact = np.unique(faces, return_inverse=True)
+        linear = srgb_to_linear(np.array(look.rgb))
+        material = PBRMaterial(
+            name=f"{look.material} {names[0]}",
+            baseColorFactor=[*(round(255 * float(c)) for c in linear), 255],
+            metallicFactor=look.metallic,
+            roughnessFactor=look.roughness,
+        )
+        mesh = trimesh.Trimesh(
+            made.mesh.vertices[used],
+            compact.reshape(-1, 3),
+            visual=TextureVisuals(material=material),
+            process=False,
+            metadata={"name": names[0]},
+        )
+        parts.append(with_creased_normals(mesh))
+    return parts
+
+
+def _looks(template: Template, wanted: Wanted, rng: np.random.Generator) -> dict[str, Look]:
+    """Return the look of each slot: what the text says, else drawn; a slot of '' looks like the first."""
+    looks: dict[str, Look] = {}
+    first = next(iter(template.slots))
+    for slot, choices in template.slots.items():
+        drawn = choices[int(rng.integers(len(choices)))]
+        look = look_of(drawn) if drawn else looks[first]
+        wish = wanted.wishes.get(slot, Wish())
+        looks[slot] = wish.of(wanted.wishes.get("", Wish()).of(look) if slot == first else look)
+    return looks
+
+
+def _check_parts(template: Template, wanted: Wanted, mesh: PartedMesh) -> None:
+    known = sorted({*template.slots, *mesh.names})
+    for part in wanted.wishes:
+        if part and part not in known:
+            raise UsageError(f"a {template.category} has no {part!r} here. Its parts: {', '.join(known)}")
+
+
+def _scale(template: Template, wanted: Wanted, mesh: PartedMesh) -> float:
+    """Return the scale that gives the stated size, or the relative one; 1 where the text says neither."""
+    extents = np.ptp(mesh.vertices, axis=0)
+    now = {
+        "": extents.max(),
+        "height": extents[2],
+        "width": extents[:2].min(),
+        "length": extents[:2].max(),
+        "depth": extents[:2].min(),
+    }
+    prior = lookup(template.category)
+    assert prior is not None, template.category
+    interval = prior.longest_axis_m
+    if wanted.lengths_m:
+        direction, length = next(iter(wanted.lengths_m.items()))
+        scale = length / float(now[direction])
+        longest = float(extents.max()) * scale
+        if not interval.low / SIZE_MARGIN <= longest <= interval.high * SIZE_MARGIN:
+            raise UsageError(
+                f"a {template.category} of {longest:.3g} m: such are {interval.low:g} to {interval.high:g} m; check the unit"
+            )
+        return scale
+    if wanted.relative is None:
+        return 1.0
+    return float(interval.low + wanted.relative * (interval.high - interval.low)) / float(extents.max())
+
+
+def _scaled(point: KnownPoint, scale: float) -> KnownPoint:
+    x, y, z = point.position_m
+    return KnownPoint(point.label, point.kind, point.part, (x * scale, y * scale, z * scale), point.direction)

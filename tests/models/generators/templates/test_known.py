@@ -1,0 +1,53 @@
+"""What a template knows of its things: mass properties against closed forms, points on the surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manitwin.geometry.solids.shapes import box, cylinder
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.known import known_of, mass_properties
+from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.text import read_text
+
+TEMPLATES = load_templates()
+
+
+def test_two_boxes_of_two_densities_have_the_inertia_of_the_parallel_axis_theorem() -> None:
+    light, heavy = box(0.1, 0.1, 0.1), box(0.1, 0.1, 0.1).translate((0.1, 0, 0))
+    mass, center, inertia = mass_properties([(light, 1000.0), (heavy, 3000.0)])
+    assert mass == pytest.approx(4.0) and center == pytest.approx([0.075, 0, 0.05])
+    own = (1.0 + 3.0) * 0.1**2 / 6
+    apart = 1.0 * 0.075**2 + 3.0 * 0.025**2
+    assert np.diag(inertia) == pytest.approx([own, own + apart, own + apart])
+    assert inertia - np.diag(np.diag(inertia)) == pytest.approx(np.zeros((3, 3)), abs=1e-9)
+
+
+def test_head_of_steel_draws_the_centre_of_a_hammer_to_it() -> None:
+    wanted = read_text("hammer with a wooden handle", TEMPLATES)
+    thing = make(TEMPLATES["hammer"], wanted, np.random.default_rng(5))
+    known = known_of(thing, "hammer with a wooden handle")
+    assert known.mass_kg == pytest.approx(sum(thing.masses_kg.values()), rel=1e-6)
+    assert known.center_of_mass_m is not None
+    along = np.array(known.center_of_mass_m)[0] / np.ptp(thing.mesh.vertices[:, 0])
+    assert along > 0.2, "well on the head's side of the middle"
+    assert known.material in ("steel", "wood") and [p.label for p in known.functional_points] == [
+        "striking face",
+        "claw",
+        "handle",
+    ]
+
+
+def test_point_of_an_opening_is_on_the_rim() -> None:
+    thing = make(TEMPLATES["bowl"], read_text("bowl", TEMPLATES), np.random.default_rng(1))
+    opening = known_of(thing, "bowl").functional_points[0]
+    height = thing.mesh.vertices[:, 2].max()
+    assert opening.label == "opening" and opening.position_m[2] > 0.9 * height
+    assert np.hypot(*opening.position_m[:2]) > 0.04
+
+
+def test_full_cylinder_weighs_its_density() -> None:
+    mass, center, inertia = mass_properties([(cylinder(0.03, 0.2, sides=200), 1000.0)])
+    assert mass == pytest.approx(np.pi * 0.03**2 * 0.2 * 1000, rel=1e-3) and center[2] == pytest.approx(0.1)
+    assert inertia[2, 2] == pytest.approx(0.5 * mass * 0.03**2, rel=2e-3)

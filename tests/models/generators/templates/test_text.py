@@ -1,0 +1,107 @@
+"""What sentences ask templates for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manitwin.errors import UsageError
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.looks import COLORS, MATERIALS
+from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.text import MAX_CHARACTERS, Wanted, read_text
+
+TEMPLATES = load_templates()
+
+
+def read(text: str) -> Wanted:
+    return read_text(text, TEMPLATES)
+
+
+@pytest.mark.parametrize(
+    ("text", "category"),
+    [
+        ("mug", "mug"),
+        ("a mug", "mug"),
+        ("Two MUGS!", "mug"),
+        ("a cup of tea", "cup"),
+        ("the red coffee mug", "mug"),
+        ("smartphone", "mobile phone"),
+        ("chef's knife", "chef's knife"),
+        ("a stainless steel frying pan with a wooden handle", "frying pan"),
+        ("claw hammer", "hammer"),
+        ("wooden spoon", "cooking spoon"),
+        ("ballpoint pen", "pen"),
+    ],
+)
+def test_category_is_the_thing_that_is_named(text: str, category: str) -> None:
+    assert read(text).category == category
+
+
+def test_words_before_and_after_the_thing_describe_it() -> None:
+    red = tuple(int(COLORS["red"][i : i + 2], 16) / 255 for i in (0, 2, 4))
+    for text in ("a red ceramic mug", "mug, red ceramic", "mug in red ceramic"):
+        wish = read(text).wishes[""]
+        assert wish.rgb == red and wish.material == MATERIALS["ceramic"]
+
+
+def test_parts_are_described_by_their_name() -> None:
+    wanted = read("a small blue mug with a wooden handle")
+    assert wanted.relative is not None and wanted.relative < 0.5
+    assert wanted.wishes["handle"].material == MATERIALS["wood"] and wanted.wishes[""].rgb is not None
+
+
+@pytest.mark.parametrize(
+    ("text", "lengths"),
+    [
+        ("a mug, 9 cm", {"": 0.09}),
+        ("mug 95 mm tall", {"height": 0.095}),
+        ("a plate 10 inches wide", {"width": 0.254}),
+        ("ruler, 0.3 m long", {"length": 0.3}),
+        ("a 12cm glass", {"": 0.12}),
+    ],
+)
+def test_lengths_are_read_with_their_unit_and_direction(text: str, lengths: dict[str, float]) -> None:
+    assert read(text).lengths_m == pytest.approx(lengths)
+
+
+def test_light_and_dark_move_a_colour() -> None:
+    light, plain, dark = (read(f"{shade} blue mug").wishes[""].rgb for shade in ("light", "", "dark"))
+    assert light is not None and plain is not None and dark is not None
+    assert sum(light) > sum(plain) > sum(dark)
+
+
+def test_words_that_say_nothing_to_a_template_are_kept_apart() -> None:
+    assert read("a vintage mug").unused == ("vintage",)
+
+
+@pytest.mark.parametrize(
+    "text", ["a hamer", "a unicorn", "", "9 cm", "red", "with a handle", "x" * (MAX_CHARACTERS + 1)]
+)
+def test_text_that_names_no_template_is_refused_in_one_line(text: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        read(text)
+    assert "\n" not in str(caught.value) and len(str(caught.value)) < 700
+
+
+def test_nearest_categories_are_named() -> None:
+    with pytest.raises(UsageError, match=r"did you mean hammer"):
+        read("a hamer")
+
+
+def test_stated_size_is_the_size() -> None:
+    for text, axis, size_m in (
+        ("mug 10 cm tall", 2, 0.10),
+        ("a plate 26 cm wide", 0, 0.26),
+        ("ruler 30 cm long", 0, 0.30),
+    ):
+        wanted = read(text)
+        thing = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+        assert np.ptp(thing.mesh.vertices, axis=0)[axis] == pytest.approx(size_m, rel=1e-6)
+
+
+@pytest.mark.parametrize("text", ["a mug 3 m tall", "hammer, 2 mm", "a mug with a red wheel"])
+def test_what_no_such_thing_has_is_refused(text: str) -> None:
+    wanted = read(text)
+    with pytest.raises(UsageError):
+        make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
