@@ -21,7 +21,7 @@ from sapien import physx
 import manitwin
 from manitwin.config import BuildConfig
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.record import Check
+from manitwin.twin.record_values import Check
 
 SAMPLES = Path(__file__).resolve().parent.parent / "samples"
 QUICK = BuildConfig(

@@ -23,7 +23,7 @@ from manitwin.pipeline.robustness import RobustnessStage
 from manitwin.pipeline.second_opinion import SecondOpinionStage
 from manitwin.pipeline.verify import VerifyStage
 from manitwin.robots.grippers.gripper import load_gripper
-from manitwin.twin.record import GraspSummary
+from manitwin.twin.grasp_summary import GraspSummary
 
 FEW = GraspConfig(simulated=12, unfiltered=4, raw_per_round=2000, rounds=3, near_enough=200)
 SECOND = SecondOpinionConfig(jittered=6)

@@ -21,7 +21,8 @@ from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import load_solid
 from manitwin.pipeline.physical import PhysicalStage
-from manitwin.twin.record import Estimate, Physical
+from manitwin.twin.record import Physical
+from manitwin.twin.record_values import Estimate
 
 
 class Says(RulesAnnotator):

@@ -17,7 +17,7 @@ from manitwin.errors import Rejected
 from manitwin.pipeline.record_grasps import RecordGraspsStage
 from manitwin.pipeline.second_opinion import SecondOpinionStage
 from manitwin.robots.grippers.gripper import load_gripper
-from manitwin.twin.record import GraspSummary, OtherGripper
+from manitwin.twin.grasp_summary import GraspSummary, OtherGripper
 
 OUTCOMES = ["slips", "held", "held", "drops", "held", "held", "held", "held", "slips"]  # the last two are unfiltered
 HELD, FAILED_THERE, CHOSEN = {1, 2, 4, 5, 6}, {2, 5}, 7

@@ -10,7 +10,7 @@ import pytest
 from grasp_drafts import PANDA, Scripted, number_of, proposed_draft, run_all
 from manitwin.config import RobustnessConfig, VerifyConfig
 from manitwin.pipeline.robustness import RobustnessStage, rank_values
-from manitwin.twin.record import RobustnessSummary
+from manitwin.twin.grasp_summary import RobustnessSummary
 
 OUTCOMES = ["held", "slips", "held", "held", "drops", "held", "held"]  # the last is unfiltered
 STILL = RobustnessConfig(pose_m=0, pose_deg=0)

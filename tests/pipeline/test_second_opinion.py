@@ -11,7 +11,7 @@ from grasp_drafts import PANDA, Scripted, number_of, proposed_draft, run_all
 from manitwin.config import SecondOpinionConfig, VerifyConfig
 from manitwin.engine.stage import Draft
 from manitwin.pipeline.second_opinion import FAILS, HOLDS, NOT_TRIED, SecondOpinionStage
-from manitwin.twin.record import SecondOpinion
+from manitwin.twin.grasp_summary import SecondOpinion
 
 OUTCOMES = ["held", "held", "slips", "held", "drops", "slips", "held", "slips", "held", "drops"]
 HELD, FAILED = [0, 1, 3, 6], [2, 4, 5, 7]  # the last two are the unfiltered sample

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.twin.record import GraspSummary, SecondOpinion, TwinRecord
+from manitwin.twin.grasp_summary import GraspSummary, SecondOpinion
+from manitwin.twin.record import TwinRecord
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,10 @@ from rich.table import Table
 
 from manitwin.cli.console import shown_text
 from manitwin.pipeline.quality import rehearsed_words
+from manitwin.twin.grasp_summary import GraspSummary, OtherGripper, SecondOpinion
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.record import Estimate, GraspSummary, OtherGripper, SecondOpinion, TwinRecord
+from manitwin.twin.record import TwinRecord
+from manitwin.twin.record_values import Estimate
 from manitwin.twin.resting import RestingPose, resting_poses
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from manitwin.config import VerifyConfig
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.twin.record import Outcome
+from manitwin.twin.grasp_summary import Outcome
 
 GRAVITY_M_S2 = 9.81
 

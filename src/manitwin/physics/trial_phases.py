@@ -16,7 +16,7 @@ import numpy as np
 
 from manitwin.geometry.poses import rotation_angle_rad
 from manitwin.physics.trial import GRAVITY_M_S2, TrialResult, TrialSettings
-from manitwin.twin.record import Outcome
+from manitwin.twin.grasp_summary import Outcome
 
 CHECK_EVERY_FRAMES = 4
 SLIDE_DIRECTIONS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]], float)

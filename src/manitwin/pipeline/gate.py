@@ -14,7 +14,7 @@ from manitwin.errors import Rejected
 from manitwin.geometry.repair.components import separate_objects
 from manitwin.models.annotators.protocol import Annotator, QualityVerdict
 from manitwin.pipeline.object_state import load_solid, read_subject
-from manitwin.twin.record import Check
+from manitwin.twin.record_values import Check
 
 
 class GateStage:

@@ -20,7 +20,8 @@ from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Su
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import findings_of, object_name, read_subject
 from manitwin.twin.import_record import TEMPLATE
-from manitwin.twin.record import Estimate, OrientedBox, Physical
+from manitwin.twin.record import OrientedBox, Physical
+from manitwin.twin.record_values import Estimate
 
 CONFIRMED = ("measured", "user")
 """Sources that a plausibility check does not overrule (docs/imports.md: an implausible mass of another source is rejected)."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from manitwin.engine.stage import Draft
-from manitwin.twin.record import Check
+from manitwin.twin.record_values import Check
 
 UNCOVERED_LIMIT_M = 0.002
 """Of the surface that no collision hull covers: more would let fingers sink in (measured on real meshes: docs/measured.md)."""

@@ -17,8 +17,8 @@ from manitwin.pipeline.robustness import ROBUSTNESS, ROBUSTNESS_FILE, rank_value
 from manitwin.pipeline.second_opinion import AGREEMENT, FAILS, NOT_TRIED, SECOND_OPINION
 from manitwin.pipeline.verify import TRIAL, VERDICTS
 from manitwin.robots.grippers.gripper import Gripper
+from manitwin.twin.grasp_summary import FailureTable, GraspSummary, OtherGripper
 from manitwin.twin.grasp_table import JITTERED, GripperRows, write_grasp_table
-from manitwin.twin.record import FailureTable, GraspSummary, OtherGripper
 
 TABLE = "grasps.parquet"
 

@@ -15,7 +15,7 @@ from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
 from manitwin.pipeline.object_state import joints_of, load_body
 from manitwin.pipeline.verify import VERDICTS, trial_settings
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.twin.record import RobustnessSummary
+from manitwin.twin.grasp_summary import RobustnessSummary
 
 ROBUSTNESS_FILE = "robustness{}.npz"
 ROBUSTNESS = "robustness{}"

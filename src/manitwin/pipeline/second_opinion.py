@@ -15,7 +15,7 @@ from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
 from manitwin.pipeline.object_state import joints_of, load_body
 from manitwin.pipeline.verify import VERDICTS, trial_settings
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.twin.record import SecondOpinion as SecondOpinionRecord
+from manitwin.twin.grasp_summary import SecondOpinion as SecondOpinionRecord
 
 SECOND_OPINION = "second_opinion{}.npz"
 AGREEMENT = "second_opinion{}"

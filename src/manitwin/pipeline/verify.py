@@ -16,7 +16,7 @@ from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
 from manitwin.pipeline.gripper_kinds import KINDS
 from manitwin.pipeline.object_state import joints_of, load_body
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.twin.record import Trial
+from manitwin.twin.grasp_summary import Trial
 
 VERDICTS = "verdicts{}.npz"
 TRIAL = "trial{}"

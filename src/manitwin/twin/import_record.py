@@ -11,7 +11,7 @@ from pydantic import Field, ValidationError
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.printable import printable_line
-from manitwin.twin.record import Finite, Matrix3, Matrix4, Record, Vector3
+from manitwin.twin.record_values import Finite, Matrix3, Matrix4, Record, Vector3
 
 IMPORT_RECORD, IMPORTED_MESH = "import.json", "asset.glb"
 MAX_BYTES = 64 << 20

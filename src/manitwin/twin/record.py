@@ -5,18 +5,31 @@ SI units, object frame (right-handed, +Z up, origin at the bottom centre), quate
 
 from __future__ import annotations
 
-import math
-import re
-from pathlib import PurePosixPath
-from typing import Annotated, Literal
+from typing import Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
+
+from manitwin.twin.grasp_summary import GraspSummary
+from manitwin.twin.record_values import (
+    LARGEST_KG,
+    LARGEST_M,
+    Check,
+    Estimate,
+    FileBelow,
+    Finite,
+    FolderName,
+    Matrix3,
+    Matrix4,
+    Quaternion,
+    Record,
+    Unit,
+    Vector3,
+)
 
 SCHEMA_VERSION = 1
 
 Status = Literal["accepted", "rejected"]
 GraspType = Literal["parallel_jaw", "pinch", "power", "three_finger", "enveloping"]  # the paper's five
-Outcome = Literal["held", "collides", "unreachable", "misses", "penetrates", "drops", "unstable", "slips"]
 
 _OF_EVERY_STAGE = frozenset({"too_large"})  # any stage's process has a limit of memory
 REJECTION_REASONS: dict[str, frozenset[str]] = {
@@ -31,76 +44,6 @@ REJECTION_REASONS: dict[str, frozenset[str]] = {
         "placement": frozenset({"no_stable_pose"}),
     }.items()
 }
-
-
-def _finite(value: float) -> float:
-    if not math.isfinite(value):
-        raise ValueError("not a finite number")
-    return value
-
-
-CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f\ud800-\udfff]")
-"""What no text of a record holds: XML, which many exports are, has no control characters, and UTF-8 no lone surrogates."""
-LARGEST_M, LARGEST_KG = 1e4, 1e6
-"""Far beyond what a gripper meets, and no trouble for the arithmetic of any simulator."""
-
-
-def _file_below(name: str) -> str:
-    parts = PurePosixPath(name).parts
-    if not parts or name.startswith("/") or ".." in parts or not name.isprintable():
-        raise ValueError(f"{name[:80]!r} is no file below the twin's folder")
-    return name
-
-
-def _folder_name(name: str) -> str:
-    if name.startswith(".") or "/" in _file_below(name):
-        raise ValueError(f"{name[:80]!r} is no name for a folder")
-    return name
-
-
-FileBelow = Annotated[str, AfterValidator(_file_below)]
-FolderName = Annotated[str, AfterValidator(_folder_name)]
-Finite = Annotated[float, AfterValidator(_finite)]
-Vector3 = Annotated[list[Finite], Field(min_length=3, max_length=3)]
-Quaternion = Annotated[list[Finite], Field(min_length=4, max_length=4)]
-Matrix3 = Annotated[list[Vector3], Field(min_length=3, max_length=3)]
-Matrix4 = Annotated[list[Quaternion], Field(min_length=4, max_length=4)]
-Unit = Annotated[float, Field(ge=0, le=1)]
-
-
-class Record(BaseModel):
-    """A part of the schema: unknown keys are errors, values do not change."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Estimate(Record):
-    """A number with its interval and who said so.
-
-    ``source``: measured | user | vlm:<model> | prior:<category> | density*volume | imported:<format> | default. What was
-    imported is another tool's word: it is held against the same plausibility as an estimate.
-    """
-
-    value: Finite
-    low: Finite
-    high: Finite
-    source: str = Field(min_length=1)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Estimate:
-        if not self.low <= self.value <= self.high:
-            raise ValueError(f"{self.value} is outside [{self.low}, {self.high}]")
-        return self
-
-
-class Check(Record):
-    """One quality check: ``passed`` is None where nothing could judge it."""
-
-    name: str
-    passed: bool | None
-    value: float | str | None = None
-    limit: float | str | None = None
-    message: str = ""
 
 
 class Rejection(Record):
@@ -273,107 +216,6 @@ class Points(Record):
     candidates: Candidates
     functional: list[FunctionalPoint]
     grasp: list[GraspPoint]
-
-
-class Trial(Record):
-    """The settings of the grasp trial: a success rate means nothing without them."""
-
-    engine: str
-    finger_friction: Finite
-    object_friction: Finite
-    combine: str
-    force_n: Finite
-    timestep_s: Finite
-    solver_iterations: int
-    max_steps: int
-    stable_frames: int
-    max_displacement_m: Finite
-    slide_distance_m: Finite
-
-
-class SecondOpinion(Record):
-    """The agreement of a second engine: over grasps that held, some that failed, and jittered controls of those that held.
-
-    Kappa is Cohen's over the jittered alone: among grasps that nearly all hold, agreement says little.
-    """
-
-    engine: str
-    held_tried: int
-    holds_share: Unit | None
-    failed_tried: int
-    failed_pass_share: Unit | None
-    jittered: int
-    jittered_held: int
-    jittered_hold_in_second_engine: int
-    jittered_agree: int
-    kappa: Finite | None
-
-
-class RobustnessSummary(Record):
-    """The perturbed trials of the held grasps, and how many survive.
-
-    ``median`` is that of the grasps' shares; ``robust`` counts those that rather hold in ``robust_share`` of the cases than
-    in ``fragile_share`` (the sequential test's verdict).
-    """
-
-    pose_m: Finite
-    pose_deg: Finite
-    friction: tuple[Finite, Finite]
-    force: tuple[Finite, Finite]
-    mass_kg: tuple[Finite, Finite]
-    center_of_mass_m: Finite
-    max_trials: int
-    trials: int
-    median: Unit | None
-    robust: int
-    robust_share: Unit
-    fragile_share: Unit
-
-
-class FailureTable(Record):
-    """Outcomes counted by what was grasped: by the type of the nearest grasp point and by the nearest functional point."""
-
-    by_grasp_type: dict[str, dict[str, int]]
-    by_region: dict[str, dict[str, int]]
-
-
-class GraspSummary(Record):
-    """The outcomes of the grasps of one gripper."""
-
-    gripper: str
-    gripper_sha256: str
-    proposed: int
-    proposed_by_filter: dict[str, int]
-    simulated: int
-    verified: int
-    success_rate: Unit
-    unfiltered_simulated: int
-    unfiltered_success_rate: Unit | None
-    failures: dict[str, int]
-    approach_octants: int
-    file: str
-    association_radius_m: Finite
-    association_radius_widened: bool
-    share_beyond_3cm: Unit
-    trial: Trial
-    failure_table: FailureTable
-    second_opinion: SecondOpinion | None
-    robustness: RobustnessSummary | None
-    other_grippers: dict[str, OtherGripper] = Field(default_factory=dict)
-
-
-class OtherGripper(Record):
-    """The outcomes of the grasps of another gripper: a summary, or the reason for none; and what it can hold of the first's.
-
-    ``transferred`` counts the grasp points by which the first gripper holds the object and this one does too, of
-    ``transferable``.
-    """
-
-    summary: GraspSummary | None
-    reason: str | None
-    detail: str | None
-    transferable: int
-    transferred: int
 
 
 class Placement(Record):

@@ -17,7 +17,8 @@ from manitwin.errors import TwinError
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable, printable_line
-from manitwin.twin.record import CONTROLS, SCHEMA_VERSION, TwinRecord
+from manitwin.twin.record import SCHEMA_VERSION, TwinRecord
+from manitwin.twin.record_values import CONTROLS
 from manitwin.twin.twin_files import require_plain
 
 RECORD = "twin.json"

@@ -24,7 +24,7 @@ from manitwin.assets.writers.write import export_twin, safe_name, write_exported
 from manitwin.errors import ExportError, UsageError
 from manitwin.formats.markdown import markdown_escaped
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.record import Estimate
+from manitwin.twin.record_values import Estimate
 
 OURS = ("mjcf", "urdf", "sdf", "glb")
 HOSTILE = 'Ada --> <script>alert(1)</script> --\x00\ud800\n# [x](http://evil) & "Söhne" ---'

@@ -14,8 +14,9 @@ from manitwin.formats.glb import read_glb
 from manitwin.formats.meshes.obj import read_obj
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.geometry.poses import rotation_between, rotation_from_quaternion_wxyz, transform
+from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.record import FunctionalPoint, GraspPoint, GraspSummary
+from manitwin.twin.record import FunctionalPoint, GraspPoint
 
 
 def read(path: Path) -> Asset:

@@ -14,7 +14,7 @@ from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.mass_properties import principal_axes
 from manitwin.assets.writers.usd_materials import GlbImages, PreviewMaterials, unique_name
 from manitwin.formats.meshes.textures import material_of, uv_of
-from manitwin.twin.record import Estimate
+from manitwin.twin.record_values import Estimate
 
 CANNOT_SAY = (
     "USD has no rule for how the frictions of two bodies are combined: the simulator's own is used "

@@ -13,7 +13,7 @@ from manitwin.assets.writers.mass_properties import inertial_of
 from manitwin.assets.writers.registry import exporter
 from manitwin.errors import ExportError
 from manitwin.formats.markdown import markdown_escaped
-from manitwin.twin.record import Estimate
+from manitwin.twin.record_values import Estimate
 from manitwin.twin.store import folder_beside
 
 MAX_NAME = 255

@@ -17,9 +17,10 @@ from manitwin.errors import AssetError, TwinError
 from manitwin.formats.json_file import json_number, read_json_object
 from manitwin.geometry.shape_descriptor import ShapeDescriptor, shape_descriptor
 from manitwin.pipeline.stage_order import place_in_pipeline
+from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.grasp_table import read_grasp_table
 from manitwin.twin.loaded_twin import read_visual
-from manitwin.twin.record import GraspSummary, Points, TwinRecord
+from manitwin.twin.record import Points, TwinRecord
 from manitwin.twin.store import RECORD, REMEDY, RUN, read_record
 
 VISUAL, GRASPS = "visual.glb", "grasps.parquet"

@@ -18,7 +18,8 @@ from manitwin.models.annotators.protocol import (
     Subject,
 )
 from manitwin.twin.import_record import GivenPoint, ImportRecord
-from manitwin.twin.record import Estimate, FunctionalPoint, GraspPoint, GraspType, Language
+from manitwin.twin.record import FunctionalPoint, GraspPoint, GraspType, Language
+from manitwin.twin.record_values import Estimate
 
 NEAR_M, NEAR_SHARE = 0.02, 0.1
 """A candidate stands for a given point within 2 cm, or 10 % of the longest side: 42 candidates lie about so far apart."""

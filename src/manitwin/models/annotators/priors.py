@@ -19,7 +19,8 @@ from manitwin.errors import ManiTwinError, choose_from
 from manitwin.formats.toml_file import parse_toml
 from manitwin.geometry.parts.features import Feature
 from manitwin.geometry.parts.shape import HeadEnd
-from manitwin.twin.record import Estimate, Finite, GraspType, Record
+from manitwin.twin.record import GraspType
+from manitwin.twin.record_values import Estimate, Finite, Record
 
 TABLES = resources.files("manitwin.models.annotators") / "prior_tables"
 VOCABULARY_FILES = ("materials", "forms")

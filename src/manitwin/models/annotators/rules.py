@@ -20,7 +20,8 @@ from manitwin.models.annotators.protocol import (
     Subject,
 )
 from manitwin.models.annotators.words import describe
-from manitwin.twin.record import Estimate, Language
+from manitwin.twin.record import Language
+from manitwin.twin.record_values import Estimate
 
 _SPREAD = 3.29  # natural logs between low and high, in standard deviations: an interval of 90 %
 _SIZE_EXPONENT = (

@@ -12,7 +12,7 @@ from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import clean_views, name_line
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
-from manitwin.twin.record import Estimate
+from manitwin.twin.record_values import Estimate
 
 Matter = Literal[
     "plastic", "ceramic", "glass", "steel", "aluminium", "wood", "cardboard", "paper", "rubber", "foam", "textile",
