@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import socketserver
-import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from socketserver import StreamRequestHandler
 from typing import Any
 
 import numpy as np
@@ -39,6 +38,7 @@ from manitwin.models.vlm.openai_chat import OpenAiChat
 from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.models.vlm.structured import ask
+from raw_server import tcp_server
 
 SECRET = "sk-0123456789-that-nobody-may-see"
 ASKED_AT_MOST = 12
@@ -209,32 +209,16 @@ def raw_server(script: Script) -> Iterator[tuple[str, list[bytes]]]:
     """Answer every request with the bytes that ``script`` writes; gives the URL and the heads of what was asked."""
     asked: list[bytes] = []
 
-    class Handler(socketserver.StreamRequestHandler):
-        def handle(self) -> None:
-            try:
-                head = b""
-                while (line := self.rfile.readline()) not in (b"\r\n", b""):
-                    head += line
-                length = [
-                    int(line.split(b":")[1]) for line in head.split(b"\r\n") if line.lower().startswith(b"content-l")
-                ]
-                asked.append(head + self.rfile.read(sum(length)))
-                script(lambda data: self.connection.sendall(data))
-            except OSError:
-                return  # the client has gone away, as it should
+    def converse(connection: StreamRequestHandler) -> None:
+        head = b""
+        while (line := connection.rfile.readline()) not in (b"\r\n", b""):
+            head += line
+        length = [int(line.split(b":")[1]) for line in head.split(b"\r\n") if line.lower().startswith(b"content-l")]
+        asked.append(head + connection.rfile.read(sum(length)))
+        script(connection.connection.sendall)
 
-    class Server(socketserver.ThreadingTCPServer):
-        daemon_threads = True
-        block_on_close = False
-
-    with Server(("127.0.0.1", 0), Handler) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
-        thread.start()
-        try:
-            yield f"http://127.0.0.1:{server.server_address[1]}", asked
-        finally:
-            server.shutdown()
-            thread.join()
+    with tcp_server(converse) as address:
+        yield f"http://{address}", asked
 
 
 def leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:

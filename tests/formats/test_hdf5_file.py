@@ -51,8 +51,9 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe.h5")
     (tmp_path / "zero.h5").symlink_to("/dev/zero")
     (tmp_path / "folder.h5").mkdir()
-    for name in ("pipe.h5", "zero.h5", "folder.h5", "gone.h5"):
-        refused(tmp_path / name, lambda file: file.names())
+    causes = {"pipe.h5": "a named pipe", "zero.h5": "a device", "folder.h5": "a folder", "gone.h5": "No such file"}
+    for name, cause in causes.items():
+        assert cause in refused(tmp_path / name, lambda file: file.names())
 
 
 def test_links_are_not_followed(tmp_path: Path) -> None:

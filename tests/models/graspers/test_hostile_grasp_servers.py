@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import socketserver
 import struct
 import threading
 from collections.abc import Callable, Iterator
@@ -24,6 +23,7 @@ from manitwin.models.graspers.graspgen import GraspGenGrasper
 from manitwin.models.graspers.graspgenx import GraspGenXGrasper
 from manitwin.models.graspers.protocol import GraspRequest
 from manitwin.robots.grippers.gripper import load_gripper
+from raw_server import tcp_server
 
 Write = Callable[[bytes], None]
 Read = Callable[[int], bytes]
@@ -36,25 +36,8 @@ SERVERS = {"graspgen": FakeGraspGen, "graspgenx": FakeGraspGenX}
 def raw(script: Callable[[Read, Write], None]) -> Iterator[str]:
     """Serve a script of bytes to whoever connects; gives the URL."""
 
-    class Handler(socketserver.StreamRequestHandler):
-        def handle(self) -> None:
-            try:
-                script(self.rfile.read, self.connection.sendall)
-            except OSError:
-                return  # the client has gone away, as it should
-
-    class Server(socketserver.ThreadingTCPServer):
-        daemon_threads = True
-        block_on_close = False
-
-    with Server(("127.0.0.1", 0), Handler) as server:
-        thread = threading.Thread(target=server.serve_forever, args=(0.02,), daemon=True)
-        thread.start()
-        try:
-            yield f"tcp://127.0.0.1:{server.server_address[1]}"
-        finally:
-            server.shutdown()
-            thread.join()
+    with tcp_server(lambda connection: script(connection.rfile.read, connection.connection.sendall)) as address:
+        yield f"tcp://{address}"
 
 
 def asked(url: str, timeout_s: float = 20.0) -> Any:

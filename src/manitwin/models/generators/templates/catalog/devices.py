@@ -14,7 +14,10 @@ def slab(model: Model, x_m: float, y_m: float, z_m: float, *, corner_m: float = 
     return model.add("body", prism(rectangle(x_m, y_m, radius_m=corner_m), z_m, radius_m=min(edge_m, 0.45 * z_m)))
 
 
-def _screened(length_m: float, width: float, thick_m: float, border: float) -> Model:
+@template("mobile phone")
+@template("tablet")
+def screened(*, length_m: float, width: float, thick_m: float, border: float) -> Model:
+    """Build a phone or a tablet on its back, its screen up."""
     across = width * length_m
     model = slab(Model(), length_m, across, thick_m)
     edge = 2 * border * across
@@ -27,18 +30,6 @@ def _screened(length_m: float, width: float, thick_m: float, border: float) -> M
     model.add("button", box(0.012, 0.002, 0.36 * thick_m).translate((0.2 * length_m, side, 0.32 * thick_m)))
     model.point("screen", "face", "screen", (0.0, 0.0, thick_m + 0.0004), (0.0, 0.0, 1.0))
     return model.point("button", "button", "button", (0.2 * length_m, side + 0.001, 0.5 * thick_m), (0.0, 1.0, 0.0))
-
-
-@template("mobile phone")
-def mobile_phone(*, length_m: float, width: float, thick_m: float, border: float) -> Model:
-    """Build a phone on its back."""
-    return _screened(length_m, width, thick_m, border)
-
-
-@template("tablet")
-def tablet(*, length_m: float, width: float, thick_m: float, border: float) -> Model:
-    """Build a tablet on its back."""
-    return _screened(length_m, width, thick_m, border)
 
 
 @template("remote control")

@@ -61,24 +61,15 @@ def wine_glass(*, height_m: float, width: float, stem: float, wall_m: float, foo
     return model.point("foot", "face", "foot", (0.0, 0.0, 0.0), (0.0, 0.0, -1.0))
 
 
-def _bowl(width_m: float, height: float, wall_m: float, foot: float) -> Model:
+@template("bowl")
+@template("mixing bowl")
+def bowl(*, width_m: float, height: float, wall_m: float, foot: float) -> Model:
+    """Build a bowl on a foot: ``height`` and ``foot`` over the width."""
     radius, high = 0.5 * width_m, height * width_m
     turn = np.linspace(0.0, np.pi / 2, 12)
     side = zip(radius * (foot + (1 - foot) * np.sin(turn)), high * (0.06 + 0.94 * (1 - np.cos(turn))), strict=True)
     profile = [(foot * radius, 0.0), *((float(r), float(z)) for r, z in side)]
     return hollowed(Model(), profile, wall_m, 0.06 * high + wall_m)
-
-
-@template("bowl")
-def bowl(*, width_m: float, height: float, wall_m: float, foot: float) -> Model:
-    """Build a bowl on a foot: ``height`` and ``foot`` over the width."""
-    return _bowl(width_m, height, wall_m, foot)
-
-
-@template("mixing bowl")
-def mixing_bowl(*, width_m: float, height: float, wall_m: float, foot: float) -> Model:
-    """Build a deep bowl with a thin wall."""
-    return _bowl(width_m, height, wall_m, foot)
 
 
 @template("pet bowl")
@@ -100,22 +91,13 @@ def pet_bowl(*, width_m: float, height: float, wall_m: float, flare: float) -> M
     return model.point("opening", "opening", "rim", (0.0, 0.0, high), (0.0, 0.0, 1.0))
 
 
-def _flat(width_m: float, height: float, wall_m: float, well: float) -> Model:
+@template("plate")
+@template("saucer")
+def plate(*, width_m: float, height: float, wall_m: float, well: float) -> Model:
+    """Build a plate or a saucer: ``well`` is the share of its radius that is flat."""
     radius, high = 0.5 * width_m, height * width_m
     profile = rounded([(well * radius, 0.0), ((well + 0.11) * radius, 0.25 * high), (radius, high)], 0.012)
     return hollowed(Model(), profile, wall_m, wall_m)
-
-
-@template("plate")
-def plate(*, width_m: float, height: float, wall_m: float, well: float) -> Model:
-    """Build a plate: ``well`` is the share of its radius that is flat."""
-    return _flat(width_m, height, wall_m, well)
-
-
-@template("saucer")
-def saucer(*, width_m: float, height: float, wall_m: float, well: float) -> Model:
-    """Build a saucer."""
-    return _flat(width_m, height, wall_m, well)
 
 
 @template("pitcher")
