@@ -59,6 +59,7 @@ def read_subject(draft: Draft[Item], *, solid: str, visual: str, metric: bool, s
 
     ``scale`` is how much larger these are than the canonical mesh, which the views were taken of.
     """
+    given = read_given(draft)
     return Subject(
         name=object_name(draft),
         solid=load_solid(draft.path(solid)),
@@ -67,7 +68,7 @@ def read_subject(draft: Draft[Item], *, solid: str, visual: str, metric: bool, s
         views=pictures(draft.path("views/"), "rgb"),
         cameras=tuple(Camera.from_json(value).scaled(scale) for value in draft.field("cameras")),
         seed=draft.seed,
-        given=read_given(draft),
+        given=given if given is None or scale == 1.0 else given.scaled(scale),
     )
 
 

@@ -17,6 +17,8 @@ IMPORT_RECORD, IMPORTED_MESH = "import.json", "asset.glb"
 MAX_BYTES = 64 << 20
 TEMPLATE = "template"
 """The format of what a template knows of the thing that it made."""
+FITTED = "fitted"
+"""The format of what a template knows of the thing in a photo that it was fitted to."""
 Positive = Annotated[Finite, Field(gt=0)]
 
 
@@ -75,6 +77,8 @@ class ImportRecord(Record):
     @property
     def source(self) -> str:
         """The source, as an Estimate names it."""
+        if self.format == FITTED:
+            return f"template:{self.called}, fitted to the photo"
         return f"template:{self.name}" if self.format == TEMPLATE else f"imported:{self.format}"
 
     @property
@@ -103,6 +107,18 @@ class ImportRecord(Record):
                     for grasps in self.grasps
                 ],
                 "rests": [(np.array(rest) @ np.linalg.inv(transform)).tolist() for rest in self.rests],
+            }
+        )
+
+    def scaled(self, factor: float) -> ImportRecord:
+        """Return the record of the thing at another size: its points move; masses and grasps are of true size only."""
+        return self.model_copy(
+            update={
+                name: [
+                    point.model_copy(update={"position_m": (factor * np.array(point.position_m)).tolist()})
+                    for point in getattr(self, name)
+                ]
+                for name in ("functional_points", "grasp_points")
             }
         )
 

@@ -5,7 +5,9 @@ Metres, Z up. Curves are cut into chords of at most ``CHORD_ERROR`` of their rad
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from itertools import product
 
 import numpy as np
@@ -16,12 +18,28 @@ from manitwin.errors import ManiTwinError
 SIDES = 48
 """Chords of a full circle: their area is 0.3 % less than the circle's."""
 CORNER_SIDES = 16
+_coarseness: ContextVar[float] = ContextVar("coarseness", default=1.0)
 
 Point = tuple[float, float]
 
 
 class SolidError(ManiTwinError):
     """Measures that give no closed solid."""
+
+
+@contextmanager
+def coarser(share: float) -> Iterator[None]:
+    """Cut full circles into this share of their usual chords: for solids that are drawn small and thrown away."""
+    token = _coarseness.set(share)
+    try:
+        yield
+    finally:
+        _coarseness.reset(token)
+
+
+def chords(usual: int) -> int:
+    """Return how many chords a full circle of that many has now; a multiple of four, so that its extents stay."""
+    return usual if _coarseness.get() == 1.0 else max(8, 4 * round(usual * _coarseness.get() / 4))
 
 
 def box(x_m: float, y_m: float, z_m: float, *, radius_m: float = 0.0) -> Manifold:
@@ -74,29 +92,31 @@ def rectangle(x_m: float, y_m: float, *, radius_m: float = 0.0) -> CrossSection:
     return inner.offset(radius_m, JoinType.Round, 2.0, CORNER_SIDES)
 
 
-def lathe(profile: Sequence[Point] | np.ndarray, *, sides: int = SIDES) -> Manifold:
+def lathe(profile: Sequence[Point] | np.ndarray, *, sides: int | None = None) -> Manifold:
     """Return the solid of a profile ``(K, 2)`` of (radius, z), closed along the axis, turned about Z."""
     points = [(max(0.0, float(r)), float(z)) for r, z in profile]
     first, last = points[0], points[-1]
     points = [*([(0.0, first[1])] if first[0] > 0 else []), *points, *([(0.0, last[1])] if last[0] > 0 else [])]
-    return checked(CrossSection([np.array(points)], FillRule.NonZero).revolve(sides), "lathe")
+    return checked(CrossSection([np.array(points)], FillRule.NonZero).revolve(sides or chords(SIDES)), "lathe")
 
 
-def cylinder(radius_m: float, height_m: float, *, top_radius_m: float | None = None, sides: int = SIDES) -> Manifold:
+def cylinder(
+    radius_m: float, height_m: float, *, top_radius_m: float | None = None, sides: int | None = None
+) -> Manifold:
     """Return a cylinder or frustum that stands on z = 0."""
     top = radius_m if top_radius_m is None else top_radius_m
-    return checked(Manifold.cylinder(height_m, radius_m, top, sides), "cylinder")
+    return checked(Manifold.cylinder(height_m, radius_m, top, sides or chords(SIDES)), "cylinder")
 
 
-def ellipsoid(x_m: float, y_m: float, z_m: float, *, sides: int = SIDES) -> Manifold:
+def ellipsoid(x_m: float, y_m: float, z_m: float, *, sides: int | None = None) -> Manifold:
     """Return an ellipsoid with these full extents about the origin."""
-    return checked(Manifold.sphere(0.5, sides).scale((x_m, y_m, z_m)), "ellipsoid")
+    return checked(Manifold.sphere(0.5, sides or chords(SIDES)).scale((x_m, y_m, z_m)), "ellipsoid")
 
 
-def torus(ring_radius_m: float, tube_radius_m: float, *, sides: int = SIDES) -> Manifold:
+def torus(ring_radius_m: float, tube_radius_m: float, *, sides: int | None = None) -> Manifold:
     """Return a ring about Z, centred at the origin."""
-    circle = CrossSection.circle(tube_radius_m, CORNER_SIDES).translate((ring_radius_m, 0))
-    return checked(circle.revolve(sides), "torus")
+    circle = CrossSection.circle(tube_radius_m, chords(CORNER_SIDES)).translate((ring_radius_m, 0))
+    return checked(circle.revolve(sides or chords(SIDES)), "torus")
 
 
 def union(solids: Sequence[Manifold]) -> Manifold:

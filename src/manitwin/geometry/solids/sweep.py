@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from manifold3d import Manifold, Mesh
 
-from manitwin.geometry.solids.shapes import CORNER_SIDES, SolidError, checked
+from manitwin.geometry.solids.shapes import CORNER_SIDES, SolidError, checked, chords
 
 
 def tube(
@@ -16,7 +16,7 @@ def tube(
     *,
     flatten: float = 1.0,
     across: Sequence[float] = (0.0, 1.0, 0.0),
-    sides: int = CORNER_SIDES,
+    sides: int | None = None,
 ) -> Manifold:
     """Return an elliptic section swept along a path ``(K, 3)`` in metres, with flat ends.
 
@@ -24,7 +24,7 @@ def tube(
     half width in the other direction. The frame is carried along without twist (Wang et al. 2008, "Computation of
     rotation minimizing frames"). Raises SolidError where the path has no length.
     """
-    angles = np.linspace(0, 2 * np.pi, sides, endpoint=False)
+    angles = np.linspace(0, 2 * np.pi, sides or chords(CORNER_SIDES), endpoint=False)
     return sweep(path_m, np.stack([np.cos(angles), flatten * np.sin(angles)], axis=1), radius_m, across=across)
 
 

@@ -14,7 +14,7 @@ from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
 from manitwin.config import Resource
-from manitwin.errors import Unavailable, Unsupported, UsageError
+from manitwin.errors import Rejected, Unavailable, Unsupported, UsageError
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.geometry.solids.shapes import SolidError
@@ -23,6 +23,19 @@ from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.fitting.fit import (
+    LEAST_CONFIDENCE,
+    LEAST_IOU,
+    MOST_OUTLINE,
+    fit,
+    template_for,
+)
+from manitwin.models.generators.templates.fitting.generated import (
+    known_of_fitted,
+    notes_of,
+    texture_of,
+    visual_part,
+)
 from manitwin.models.generators.templates.known import known_of
 from manitwin.models.generators.templates.made import make, visual_parts
 from manitwin.models.generators.templates.template import Template
@@ -38,10 +51,11 @@ class _Job:
     notes: dict[str, Any]
     unseen_share: float | None
     known: ImportRecord | None = None
+    metric: bool = False
 
 
 class LiftGenerator:
-    """Lift a silhouette to a solid (revolution, box or inflation), or build the template that a text names.
+    """Fit the template that a photo's name means, else lift its silhouette; or build the template that a text names.
 
     Of a photo it sees one side only and no depth: a stand-in for tests, demonstrations and machines without a GPU, not to
     be compared with learned generators. ``submit`` does all the work; jobs live as long as this object.
@@ -70,8 +84,7 @@ class LiftGenerator:
             return self._from_text(request.text or "", request.seed)
         digest = hashlib.sha256(np.ascontiguousarray(request.rgba).tobytes() + (request.name or "").encode())
         job_id = digest.hexdigest()[:16]
-        lifted = lift(request.rgba, hint_from_name(request.name))
-        self._jobs[job_id] = _Job(write_glb([textured_part(lifted)]), lifted.notes, unseen_share(lifted.surface))
+        self._jobs[job_id] = _from_photo(request.rgba, request.name)
         return job_id
 
     def _from_text(self, text: str, seed: int) -> str:
@@ -89,7 +102,7 @@ class LiftGenerator:
             "masses_kg": {part: round(mass, 6) for part, mass in made.masses_kg.items()},
             "unused_words": list(wanted.unused),
         }
-        self._jobs[job_id] = _Job(write_glb(visual_parts(made)), notes, None, known_of(made, text))
+        self._jobs[job_id] = _Job(write_glb(visual_parts(made)), notes, None, known_of(made, text), metric=True)
         return job_id
 
     def poll(self, job_id: str) -> JobState:
@@ -109,11 +122,36 @@ class LiftGenerator:
             path=path,
             model=str(job.notes["primitive"]),
             notes=job.notes,
-            metric=job.known is not None,
+            metric=job.metric,
             rests=True,
             unseen_share=job.unseen_share,
             known=job.known,
         )
+
+
+def _from_photo(rgba: np.ndarray, name: str | None) -> _Job:
+    """Return the template that the name means where its fit explains the photo, else the photo lifted."""
+    template = template_for(name)
+    fitted = None if template is None else fit(template.category, rgba)
+    if fitted is not None and fitted.confidence >= LEAST_CONFIDENCE:
+        surface = texture_of(fitted, rgba)
+        known = known_of_fitted(fitted, name or fitted.category)
+        return _Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)
+    try:
+        lifted = lift(rgba, hint_from_name(name))
+    except Rejected as error:
+        if fitted is None:
+            raise
+        residual = fitted.residual
+        raise Rejected(
+            error.reason,
+            f"{error.detail}; and no {fitted.category} that the template makes has this outline: overlap {residual.iou:.2f}"
+            f" (at least {LEAST_IOU}), outlines {residual.outline:.4f} of its length apart (at most {MOST_OUTLINE});"
+            " check the name and the cut-out",
+            error.stage,
+        ) from error
+    notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
+    return _Job(write_glb([textured_part(lifted)]), notes, unseen_share(lifted.surface))
 
 
 def _template_and_wish(text: str) -> tuple[Template, Wanted]:

@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
+from manitwin.models.generators.bleeding import bled
 from manitwin.models.generators.lift.silhouette import Silhouette, turned_upright, turning
 
 MAX_SIDE_PX = 1024
@@ -52,19 +53,6 @@ def crop_object(rgba: np.ndarray, mask_side_px: int) -> Crop:
     colours, alpha = _scaled(box, MAX_SIDE_PX)
     _, small = _scaled(box, mask_side_px)
     return Crop(bled(colours, alpha > 127), _cleaned(small > 127))
-
-
-def bled(colours: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Replace what is not well inside ``mask`` by the nearest colour that is."""
-    depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
-    # edge pixels mix object and background; thin parts keep their middle line
-    local = ndimage.maximum_filter(depth, size=1 + 2 * max(4, round(0.010 * max(mask.shape))))
-    inset = max(3.5, 0.010 * max(mask.shape))
-    inner = mask & (depth >= np.minimum(inset, 0.6 * local)) & (depth > 0)
-    nearest = ndimage.distance_transform_edt(~inner, return_distances=False, return_indices=True)
-    filled = colours[nearest[0], nearest[1]]
-    soft = cv2.GaussianBlur(filled, (0, 0), 2.0)
-    return np.where(inner[..., None], colours, soft)
 
 
 def beside(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +17,7 @@ from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.templates.looks import Look, look_of
-from manitwin.models.generators.templates.template import KnownPoint, Template
+from manitwin.models.generators.templates.template import KnownPoint, Model, Template
 from manitwin.models.generators.templates.text import Wanted, Wish
 
 LEAST_WALL_M = 0.0008
@@ -48,9 +49,21 @@ def make(template: Template, wanted: Wanted, rng: np.random.Generator) -> Made:
     model = template.build(**measures)
     mesh = model.assembly.mesh()
     _check_parts(template, wanted, mesh)
-    scale = _scale(template, wanted, mesh)
+    return dressed(template, model, mesh, measures, looks_by_slot, wanted.wishes, _scale(template, wanted, mesh))
+
+
+def dressed(
+    template: Template,
+    model: Model,
+    mesh: PartedMesh,
+    measures: Mapping[str, float],
+    looks_by_slot: Mapping[str, Look],
+    wishes: Mapping[str, Wish],
+    scale: float,
+) -> Made:
+    """Return a built model and its mesh, scaled, with the looks of its slots and what is wished for single parts."""
     looks = {part: looks_by_slot[model.slots[part] or next(iter(template.slots))] for part in mesh.names}
-    for part, wish in wanted.wishes.items():
+    for part, wish in wishes.items():
         if part in looks and part not in template.slots:
             looks[part] = wish.of(looks[part])
     densities = {part: template.contents_kg_m3.get(part, look.density_kg_m3) for part, look in looks.items()}

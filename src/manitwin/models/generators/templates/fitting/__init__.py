@@ -1,0 +1,1 @@
+"""Fit templates to photos: see ``fit``."""

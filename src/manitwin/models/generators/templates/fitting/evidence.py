@@ -1,0 +1,113 @@
+"""What a matted photo says of a shape: its mask, the signed distance to its outline, its inner edges and its colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+SIDE_PX = 112
+FINE = 2
+"""How many times finer outlines are drawn than colours: the fit follows differences of less than a pixel."""
+BOX_SHARE = 0.82
+"""How much of the small picture the object's box fills: what is larger than the photo says is seen beyond it."""
+REACH = 0.06
+"""Of the picture's side: distances to the outline are told up to here."""
+_RIM_PX = 3  # the outline's own gradient is no inner edge
+_EDGE_LAB = 14.0  # a gradient of this many units of Lab a pixel, after smoothing, is half an edge
+_DIAGONAL_35MM = 43.27
+TYPICAL_FOCAL_MM, FOCAL_SPREAD = 36.0, 0.45
+"""The lens of phones and cameras as 35 mm equivalent, and the standard deviation of its logarithm: 26 to 80 mm are usual."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A photo's object in a square picture ``SIDE_PX`` wide.
+
+    ``mask (S, S) bool``; ``outline`` the signed distance to its outline over the reach, in -1..1, positive inside;
+    ``edge (S, S)`` how much of an inner edge lies at each pixel or next to it, 0..1; ``lab (S, S, 3) float32``; ``inner (S, S)
+    bool`` well inside; ``perspective`` the object's size over its distance for a usual lens; ``center_px`` and ``box_px`` the
+    box in the photo: its centre (x, y) and its longer side.
+    """
+
+    mask: np.ndarray
+    outline: np.ndarray
+    edge: np.ndarray
+    lab: np.ndarray
+    inner: np.ndarray
+    perspective: float
+    center_px: tuple[float, float]
+    box_px: float
+
+
+def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
+    """Return what ``rgba (H, W, 4) uint8`` says, whose alpha is the object's mask; ``focal_mm`` is 35 mm equivalent, if known."""
+    solid = rgba[..., 3] > 127
+    rows, columns = np.nonzero(solid.any(axis=1))[0], np.nonzero(solid.any(axis=0))[0]
+    height, width = float(rows[-1] - rows[0] + 1), float(columns[-1] - columns[0] + 1)
+    center = ((columns[0] + columns[-1]) / 2, (rows[0] + rows[-1]) / 2)
+    box_px = max(height, width)
+    fine = _crop(rgba, center, box_px, FINE * SIDE_PX)
+    small = np.asarray(cv2.resize(fine, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA))
+    whole, mask = _largest(fine[..., 3] > 127.5), _largest(small[..., 3] > 127.5)
+    lab = np.asarray(cv2.cvtColor(np.ascontiguousarray(small[..., :3] / 255), cv2.COLOR_RGB2Lab))
+    depth = cv2.distanceTransform(mask.astype(np.uint8), cv2.DIST_L2, 5)
+    focal_px = (focal_mm or TYPICAL_FOCAL_MM) / _DIAGONAL_35MM * float(np.hypot(*rgba.shape[:2]))
+    return Evidence(
+        mask=mask,
+        outline=signed_distance(whole),
+        edge=_edges(lab, depth > _RIM_PX),
+        lab=lab,
+        inner=depth > _RIM_PX,
+        perspective=box_px / focal_px,
+        center_px=center,
+        box_px=box_px,
+    )
+
+
+def signed_distance(mask: np.ndarray) -> np.ndarray:
+    """Return the distance to a finely drawn outline over the reach, cut to -1..1, positive inside, at every other pixel."""
+    inside = mask.astype(np.uint8)
+    away = cv2.distanceTransform(inside, cv2.DIST_L2, 3) - cv2.distanceTransform(1 - inside, cv2.DIST_L2, 3)
+    some = away[1 :: 2 * FINE, 1 :: 2 * FINE]
+    return np.clip(some / (REACH * mask.shape[0]), -1, 1)
+
+
+def _largest(mask: np.ndarray) -> np.ndarray:
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+    return mask if count <= 2 else labels == 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
+
+
+def _crop(rgba: np.ndarray, center: tuple[float, float], box_px: float, side_px: int) -> np.ndarray:
+    """Return the object's square of the photo ``(side, side, 4) float32``, colours of the object only."""
+    half = 0.5 * box_px / BOX_SHARE
+    left, top = max(0, int(center[0] - half) - 2), max(0, int(center[1] - half) - 2)
+    picture = rgba[top : int(center[1] + half) + 3, left : int(center[0] + half) + 3].astype(np.float32)
+    picture[..., :3] *= picture[..., 3:] / 255
+    scale = BOX_SHARE * side_px / box_px
+    shrunk = min(1.0, 1.5 * scale)  # first by averages, then by samples between them
+    if shrunk < 1:
+        size = (max(1, round(picture.shape[1] * shrunk)), max(1, round(picture.shape[0] * shrunk)))
+        ratio = np.array(size, dtype=float) / np.array(picture.shape[1::-1], dtype=float)
+        picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+    else:
+        ratio = np.ones(2)
+    middle = (np.array(center) - (left, top) + 0.5) * ratio - 0.5
+    step = scale / ratio
+    shift = (side_px - 1) / 2 - step * middle
+    move = np.array([[step[0], 0, shift[0]], [0, step[1], shift[1]]])
+    small = np.asarray(cv2.warpAffine(picture, move, (side_px, side_px), flags=cv2.INTER_LINEAR))
+    small[..., :3] = small[..., :3] / (np.maximum(small[..., 3:], 1) / 255)
+    return np.clip(small, 0, 255)
+
+
+def _edges(lab: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    smooth = cv2.GaussianBlur(lab, (0, 0), 1.0)
+    gradient = np.zeros(lab.shape[:2], np.float32)
+    for channel in range(3):
+        x = cv2.Sobel(smooth[..., channel], cv2.CV_32F, 1, 0) / 4
+        y = cv2.Sobel(smooth[..., channel], cv2.CV_32F, 0, 1) / 4
+        gradient = np.maximum(gradient, np.hypot(x, y))
+    strength = np.where(inner, gradient / (gradient + _EDGE_LAB / 4), 0).astype(np.float32)
+    return np.asarray(cv2.GaussianBlur(cv2.dilate(strength, np.ones((3, 3), np.uint8)), (0, 0), 1.0))

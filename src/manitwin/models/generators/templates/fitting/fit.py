@@ -1,0 +1,109 @@
+"""Fit a template to a matted photo: its measures and the camera's view from outline, inner edges and shading."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.geometry.solids.shapes import SolidError
+from manitwin.models.annotators.priors import lookup, named
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.fitting.evidence import evidence_of
+from manitwin.models.generators.templates.fitting.residual import Residual
+from manitwin.models.generators.templates.fitting.search import search
+from manitwin.models.generators.templates.fitting.shape import Family
+from manitwin.models.generators.templates.fitting.view import View
+from manitwin.models.generators.templates.looks import Look, look_of
+from manitwin.models.generators.templates.made import Made, dressed
+from manitwin.models.generators.templates.template import Template
+
+LEAST_CONFIDENCE = 0.5
+LEAST_IOU, MOST_OUTLINE = 0.91, 0.0085
+"""Where a fit is as likely that of another kind of thing: measured on rendered photos under right and wrong names."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A template with the measures that explain a photo best, and the view that it is seen from.
+
+    ``made`` is the solid with its parts in the object frame; a photo tells no size, so its longest side is the usual one of its
+    category, and its looks are the first ones of the template. ``confidence`` is in 0..1, 0.5 where a fit is as likely wrong as
+    right; ``center_px`` and ``box_px`` say where the photo frame of ``view`` lies in the photo.
+    """
+
+    category: str
+    made: Made
+    view: View
+    residual: Residual
+    upright: bool
+    confidence: float
+    center_px: tuple[float, float]
+    box_px: float
+
+
+def template_for(name: str | None) -> Template | None:
+    """Return the template of what a thing is called, by its own names and by those of the priors; None where there is none."""
+    templates = load_templates()
+    words = " ".join((name or "").lower().replace("_", " ").replace("-", " ").split())
+    if not words:
+        return None
+    by_name = {other: template for template in templates.values() for other in (template.category, *template.names)}
+    if words in by_name:
+        return by_name[words]
+    prior = named(words) or lookup(words)
+    return None if prior is None else templates.get(prior.category)
+
+
+def fit(
+    category: str,
+    rgba: np.ndarray,
+    initial_measures: Mapping[str, float] | None = None,
+    *,
+    focal_mm: float | None = None,
+) -> Fitted | None:
+    """Fit the template of a category to ``rgba (H, W, 4) uint8``, whose alpha is the object's mask.
+
+    ``initial_measures`` are expected in place of the usual ones, ``focal_mm`` is the lens as 35 mm equivalent where it is known.
+    None where no measures near the expected ones give a solid. Raises KeyError for a category without a template.
+    """
+    template = load_templates()[category]
+    evidence = evidence_of(rgba, focal_mm)
+    family = Family(template, initial_measures)
+    found = search(family, evidence)
+    if not found:
+        return None
+    best = found[0]
+    try:
+        made = _made(template, family.measures(best.spreads))
+    except SolidError:
+        return None
+    return Fitted(
+        category=category,
+        made=made,
+        view=best.view,
+        residual=best.residual,
+        upright=best.upright,
+        confidence=confidence_of(best.residual),
+        center_px=evidence.center_px,
+        box_px=evidence.box_px,
+    )
+
+
+def confidence_of(residual: Residual) -> float:
+    """Return how likely a fit is that of the right kind of thing: the worse of overlap and of the outlines' distance."""
+    score = min((residual.iou - LEAST_IOU) / 0.02, (MOST_OUTLINE - residual.outline) / 0.0015)
+    return float(1 / (1 + np.exp(-score)))
+
+
+def _made(template: Template, measures: dict[str, float]) -> Made:
+    looks: dict[str, Look] = {}
+    for slot, choices in template.slots.items():
+        looks[slot] = look_of(choices[0]) if choices[0] else looks[next(iter(template.slots))]
+    model = template.build(**measures)
+    mesh = model.assembly.mesh()
+    prior = lookup(template.category)
+    assert prior is not None, template.category
+    scale = prior.longest_axis_m.typical / float(np.ptp(mesh.vertices, axis=0).max())
+    return dressed(template, model, mesh, measures, looks, {}, scale)

@@ -1,0 +1,82 @@
+"""A fitted template as what a generator gives: its textured mesh, what it knows, and how sure it is."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.formats.meshes.triangles import with_creased_normals
+from manitwin.models.generators.templates.fitting.fit import Fitted
+from manitwin.models.generators.templates.fitting.texturing import Textured, textured
+from manitwin.models.generators.templates.known import known_of
+from manitwin.twin.import_record import FITTED, ImportRecord
+
+ROUGHNESS = 0.6
+
+
+def texture_of(fitted: Fitted, rgba: np.ndarray) -> Textured:
+    """Return the fitted solid with the photo ``rgba (H, W, 4) uint8`` on what it shows."""
+    colours = {part: look.rgb for part, look in fitted.made.looks.items()}
+    return textured(fitted.made.mesh, fitted.view, rgba, fitted.center_px, fitted.box_px, colours)
+
+
+def visual_part(surface: Textured) -> trimesh.Trimesh:
+    """Return the mesh in the object frame with its texture."""
+    vertices, faces, uv = surface.mesh()
+    material = PBRMaterial(
+        name="photo",
+        baseColorFactor=[255, 255, 255, 255],
+        baseColorTexture=Image.fromarray(surface.texture),
+        metallicFactor=0.0,
+        roughnessFactor=ROUGHNESS,
+    )
+    visual = TextureVisuals(uv=uv, material=material)
+    mesh = trimesh.Trimesh(vertices, faces, visual=visual, process=False, metadata={"name": "fitted"})
+    return with_creased_normals(mesh)
+
+
+def known_of_fitted(fitted: Fitted, name: str) -> ImportRecord:
+    """Return what is known of a fitted thing: its category and functional points.
+
+    Its mass is not: a photo tells neither size nor matter.
+    """
+    known = known_of(fitted.made, name)
+    return known.model_copy(
+        update={
+            "format": FITTED,
+            "mass_kg": None,
+            "center_of_mass_m": None,
+            "inertia_kg_m2": None,
+            "material": None,
+            "missing": ["mass", "material", *known.missing],
+        }
+    )
+
+
+def notes_of(fitted: Fitted) -> dict[str, Any]:
+    """Return how the shape was found, for the record."""
+    view, residual = fitted.view, fitted.residual
+    return {
+        "primitive": f"template:{fitted.category}",
+        "source": "template fitted to the photo",
+        "category": fitted.category,
+        "confidence": round(fitted.confidence, 3),
+        "residual": {
+            "iou": round(residual.iou, 4),
+            "outline": round(residual.outline, 5),
+            "edges": round(residual.edges, 3),
+            "shading": round(residual.shading, 3),
+        },
+        "measures": {name: round(value, 6) for name, value in fitted.made.measures.items()},
+        "view": {
+            "yaw_deg": round(float(np.degrees(view.yaw_rad)), 1),
+            "elevation_deg": round(float(np.degrees(view.elevation_rad)), 1),
+            "roll_deg": round(float(np.degrees(view.roll_rad)), 1),
+            "perspective": round(view.perspective, 4),
+        },
+    }

@@ -1,0 +1,125 @@
+"""How far a drawn solid is from a photo: outline, inner edges, shading and colours of its parts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from manitwin.models.generators.templates.fitting.drawing import seen_faces, silhouette, to_pixels
+from manitwin.models.generators.templates.fitting.evidence import (
+    BOX_SHARE,
+    FINE,
+    REACH,
+    SIDE_PX,
+    Evidence,
+    signed_distance,
+)
+from manitwin.models.generators.templates.fitting.shape import CoarseSolid
+from manitwin.models.generators.templates.fitting.view import View
+
+_CREASE_COSINE = 0.82  # neighbouring pixels whose normals differ by more than 35 degrees have an edge between them
+_LEAST_EDGE_PX = 12
+_RIDGE = 2.0
+_LIGHTNESS_SHARE = 0.7
+
+
+@dataclass(frozen=True)
+class Residual:
+    """How a solid and a photo disagree: 1 - ``iou`` and ``outline`` (mean distance of both outlines over the object's longer
+    side) of the silhouettes; ``edges`` the share of the solid's inner edges where the photo has none; ``shading`` the share of
+    the colours' variance that normals and parts do not explain. ``edge_px`` is how many inner edge pixels were looked at.
+    """
+
+    iou: float
+    outline: float
+    edges: float
+    shading: float
+    edge_px: int
+
+    @property
+    def cost(self) -> float:
+        """The weighted sum by which fits are compared."""
+        return (1 - self.iou) + 6.0 * self.outline + 0.10 * self.edges + 0.15 * self.shading
+
+
+def outline_difference(solid: CoarseSolid, view: View, evidence: Evidence) -> np.ndarray:
+    """Return the differences of signed distances ``(N,)`` to both outlines, of whose squares the fit makes the least."""
+    flat, _ = view.project(solid.vertices)
+    drawn = silhouette(to_pixels(flat, FINE * SIDE_PX, BOX_SHARE), solid.faces, solid.edges, FINE * SIDE_PX)
+    return np.asarray((signed_distance(drawn) - evidence.outline).ravel())
+
+
+def iou(mask: np.ndarray, evidence: Evidence) -> float:
+    """Return intersection over union of a mask and the photo's."""
+    drawn = mask > 0
+    return float((drawn & evidence.mask).sum() / max(1, (drawn | evidence.mask).sum()))
+
+
+def residual(solid: CoarseSolid, view: View, evidence: Evidence) -> Residual:
+    """Compare a solid seen from a view with a photo."""
+    flat, distance = view.project(solid.vertices)
+    pixels = to_pixels(flat, FINE * SIDE_PX, BOX_SHARE)
+    face = seen_faces(pixels, distance, solid.faces, FINE * SIDE_PX)[::FINE, ::FINE]
+    drawn = silhouette(to_pixels(flat, SIDE_PX, BOX_SHARE), solid.faces, solid.edges, SIDE_PX)
+    normals = (solid.normals @ view.object_to_camera.T).astype(np.float32)[face]
+    part = np.where(face >= 0, solid.part[face], -1)
+    edges, count = _edges(normals, part, drawn, evidence)
+    return Residual(
+        iou=iou(drawn, evidence),
+        outline=_outline_distance(drawn, evidence),
+        edges=edges,
+        shading=_unexplained(normals, part, drawn, evidence),
+        edge_px=count,
+    )
+
+
+def _outline_distance(drawn: np.ndarray, evidence: Evidence) -> float:
+    """Return the mean distance from each outline to the other, cut at the reach, over the object's longer side."""
+    inside = evidence.mask.astype(np.uint8)
+    cross = np.ones((3, 3), np.uint8)
+    here, there = drawn - cv2.erode(drawn, cross), inside - cv2.erode(inside, cross)
+    if not here.any():
+        return 1.0
+    away_here, away_there = (cv2.distanceTransform(1 - rim, cv2.DIST_L2, 3) for rim in (here, there))
+    limit = REACH * SIDE_PX
+    mean = np.minimum(away_there[here > 0], limit).mean() + np.minimum(away_here[there > 0], limit).mean()
+    return float(mean / 2 / (BOX_SHARE * SIDE_PX))
+
+
+def _edges(normals: np.ndarray, part: np.ndarray, drawn: np.ndarray, evidence: Evidence) -> tuple[float, int]:
+    """Return the share of inner edges without one in the photo, and the number of their pixels."""
+    inner = (cv2.erode(drawn, np.ones((5, 5), np.uint8)) > 0) & evidence.inner
+    edge = np.zeros(drawn.shape, bool)
+    for axis in (0, 1):
+        here, there = (slice(None, -1), slice(None)), (slice(1, None), slice(None))
+        if axis == 1:
+            here, there = here[::-1], there[::-1]
+        crease = (normals[here] * normals[there]).sum(axis=-1) < _CREASE_COSINE
+        edge[here] |= crease | (part[here] != part[there])
+    edge &= inner
+    count = int(edge.sum())
+    missing = float(1 - evidence.edge[edge].mean()) if count else 1.0
+    # few pixels say little: they count with as many that would say nothing either way
+    return (count * missing + _LEAST_EDGE_PX * 0.7) / (count + _LEAST_EDGE_PX), count
+
+
+def _unexplained(normals: np.ndarray, part: np.ndarray, drawn: np.ndarray, evidence: Evidence) -> float:
+    """Return the share of the colours' variance that is left by a linear model of the normals for each part."""
+    both = ((drawn > 0) & evidence.inner)[::2, ::2]
+    colours = evidence.lab[::2, ::2][both].astype(np.float64) * (_LIGHTNESS_SHARE, 1.0, 1.0)
+    if len(colours) < 30:
+        return 1.0
+    colours -= np.median(colours, axis=0)
+    parts, shading = part[::2, ::2][both], normals[::2, ::2][both].astype(np.float64)
+    left = 0.0
+    for one in np.unique(parts):
+        own = parts == one
+        some, count = colours[own], int(own.sum())
+        features = np.column_stack([np.ones(count), shading[own], shading[own, 0] ** 2, shading[own, 1] ** 2])
+        gram = features.T @ features + _RIDGE * np.diag([0.0, 1, 1, 1, 1, 1]) + 1e-6 * np.eye(6)
+        fitted = features @ np.linalg.solve(gram, features.T @ some)
+        left += float(np.abs(some - fitted).sum())
+    # differences count, not their squares: a label's print is no reason to turn the object
+    return min(1.0, left / max(float(np.abs(colours).sum()), 2.0 * len(colours)))

@@ -1,0 +1,255 @@
+"""The texture of a fitted template: the photo where it shows the surface, and quiet colours where it does not.
+
+Unseen places take what the photo shows of their own part: the ring of the same height where the part is turned about Z, else
+the nearest places that are seen. A median over many of them keeps the ground and drops letters, which a copy would mirror.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import trimesh
+from manifold3d import Manifold, Mesh
+from scipy.spatial import cKDTree
+
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.solids.parts import PartedMesh
+from manitwin.models.generators.bleeding import bled
+from manitwin.models.generators.templates.fitting.view import View, normalised
+
+TEXTURE_PX = 1024
+_CELL_PX = 48
+_LONGEST_EDGE = 0.05  # of the half diagonal: no face is larger than what one decides about
+_GRAZING_COSINE = 0.17  # beyond 80 degrees the photo shows streaks
+_NEARBY = 0.022  # of the half diagonal: what has something else before it as near as this may show that instead
+_BEFORE = 0.05
+_NEAREST = 48
+_LEAST_SEEN = 6
+_BORDER = 0.1
+_ROUND_SPREAD = 0.03
+_MARGIN = 0.05
+
+
+@dataclass(frozen=True)
+class Textured:
+    """A refined solid ``vertices (V, 3)`` m, ``faces (F, 3)``, ``uv (F, 3, 2)`` (v upward) into ``texture (H, W, 3) uint8``.
+
+    ``seen (F,)`` is where the photo shows it."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray
+    texture: np.ndarray
+    seen: np.ndarray
+
+    def mesh(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return vertices ``(N, 3)``, faces ``(F, 3)`` and uv ``(N, 2)`` with a vertex for each place in the texture."""
+        corners = np.column_stack([self.faces.reshape(-1, 1), np.round(self.uv.reshape(-1, 2) * 65536)])
+        _, first, index = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+        return self.vertices[self.faces.ravel()[first]], index.reshape(-1, 3), self.uv.reshape(-1, 2)[first]
+
+    @property
+    def unseen_share(self) -> float:
+        """How much of the area the photo does not show."""
+        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
+        areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        return float(areas[~self.seen].sum() / areas.sum())
+
+
+def textured(
+    mesh: PartedMesh,
+    view: View,
+    rgba: np.ndarray,
+    center_px: tuple[float, float],
+    box_px: float,
+    colours: Mapping[str, tuple[float, float, float]],
+) -> Textured:
+    """Texture a solid seen from ``view`` in a photo ``rgba (H, W, 4) uint8``; ``colours`` (sRGB, 0..1) are those of parts
+    that the photo shows nothing of.
+    """
+    fine = refined(mesh)
+    points, center, half = normalised(fine.vertices)
+    seen = _seen(points, fine, view)
+    photo, origin, scale = _crop(rgba)
+    flat, _ = view.project(points)
+    pixels = (flat * box_px + np.array(center_px) - origin + 0.5) * scale - 0.5
+    tones = _unseen_colours(points + center / half, fine, seen, _sampled(photo, pixels), colours)
+    cells, cell_uv = _charts(points, fine, ~seen, tones)
+    texture, uv = _laid_out(photo, pixels, cells, cell_uv, fine.faces, seen)
+    return Textured(fine.vertices, fine.faces, uv, texture, seen)
+
+
+def refined(mesh: PartedMesh) -> PartedMesh:
+    """Return the same solid with no long edges."""
+    half = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0))) / 2
+    solid = Manifold(
+        Mesh(
+            vert_properties=np.ascontiguousarray(mesh.vertices / half, np.float32),
+            tri_verts=np.ascontiguousarray(mesh.faces, np.uint32),
+            face_id=np.ascontiguousarray(mesh.part, np.uint32),
+        )
+    )
+    out = solid.refine_to_length(_LONGEST_EDGE).to_mesh()
+    return PartedMesh(
+        np.asarray(out.vert_properties, float)[:, :3] * half,
+        np.asarray(out.tri_verts, np.int64),
+        np.asarray(out.face_id, np.int64),
+        mesh.names,
+    )
+
+
+def _seen(points: np.ndarray, mesh: PartedMesh, view: View) -> np.ndarray:
+    """Return which faces ``(F,)`` the camera sees well and whole."""
+    solid = trimesh.Trimesh(points, mesh.faces, process=False)
+    caster, eye = RayCaster(solid), view.camera_position
+    corners = points[mesh.faces]
+    centers = corners.mean(axis=1)
+    normals = np.asarray(solid.face_normals)
+    toward = eye - centers
+    cosine = (normals * toward).sum(axis=1) / np.linalg.norm(toward, axis=1)
+    right, up = view.object_to_camera[0], view.object_to_camera[1]
+    aside = [_NEARBY * (x * right + y * up) for x, y in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+    targets = [centers, *(0.3 * centers + 0.7 * corners[:, corner] for corner in range(3))]
+    free = cosine > _GRAZING_COSINE
+    some = np.nonzero(free)[0]
+    for target, slack in [*((t, 0.012) for t in targets), *((centers + step, _BEFORE) for step in aside)]:
+        ray = target[some] - eye
+        length = np.linalg.norm(ray, axis=1)
+        distance, _ = caster.first_hits(np.broadcast_to(eye, ray.shape), ray / length[:, None])
+        free[some] &= ~(distance < length - slack)
+    return free
+
+
+def _crop(rgba: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the object's colours without those of the background, the crop's corner in the photo (x, y), and its scale."""
+    solid = rgba[..., 3] > 127
+    rows, columns = np.nonzero(solid.any(axis=1))[0], np.nonzero(solid.any(axis=0))[0]
+    margin = int(np.ceil(_MARGIN * max(np.ptp(rows), np.ptp(columns)))) + 2
+    top, left = max(0, rows[0] - margin), max(0, columns[0] - margin)
+    box = rgba[top : rows[-1] + margin + 1, left : columns[-1] + margin + 1]
+    scale = min(1.0, TEXTURE_PX / max(box.shape[:2]))
+    if scale < 1:
+        size = (round(box.shape[1] * scale), round(box.shape[0] * scale))
+        box = cv2.resize(box, size, interpolation=cv2.INTER_AREA)
+    return bled(np.ascontiguousarray(box[..., :3]), box[..., 3] > 200), np.array([left, top]), scale
+
+
+def _sampled(photo: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """Return the photo's smoothed colours ``(V, 3)`` at places ``(V, 2)``."""
+    soft = cv2.GaussianBlur(photo, (0, 0), max(1.0, 0.006 * max(photo.shape))).astype(np.float32)
+    at = pixels.astype(np.float32)
+    return np.asarray(cv2.remap(soft, at[:, :1], at[:, 1:], cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)[:, 0])
+
+
+def _unseen_colours(
+    points: np.ndarray,
+    mesh: PartedMesh,
+    seen: np.ndarray,
+    shown: np.ndarray,
+    colours: Mapping[str, tuple[float, float, float]],
+) -> np.ndarray:
+    """Return a colour ``(F, 3)`` for each face, from those that the photo shows of its part."""
+    centers = points[mesh.faces].mean(axis=1)
+    of_face = shown[mesh.faces].mean(axis=1)
+    tones = np.zeros((len(centers), 3))
+    shown_as: dict[tuple[float, float, float], np.ndarray] = {}  # what is seen of a part speaks for others of its look
+    for name in mesh.names:
+        known = (mesh.part == mesh.names.index(name)) & seen
+        if known.sum() >= _LEAST_SEEN and colours[name] not in shown_as:
+            shown_as[colours[name]] = np.median(of_face[known], axis=0)
+    for number, name in enumerate(mesh.names):
+        own = mesh.part == number
+        known = own & seen
+        if not own.any():
+            continue
+        if known.sum() < _LEAST_SEEN:
+            tones[own] = shown_as.get(colours[name], 255 * np.array(colours[name]))
+            continue
+        some, there = of_face[known], centers[known]
+        places = _across(centers[own]) if _is_turned(centers[own]) else centers[own]
+        count = min(len(some), max(_NEAREST, len(some) // 8))
+        _, near = cKDTree(places[seen[own]]).query(places, k=count)
+        quiet = np.median(some[near.reshape(len(places), -1)], axis=1)
+        # at the border of what is seen the colours go over into each other
+        distance, close = cKDTree(there).query(centers[own], k=6)
+        share = np.exp(-((distance[:, 0] / _BORDER) ** 2))[:, None]
+        tones[own] = share * some[close].mean(axis=1) + (1 - share) * quiet
+    return tones
+
+
+def _is_turned(centers: np.ndarray) -> bool:
+    """Tell whether the faces' centres of a part lie on rings about Z: hardly any radius differs at its height."""
+    radius, height = np.hypot(centers[:, 0], centers[:, 1]), centers[:, 2]
+    if radius.max() < 1e-6 or len(centers) < 24:
+        return False
+    angle = np.arctan2(centers[:, 1], centers[:, 0])
+    if len(np.unique(np.floor(angle / (np.pi / 4)))) < 8:
+        return False
+    order = np.lexsort((radius, np.round(height, 2)))
+    groups = np.split(radius[order], np.nonzero(np.diff(np.round(height, 2)[order]))[0] + 1)
+    return float(np.median([np.ptp(group) for group in groups])) < _ROUND_SPREAD
+
+
+def _across(centers: np.ndarray) -> np.ndarray:
+    """Return radius and height ``(N, 2)``: what is on one ring is one place."""
+    return np.column_stack([np.hypot(centers[:, 0], centers[:, 1]), centers[:, 2]])
+
+
+def _charts(
+    points: np.ndarray, mesh: PartedMesh, wanted: np.ndarray, tones: np.ndarray
+) -> tuple[list[np.ndarray], dict[int, tuple[int, np.ndarray]]]:
+    """Return small pictures of the colours of the wanted faces, and for each face its picture and corners ``(3, 2)`` in it.
+
+    A chart holds the faces of a part that look along one axis, projected along it: their colours are quiet, so that faces
+    behind each other may share a place.
+    """
+    normals = np.cross(
+        points[mesh.faces[:, 1]] - points[mesh.faces[:, 0]], points[mesh.faces[:, 2]] - points[mesh.faces[:, 0]]
+    )
+    axis = np.abs(normals).argmax(axis=1)
+    side = 2 * axis + (normals[np.arange(len(axis)), axis] < 0)
+    cells: list[np.ndarray] = []
+    places: dict[int, tuple[int, np.ndarray]] = {}
+    grid = np.stack(np.meshgrid(np.arange(_CELL_PX), np.arange(_CELL_PX)), -1).reshape(-1, 2)
+    for part in range(len(mesh.names)):
+        for direction in range(6):
+            chosen = np.nonzero(wanted & (mesh.part == part) & (side == direction))[0]
+            if not len(chosen):
+                continue
+            flat = points[mesh.faces[chosen]][..., [k for k in range(3) if k != direction // 2]]
+            low, high = flat.min(axis=(0, 1)), flat.max(axis=(0, 1))
+            inside = 1.5 + (flat - low) / np.maximum(high - low, 1e-9) * (_CELL_PX - 4)
+            tree = cKDTree(inside.mean(axis=1))
+            distance, near = tree.query(grid, k=min(4, len(chosen)))
+            near, weight = near.reshape(len(grid), -1), 1 / (distance.reshape(len(grid), -1) + 0.7)
+            colour = (tones[chosen][near] * weight[..., None]).sum(axis=1) / weight.sum(axis=1, keepdims=True)
+            cells.append(colour.reshape(_CELL_PX, _CELL_PX, 3))
+            places |= {int(face): (len(cells) - 1, inside[k]) for k, face in enumerate(chosen)}
+    return cells, places
+
+
+def _laid_out(
+    photo: np.ndarray,
+    pixels: np.ndarray,
+    cells: list[np.ndarray],
+    places: dict[int, tuple[int, np.ndarray]],
+    faces: np.ndarray,
+    seen: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Put the photo and the cells beside each other; return the picture and the corners' coordinates in it ``(F, 3, 2)``."""
+    rows = max(1, photo.shape[0] // _CELL_PX)
+    columns = -(-len(cells) // rows)
+    height, width = max(photo.shape[0], _CELL_PX), photo.shape[1] + columns * _CELL_PX
+    picture = np.zeros((height, width, 3), np.uint8)
+    picture[: photo.shape[0], : photo.shape[1]] = photo
+    corners = np.array([(photo.shape[1] + (k // rows) * _CELL_PX, (k % rows) * _CELL_PX) for k in range(len(cells))])
+    for cell, (x, y) in zip(cells, corners, strict=True):
+        picture[y : y + _CELL_PX, x : x + _CELL_PX] = np.clip(cell + 0.5, 0, 255)
+    at = pixels[faces]
+    for face, (cell_number, inside) in places.items():
+        at[face] = inside + corners[cell_number]
+    uv = (at + 0.5) / (width, height)
+    return picture, np.stack([uv[..., 0], 1 - uv[..., 1]], axis=-1)

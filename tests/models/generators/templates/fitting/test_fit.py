@@ -1,0 +1,152 @@
+"""Templates fitted to pictures that are drawn of templates with other measures, seen from known views."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import trimesh
+
+from manitwin.errors import Rejected
+from manitwin.formats.glb import read_glb
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.models.generators.lift import LiftGenerator
+from manitwin.models.generators.protocol import GenerationRequest
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.fitting.drawing import edges_between, seen_faces, silhouette, to_pixels
+from manitwin.models.generators.templates.fitting.fit import LEAST_CONFIDENCE, fit, template_for
+from manitwin.models.generators.templates.fitting.generated import texture_of
+from manitwin.models.generators.templates.fitting.view import View, boxed, normalised
+
+SIDE_PX = 480
+LETTERS = (250, 40, 40)
+
+
+def photo_of(category: str, view: View, measures: dict[str, float], *, letters: bool = False) -> np.ndarray:
+    """Draw a template, lit from the upper left, on transparent magenta ``(H, W, 4)``; letters on its front are red bars."""
+    template = load_templates()[category]
+    mesh = template.build(**template.typical() | measures).assembly.mesh()
+    points, _, _ = normalised(mesh.vertices)
+    scale, x, y = boxed(view.project(points)[0])
+    flat, distance = View(**vars(view) | {"scale": scale, "x": x, "y": y}).project(points)
+    face = seen_faces(to_pixels(flat, SIDE_PX, 0.7), distance, mesh.faces, SIDE_PX)
+    solid = trimesh.Trimesh(points, mesh.faces, process=False)
+    normals = solid.face_normals @ view.object_to_camera.T
+    light = 0.45 + 0.5 * np.clip(normals @ np.array([-0.4, 0.6, 0.69]), 0, 1)
+    rgba = np.zeros((SIDE_PX, SIDE_PX, 4), np.uint8)
+    rgba[...] = (255, 0, 255, 0)
+    shown = face >= 0
+    tone = np.array([[210, 190, 90], [90, 140, 200], [120, 180, 120], [200, 200, 200]])[mesh.part % 4]
+    rgba[shown, :3] = (tone * light[:, None])[face[shown]]
+    rgba[shown, 3] = 255
+    if letters:
+        row, column = (int(places.mean()) for places in np.nonzero(shown))
+        for k in range(-2, 3):
+            top = row + 12 * k
+            cv2.rectangle(rgba, (column - 30, top), (column + 30, top + 4), (*LETTERS, 255), -1)
+        rgba[~shown] = (255, 0, 255, 0)
+    return rgba
+
+
+def test_silhouette_is_that_of_every_layer_together() -> None:
+    mesh = load_templates()["mug"].build(**load_templates()["mug"].typical()).assembly.mesh()
+    points, _, _ = normalised(mesh.vertices)
+    flat, distance = View(0.7, 0.5, 0.1, 0.2, scale=0.5).project(points)
+    pixels = to_pixels(flat, 200, 0.8)
+    drawn = silhouette(pixels, mesh.faces, edges_between(mesh.faces), 200)
+    painted = seen_faces(pixels, distance, mesh.faces, 200) >= 0  # fills each pixel that a face touches
+    assert 0 <= painted.sum() - drawn.sum() < 0.6 * cv2.arcLength(_outer(painted), True)
+    assert not (drawn > painted).any()
+
+
+def _outer(mask: np.ndarray) -> np.ndarray:
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_LIST, cv2.CHAIN_APPROX_NONE)
+    return np.asarray(np.concatenate(contours))
+
+
+def test_mug_seen_from_above_gets_its_proportions_hollow_and_handle() -> None:
+    measures = {"width": 0.96, "taper": 0.9, "handle": 0.37}
+    rgba = photo_of("mug", View(0.6, np.radians(35), 0.03, 0.22), measures)
+    fitted = fit("mug", rgba)
+    assert fitted is not None and fitted.confidence > 0.9
+    assert np.degrees(fitted.view.elevation_rad) == pytest.approx(35, abs=4)
+    assert fitted.made.measures["width"] == pytest.approx(0.96, rel=0.04)
+    assert fitted.made.measures["handle"] == pytest.approx(0.37, rel=0.08)
+    solid = trimesh.Trimesh(fitted.made.mesh.vertices, fitted.made.mesh.faces)
+    assert solid.volume < 0.35 * solid.convex_hull.volume
+    assert {"handle", "inside", "rim"} <= set(fitted.made.mesh.names)
+
+
+def test_box_seen_at_a_corner_gets_its_three_sides() -> None:
+    rgba = photo_of("box", View(0.6, np.radians(30), 0.0, 0.25), {"width": 0.9, "depth": 0.5})
+    fitted = fit("box", rgba)
+    assert fitted is not None and fitted.confidence > 0.9
+    sides = np.sort(np.ptp(fitted.made.mesh.vertices, axis=0))
+    assert sides[:2] / sides[2] == pytest.approx([0.5, 0.9], rel=0.06)
+
+
+def test_bottle_that_leans_in_the_photo_stands_on_its_base() -> None:
+    rgba = photo_of("bottle", View(0.0, np.radians(10), np.radians(50), 0.15), {"width": 0.33})
+    fitted = fit("bottle", rgba)
+    assert fitted is not None and fitted.confidence > 0.9 and not fitted.upright
+    low, high = fitted.made.mesh.vertices.min(axis=0), fitted.made.mesh.vertices.max(axis=0)
+    assert low[2] == pytest.approx(0, abs=1e-6)
+    assert (high - low)[0] / (high - low)[2] == pytest.approx(0.33, rel=0.06)
+
+
+@pytest.mark.parametrize(("shown", "said"), [("spoon", "mug"), ("bottle", "bowl")])
+def test_photo_of_another_thing_is_no_confident_fit(shown: str, said: str) -> None:
+    fitted = fit(said, photo_of(shown, View(0.4, np.radians(30), 0.0, 0.2), {}))
+    assert fitted is not None and fitted.confidence < 0.5 * LEAST_CONFIDENCE
+
+
+def test_wrong_name_of_a_container_is_rejected_with_what_was_measured() -> None:
+    rgba = photo_of("fork", View(0.4, np.radians(60), 0.0, 0.2), {})
+    with pytest.raises(Rejected, match=r"no mug that the template makes has this outline: overlap 0\.\d\d") as caught:
+        LiftGenerator().submit(GenerationRequest(rgba, None, "coffee mug", seed=0))
+    assert caught.value.reason == "generator_failed" and caught.value.stage == "generate"
+
+
+def test_names_of_templates_and_of_priors_find_a_template() -> None:
+    for name, category in (("Coffee_mug", "mug"), ("soda can", "drink can"), ("pliers", "pliers")):
+        template = template_for(name)
+        assert template is not None and template.category == category
+    assert template_for(None) is None and template_for("unicorn") is None
+
+
+def test_texture_has_neither_background_nor_mirrored_letters() -> None:
+    rgba = photo_of("can", View(0.0, np.radians(12), 0.0, 0.15), {"width": 0.7}, letters=True)
+    fitted = fit("can", rgba)
+    assert fitted is not None
+    surface = texture_of(fitted, rgba)
+    height, width = surface.texture.shape[:2]
+    middle = surface.uv.mean(axis=1)
+    at = np.column_stack([(1 - middle[:, 1]) * height, middle[:, 0] * width]).astype(int)
+    colours = surface.texture[at[:, 0], at[:, 1]].astype(int)
+    assert not (np.abs(colours - [255, 0, 255]).sum(axis=1) < 150).any()
+    red = np.abs(colours - LETTERS).sum(axis=1) < 120
+    assert red[surface.seen].any() and not red[~surface.seen].any()
+    assert 0.4 < surface.unseen_share < 0.9
+
+
+def test_generator_gives_a_closed_solid_and_the_points_that_it_knows(tmp_path: Path) -> None:
+    rgba = photo_of("mug", View(0.6, np.radians(25), 0.0, 0.2), {})
+    files = []
+    for _ in range(2):
+        generator = LiftGenerator()
+        made = generator.fetch(generator.submit(GenerationRequest(rgba, None, "coffee mug", seed=0)), tmp_path)
+        files.append(made.path.read_bytes())
+    assert files[0] == files[1]
+    assert made.notes["primitive"] == "template:mug" and made.notes["source"] == "template fitted to the photo"
+    assert made.rests and not made.metric and made.known is not None and made.known.mass_kg is None
+    assert made.known.source == "template:mug, fitted to the photo"
+    (part,) = read_glb(made.path)
+    solid = trimesh.Trimesh(part.vertices, part.faces, process=True, merge_tex=True, merge_norm=True)
+    assert solid.is_watertight and solid.volume > 0
+    handle = next(point for point in made.known.functional_points if point.label == "handle")
+    away, _ = RayCaster(solid).first_hits(
+        np.array([handle.position_m]) + 0.05 * np.array([handle.normal]), -np.array([handle.normal])
+    )
+    assert away[0] == pytest.approx(0.05, abs=0.002)
