@@ -28,6 +28,7 @@ from manitwin.models.generators.templates.fitting.fit import (
     LEAST_IOU,
     MOST_OUTLINE,
     fit,
+    kinds_of,
     template_for,
 )
 from manitwin.models.generators.templates.fitting.generated import (
@@ -132,7 +133,7 @@ class LiftGenerator:
 def _from_photo(rgba: np.ndarray, name: str | None) -> _Job:
     """Return the template that the name means where its fit explains the photo, else the photo lifted."""
     template = template_for(name)
-    fitted = None if template is None else fit(template.category, rgba)
+    fitted = None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category))
     if fitted is not None and fitted.confidence >= LEAST_CONFIDENCE:
         surface = texture_of(fitted, rgba)
         known = known_of_fitted(fitted, name or fitted.category)

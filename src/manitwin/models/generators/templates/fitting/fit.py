@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from manitwin.geometry.solids.shapes import SolidError
-from manitwin.models.annotators.priors import lookup, named
+from manitwin.models.annotators.priors import Prior, lookup, named
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.evidence import evidence_of
 from manitwin.models.generators.templates.fitting.residual import Residual
@@ -19,9 +19,10 @@ from manitwin.models.generators.templates.looks import Look, look_of
 from manitwin.models.generators.templates.made import Made, dressed
 from manitwin.models.generators.templates.template import Template
 
+_MOST_KINDS, _SIZE_MARGIN = 6, 1.5
 LEAST_CONFIDENCE = 0.5
-LEAST_IOU, MOST_OUTLINE = 0.91, 0.0085
-"""Where a fit is as likely that of another kind of thing: measured on rendered photos under right and wrong names."""
+LEAST_IOU, MOST_OUTLINE = 0.80, 0.0085
+"""95 of 100 rendered photos under the right name are within both, 12 of 100 under a wrong one; half of them bent by 8 %."""
 
 
 @dataclass(frozen=True)
@@ -56,44 +57,62 @@ def template_for(name: str | None) -> Template | None:
     return None if prior is None else templates.get(prior.category)
 
 
+def kinds_of(category: str) -> list[str]:
+    """Return the categories that people may mean by a category's name: a can may be a drink can, a water bottle a bottle.
+
+    They share its last word and are about as large: nobody calls a watering can a can.
+    """
+    templates, last = load_templates(), category.split()[-1]
+    said = lookup(category)
+    kinds = [other for other in templates if other != category and other.split()[-1] == last]
+    if category != last:
+        kinds = [other for other in kinds if other == last]
+    return [other for other in kinds if said is not None and _about_as_large(lookup(other), said)][:_MOST_KINDS]
+
+
+def _about_as_large(one: Prior | None, other: Prior) -> bool:
+    low, high = other.longest_axis_m.low / _SIZE_MARGIN, other.longest_axis_m.high * _SIZE_MARGIN
+    return one is not None and low <= one.longest_axis_m.typical <= high
+
+
 def fit(
     category: str,
     rgba: np.ndarray,
     initial_measures: Mapping[str, float] | None = None,
     *,
+    or_of: Sequence[str] = (),
     focal_mm: float | None = None,
 ) -> Fitted | None:
     """Fit the template of a category to ``rgba (H, W, 4) uint8``, whose alpha is the object's mask.
 
-    ``initial_measures`` are expected in place of the usual ones, ``focal_mm`` is the lens as 35 mm equivalent where it is known.
-    None where no measures near the expected ones give a solid. Raises KeyError for a category without a template.
+    ``initial_measures`` are expected in place of the usual ones. ``or_of`` are other categories, taken where they explain the
+    photo clearly better. ``focal_mm`` is the lens as 35 mm equivalent where it is known. None where no measures near the expected
+    ones give a solid. Raises KeyError for a category without a template.
     """
-    template = load_templates()[category]
+    templates = load_templates()
     evidence = evidence_of(rgba, focal_mm)
-    family = Family(template, initial_measures)
-    found = search(family, evidence)
-    if not found:
-        return None
-    best = found[0]
-    try:
-        made = _made(template, family.measures(best.spreads))
-    except SolidError:
-        return None
-    return Fitted(
-        category=category,
-        made=made,
-        view=best.view,
-        residual=best.residual,
-        upright=best.upright,
-        confidence=confidence_of(best.residual),
-        center_px=evidence.center_px,
-        box_px=evidence.box_px,
-    )
+    families = [Family(templates[category], initial_measures), *(Family(templates[other]) for other in or_of)]
+    for best in search(families, evidence):
+        try:
+            made = _made(best.family.template, best.family.measures(best.spreads))
+        except SolidError:
+            continue
+        return Fitted(
+            category=best.family.template.category,
+            made=made,
+            view=best.view,
+            residual=best.residual,
+            upright=best.upright,
+            confidence=confidence_of(best.residual),
+            center_px=evidence.center_px,
+            box_px=evidence.box_px,
+        )
+    return None
 
 
 def confidence_of(residual: Residual) -> float:
     """Return how likely a fit is that of the right kind of thing: the worse of overlap and of the outlines' distance."""
-    score = min((residual.iou - LEAST_IOU) / 0.02, (MOST_OUTLINE - residual.outline) / 0.0015)
+    score = min((residual.iou - LEAST_IOU) / 0.03, (MOST_OUTLINE - residual.outline) / 0.0015)
     return float(1 / (1 + np.exp(-score)))
 
 

@@ -21,6 +21,8 @@ from manitwin.models.generators.templates.fitting.view import View
 
 _CREASE_COSINE = 0.82  # neighbouring pixels whose normals differ by more than 35 degrees have an edge between them
 _LEAST_EDGE_PX = 12
+_LEAST_SEEN_PX = 4
+_INWARD = frozenset({"inside", "base", "underside", "foot", "holes"})  # hidden as a rule
 _RIDGE = 2.0
 _LIGHTNESS_SHARE = 0.7
 
@@ -29,19 +31,21 @@ _LIGHTNESS_SHARE = 0.7
 class Residual:
     """How a solid and a photo disagree: 1 - ``iou`` and ``outline`` (mean distance of both outlines over the object's longer
     side) of the silhouettes; ``edges`` the share of the solid's inner edges where the photo has none; ``shading`` the share of
-    the colours' variance that normals and parts do not explain. ``edge_px`` is how many inner edge pixels were looked at.
+    the colours' variance that normals and parts do not explain. ``hidden`` is the share of the surface in parts of
+    which nothing is seen: what has no trace in the photo is less likely there. ``edge_px`` counts inner edge pixels.
     """
 
     iou: float
     outline: float
     edges: float
     shading: float
+    hidden: float
     edge_px: int
 
     @property
     def cost(self) -> float:
         """The weighted sum by which fits are compared."""
-        return (1 - self.iou) + 6.0 * self.outline + 0.10 * self.edges + 0.15 * self.shading
+        return (1 - self.iou) + 6.0 * self.outline + 0.10 * self.edges + 0.15 * self.shading + 0.15 * self.hidden
 
 
 def outline_difference(solid: CoarseSolid, view: View, evidence: Evidence) -> np.ndarray:
@@ -71,8 +75,15 @@ def residual(solid: CoarseSolid, view: View, evidence: Evidence) -> Residual:
         outline=_outline_distance(drawn, evidence),
         edges=edges,
         shading=_unexplained(normals, part, drawn, evidence),
+        hidden=_hidden(solid, part),
         edge_px=count,
     )
+
+
+def _hidden(solid: CoarseSolid, part: np.ndarray) -> float:
+    seen = np.bincount(part[part >= 0], minlength=len(solid.names)) >= _LEAST_SEEN_PX
+    inward = np.array([name in _INWARD for name in solid.names])
+    return float(solid.areas[~(seen | inward)[solid.part]].sum() / solid.areas.sum())
 
 
 def _outline_distance(drawn: np.ndarray, evidence: Evidence) -> float:

@@ -6,6 +6,7 @@ the measures' intervals, the upright camera and the usual lens as weak priors; i
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import cv2
@@ -25,8 +26,11 @@ from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE,
 ELEVATIONS_DEG = (4.0, 20.0, 36.0, 54.0, 78.0)
 YAWS = 12
 _ROUND_IOU = 0.985
-_TILTED_COST = 0.03  # of IoU: most things are photographed as they rest
-_STARTS, _REFINED = 7, 3
+_TILTED_COST = 0.04  # of IoU: most things are photographed as they rest
+_STARTS, _STARTS_OF_OTHERS = 7, 3
+_REFINED, _RIVALS = 2, 2
+_OTHER_KIND_COST = 0.02
+_USUAL_ELEVATION_DEG, _STEEP_COST = 30.0, 0.0005  # a degree more: what stands is seldom seen from above
 _UPRIGHT_ROLL_RAD, _FREE_ROLL_RAD = np.radians(6.0), np.radians(60.0)
 _PRIOR = 0.15  # weight of one standard deviation of a prior, in the outline's residual
 _TRIES = 4
@@ -38,35 +42,75 @@ _POSE_STEPS = (0.06, 0.06, 0.03, 0.3, 0.015, 0.01, 0.01)
 
 @dataclass(frozen=True)
 class Candidate:
-    """Measures by their spreads, a view, and what they leave unexplained; ``upright``: the camera was not rolled."""
+    """Measures of a family by their spreads, a view, and what they leave unexplained; ``upright``: the camera was not rolled."""
 
+    family: Family
     spreads: np.ndarray
     view: View
     upright: bool
     residual: Residual
 
 
-def search(family: Family, evidence: Evidence) -> list[Candidate]:
-    """Return fits of a family to a photo, the best first; empty where the usual measures give no solid."""
-    spreads = np.zeros(len(family.free))
-    solid = family.solid(spreads)
-    if solid is None:
-        return []
-    turns = is_round(solid)
-    starts = grid(solid, evidence, turns)
-    found = []
-    problem = _Problem(family, evidence, turns)
-    for view, upright in starts[:_STARTS]:
-        placed = problem.solve(spreads, view, upright, measures=False, rounds=2)
-        found.append((problem.cost(*placed, upright), placed, upright))
-    found.sort(key=lambda each: each[0])
+def search(families: Sequence[Family], evidence: Evidence) -> list[Candidate]:
+    """Return fits to a photo, the best first; empty where no usual measures give a solid.
+
+    The first family is what the photo is said to show, the others what may be meant: they have to explain it better.
+    """
+    found: list[_Start] = []
+    usual: dict[int, _Start] = {}
+    for number, family in enumerate(families):
+        spreads = np.zeros(len(family.free))
+        solid = family.solid(spreads)
+        if solid is None:
+            continue
+        turns = is_round(solid)
+        problem = _Problem(family, evidence, turns)
+        for start, upright in grid(solid, evidence, turns)[: _STARTS if number == 0 else _STARTS_OF_OTHERS]:
+            _, view = problem.solve(spreads, start, upright, measures=False, rounds=2)
+            cost = residual(solid, view, evidence).cost + _prejudice(family, number, view, upright)
+            found.append(_Start(cost, number, problem, view, upright))
+            if upright and np.degrees(start.elevation_rad) < _USUAL_ELEVATION_DEG:
+                usual.setdefault(number, _Start(cost, number, problem, start, upright))
+    found.sort(key=lambda each: (each.cost, each.number))
     candidates = []
-    for _, (_, view), upright in found[:_REFINED]:
-        at, view = problem.solve(spreads, view, upright, measures=True, rounds=6)
+    for chosen in _refined(found, usual):
+        family, upright = families[chosen.number], chosen.upright
+        at, view = chosen.problem.solve(np.zeros(len(family.free)), chosen.view, upright, measures=True, rounds=6)
         final = family.solid(at)
         if final is not None:
-            candidates.append(Candidate(at, view, upright, residual(final, view, evidence)))
-    return sorted(candidates, key=lambda each: each.residual.cost + (0.0 if each.upright else _TILTED_COST))
+            left = residual(final, view, evidence)
+            cost = left.cost + _prejudice(family, chosen.number, view, upright)
+            candidates.append((cost, Candidate(family, at, view, upright, left)))
+    return [candidate for _, candidate in sorted(candidates, key=lambda each: each[0])]
+
+
+@dataclass(frozen=True)
+class _Start:
+    """A view from which a family, by its number, is fitted with its measures."""
+
+    cost: float
+    number: int
+    problem: _Problem
+    view: View
+    upright: bool
+
+
+def _refined(found: list[_Start], usual: dict[int, _Start]) -> list[_Start]:
+    """Return the starts that get their measures: the best of what is said, the best of each near rival, and the usual view.
+
+    A thing of unusual proportions looks like a usual one from higher up, so the best view is not enough.
+    """
+    said = [start for start in found if start.number == 0][:_REFINED]
+    best = {start.number: start for start in reversed(found) if start.number}
+    rivals = sorted(best.values(), key=lambda start: (start.cost, start.number))[:_RIVALS]
+    return [*said, *rivals, *(usual[number] for number in (0, *(rival.number for rival in rivals)) if number in usual)]
+
+
+def _prejudice(family: Family, number: int, view: View, upright: bool) -> float:
+    """Return what a fit has to explain better for being a rarer view, or another kind than is said."""
+    steep = max(0.0, float(np.degrees(view.elevation_rad)) - _USUAL_ELEVATION_DEG)
+    rare = _STEEP_COST * steep if family.stands and upright else 0.0
+    return rare + (0.0 if upright else _TILTED_COST) + (_OTHER_KIND_COST if number else 0.0)
 
 
 def is_round(solid: CoarseSolid) -> bool:
@@ -198,13 +242,6 @@ class _Problem:
             if float(value @ value) > _ENOUGH * before:
                 break
         return np.concatenate([at[:count], spreads[count:]]), self._decode(at[count:])
-
-    def cost(self, spreads: np.ndarray, view: View, upright: bool) -> float:
-        """Return the cost by which starts are compared."""
-        solid = self._family.solid(spreads)
-        if solid is None:
-            return float("inf")
-        return residual(solid, view, self._evidence).cost + (0.0 if upright else _TILTED_COST)
 
     def _prior(self, spreads: np.ndarray, pose: np.ndarray, upright: bool, middle_roll: float) -> np.ndarray:
         roll = (pose[2] - middle_roll) / (_UPRIGHT_ROLL_RAD if upright else _FREE_ROLL_RAD)

@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from manitwin.geometry.solids.shapes import SolidError, coarser
+from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.templates.fitting.drawing import edges_between
 from manitwin.models.generators.templates.fitting.view import normalised
 from manitwin.models.generators.templates.template import Template
 
 _COARSE = 0.6  # of the chords of a full circle: the outline is off by 0.4 % of a radius
 _SPREADS_IN_INTERVAL = 1.5  # the interval that nearly all things are in reaches so many standard deviations either way
-MOST_SPREADS = 2.2
+MOST_SPREADS = 4.0
 _LEAST_SPREAD = 0.04  # of the usual value
 
 
@@ -39,9 +40,18 @@ class CoarseSolid:
     @property
     def normals(self) -> np.ndarray:
         """The faces' outward unit normals ``(F, 3)``."""
-        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
-        cross = np.cross(b - a, c - a)
+        cross = self._cross
         return np.asarray(cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-15))
+
+    @property
+    def areas(self) -> np.ndarray:
+        """The faces' areas ``(F,)``, in squares of the half diagonal."""
+        return np.asarray(np.linalg.norm(self._cross, axis=1) / 2)
+
+    @property
+    def _cross(self) -> np.ndarray:
+        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
+        return np.cross(b - a, c - a)
 
     def reshaped(self, vertices: np.ndarray) -> CoarseSolid:
         """Return the same faces with other normalised vertices."""
@@ -54,6 +64,8 @@ class Family:
     def __init__(self, template: Template, initial: Mapping[str, float] | None = None):
         """Take the template, and measures that are expected in place of the usual ones."""
         self.template = template
+        prior = lookup(template.category)
+        self.stands = prior is not None and prior.stands is True
         expected = template.typical() | {
             name: value for name, value in (initial or {}).items() if name in template.measures
         }
