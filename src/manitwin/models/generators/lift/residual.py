@@ -72,15 +72,16 @@ def explained(mesh: trimesh.Trimesh, camera: Camera, mask: np.ndarray, rgb: np.n
 def parallel_camera(mask_shape: tuple[int, int], *, elevation_deg: float = 0.0) -> Camera:
     """Return the camera of a parallel projection onto a picture of ``mask_shape`` (H, W), for solids in its pixels.
 
-    The solid has x to the right and y up in the picture, pixel (column, row) at ``(column, -row)``, and z towards the viewer;
-    the camera looks down on it by ``elevation_deg`` about the picture's middle.
+    x runs to the right, y up, z towards the viewer; the camera looks down by ``elevation_deg`` e. The pixel (column, row) shows
+    what has x = column and y cos(e) - z sin(e) = -row.
     """
     height, width = mask_shape
     distance = height / 2 / float(np.tan(TELESCOPE_FOV_RAD / 2))
     angle = np.deg2rad(elevation_deg)
     pose = np.eye(4)
     pose[:3, :3] = [[1, 0, 0], [0, np.cos(angle), np.sin(angle)], [0, -np.sin(angle), np.cos(angle)]]
-    pose[:3, 3] = np.array([(width - 1) / 2, (1 - height) / 2, 0.0]) + distance * pose[:3, 2]
+    middle = np.array([(width - 1) / 2, (1 - height) / 2])
+    pose[:3, 3] = pose[:3, :2] @ middle + distance * pose[:3, 2]
     return Camera(pose, TELESCOPE_FOV_RAD, width, height)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import manifold3d
 import numpy as np
+import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
 _EDGE_ON = 1e-6
@@ -38,6 +39,11 @@ class LiftedSurface:
     def moved(self, matrix: np.ndarray, offset: np.ndarray) -> LiftedSurface:
         """Return the surface under ``x -> matrix @ x + offset``; ``matrix`` must not mirror."""
         return LiftedSurface(self.vertices @ matrix.T + offset, self.faces, self.uv, self.facing)
+
+
+def bare_mesh(surface: LiftedSurface) -> trimesh.Trimesh:
+    """Return the geometry alone."""
+    return trimesh.Trimesh(surface.vertices, surface.faces, process=False)
 
 
 def unseen_share(surface: LiftedSurface) -> float:

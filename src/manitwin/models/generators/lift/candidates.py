@@ -1,0 +1,197 @@
+"""The solids that may explain a photo: a body of revolution with handles, one that lies, a box, an inflated outline."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from manitwin.models.generators.lift.handles import handle_tubes
+from manitwin.models.generators.lift.hint import ShapeHint
+from manitwin.models.generators.lift.inflation import inflate
+from manitwin.models.generators.lift.primitives import DEPTH_SHARE, make_box, profile, revolve, trim_caps
+from manitwin.models.generators.lift.residual import Explained, explained, parallel_camera
+from manitwin.models.generators.lift.revolution import WALL_SHARE, chosen_elevation, half_widths, projected, solid_of
+from manitwin.models.generators.lift.silhouette import Silhouette, turning
+from manitwin.models.generators.lift.surface import (
+    TILTED_TIP_ANGLE_DEG,
+    UPRIGHT_TIP_ANGLE_DEG,
+    LiftedSurface,
+    bare_mesh,
+    laid,
+    laid_round,
+    stood,
+    tip_angle_deg,
+)
+from manitwin.models.generators.lift.texture import Crop
+
+_FLAT_BOX_DEPTH_SHARE = 0.12  # of the shorter side: a book, a tray
+UPRIGHT_TILT_DEG = 20.0  # an axis that leans less stands in the photo
+LEANING_DEG = 3.0  # what leans more is set upright about its own axis, as if seen from the side
+LEAST_BODY_SHARE = 0.55  # of the outline: the body that a round container's handles and spouts stick out of
+LEAST_TURNED_IOU = 0.92
+LYING_TIP_ANGLE_DEG = 5.0
+_RELIEF_RISE = 1.5  # a bar of radius r lies as a relief this many r high: between a half bar and a whole one
+_COMPACT = (
+    1.5  # round things no longer than this are set on their base, whatever else is usual: it is flat, they do not roll
+)
+
+
+@dataclass(frozen=True)
+class View:
+    """What is known of the photo: the crop, its colours at the mask's size, and the outline's measures."""
+
+    crop: Crop
+    photo: np.ndarray
+    silhouette: Silhouette
+
+    def explained(self, surface: LiftedSurface, elevation_deg: float = 0.0) -> Explained:
+        """Compare a solid in the picture's pixels with the photo."""
+        shape = (self.crop.mask.shape[0], self.crop.mask.shape[1])
+        camera = parallel_camera(shape, elevation_deg=elevation_deg)
+        return explained(bare_mesh(surface), camera, self.crop.mask, self.photo)
+
+
+@dataclass(frozen=True)
+class Made:
+    """A solid at rest, how well it explained the photo as it was seen, and notes."""
+
+    surface: LiftedSurface
+    explained: Explained
+    notes: dict[str, Any]
+
+
+def standing_turned(view: View, hint: ShapeHint, *, plain: bool) -> Made | None:
+    """Return a body of revolution that stands in the photo, with its handles; None where that does not explain the outline.
+
+    ``plain``: the outline alone is one that such bodies have.
+    """
+    silhouette, mask = view.silhouette, view.crop.mask
+    round_thing = hint.round or (hint.container and not hint.boxy)
+    if hint.boxy or (hint.flat and not hint.container) or hint.stands is False:
+        return None
+    _, widths, _ = half_widths(mask)
+    body_share = 2 * float(widths.sum()) / float(mask.sum())
+    if body_share < (LEAST_BODY_SHARE if round_thing else 0.97):
+        return None
+    whole = silhouette.holes == 0 and body_share > 0.97
+    if whole and not round_thing and not plain:
+        return None
+    if whole and not hint.container and abs(silhouette.axis_tilt_deg) > LEANING_DEG:
+        return None
+    turned, _ = chosen_elevation(
+        mask, view.photo, hollow=hint.container, handled=hint.container or silhouette.holes > 0
+    )
+    if not hint.container and turned.elevation_deg == 0:
+        least = UPRIGHT_TIP_ANGLE_DEG if hint.stands is None else 0.0
+        if tip_angle_deg(solid_of(turned)) < max(least, 1.0):
+            return None
+    wall_px = WALL_SHARE * float(turned.radii.max()) if hint.container else None
+    tubes = handle_tubes(mask, turned)
+    surface = solid_of(turned, wall_px=wall_px, tubes=tubes)
+    found = view.explained(surface, turned.elevation_deg)
+    if found.silhouette_iou < LEAST_TURNED_IOU:
+        return None
+    notes = {
+        "rests": "standing",
+        "hollow": hint.container,
+        "elevation_deg": round(turned.elevation_deg, 1),
+        "handles": len(tubes),
+    }
+    return Made(
+        projected(surface, (mask.shape[0], mask.shape[1]), turned.elevation_deg, turned.column_px), found, notes
+    )
+
+
+def revolved(view: View, hint: ShapeHint) -> Made:
+    """Return a body of revolution about the outline's mirror axis, however it lies, seen from the side."""
+    silhouette = view.silhouette
+    tilt = silhouette.axis_tilt_deg
+    rows, radii = profile(silhouette)
+    third = len(radii) // 3
+    # a thing that lies in the photo stands on its wider end
+    upside_down = abs(tilt) > 45 and radii[:third].mean() > radii[-third:].mean()
+    rows, radii = trim_caps(rows, radii, base_at_top=upside_down)
+    open_top = hint.container and not upside_down and radii[: max(3, len(radii) // 20)].mean() > 0.6 * radii.max()
+    surface = revolve(silhouette, rows, radii, wall_px=WALL_SHARE * radii.max() if open_top else None)
+    found = view.explained(_in_picture(surface, silhouette))
+    if upside_down:
+        surface = surface.moved(np.diag([-1.0, -1.0, 1.0]), np.zeros(3))
+    least = UPRIGHT_TIP_ANGLE_DEG if abs(tilt) < UPRIGHT_TILT_DEG else TILTED_TIP_ANGLE_DEG
+    stands = hint.stands if hint.stands is not None else tip_angle_deg(surface) >= least
+    if stands or silhouette.elongation < _COMPACT:
+        return Made(surface, found, {"rests": "standing", "hollow": bool(open_top)})
+    leaning = np.radians(tilt + (180 if upside_down else 0))
+    turn = np.array([[np.cos(leaning), np.sin(leaning), 0], [-np.sin(leaning), np.cos(leaning), 0], [0, 0, 1]])
+    lying = laid_round(surface.moved(turn, np.zeros(3)))
+    return Made(lying, found, {"rests": "lying", "hollow": bool(open_top)})
+
+
+def _in_picture(surface: LiftedSurface, silhouette: Silhouette) -> LiftedSurface:
+    """Return a surface about the upright axis as it lies in the picture's pixels."""
+    height, width = silhouette.mask.shape
+    back = np.linalg.inv(np.vstack([turning(height, width, silhouette.axis_tilt_deg), [0, 0, 1]]))
+    upright = np.column_stack(
+        [surface.vertices[:, 0] + silhouette.axis_column_px, -surface.vertices[:, 1], np.ones(len(surface.vertices))]
+    )
+    pixels = upright @ back.T
+    vertices = np.column_stack([pixels[:, 0], -pixels[:, 1], surface.vertices[:, 2]])
+    return LiftedSurface(vertices, surface.faces, surface.uv, surface.facing)
+
+
+def boxed(view: View, hint: ShapeHint) -> Made:
+    """Return a box whose front is the outline's rectangle."""
+    flat = hint.flat or hint.stands is False
+    share = _FLAT_BOX_DEPTH_SHARE if flat else DEPTH_SHARE
+    surface = make_box(view.silhouette, depth_share=share)
+    # a box's own axes are those of its rectangle: it is compared by that
+    found = Explained(view.silhouette.rectangle_iou)
+    if flat:
+        return Made(laid(surface), found, {"rests": "lying", "depth_share": share})
+    return Made(surface, found, {"rests": "standing", "depth_share": share})
+
+
+def inflated(view: View, hint: ShapeHint) -> Made:
+    """Return the inflated outline: rounded on both sides, with a flat base where it stands and a facet where it lies."""
+    silhouette = view.silhouette
+    limit, source = _depth_limit_px(silhouette, hint)
+    notes: dict[str, Any] = {"depth_limit": _share(limit, silhouette), "depth_source": source}
+    sturdy = silhouette.elongation < 2.5 and not (silhouette.holes and silhouette.solidity < 0.6)
+    if hint.stands or (hint.stands is None and sturdy):
+        body = inflate(silhouette.mask, depth_limit_px=limit, rise=1.0, flat_back=False)
+        standing = stood(body, 2.0 if hint.stands else UPRIGHT_TIP_ANGLE_DEG)
+        if standing is not None:
+            return Made(standing, view.explained(body), {"rests": "standing", **notes})
+    rise = 1.0 if source == "prior" else _RELIEF_RISE / 2
+    body = inflate(silhouette.mask, depth_limit_px=limit, rise=rise, flat_back=False)
+    found = view.explained(body)
+    lying = laid_round(body)
+    if tip_angle_deg(lying) < LYING_TIP_ANGLE_DEG:
+        relief = inflate(silhouette.mask, depth_limit_px=limit, rise=_RELIEF_RISE, flat_back=True)
+        return Made(laid(relief), found, {"rests": "lying", **notes})
+    return Made(lying, found, {"rests": "lying", **notes})
+
+
+def _depth_limit_px(silhouette: Silhouette, hint: ShapeHint) -> tuple[float | None, str]:
+    """Return how far a body may rise to each side, and what says so.
+
+    The category's volume, spread over the outline, is its mean thickness: what is flat is as thick everywhere. Without a
+    category, nothing in one outline tells a flat head from a round one: slender things get the mean of both.
+    """
+    typical, largest = silhouette.typical_radius_px, silhouette.largest_radius_px
+    if hint.round and not hint.flat:
+        return None, "round"
+    if hint.volume_share is not None:
+        length = float(max(np.linalg.norm(np.diff(silhouette.corners[:3], axis=0), axis=1)))
+        thickness = hint.volume_share * length**3 / float(silhouette.mask.sum())
+        return float(np.clip(thickness / 2, 0.08 * typical, 1.5 * largest)), "prior"
+    if hint.flat or silhouette.holes:
+        return 1.15 * typical, "outline"
+    if silhouette.elongation > 2.5:
+        return float(np.sqrt(typical * largest)), "outline"
+    return 0.6 * largest, "outline"
+
+
+def _share(limit_px: float | None, silhouette: Silhouette) -> float | None:
+    return None if limit_px is None else round(limit_px / max(silhouette.mask.shape), 4)

@@ -1,0 +1,132 @@
+"""Handles that stick out of a body of revolution: the medial line of what is left of the outline becomes a swept tube.
+
+The handle lies in the plane through the body's axis that faces the camera: one photo says nothing of its turn.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from manifold3d import Manifold
+from scipy import ndimage
+from scipy.ndimage import gaussian_filter1d
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import dijkstra
+
+from manitwin.geometry.solids.shapes import SolidError
+from manitwin.geometry.solids.sweep import tube
+from manitwin.models.generators.lift.revolution import Turned, outline_of
+
+LEAST_AREA_SHARE = 0.012  # of the outline: smaller bits are the outline's unevenness
+LEAST_REACH_SHARE = 0.12  # of the body's largest radius, out of the body
+TOUCH_PX = 3.0
+MOST_HANDLES = 3
+SAMPLES = 28
+_LEAST_RADIUS_PX = 1.5
+
+
+def body_mask(turned: Turned, shape: tuple[int, int]) -> np.ndarray:
+    """Return the picture (H, W) bool of a body of revolution."""
+    widths = outline_of(turned, np.arange(shape[0], dtype=float))
+    return np.asarray(np.abs(np.arange(shape[1])[None] - turned.column_px) <= widths[:, None])
+
+
+def handle_tubes(mask: np.ndarray, turned: Turned) -> list[Manifold]:
+    """Return tubes in the solid's frame (see ``Turned``) for the parts of ``mask`` (H, W) that stick out of the body."""
+    body = body_mask(turned, (mask.shape[0], mask.shape[1]))
+    outside = ndimage.binary_opening(mask & ~ndimage.binary_dilation(body, iterations=2))
+    labels, count = ndimage.label(outside, np.ones((3, 3)))
+    sizes = ndimage.sum_labels(outside, labels, np.arange(1, count + 1)) if count else np.zeros(0)
+    from_body = ndimage.distance_transform_edt(~body)
+    tubes = []
+    for index in np.argsort(sizes)[::-1][:MOST_HANDLES]:
+        part = labels == index + 1
+        reach = float(from_body[part].max())
+        if sizes[index] < LEAST_AREA_SHARE * mask.sum() or reach < LEAST_REACH_SHARE * turned.radii.max():
+            continue
+        found = medial_line(mask & ~body & ndimage.binary_dilation(part, iterations=3), from_body)
+        if found is not None and (made := _swept(*found, turned)) is not None:
+            tubes.append(made)
+    return tubes
+
+
+def medial_line(part: np.ndarray, from_body: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool] | None:
+    """Return the middle line ``(K, 2)`` (x, y) of a part from the body out, its radii ``(K,)``, and whether it comes back.
+
+    ``part (H, W) bool`` touches the body; ``from_body (H, W)`` is the distance to it. None for what touches nowhere.
+    """
+    radius = cv2.distanceTransform(np.pad(part, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    # where it joins the body it does not end
+    touching, count = ndimage.label(part & (from_body <= TOUCH_PX), np.ones((3, 3)))
+    if count == 0:
+        return None
+    sizes = ndimage.sum_labels(part, touching, np.arange(1, count + 1))
+    ends = np.argsort(sizes)[::-1][:2] + 1
+    rows, columns = np.nonzero(part)
+    index = np.full(part.shape, -1)
+    index[rows, columns] = np.arange(len(rows))
+    graph = _graph(index, rows, columns, radius)
+    start = _middle(touching == ends[0], index)
+    distance, before = dijkstra(graph, indices=start, return_predecessors=True)
+    loop = len(ends) == 2 and sizes[ends[1] - 1] > 0.15 * sizes[ends[0] - 1]
+    reachable = np.where(np.isfinite(distance), from_body[rows, columns], -1.0)
+    goal = _middle(touching == ends[1], index) if loop else int(np.argmax(reachable))
+    if not np.isfinite(distance[goal]):
+        return None
+    line = [goal]
+    while line[-1] != start and before[line[-1]] >= 0:
+        line.append(int(before[line[-1]]))
+    order = np.array(line[::-1])
+    if len(order) < 4:
+        return None
+    path = np.column_stack([columns[order], rows[order]]).astype(float)
+    radii = radius[rows[order], columns[order]]
+    # near the body the part widens into it, and its own end is round: the middle is what it is
+    usual = float(np.median(radii[len(radii) // 5 : max(len(radii) // 5 + 1, 4 * len(radii) // 5)]))
+    return path, np.minimum(radii, 1.25 * usual), bool(loop)
+
+
+def _graph(index: np.ndarray, rows: np.ndarray, columns: np.ndarray, radius: np.ndarray) -> coo_matrix:
+    """Return the graph of neighbouring pixels, cheap along the middle."""
+    weight = 1.0 / np.maximum(radius[rows, columns], 0.5) ** 2
+    entries = []
+    padded = np.pad(index, 1, constant_values=-1)
+    for dy, dx in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        other = padded[rows + 1 + dy, columns + 1 + dx]
+        here = np.nonzero(other >= 0)[0]
+        there = other[here]
+        entries.append((here, there, np.hypot(dy, dx) * (weight[here] + weight[there]) / 2))
+    row, column, value = (np.concatenate(each) for each in zip(*entries, strict=True))
+    size = len(rows)
+    return coo_matrix(
+        (np.append(value, value), (np.append(row, column), np.append(column, row))), shape=(size, size)
+    ).tocsr()
+
+
+def _middle(where: np.ndarray, index: np.ndarray) -> int:
+    rows, columns = np.nonzero(where)
+    nearest = np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2)
+    return int(index[rows[nearest], columns[nearest]])
+
+
+def _swept(path: np.ndarray, radii: np.ndarray, loop: bool, turned: Turned) -> Manifold | None:
+    """Return the tube in the solid's frame, its ends within the body."""
+    smooth = gaussian_filter1d(path, max(1.0, len(path) / 40), axis=0, mode="nearest")
+    radii = gaussian_filter1d(radii, max(1.0, len(path) / 20), mode="nearest")
+    x, y = smooth[:, 0], -smooth[:, 1] / np.cos(turned.angle_rad)
+    points = np.column_stack([x, y, np.zeros(len(x))])
+    inward = np.sign(turned.column_px - x[0])
+    # into the wall: a tube that only touches does not join
+    deep = float(np.median(radii)) + TOUCH_PX
+    points = np.vstack(
+        [points[0] + [inward * deep, 0, 0], points, *([points[-1] + [inward * deep, 0, 0]] if loop else [])]
+    )
+    radii = np.concatenate([radii[:1], radii, *([radii[-1:]] if loop else [])])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    wanted = np.linspace(0, along[-1], SAMPLES)
+    points = np.stack([np.interp(wanted, along, points[:, axis]) for axis in range(3)], axis=1)
+    radii = np.maximum(np.interp(wanted, along, radii), _LEAST_RADIUS_PX)
+    try:
+        return tube(points, radii, across=(0.0, 0.0, 1.0))
+    except SolidError:
+        return None
