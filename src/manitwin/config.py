@@ -219,6 +219,13 @@ class MattingConfig(Section):
     second_object_share: float = Field(default=0.12, gt=0, le=1)
 
 
+class NamingConfig(Section):
+    """Naming what nobody has named, from its photo or its views; less likely than ``min_probability``, it stays unknown."""
+
+    enabled: bool = True
+    min_probability: float = Field(default=0.7, gt=0, le=1)
+
+
 class GenerateConfig(Section):
     """Asking a generator: a mesh that is no closed solid, or a job that fails, is asked for again, ``attempts`` times in all.
 
@@ -303,6 +310,7 @@ class BuildConfig(Section):
     second_simulator: str = "mujoco"
     grippers: tuple[str, ...] = Field(default=("panda",), min_length=1)
     matting: MattingConfig = MattingConfig()
+    naming: NamingConfig = NamingConfig()
     generate: GenerateConfig = GenerateConfig()
     vlm: VlmConfig = VlmConfig()
     mesh: MeshConfig = MeshConfig()

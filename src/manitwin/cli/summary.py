@@ -41,6 +41,9 @@ def print_summary(twin: Twin, console: Console) -> None:
 
 def _rows(record: TwinRecord) -> list[tuple[str, str]]:
     rows = [("source", f"{record.source.kind} {record.source.file}, licence {record.source.license}")]
+    if record.naming is not None:
+        guess = record.naming.name or "unknown"
+        rows.append(("named", f"{guess}, probability {estimate_text(record.naming.probability)}"))
     if record.physical is not None:
         physical = record.physical
         centimetres = " x ".join(f"{100 * side:.1f}" for side in physical.extents_m)

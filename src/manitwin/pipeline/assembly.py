@@ -18,14 +18,20 @@ from manitwin.formats.packed_source import pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
-from manitwin.pipeline.quality import rehearsal_checks
+from manitwin.pipeline.quality import (
+    UNKNOWN,
+    likeliest_words,
+    naming_checks,
+    rehearsal_checks,
+    size_checks,
+    unknown_size_words,
+)
 from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
 from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
 from manitwin.twin.wholeness import note_sizes
 
 NAME_HINT = "say what it is with --name (mug, fork, ...) or a column name"
 
-UNKNOWN = "prior:unknown"
 RULES = "rules"
 """The annotator that knows of a thing what its prior says: of a nameless one, the prior of anything."""
 
@@ -54,8 +60,9 @@ def assemble(
     record: dict[str, Any] = {
         "twin_id": draft.item_id,
         "name": object_name(draft),
+        "naming": draft.fields.get("naming"),
         "status": "rejected" if rejected else "accepted",
-        "rejection": _rejection(rejected, rejecting_stage).model_dump() if rejected else None,
+        "rejection": _rejection(rejected, rejecting_stage, draft).model_dump() if rejected else None,
         "source": source,
         "provenance": {
             "manitwin_version": installed_version(),
@@ -89,7 +96,8 @@ def _provenance(stage: Stage, draft: Draft[Item]) -> dict[str, Any]:
 
 def _checks_so_far(draft: Draft[Item]) -> list[dict[str, Any]]:
     """Return the checks of a twin that was rejected; those of an accepted one take their place."""
-    return [*(check.model_dump() for check in rehearsal_checks(draft)), *draft.fields.get("gate", {}).get("checks", [])]
+    made = [*rehearsal_checks(draft), *naming_checks(draft), *size_checks(draft)]
+    return [*(check.model_dump() for check in made), *draft.fields.get("gate", {}).get("checks", [])]
 
 
 def _model(stage: Stage, draft: Draft[Item]) -> str | None:
@@ -117,11 +125,15 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path) -> dict[str, Any]
     }
 
 
-def _rejection(rejected: Rejected, stage: str | None) -> Rejection:
+def _rejection(rejected: Rejected, stage: str | None, draft: Draft[Item]) -> Rejection:
+    """Return the reason with its stage; where it may be the fault of a size that nobody knows, with that."""
     named = rejected.stage or stage or ""
     if rejected.reason not in REJECTION_REASONS.get(named, frozenset()):
         named = next((s for s, reasons in REJECTION_REASONS.items() if rejected.reason in reasons), named)
-    return Rejection(stage=named, reason=rejected.reason, detail=rejected.detail)
+    detail = rejected.detail
+    if rejected.reason in OF_SIZE and size_checks(draft):
+        detail += f", but nobody says how large it is: {unknown_size_words(draft.field('size'))}"
+    return Rejection(stage=named, reason=rejected.reason, detail=detail)
 
 
 def _write_accepted(draft: Draft[Item], folder: Path) -> None:
@@ -157,13 +169,22 @@ def _accepted_sections(draft: Draft[Item]) -> dict[str, Any]:
     }
 
 
+def name_hint(record: TwinRecord) -> str | None:
+    """Return what to tell of a name, with the classifier's guesses; None where a name would change nothing."""
+    if not name_would_help(record):
+        return None
+    if record.naming is None:
+        return NAME_HINT
+    return f"{NAME_HINT}; by its pictures it is {likeliest_words(record.naming.model_dump())}"
+
+
 def name_would_help(record: TwinRecord) -> bool:
-    """Tell whether the result rests on what is true of anything, and a name would put something better in its place.
+    """Tell whether the result rests on what is true of anything, or a classifier says, and a name would be better.
 
     Accepted: size, mass or friction are of ``prior:unknown``. Rejected: where a size or mass of that prior decided, where size
     and mass contradict each other, or where the posture of a lifted photo did, which the name has a say in.
     """
-    if record.name is not None:
+    if record.name is not None and record.naming is None:
         return False
     if record.physical is not None:
         physical = record.physical

@@ -18,7 +18,15 @@ class CaptionStage:
 
     name: ClassVar[str] = "caption"
     version: ClassVar[str] = "1"
-    reads: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "views/", "cameras", "geometry?")
+    reads: ClassVar[tuple[str, ...]] = (
+        "visual.glb",
+        "solid.npz",
+        "physical",
+        "views/",
+        "cameras",
+        "geometry?",
+        "naming?",
+    )
     writes: ClassVar[tuple[str, ...]] = ("language",)
 
     settings = NO_SETTINGS

@@ -32,8 +32,8 @@ class FinishStage:
     name: ClassVar[str] = "finish"
     version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = (
-        "visual.glb", "solid.npz", "hulls.npz", "grasps.parquet", "photo.png?", "matte?", "generation?", "geometry",
-        "gate", "physical", "collision", "language", "points", "grasps", "placements",
+        "visual.glb", "solid.npz", "hulls.npz", "grasps.parquet", "photo.png?", "matte?", "naming?", "generation?", "geometry",
+        "gate", "physical", "size", "collision", "language", "points", "grasps", "placements",
     )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = ("card.png", "quality")
     needs: ClassVar[Resource] = "cpu"
@@ -94,6 +94,8 @@ def card_text(draft: Draft[Item]) -> CardText:
         ("grasps held", f"{grasps['verified']} of {grasps['simulated']}"),
     )
     made_by = f"made by {draft.field('generation')['generator']}" if "generation" in draft.fields else "mesh given"
+    said = (draft.fields.get("naming") or {}).get("name")
+    made_by += f"   named by {draft.field('naming')['probability']['source']}" if said else ""
     footer = f"{draft.item_id}   {made_by}   mass: {mass['source']}   friction: {friction['source']}"
     stamp = "REHEARSAL" if draft.rehearsed else None
     return CardText(language["category"], language["caption"], facts, footer, stamp)

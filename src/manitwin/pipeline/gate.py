@@ -25,7 +25,7 @@ class GateStage:
 
     name: ClassVar[str] = "gate"
     version: ClassVar[str] = "1"
-    reads: ClassVar[tuple[str, ...]] = ("canonical.npz", "canonical.glb", "geometry", "views/", "cameras")
+    reads: ClassVar[tuple[str, ...]] = ("canonical.npz", "canonical.glb", "geometry", "views/", "cameras", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("gate",)
 
     def __init__(self, settings: GateConfig, annotator: Annotator | None = None):

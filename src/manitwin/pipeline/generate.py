@@ -14,6 +14,7 @@ from manitwin.models.generators.generated_mesh import as_glb
 from manitwin.models.generators.protocol import GenerationRequest, Generator
 from manitwin.models.generators.run import run_generator
 from manitwin.pipeline.item import Item
+from manitwin.pipeline.object_state import object_name
 
 
 class GenerateStage:
@@ -21,7 +22,7 @@ class GenerateStage:
 
     name: ClassVar[str] = "generate"
     version: ClassVar[str] = "5"
-    reads: ClassVar[tuple[str, ...]] = ("photo.png?",)
+    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 
     def __init__(self, settings: GenerateConfig, generator: Generator, submit_again: bool = False):
@@ -36,7 +37,7 @@ class GenerateStage:
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Generate; raises Rejected ``generator_failed``, or BackendError where the generator cannot work now."""
         rgba = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
-        request = GenerationRequest(rgba=rgba, text=draft.payload.text, name=draft.payload.name, seed=draft.seed)
+        request = GenerationRequest(rgba=rgba, text=draft.payload.text, name=object_name(draft), seed=draft.seed)
         made = run_generator(
             self.generator, request, folder, settings=self.settings, jobs=draft.jobs, submit_again=self._submit_again
         )

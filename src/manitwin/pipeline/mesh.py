@@ -42,7 +42,7 @@ class MeshStage:
 
     name: ClassVar[str] = "mesh"
     version: ClassVar[str] = "1"
-    reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?")
+    reads: ClassVar[tuple[str, ...]] = (f"{_GENERATED}?", "generation?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry")
     needs: ClassVar[Resource] = "cpu"
     backend: ClassVar[str] = "builtin"

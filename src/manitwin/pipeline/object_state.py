@@ -84,11 +84,16 @@ def read_given(draft: Draft[Item]) -> ImportRecord | None:
 
 
 def object_name(draft: Draft[Item]) -> str | None:
-    """Return what the object is called: by the user, else by the generator that knows what it made; None: nobody says."""
+    """Return what the object is called; None: nobody says.
+
+    The user's word counts first, then that of a generator that knows what it made, then a classifier's.
+    """
     if draft.payload.name is not None:
         return draft.payload.name
     known = _known(draft)
-    return None if known is None else str(known["name"])
+    if known is not None:
+        return str(known["name"])
+    return cast(str | None, (draft.fields.get("naming") or {}).get("name"))
 
 
 def _known(draft: Draft[Item]) -> dict[str, Any] | None:

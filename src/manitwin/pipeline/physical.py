@@ -35,8 +35,8 @@ class PhysicalStage:
 
     name: ClassVar[str] = "physical"
     version: ClassVar[str] = "3"
-    reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras")
-    writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings")
+    reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras", "naming?")
+    writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings", "size")
 
     def __init__(self, settings: PhysicalConfig, annotator: Annotator):
         self.settings = settings
@@ -47,7 +47,9 @@ class PhysicalStage:
         self.expected_usd = annotator.expected_usd("physical")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
-        """Write ``visual.glb`` and ``solid.npz`` in true metres; return ``physical`` and what speaks against it.
+        """Write ``visual.glb`` and ``solid.npz`` in true metres; return ``physical``, what speaks against it, and ``size``.
+
+        ``size`` is the Estimate that gave the scale, of the longest axis in metres; None where the mesh had it.
 
         Raises Rejected where size, mass or density are beyond what a thing of this name has, BadReply where the
         annotator gives neither mass nor density.
@@ -81,7 +83,8 @@ class PhysicalStage:
             inertia_kg_m2=properties.inertia_kg_m2.tolist(),
             mass_distribution="solid" if estimates.wall_thickness_m is None else "shell",
         )
-        return {"physical": physical.model_dump(), "physical_findings": findings_of(estimates)}
+        said = None if metric or estimates.longest_axis_m is None else estimates.longest_axis_m.model_dump()
+        return {"physical": physical.model_dump(), "physical_findings": findings_of(estimates), "size": said}
 
     def _check_size(self, name: str | None, longest_m: float, said: Estimate | None) -> None:
         prior = lookup(name)

@@ -26,7 +26,7 @@ class PointsStage:
     version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "language", "candidates", "visible_candidates",
-        "cameras", "geometry?",
+        "cameras", "geometry?", "naming?",
     )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = ("points", "points_findings")
 

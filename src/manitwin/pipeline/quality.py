@@ -20,12 +20,19 @@ CENTER_OF_MASS_LIMIT = 0.1
 REHEARSAL = "rehearsal"
 """The check that only fails, and is only there, where a rehearsal server stood in for a model."""
 
+UNKNOWN = "prior:unknown"
+"""The source of what is only usual of anything."""
+
 ESTIMATES = ("mass_kg", "friction_static", "friction_dynamic", "restitution")
 
 
 def quality_checks(draft: Draft) -> list[dict[str, Any]]:
     """Collect the gate's checks and the findings of the later stages, in the order of the stages."""
-    checks = [*rehearsal_checks(draft), *(Check(**check) for check in draft.field("gate")["checks"])]
+    checks = [
+        *rehearsal_checks(draft),
+        *naming_checks(draft),
+        *(Check(**check) for check in draft.field("gate")["checks"]),
+    ]
     if "matte" in draft.fields:
         matte = draft.field("matte")
         checks.append(
@@ -36,6 +43,7 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
                 message="; ".join(matte["findings"]),
             )
         )
+    checks += size_checks(draft)
     checks += _unseen(draft)
     findings = draft.field("geometry")["findings"]
     checks.append(
@@ -50,6 +58,39 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
     for checks_of in (_physical_checks, _examined, _collision_checks, _grasp_checks, _placement_checks):
         checks += checks_of(draft)
     return [check.model_dump() for check in checks]
+
+
+def naming_checks(draft: Draft) -> list[Check]:
+    """Return what a classifier takes a thing for that nobody has named: a finding, unless it is sure; none for others."""
+    naming = draft.fields.get("naming")
+    if naming is None:
+        return []
+    value, source = naming["probability"]["value"], naming["probability"]["source"]
+    if naming["name"] is not None:
+        message = f"{source} takes it for a {naming['name']} ({likeliest_words(naming)}); --name overrules it"
+    else:
+        message = f"{source} cannot tell what it is ({likeliest_words(naming)}); say it with --name"
+    return [Check(name="named", passed=naming["name"] is not None, value=value, message=message)]
+
+
+def size_checks(draft: Draft) -> list[Check]:
+    """Return the failed check of a size that is only what is usual of anything; none where somebody said it or what it is."""
+    size = draft.fields.get("size")
+    if size is None or size["source"] != UNKNOWN:
+        return []
+    message = f"nobody says how large it is: {unknown_size_words(size)}; say what it is with --name"
+    return [Check(name="size_known", passed=False, value=size["value"], message=message)]
+
+
+def unknown_size_words(size: dict[str, Any]) -> str:
+    """Say of a size that only the prior of anything gives: '15 cm is what is usual of anything (2 to 60 cm)'."""
+    value, low, high = (f"{100 * size[key]:.3g}" for key in ("value", "low", "high"))
+    return f"{value} cm is what is usual of anything ({low} to {high} cm)"
+
+
+def likeliest_words(naming: dict[str, Any]) -> str:
+    """Say the likeliest names with their probabilities: 'orange 41 %, lemon 12 %, apple 3 %'."""
+    return ", ".join(f"{guess['name']} {100 * guess['probability']:.0f} %" for guess in naming["likeliest"])
 
 
 def _unseen(draft: Draft) -> list[Check]:
@@ -77,7 +118,7 @@ def rehearsed_words(stages: Iterable[str]) -> str:
 def _physical_checks(draft: Draft) -> list[Check]:
     physical = draft.field("physical")
     invented = [name for name in ESTIMATES if physical[name]["source"] == "default"]
-    unknown = physical["mass_kg"]["source"] == "prior:unknown"
+    unknown = physical["mass_kg"]["source"] == UNKNOWN
     uncertainty, longest = physical["center_of_mass_uncertainty_m"], max(physical["extents_m"])
     return [
         Check(

@@ -18,7 +18,7 @@ from manitwin.formats.sniff import sniff
 from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.annotators.given import KeepsGiven
 from manitwin.models.registry import create, target, without_url
-from manitwin.pipeline.assembly import NAME_HINT, assemble, name_would_help
+from manitwin.pipeline.assembly import assemble, name_hint
 from manitwin.pipeline.candidates import CandidatesStage
 from manitwin.pipeline.caption import CaptionStage
 from manitwin.pipeline.collision import CollisionStage
@@ -29,6 +29,7 @@ from manitwin.pipeline.grasps import GraspsStage
 from manitwin.pipeline.gripper_kinds import KINDS
 from manitwin.pipeline.item import Item, require_readable_size, twin_id
 from manitwin.pipeline.mesh import MeshStage
+from manitwin.pipeline.naming import NameStage
 from manitwin.pipeline.photo import PhotoStage
 from manitwin.pipeline.physical import PhysicalStage
 from manitwin.pipeline.placement import PlacementStage
@@ -90,6 +91,7 @@ def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
         *_generation(kind, config),
         MeshStage(config.mesh),
         ViewsStage(config.views, annotator.picture_px),
+        *([NameStage(config.naming)] if kind == "mesh" else []),
         GateStage(config.gate, annotator),
         PhysicalStage(config.physical, annotator),
         CollisionStage(config.collision),
@@ -132,7 +134,7 @@ def _trials(gripper: Gripper, suffix: str, config: BuildConfig) -> list[Stage]:
 def _generation(kind: Kind, config: BuildConfig) -> list[Stage]:
     if kind == "mesh":
         return []
-    photo: list[Stage] = [PhotoStage(config.matting)] if kind == "image" else []
+    photo: list[Stage] = [PhotoStage(config.matting), NameStage(config.naming)] if kind == "image" else []
     generator = create("generator", config.generator, config)
     return [*photo, GenerateStage(config.generate, generator, config.services.submit_again)]
 
@@ -259,7 +261,7 @@ def ending_of(record: TwinRecord) -> Ending:
         detail = f"{record.grasps.verified} of {record.grasps.simulated} grasps verified" if record.grasps else ""
     if record.provenance.rehearsed:
         detail += "; a rehearsal"
-    return Ending(record.status, record.revision, reason, detail, NAME_HINT if name_would_help(record) else None)
+    return Ending(record.status, record.revision, reason, detail, name_hint(record))
 
 
 def _claimed_kind(item: Item) -> Kind:

@@ -3,7 +3,19 @@
 from __future__ import annotations
 
 STAGE_ORDER = (
-    *("photo", "generate", "mesh", "views", "gate", "physical", "collision", "placement", "caption", "candidates"),
+    *(
+        "photo",
+        "name",
+        "generate",
+        "mesh",
+        "views",
+        "gate",
+        "physical",
+        "collision",
+        "placement",
+        "caption",
+        "candidates",
+    ),
     *("points", "grasps", "verify", "second_opinion", "robustness", "record_grasps", "finish"),
 )
 """The order of ``recipe.stages_for``; twin.json keeps its stages by name."""

@@ -94,6 +94,24 @@ class Provenance(Record):
         return tuple(sorted(name for name, stage in self.stages.items() if stage.rehearsal))
 
 
+class Likely(Record):
+    """What a thing may be, and how likely that is."""
+
+    name: str
+    probability: Unit
+
+
+class Naming(Record):
+    """What a classifier takes a thing for that nobody has named: ``name`` is None where no guess was likely enough.
+
+    ``probability`` is that of ``name``, or of the likeliest guess; its interval is that of the single pictures.
+    """
+
+    name: str | None
+    probability: Estimate
+    likeliest: list[Likely]
+
+
 class Hulls(Record):
     """The convex collision hulls, measured against the surface they stand for."""
 
@@ -243,6 +261,7 @@ class TwinRecord(Record):
     revision: str
     files: dict[FileBelow, str]
     name: str | None
+    naming: Naming | None = None
     status: Status
     rejection: Rejection | None
     source: Source

@@ -122,7 +122,7 @@ def test_stages_stand_in_the_order_of_the_pipeline(tmp_path: Path) -> None:
     stages = rows_of(folder)["stages"].to_pylist()
     assert [stage["stage"] for stage in stages] == names
     assert [stage["position"] for stage in stages] == list(range(len(names)))
-    assert stages[0]["seconds"] is None and stages[2]["seconds"] == 2.0  # the photo stage left no costs
+    assert stages[0]["seconds"] is None and stages[3]["seconds"] == 2.0  # the photo stage left no costs
 
 
 @pytest.mark.parametrize("name", ["twin.json", "run.json", "visual.glb", "grasps.parquet"])

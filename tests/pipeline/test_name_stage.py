@@ -1,0 +1,79 @@
+"""A thing that nobody has named gets a classifier's name, which every later stage goes by; a person's word overrules it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from manitwin.config import BuildConfig, NamingConfig
+from manitwin.engine.stage import Draft
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.naming import NameStage, cut_view
+from manitwin.pipeline.object_state import object_name
+from manitwin.pipeline.quality import naming_checks
+from manitwin.pipeline.recipe import stages_for
+from manitwin.render.renderer import BACKDROP
+from manitwin.twin.record import Naming
+
+SAMPLE = Path(__file__).resolve().parents[2] / "samples" / "bottle.jpg"
+SURE = {"name": "orange", "probability": {"value": 0.9, "low": 0.8, "high": 0.95, "source": "efficientnet-lite0"}}
+SURE["likeliest"] = [{"name": "orange", "probability": 0.9}, {"name": "lemon", "probability": 0.05}]
+
+
+def draft(folder: Path, name: str | None = None) -> Draft[Item]:
+    made = Draft("t", Item(file=str(SAMPLE), name=name), seed=0)
+    Image.open(SAMPLE).convert("RGBA").save(folder / "photo.png")
+    made.paths["photo.png"] = folder / "photo.png"
+    return made
+
+
+def test_a_photo_without_a_name_is_looked_at_and_one_with_a_name_is_not(tmp_path: Path) -> None:
+    naming = NameStage(NamingConfig()).run(draft(tmp_path), tmp_path)["naming"]
+    json.dumps(naming, allow_nan=False)
+    record = Naming.model_validate(naming)
+    assert record.probability.source == "efficientnet-lite0" and len(record.likeliest) == 3
+    assert NameStage(NamingConfig()).run(draft(tmp_path, "mug"), tmp_path) == {"naming": None}
+    assert NameStage(NamingConfig(enabled=False)).run(draft(tmp_path), tmp_path) == {"naming": None}
+
+
+def test_the_classifiers_name_counts_after_a_persons_and_a_generators(tmp_path: Path) -> None:
+    made = draft(tmp_path)
+    made.fields["naming"] = SURE
+    assert object_name(made) == "orange"
+    made.fields["naming"] = SURE | {"name": None}
+    assert object_name(made) is None
+    made.fields |= {"naming": SURE, "generation": {"known": {"name": "mug"}}}
+    assert object_name(made) == "mug"
+    assert object_name(Draft("t", Item(file=str(SAMPLE), name="my cup"), seed=0, fields=made.fields)) == "my cup"
+
+
+def test_every_stage_that_goes_by_the_name_reads_it() -> None:
+    for kind in ("image", "mesh"):
+        stages = stages_for(kind, BuildConfig())
+        names = [stage.name for stage in stages]
+        assert names.index("name") == (1 if kind == "image" else names.index("gate") - 1)
+        asked = {"generate", "mesh", "gate", "physical", "caption", "points", "finish"}
+        assert {s.name for s in stages if "naming?" in s.reads} == asked & set(names)
+    assert "name" not in [stage.name for stage in stages_for("text", BuildConfig())]
+
+
+def test_the_finding_names_the_likeliest_and_the_remedy(tmp_path: Path) -> None:
+    made = draft(tmp_path)
+    assert naming_checks(made) == []
+    made.fields["naming"] = SURE
+    (sure,) = naming_checks(made)
+    assert sure.passed and "orange 90 %, lemon 5 %" in sure.message and "--name" in sure.message
+    made.fields["naming"] = SURE | {"name": None}
+    (unsure,) = naming_checks(made)
+    assert unsure.passed is False and "cannot tell what it is (orange 90 %" in unsure.message
+
+
+def test_a_view_is_cut_out_of_its_backdrop() -> None:
+    view = np.full((40, 40, 3), BACKDROP, np.uint8)
+    view[10:20, 5:30] = (20, 30, 40)
+    alpha = cut_view(view)[..., 3]
+    assert alpha[10:20, 5:30].min() == 255 and alpha.astype(float).sum() == 250 * 255
+    assert cut_view(np.full((4, 4, 3), BACKDROP, np.uint8))[..., 3].min() == 255
