@@ -16,7 +16,13 @@ from manitwin.models.generators.lift import LiftGenerator
 from manitwin.models.generators.protocol import GenerationRequest
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.drawing import edges_between, seen_faces, silhouette, to_pixels
-from manitwin.models.generators.templates.fitting.fit import LEAST_CONFIDENCE, fit, template_for
+from manitwin.models.generators.templates.fitting.fit import (
+    LEAST_CONFIDENCE,
+    fit,
+    fit_several,
+    kinds_of,
+    template_for,
+)
 from manitwin.models.generators.templates.fitting.generated import texture_of
 from manitwin.models.generators.templates.fitting.view import View, boxed, normalised
 
@@ -87,6 +93,21 @@ def test_box_seen_at_a_corner_gets_its_three_sides() -> None:
     assert sides[:2] / sides[2] == pytest.approx([0.5, 0.9], rel=0.06)
 
 
+def test_several_photos_share_their_measures_and_have_views_of_their_own() -> None:
+    measures, elevations = {"width": 0.85, "depth": 0.55}, (8, 40)
+    photos = [
+        photo_of("box", View(0.5 + turn, np.radians(elevation), 0.0, 0.2), measures)
+        for turn, elevation in enumerate(elevations)
+    ]
+    fits = fit_several("box", photos)
+    assert fits is not None and len(fits) == 2 and fits[0].made is fits[1].made
+    for fitted, elevation in zip(fits, elevations, strict=True):
+        assert fitted.confidence > 0.9
+        assert np.degrees(fitted.view.elevation_rad) == pytest.approx(elevation, abs=3)
+    sides = np.sort(np.ptp(fits[0].made.mesh.vertices, axis=0))
+    assert sides[:2] / sides[2] == pytest.approx([0.55, 0.85], rel=0.04)
+
+
 def test_bottle_that_leans_in_the_photo_stands_on_its_base() -> None:
     rgba = photo_of("bottle", View(0.0, np.radians(10), np.radians(50), 0.15), {"width": 0.33})
     fitted = fit("bottle", rgba)
@@ -114,6 +135,7 @@ def test_names_of_templates_and_of_priors_find_a_template() -> None:
         template = template_for(name)
         assert template is not None and template.category == category
     assert template_for(None) is None and template_for("unicorn") is None
+    assert "drink can" in kinds_of("can") and "watering can" not in kinds_of("can")
 
 
 def test_texture_has_neither_background_nor_mirrored_letters() -> None:

@@ -1,0 +1,150 @@
+"""Measures and views of the least sum of squares between the outlines of a solid and those of photos.
+
+The outlines' signed distances are matched by the method of Levenberg (1944) and Marquardt (1963). The measures' intervals, the
+upright camera and the usual lens are weak priors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.models.generators.templates.fitting.evidence import FOCAL_SPREAD, Evidence
+from manitwin.models.generators.templates.fitting.residual import outline_difference
+from manitwin.models.generators.templates.fitting.shape import MOST_SPREADS, CoarseSolid, Family
+from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View
+
+_UPRIGHT_ROLL_RAD, _FREE_ROLL_RAD = np.radians(6.0), np.radians(60.0)
+_PRIOR = 0.15  # weight of one standard deviation of a prior, in the outline's residual
+_FIRST_DAMPING, _LEAST_DAMPING = 0.02, 1e-3
+_TRIES = 4
+_ENOUGH = 0.98
+_KEPT_ROUNDS = 3
+# steps of a pixel or two: shorter ones would follow the corners of pixels
+_SPREAD_STEP = 0.35
+_POSE_STEPS = (0.06, 0.06, 0.03, 0.3, 0.015, 0.01, 0.01)
+_POSE = len(_POSE_STEPS)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A view of a photo; ``upright``: the camera was not rolled, so that its roll is near zero."""
+
+    view: View
+    upright: bool
+
+
+class Problem:
+    """The least squares problem of one family of shapes and one or several photos of the same thing."""
+
+    def __init__(self, family: Family, evidences: Sequence[Evidence], turns: bool):
+        """Take the family, what the photos say, and whether a turn about the upright axis changes no outline."""
+        self._family, self._evidences, self._turns = family, list(evidences), turns
+        usual = [np.clip(each.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE) for each in evidences]
+        self._usual = [float(np.log(perspective)) for perspective in usual]
+
+    def solve(
+        self, spreads: np.ndarray, placed: Sequence[Placed], *, measures: bool, rounds: int
+    ) -> tuple[np.ndarray, list[Placed]]:
+        """Return measures (left as they are unless ``measures``) and a view of each photo, from the start given."""
+        solid = self._family.solid(spreads)
+        if solid is None:
+            return spreads, list(placed)
+        count = len(spreads) if measures else 0
+        state = _State(self, spreads, placed, count)
+        at = np.concatenate([spreads[:count], *(_encoded(each.view) for each in placed)])
+        value = state.residuals(at, solid)
+        jacobian = np.zeros((len(value), len(at)))
+        damping = _FIRST_DAMPING
+        for number in range(rounds):
+            state.derive(jacobian, at, solid, number)
+            gram, slope, before = jacobian.T @ jacobian, jacobian.T @ value, float(value @ value)
+            for _ in range(_TRIES):
+                change = -np.linalg.solve(gram + damping * np.diag(np.diag(gram)) + 1e-9 * np.eye(len(at)), slope)
+                trial = _bounded(at + change, count)
+                tried = state.built(trial)
+                other = None if tried is None else state.residuals(trial, tried)
+                if tried is not None and other is not None and float(other @ other) < before:
+                    at, value, solid, damping = trial, other, tried, max(damping / 3, _LEAST_DAMPING)
+                    break
+                damping *= 8
+            else:
+                break
+            if float(value @ value) > _ENOUGH * before:
+                break
+        views = [Placed(_decoded(pose), each.upright) for pose, each in zip(_poses(at, count), placed, strict=True)]
+        return np.concatenate([at[:count], spreads[count:]]), views
+
+
+class _State:
+    """The residuals of a problem about one start, and their derivatives."""
+
+    def __init__(self, problem: Problem, spreads: np.ndarray, placed: Sequence[Placed], count: int):
+        self._problem, self._spreads, self._count = problem, spreads, count
+        self._rolls = [
+            (0.0, _UPRIGHT_ROLL_RAD) if each.upright else (each.view.roll_rad, _FREE_ROLL_RAD) for each in placed
+        ]
+        self._moves = problem._family.changes(spreads, _SPREAD_STEP) if count else []
+
+    def built(self, at: np.ndarray) -> CoarseSolid | None:
+        return self._problem._family.solid(np.concatenate([at[: self._count], self._spreads[self._count :]]))
+
+    def residuals(self, at: np.ndarray, solid: CoarseSolid) -> np.ndarray:
+        blocks = [self._block(number, pose, solid) for number, pose in enumerate(_poses(at, self._count))]
+        return np.concatenate([*blocks, _PRIOR * at[: self._count]])
+
+    def derive(self, jacobian: np.ndarray, at: np.ndarray, solid: CoarseSolid, number: int) -> None:
+        """Fill in central differences; a pose changes its own photo's residuals only."""
+        for k in range(self._count):
+            # a build costs ten times a picture: the column of a measure that changes the faces is kept a while
+            if self._moves[k] is not None or number % _KEPT_ROUNDS == 0:
+                sides = [self._beside(at, solid, k, side) for side in (0, 1)]
+                if sides[0] is not None and sides[1] is not None:
+                    jacobian[:, k] = (sides[0] - sides[1]) / (2 * _SPREAD_STEP)
+        poses = _poses(at, self._count)
+        length = (len(jacobian) - self._count) // len(poses)
+        for photo, pose in enumerate(poses):
+            rows = slice(photo * length, (photo + 1) * length)
+            for k in range(1 if self._problem._turns else 0, _POSE):
+                step = np.eye(_POSE)[k] * _POSE_STEPS[k]
+                more, less = (self._block(photo, pose + sign * step, solid) for sign in (1.0, -1.0))
+                jacobian[rows, self._count + photo * _POSE + k] = (more - less) / (2 * _POSE_STEPS[k])
+
+    def _beside(self, at: np.ndarray, solid: CoarseSolid, k: int, side: int) -> np.ndarray | None:
+        moved, move = at.copy(), self._moves[k]
+        moved[k] += _SPREAD_STEP * (1 - 2 * side)
+        if move is not None and len(move[side]) == len(solid.vertices):
+            return self.residuals(moved, solid.reshaped(solid.vertices + move[side]))
+        other = self.built(moved)
+        return None if other is None else self.residuals(moved, other)
+
+    def _block(self, number: int, pose: np.ndarray, solid: CoarseSolid) -> np.ndarray:
+        middle, spread = self._rolls[number]
+        prior = [(pose[2] - middle) / spread, (pose[3] - self._problem._usual[number]) / FOCAL_SPREAD]
+        drawn = outline_difference(solid, _decoded(pose), self._problem._evidences[number])
+        return np.concatenate([drawn, _PRIOR * np.array(prior)])
+
+
+def _poses(at: np.ndarray, count: int) -> np.ndarray:
+    return np.asarray(at[count:].reshape(-1, _POSE))
+
+
+def _encoded(view: View) -> np.ndarray:
+    log_perspective, log_scale = np.log(view.perspective), np.log(view.scale)
+    return np.array([view.yaw_rad, view.elevation_rad, view.roll_rad, log_perspective, log_scale, view.x, view.y])
+
+
+def _decoded(pose: np.ndarray) -> View:
+    yaw, elevation, roll, perspective, scale, x, y = pose.tolist()
+    return View(yaw, elevation, roll, float(np.exp(perspective)), float(np.exp(scale)), x, y)
+
+
+def _bounded(at: np.ndarray, count: int) -> np.ndarray:
+    out = at.copy()
+    out[:count] = np.clip(out[:count], -MOST_SPREADS, MOST_SPREADS)
+    poses = _poses(out, count)
+    poses[:, 1] = np.clip(poses[:, 1], np.radians(-12.0), np.radians(90.0))
+    poses[:, 3] = np.clip(poses[:, 3], np.log(LEAST_PERSPECTIVE), np.log(MOST_PERSPECTIVE))
+    return np.concatenate([out[:count], poses.ravel()])
