@@ -30,6 +30,8 @@ whose use is known by construction. So size, mass, centre of mass and inertia fo
 the right part; their source is `template:CATEGORY`. What is not here is refused at once, with the nearest categories and the
 [generators](generators.md) that make other things of a text.
 
+- **How many**: `--count 20` makes twenty of each text. What the text says holds for all; what it leaves open is drawn anew for
+  each: measures, colours and materials. The same seed gives the same twenty.
 - **What it is**: one of the names below, or another word for it that the [priors](priors.md) know. The last noun counts: a mug
   rack is no mug.
 - **How it looks**: colours and materials before or after the name are those of the whole; behind *with*, of a part:

@@ -41,6 +41,7 @@ def build(
     up: str = "auto",
     license: str | None = None,
     attribution: str | None = None,
+    count: int = 1,
     strict: bool = False,
     jobs: int | None = None,
     config: BuildConfig | str | Path | None = None,
@@ -59,9 +60,10 @@ def build(
     it changes.
 
     ``name``, ``units`` m|cm|mm|auto, ``up`` y|z|auto, ``license`` and ``attribution`` hold for all inputs whose manifest row
-    does not say otherwise; with ``strict`` a manifest's column that nobody knows is an error. ``config`` None: what the data set
-    was built with, else the defaults. ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first
-    one's grasps are the twin's own; ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
+    does not say otherwise; of each text ``count`` variations are made, which differ in what it leaves open; with ``strict`` a
+    manifest's column that nobody knows is an error. ``config`` None: what the data set was built with, else the defaults.
+    ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first one's grasps are the twin's own;
+    ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
     have charged ``max_cost_usd``, items that would cost more are left unfinished; ``record`` is a file that a VLM's answers are
     added to; ``require_agreement`` verifies only what a second engine holds too; ``quick`` leaves out second engine and
     robustness. ``executor`` is local (``jobs`` processes), ray (a cluster at ``address``), or inline, in this process.
@@ -73,7 +75,7 @@ def build(
 
     defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
     request = request_build(
-        inputs, out, texts=texts, strict=strict, jobs=jobs, config=config, defaults=defaults, flags=flags
+        inputs, out, texts=texts, count=count, strict=strict, jobs=jobs, config=config, defaults=defaults, flags=flags
     )
     from manitwin.dataset.index.parts import IndexTables
     from manitwin.engine.drive import drive

@@ -83,6 +83,12 @@ Twins = Annotated[
 Record = Annotated[
     Path | None, typer.Option(help="Add every answer of the model to this file, for --vlm replay:FILE.", metavar="FILE")
 ]
+Count = Annotated[
+    int,
+    typer.Option(
+        min=1, help="Make so many variations of each text: measures, colours and materials that it leaves open."
+    ),
+]
 Name = Annotated[str | None, typer.Option(help="What the object is ('mug'): the key to the priors.")]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say what would be done, and about what it would cost; write nothing.")

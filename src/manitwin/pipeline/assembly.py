@@ -120,6 +120,7 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path) -> dict[str, Any]
         "file": name,
         "sha256": sha256,
         "prompt": item.text,
+        "variation": item.variation,
         "license": item.license or "unknown",
         "attribution": item.attribution,
     }

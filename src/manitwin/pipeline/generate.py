@@ -37,7 +37,9 @@ class GenerateStage:
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Generate; raises Rejected ``generator_failed``, or BackendError where the generator cannot work now."""
         rgba = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
-        request = GenerationRequest(rgba=rgba, text=draft.payload.text, name=object_name(draft), seed=draft.seed)
+        request = GenerationRequest(
+            rgba=rgba, text=draft.payload.text, name=object_name(draft), seed=generator_seed(draft)
+        )
         made = run_generator(
             self.generator, request, folder, settings=self.settings, jobs=draft.jobs, submit_again=self._submit_again
         )
@@ -55,3 +57,10 @@ class GenerateStage:
                 "known": None if made.known is None else made.known.model_dump(mode="json"),
             }
         }
+
+
+def generator_seed(draft: Draft[Item]) -> int:
+    """Return the run's seed, or for a further variation of a text 31 bits that are mixed from both."""
+    if not draft.payload.variation:
+        return draft.seed
+    return int(np.random.SeedSequence([draft.seed, draft.payload.variation]).generate_state(1)[0] >> 1)

@@ -30,7 +30,8 @@ class Item(Payload):
     """One input as the user gave it.
 
     ``file`` is an absolute path, or None where ``text`` is given. ``units`` and ``up`` are what the user said ('auto': unsaid).
-    ``given`` is the import.json beside an imported mesh: what another tool says of it.
+    ``given`` is the import.json beside an imported mesh: what another tool says of it. ``variation`` counts the things that are
+    made of one text: each is drawn from a seed of its own.
     """
 
     file: str | None
@@ -41,11 +42,15 @@ class Item(Payload):
     license: str | None = None
     attribution: str | None = None
     given: str | None = None
+    variation: int = 0
 
     @property
     def title(self) -> str:
-        """The name of the file, or the begin of the text."""
-        return Path(self.file).name if self.file else f"'{(self.text or '')[:40]}'"
+        """The name of the file, or the begin of the text, with the number of a variation."""
+        if self.file:
+            return Path(self.file).name
+        number = f" ({self.variation + 1})" if self.variation else ""
+        return f"'{(self.text or '')[:40]}'{number}"
 
     @property
     def modified_at(self) -> float | None:
@@ -58,7 +63,8 @@ class Item(Payload):
     def to_json(self) -> dict[str, Any]:
         """Return the fields as a ledger keeps them; of those that came later, only what is said: old rows stay equal."""
         fields = super().to_json()
-        return fields if self.given is not None else {name: value for name, value in fields.items() if name != "given"}
+        later = {"given": self.given is None, "variation": not self.variation}
+        return {name: value for name, value in fields.items() if not later.get(name, False)}
 
 
 def twin_id(item: Item) -> str:
@@ -76,6 +82,8 @@ def twin_id(item: Item) -> str:
         content = {"suffix": path.suffix.lower(), "sha256": digest, "side_files": sides}
     if item.given is not None:
         content = {"mesh": content, "given": _digest(Path(item.given))}
+    if item.variation:
+        content = {"content": content, "variation": item.variation}
     identity = {"content": content, "name": item.name, "units": item.units, "up": item.up}
     return sha256_of_json(identity)[:ID_DIGITS]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
@@ -68,7 +68,26 @@ def iterate_items(
     texts: Iterable[str] = (),
     *,
     strict: bool = False,
+    count: int = 1,
     refusal: Refusal = lambda item: None,
+) -> Iterator[Item]:
+    """Yield as ``_given_items`` does, of each text ``count`` variations.
+
+    Raises UsageError as it does, and for a photo or a mesh where more than one is asked for.
+    """
+    for item in _given_items(inputs, defaults, notes, texts, strict, refusal):
+        if item.file is not None and count > 1:
+            raise UsageError(f"{item.title}: count makes variations of texts, and this is a file; build it by itself")
+        yield from (replace(item, variation=number) for number in range(count))
+
+
+def _given_items(
+    inputs: Iterable[str | Path],
+    defaults: dict[str, str | None],
+    notes: Notes,
+    texts: Iterable[str],
+    strict: bool,
+    refusal: Refusal,
 ) -> Iterator[Item]:
     """Yield the items one by one, so that a manifest may be of any length; notes are added at the end of each.
 

@@ -90,6 +90,10 @@ def stored_config(root: DatasetRoot) -> BuildConfig:
         raise UsageError(f"{place}: not a configuration of this version ({error}); give --config") from error
 
 
+MOST_VARIATIONS = 100_000
+"""Of one text: more than any data set of the paper has of one category."""
+
+
 @dataclass(frozen=True)
 class BuildRequest:
     """The arguments of ``build``, checked; nothing is written yet. ``items`` are read, and noted, as they are iterated."""
@@ -110,10 +114,13 @@ def request_build(
     config: BuildConfig | str | Path | None,
     defaults: dict[str, str | None],
     flags: Flags,
+    count: int = 1,
 ) -> BuildRequest:
     """Check the arguments of ``build``; ``defaults`` hold for all inputs. Raises UsageError for wrong ones."""
     if jobs is not None and not 1 <= jobs <= MOST_SLOTS:
         raise UsageError(f"jobs is {jobs:.6g}; give 1 to {MOST_SLOTS}")
+    if not 1 <= count <= MOST_VARIATIONS:
+        raise UsageError(f"count is {count:.6g}; give 1 to {MOST_VARIATIONS}")
     root, words = DatasetRoot(out), list(texts)
     given = [inputs] if isinstance(inputs, str | Path) else list(inputs)
     require_inputs(root, given, words)
@@ -131,5 +138,5 @@ def request_build(
         notes.remarks.append(
             "the settings are those that the data set was built with; --config and options change them"
         )
-    items = iterate_items(given, defaults, notes, words, strict=strict, refusal=refusal(settings))
+    items = iterate_items(given, defaults, notes, words, strict=strict, count=count, refusal=refusal(settings))
     return BuildRequest(settings, root, items, notes)

@@ -61,12 +61,13 @@ class Rejection(Record):
 
 
 class Source(Record):
-    """The input that the twin was made of."""
+    """The input that the twin was made of; ``variation`` counts the things made of one text."""
 
     kind: Literal["image", "text", "mesh"]
     file: FileBelow
     sha256: str
     prompt: str | None = None
+    variation: int = 0
     license: str
     attribution: str | None = None
 

@@ -38,6 +38,7 @@ def build(
     ] = None,
     out: Annotated[str, options.output_folder("The data set: a folder, or a URL (s3://, gs://).")] = "",
     text: options.Text = None,
+    count: options.Count = 1,
     strict: options.Strict = False,
     config: options.Config = None,
     executor: options.Executor = "local",
@@ -53,7 +54,7 @@ def build(
 
     if not out:
         raise UsageError("no data set to write twins into; give a folder or URL with -o")
-    arguments: dict[str, Any] = {"texts": text or [], "strict": strict, "jobs": jobs, "config": config}
+    arguments: dict[str, Any] = {"texts": text or [], "count": count, "strict": strict, "jobs": jobs, "config": config}
     if dry_run:
         _print_dry_run(inputs or [], out, arguments, said, as_json=json)
         return
