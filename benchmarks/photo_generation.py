@@ -258,8 +258,9 @@ def run(options: argparse.Namespace) -> list[Result]:
     options.out.mkdir(parents=True, exist_ok=True)
     names = options.categories.split(",") if options.categories else list(load_templates())[:: options.every]
     first = HELD_OUT_FROM if options.held_out else 0
-    results = []
+    results: list[Result] = []
     for category in names:
+        write_results(results, options.out / "results.csv")  # what is there when a person stops it
         for seed in range(first, first + options.seeds):
             for photo in photograph(category, seed, ELEVATIONS_DEG):
                 name = f"{category.replace(' ', '_')}-{seed}-{photo.elevation_deg:.0f}.png"

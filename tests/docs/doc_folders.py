@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import trimesh
 from doc_pages import ROOT
 from doc_shell import Shell
@@ -98,6 +99,10 @@ class Folders:
         for name in ("mug.jpg", "photo.jpg", "photos/bottle.jpg"):
             _copied(ROOT / "samples" / "bottle.jpg", page / name)
         _copied(ROOT / "samples" / "mug.glb", page / "mug.glb")
+        for name in ("front.png", "side.png", "back.png"):
+            photo = np.zeros((300, 300, 4), np.uint8)
+            photo[60:260, 110:190] = 200, 60, 50, 255
+            Image.fromarray(photo).save(page / name)
         (page / "scans").mkdir()
         trimesh.load(ROOT / "samples" / "mug.glb", force="mesh").export(page / "scans" / "mug.obj")
         (page / "list.csv").write_text("file,name,license\nsamples/mug.glb,mug,CC0-1.0\n")

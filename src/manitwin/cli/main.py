@@ -21,6 +21,7 @@ from manitwin.cli.arguments import CheckedCommand, register
 from manitwin.cli.choices import SHELLS
 from manitwin.cli.commands.audit import audit
 from manitwin.cli.commands.build import build, run
+from manitwin.cli.commands.carve import carve
 from manitwin.cli.commands.doctor import doctor
 from manitwin.cli.commands.export import export
 from manitwin.cli.commands.fake import fake
@@ -87,7 +88,7 @@ register(app, reported(run, own_log=True), "run", hidden=True)
 for making in (index, stats, publish, export):
     register(app, reported(making))
 register(app, reported(import_), "import")
-for other in (status, retry, check, query, doctor, fake, prompts, audit):
+for other in (status, retry, check, query, doctor, fake, prompts, audit, carve):
     register(app, other)
 
 

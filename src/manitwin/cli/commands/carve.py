@@ -1,0 +1,48 @@
+"""``manitwin carve``: several photos of one object to one mesh, which ``manitwin build`` makes a twin of."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import options
+from manitwin.cli.console import out_console
+
+
+def carve(
+    paths: Annotated[
+        list[Path],
+        options.existing("Photos of one object, from its own height.", "PHOTO...", "two photos or more of one object"),
+    ],
+    turns: Annotated[
+        str,
+        typer.Option(
+            help="The camera's turn about the vertical in each photo: degrees, counter-clockwise from above, the first 0.",
+            metavar="0,90,...",
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="The GLB file to write.", metavar="FILE.glb")],
+    name: Annotated[str | None, typer.Option(help="What it is: round and boxy things differ.", metavar="NAME")] = None,
+) -> None:
+    """Carve a textured mesh out of several photos of one object, for `manitwin build`."""
+    from manitwin.errors import UsageError
+    from manitwin.formats.glb import write_glb
+    from manitwin.models.generators.lift.carved_photos import carve_photos, carved_part
+    from manitwin.twin.store import write_bytes_atomically
+
+    if out.suffix.lower() != ".glb":
+        raise UsageError(f"{out}: the mesh is a GLB file; give a name that ends in .glb")
+    if not out.parent.is_dir():
+        raise UsageError(f"{out.parent}: no folder there; make it, or give another place with -o")
+    try:
+        degrees = [float(turn) for turn in turns.split(",")]
+    except ValueError:
+        raise UsageError(f"--turns {turns!r}: no list of degrees; give one a photo, such as 0,90,180") from None
+    carved = carve_photos(paths, degrees, name)
+    write_bytes_atomically(out, write_glb([carved_part(carved)]))
+    filled = ", ".join(f"{o.name} {share:.0%}" for o, share in zip(carved.outlines, carved.covered, strict=True))
+    said = f' --name "{name}"' if name else ""
+    out_console.print(f"{out}: {len(carved.surface.faces)} faces; of each outline it fills {filled}")
+    out_console.print(f"manitwin build {out} --up y{said} -o TWINS makes a twin of it")

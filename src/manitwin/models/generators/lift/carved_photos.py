@@ -1,0 +1,134 @@
+"""From several photo files of one object to a textured mesh: matted, carved, coloured by what shows a place best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.config import MattingConfig
+from manitwin.errors import UsageError
+from manitwin.formats.image_file import read_image
+from manitwin.geometry.poses import GLTF_TO_OBJECT, transform_points
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.models.generators.lift.carving import (
+    BOXY_POWER,
+    HEIGHT_PX,
+    ROUND_POWER,
+    USUAL_POWER,
+    Carved,
+    Outline,
+    carve,
+)
+from manitwin.models.generators.lift.hint import hint_from_name
+from manitwin.models.generators.lift.surface import bare_mesh
+from manitwin.models.generators.lift.texture import paint_unseen
+from manitwin.models.matting import matte_photo
+
+MOST_PHOTOS = 24
+SEEN_COSINE = 0.2  # a face seen at less than 12 degrees takes painted colours
+ROUGHNESS = 0.6
+
+
+def carve_photos(paths: Sequence[Path], turns_deg: Sequence[float], name: str | None = None) -> Carved:
+    """Carve what photos show from stated turns (degrees about the vertical, counter-clockwise seen from above, the first 0).
+
+    Raises UsageError for turns that are not one a photo or all in one direction, InputError for a file that cannot be read,
+    Rejected naming the photo that cannot be matted or does not go with the others.
+    """
+    if not 2 <= len(paths) <= MOST_PHOTOS or len(turns_deg) != len(paths):
+        raise UsageError(
+            f"{len(paths)} photos and {len(turns_deg)} turns: give 2 to {MOST_PHOTOS} photos and a turn of each, such as 0 90 180"
+        )
+    if not np.isfinite(turns_deg).all():
+        raise UsageError("a turn is no number; give degrees, such as 0 90 180")
+    if np.abs(np.sin(np.deg2rad(np.subtract.outer(turns_deg, turns_deg)))).max() < 0.3:
+        raise UsageError(
+            "all photos are from one direction or its opposite: give one from the side, such as 90 degrees"
+        )
+    hint, settings = hint_from_name(name), MattingConfig()
+    photos = []
+    for path in paths:
+        pixels = read_image(path, max_side_px=settings.photo_side_px).pixels
+        photos.append((path.name, matte_photo(pixels, path.name).rgba))
+    power = ROUND_POWER if hint.round else BOXY_POWER if hint.boxy else USUAL_POWER
+    return carve(photos, turns_deg, power=power)
+
+
+def carved_part(carved: Carved) -> trimesh.Trimesh:
+    """Return the mesh in the object frame (Z up) with one texture: all photos side by side, painted colours below them."""
+    surface, outlines = carved.surface, carved.outlines
+    view = _best_views(carved)
+    atlas, places = _atlas(outlines)
+    key = surface.faces + len(surface.vertices) * view[:, None]
+    used, faces = np.unique(key, return_inverse=True)
+    vertex, chosen = used % len(surface.vertices), used // len(surface.vertices)
+    points = transform_points(carved.to_pixels, surface.vertices[vertex])
+    uv = np.zeros((len(used), 2))
+    for number, (left, top, width, height) in enumerate(places):
+        own = chosen == number
+        at = _crop_share(outlines[number % len(outlines)], points[own])
+        uv[own] = np.column_stack(
+            [(left + at[:, 0] * width) / atlas.shape[1], 1 - (top + at[:, 1] * height) / atlas.shape[0]]
+        )
+    material = PBRMaterial(
+        name="photos",
+        baseColorFactor=[255, 255, 255, 255],
+        baseColorTexture=Image.fromarray(atlas),
+        metallicFactor=0.0,
+        roughnessFactor=ROUGHNESS,
+    )
+    return trimesh.Trimesh(
+        surface.vertices[vertex] @ GLTF_TO_OBJECT[:3, :3].T,
+        faces.reshape(-1, 3),
+        visual=TextureVisuals(uv=uv, material=material),
+        process=False,
+        metadata={"name": "carved"},
+    )
+
+
+def _best_views(carved: Carved) -> np.ndarray:
+    """Return for each face the photo that shows it best; plus the number of photos where none does."""
+    mesh = bare_mesh(carved.surface)
+    caster, normals, centers = RayCaster(mesh), np.asarray(mesh.face_normals), mesh.triangles_center
+    scores = []
+    for outline in carved.outlines:
+        angle = np.deg2rad(outline.turn_deg)
+        toward = np.array([np.sin(angle), 0.0, np.cos(angle)])
+        hit = caster.first_hits(centers + 1e-3 * normals, np.tile(toward, (len(centers), 1)))[1] >= 0
+        scores.append(np.where(hit, -1.0, normals @ toward))
+    best = np.argmax(scores, axis=0)
+    return np.where(np.max(scores, axis=0) >= SEEN_COSINE, best, best + len(carved.outlines))
+
+
+def _crop_share(outline: Outline, points: np.ndarray) -> np.ndarray:
+    """Return where points ``(N, 3)`` (x, height, z towards the first viewer) are in an outline's crop, 0 to 1 right and down."""
+    rows = np.nonzero(outline.crop.mask.any(axis=1))[0]
+    columns = np.nonzero(outline.crop.mask.any(axis=0))[0]
+    scale = (rows[-1] + 1 - rows[0]) / HEIGHT_PX
+    column = columns[0] + (outline.across(points[:, 0], -points[:, 2]) + 0.5) * scale
+    row = rows[0] + (HEIGHT_PX - 0.5 - points[:, 1]) * scale
+    height, width = outline.crop.mask.shape
+    return np.clip(np.column_stack([column / width, row / height]), 0.0, 1.0)
+
+
+def _atlas(outlines: Sequence[Outline]) -> tuple[np.ndarray, list[tuple[int, int, int, int]]]:
+    """Return one picture of all photos, and below them of their painted colours, with the place of each (x, y, w, h)."""
+    rows = [[o.crop.colours for o in outlines], [paint_unseen(o.crop, None) for o in outlines]]
+    heights = [max(picture.shape[0] for picture in row) for row in rows]
+    width = max(sum(picture.shape[1] for picture in row) for row in rows)
+    atlas = np.zeros((sum(heights), width, 3), np.uint8)
+    places, top = [], 0
+    for row, height in zip(rows, heights, strict=True):
+        left = 0
+        for picture in row:
+            atlas[top : top + picture.shape[0], left : left + picture.shape[1]] = picture
+            places.append((left, top, picture.shape[1], picture.shape[0]))
+            left += picture.shape[1]
+        top += height
+    return atlas, places

@@ -1,0 +1,111 @@
+"""Solids carved out of outlines of known solids, and what does not go together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from PIL import Image
+from typer.testing import CliRunner
+
+from manitwin.cli.main import app
+from manitwin.errors import Rejected, UsageError
+from manitwin.formats.glb import read_glb
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.models.generators.lift.carved_photos import carve_photos
+from manitwin.models.generators.lift.carving import BOXY_POWER, ROUND_POWER, Carved, carve
+from manitwin.models.generators.lift.surface import to_manifold
+from manitwin.render.cameras import framing_camera
+from manitwin.render.raycast import cast_camera
+
+COLORS = np.array(
+    [[200, 40, 40], [40, 160, 60], [50, 70, 200], [220, 190, 60], [150, 150, 150], [90, 60, 30]], np.uint8
+)
+CYLINDER = trimesh.creation.cylinder(0.03, 0.12, sections=96)
+BOX = trimesh.creation.box((0.1, 0.05, 0.12))
+
+
+def _photo(mesh: trimesh.Trimesh, turn_deg: float, *, size_px: int = 300) -> np.ndarray:
+    """An RGBA picture from the front turned by ``turn_deg``, each direction of the surface in its own colour."""
+    points = np.asarray(mesh.vertices)
+    camera = framing_camera(
+        points, azimuth_deg=-90 + turn_deg, elevation_deg=0, fov_y_deg=3, width_px=size_px, height_px=size_px
+    )
+    _, normals, face = cast_camera(RayCaster(mesh), camera)
+    axes = np.concatenate([normals, -normals], axis=2)
+    return np.dstack([COLORS[axes.argmax(axis=2)], np.where(face >= 0, 255, 0).astype(np.uint8)])
+
+
+def _carved(mesh: trimesh.Trimesh, turns: list[float], power: float) -> Carved:
+    photos = [(f"{turn:.0f}.png", _photo(mesh, turn, size_px=200 + int(turn))) for turn in turns]
+    return carve(photos, turns, power=power)
+
+
+def test_two_photos_of_a_round_thing_make_it_round() -> None:
+    carved = _carved(CYLINDER, [0, 90], ROUND_POWER)
+    assert to_manifold(carved.surface).volume() == pytest.approx(np.pi * 0.25**2, rel=0.06)
+    assert len(to_manifold(carved.surface).decompose()) == 1 and min(carved.covered) > 0.97
+    assert np.ptp(carved.surface.vertices, axis=0) == pytest.approx([0.5, 1.0, 0.5], abs=0.03)
+
+
+def test_two_photos_of_a_box_make_it_a_box() -> None:
+    carved = _carved(BOX, [0, 90], BOXY_POWER)
+    assert np.ptp(carved.surface.vertices, axis=0) == pytest.approx([10 / 12, 1.0, 5 / 12], abs=0.03)
+    assert to_manifold(carved.surface).volume() == pytest.approx(50 / 144, rel=0.08)
+
+
+def test_turns_are_counter_clockwise_seen_from_above() -> None:
+    spout = trimesh.creation.box((0.05, 0.02, 0.02)).apply_translation((0.04, 0, 0))
+    spout.apply_transform(trimesh.transformations.rotation_matrix(-np.pi / 6, [0, 0, 1]))  # towards the first viewer
+    thing = trimesh.util.concatenate([CYLINDER, spout])
+    photos = [(f"{turn}.png", _photo(thing, turn)) for turn in (0, 45, 90)]
+    for turns, side in (((0, 45, 90), 1), ((0, -45, -90), -1)):  # the wrong way round it is the mirror image
+        vertices = carve(photos, turns).surface.vertices
+        tip = vertices[vertices[:, 0] > np.quantile(vertices[:, 0], 0.99)]
+        assert side * (tip[:, 2].mean() - np.median(vertices[:, 2])) > 0.1
+
+
+def test_a_photo_of_another_thing_is_named() -> None:
+    photos = [(f"{turn:.0f}.png", _photo(CYLINDER, turn)) for turn in (0.0, 60.0, 90.0, 120.0)]
+    photos[1] = ("other.png", _photo(trimesh.creation.icosphere(3, 0.06), 60))
+    with pytest.raises(Rejected, match=r"other\.png: its outline does not go with"):
+        carve(photos, [0, 60, 90, 120])
+
+
+def test_turns_that_say_too_little_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="one from the side"):
+        carve_photos([tmp_path / "a.png", tmp_path / "b.png"], [0, 180])
+    with pytest.raises(UsageError, match="a turn of each"):
+        carve_photos([tmp_path / "a.png", tmp_path / "b.png"], [0])
+
+
+def test_the_command_writes_a_mesh_with_each_side_from_its_photo(tmp_path: Path) -> None:
+    paths = []
+    for turn in (0, 90, 180):
+        paths.append(tmp_path / f"{turn}.png")
+        Image.fromarray(_photo(BOX, turn)).save(paths[-1])
+    out = tmp_path / "box.glb"
+    done = CliRunner().invoke(app, ["carve", *map(str, paths), "--turns", "0,90,180", "--name", "box", "-o", str(out)])
+    assert done.exit_code == 0, done.output
+    (part,) = read_glb(out)
+    texture = np.asarray(part.visual.material.baseColorTexture.convert("RGB"))
+    for normal, color in (((0, -1, 0), COLORS[4]), ((1, 0, 0), COLORS[0]), ((0, 1, 0), COLORS[1])):
+        faces = part.face_normals @ np.array(normal) > 0.95
+        uv = np.asarray(part.visual.uv)[part.faces[faces]].mean(axis=1)
+        at = np.clip(uv * texture.shape[1::-1], 0, np.array(texture.shape[1::-1]) - 1)
+        seen = texture[(texture.shape[0] - 1 - at[:, 1]).astype(int), at[:, 0].astype(int)]
+        assert faces.sum() > 20 and np.abs(np.median(seen, axis=0) - color).max() < 12
+
+
+def test_the_command_says_what_it_needs(tmp_path: Path) -> None:
+    photo = tmp_path / "a.png"
+    Image.fromarray(_photo(BOX, 0)).save(photo)
+    for words, told in (
+        (["--turns", "0,x", "-o", str(tmp_path / "a.glb")], "list of degrees"),
+        (["--turns", "0,90", "-o", str(tmp_path / "a.obj")], "GLB"),
+        (["--turns", "0,90", "-o", str(tmp_path / "none" / "a.glb")], "no folder"),
+    ):
+        done = CliRunner().invoke(app, ["carve", str(photo), str(photo), *words])
+        assert done.exit_code != 0 and told in " ".join(done.output.split()) + str(done.exception)
