@@ -42,23 +42,25 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
 
 ## A photo gets its template, fitted
 
-A photo with one of these names gets the template too: `lift` looks for the measures, the camera's elevation, turn, roll and lens whose
-picture has the photo's outline, and takes the one that inner edges, shading and the share of hidden parts speak for. A bottle that
-lies in the photo stands in the twin; a mug seen from above has its hollow and its handle. A plain name stands for its kinds: a can may
-be a drink can where that explains the photo better.
+A photo with one of these names gets the template too: `lift` looks for the measures, the camera's elevation, turn, roll and
+lens whose picture has the photo's outline, and takes the one that inner edges, shading and the share of hidden parts speak
+for. A bottle that lies in the photo stands in the twin; a mug seen from above has its hollow and its handle. A plain name
+stands for its kinds: a can may be a drink can where that explains the photo better.
 
-- **Confidence** (`generation.notes.confidence`) follows from the residual: the overlap of the outlines, and their mean distance over
-  the object's length. Below a half the template is not believed: the photo is lifted to a revolution, a box or an inflation, or rejected
-  with the numbers where the name is that of an open container. Thresholds come from rendered photos of templates with other measures,
-  bent by 8 % of their size, under right and wrong names: 92 % of the right ones are believed, 14 % of wrong ones drawn at random.
-- **Size, mass and material** stay those of the priors: a photo tells proportions only. Points are known by construction, as of a text;
-  their source is `template:CATEGORY, fitted to the photo`.
-- **Texture**: the photo on what it shows. Unseen places get quiet colours of their own part: those of the same ring where it is
-  turned, else of the nearest seen places, as a median that keeps no letters.
-- **What it cannot do**: walls thinner than a pixel keep the usual thickness; a box seen at one face alone has the usual depth; what
-  the template has no measure for (a bent handle, a crushed can) is not followed.
+- **Confidence** (`generation.notes.confidence`) follows from the residual: the overlap of the outlines, and their mean
+  distance over the object's length. Below a half the template is not believed: the photo is lifted to a revolution or a box,
+  or rejected with the numbers where the name is that of an open container. Before an inflation, which knows nothing of the
+  back, it is believed above 0.12. Thresholds come from rendered photos of templates with other measures, bent by 8 % of their
+  size, under right and wrong names: 92 % of the right ones are believed, 14 % of wrong ones drawn at random.
+- **Size, mass and material** stay those of the priors: a photo tells proportions only. Points are known by construction, as
+  of a text; their source is `template:CATEGORY, fitted to the photo`.
+- **Texture**: the photo on what it shows. Unseen places get quiet colours of their own part: those of the same ring where it
+  is turned, else of the nearest seen places, as a median that keeps no letters.
+- **What it cannot do**: walls thinner than a pixel keep the usual thickness; a box seen at one face alone has the usual
+  depth; what the template has no measure for (a bent handle, a crushed can) is not followed.
 
-In Python, `manitwin.models.generators.templates.fitting.fit.fit` takes measures to start from, `fit_several` several photos of one thing.
+In Python, `manitwin.models.generators.templates.fitting.fit.fit` takes measures to start from, `fit_several` several photos
+of one thing.
 
 This page is written by `python docs/make_templates_page.py`.
 """

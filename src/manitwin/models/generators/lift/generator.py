@@ -24,9 +24,11 @@ from manitwin.models.generators.lift.texture import beside
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.fit import (
+    LEAST_AGAINST_INFLATION,
     LEAST_CONFIDENCE,
     LEAST_IOU,
     MOST_OUTLINE,
+    Fitted,
     fit,
     kinds_of,
     template_for,
@@ -135,9 +137,7 @@ def _from_photo(rgba: np.ndarray, name: str | None) -> _Job:
     template = template_for(name)
     fitted = None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category))
     if fitted is not None and fitted.confidence >= LEAST_CONFIDENCE:
-        surface = texture_of(fitted, rgba)
-        known = known_of_fitted(fitted, name or fitted.category)
-        return _Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)
+        return _from_fit(fitted, rgba, name)
     try:
         lifted = lift(rgba, hint_from_name(name))
     except Rejected as error:
@@ -151,8 +151,17 @@ def _from_photo(rgba: np.ndarray, name: str | None) -> _Job:
             " check the name and the cut-out",
             error.stage,
         ) from error
+    flat = lifted.notes["primitive"] == "inflation"  # knows nothing of the back
+    if fitted is not None and flat and fitted.confidence >= LEAST_AGAINST_INFLATION:
+        return _from_fit(fitted, rgba, name)
     notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
     return _Job(write_glb([textured_part(lifted)]), notes, unseen_share(lifted.surface))
+
+
+def _from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> _Job:
+    surface = texture_of(fitted, rgba)
+    known = known_of_fitted(fitted, name or fitted.category)
+    return _Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)
 
 
 def _template_and_wish(text: str) -> tuple[Template, Wanted]:

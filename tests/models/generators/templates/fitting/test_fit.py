@@ -13,7 +13,7 @@ from manitwin.errors import Rejected
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.lift import LiftGenerator
-from manitwin.models.generators.protocol import GenerationRequest
+from manitwin.models.generators.protocol import Generated, GenerationRequest
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.drawing import edges_between, seen_faces, silhouette, to_pixels
 from manitwin.models.generators.templates.fitting.fit import (
@@ -155,12 +155,7 @@ def test_texture_has_neither_background_nor_mirrored_letters() -> None:
 
 def test_generator_gives_a_closed_solid_and_the_points_that_it_knows(tmp_path: Path) -> None:
     rgba = photo_of("mug", View(0.6, np.radians(25), 0.0, 0.2), {})
-    files = []
-    for _ in range(2):
-        generator = LiftGenerator()
-        made = generator.fetch(generator.submit(GenerationRequest(rgba, None, "coffee mug", seed=0)), tmp_path)
-        files.append(made.path.read_bytes())
-    assert files[0] == files[1]
+    made = _generated(rgba, "coffee mug", tmp_path)
     assert made.notes["primitive"] == "template:mug" and made.notes["source"] == "template fitted to the photo"
     assert made.rests and not made.metric and made.known is not None and made.known.mass_kg is None
     assert made.known.source == "template:mug, fitted to the photo"
@@ -172,3 +167,27 @@ def test_generator_gives_a_closed_solid_and_the_points_that_it_knows(tmp_path: P
         np.array([handle.position_m]) + 0.05 * np.array([handle.normal]), -np.array([handle.normal])
     )
     assert away[0] == pytest.approx(0.05, abs=0.002)
+
+
+def test_same_photo_gives_the_same_bytes(tmp_path: Path) -> None:
+    rgba = photo_of("box", View(0.6, np.radians(25), 0.0, 0.2), {})
+    files = [_generated(rgba, "cardboard box", tmp_path).path.read_bytes() for _ in range(2)]
+    assert files[0] == files[1]
+
+
+@pytest.mark.parametrize(("radius_px", "primitive"), [(48, "template:hammer"), (80, "inflation")])
+def test_doubtful_template_is_taken_before_an_inflation_and_a_wrong_one_is_not(
+    radius_px: int, primitive: str, tmp_path: Path
+) -> None:
+    rgba = photo_of("hammer", View(0.5, np.radians(80), 0.0, 0.2), {})
+    row, column = (int(places.mean()) for places in np.nonzero(rgba[..., 3]))
+    cv2.circle(rgba, (column, row), radius_px, (120, 150, 120, 255), -1)  # no hammer has such a disc on its handle
+    made = _generated(rgba, "hammer", tmp_path)
+    assert made.notes["primitive"] == primitive
+    fitted = made.notes if primitive.startswith("template") else made.notes["poor_fit"]
+    assert fitted["confidence"] < LEAST_CONFIDENCE and fitted["residual"]["outline"] > 0.009
+
+
+def _generated(rgba: np.ndarray, name: str, folder: Path) -> Generated:
+    generator = LiftGenerator()
+    return generator.fetch(generator.submit(GenerationRequest(rgba, None, name, seed=0)), folder)

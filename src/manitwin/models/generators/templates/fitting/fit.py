@@ -22,6 +22,9 @@ from manitwin.models.generators.templates.template import Template
 
 _MOST_KINDS, _SIZE_MARGIN = 6, 1.5
 LEAST_CONFIDENCE = 0.5
+LEAST_AGAINST_INFLATION = 0.12
+"""A doubtful template is nearer to the truth than an inflated outline: of rendered photos of things bent by 16 % of their size, 6
+of 6 (volumetric IoU 0.37 to 0.83 against 0 to 0.34). 98 of 100 right names are above, 23 of 100 wrong ones."""
 LEAST_IOU, MOST_OUTLINE = 0.70, 0.0085
 """92 of 100 rendered photos under the right name are within both, 14 of 100 under a wrong one; half of them bent by 8 %."""
 
