@@ -209,8 +209,13 @@ class PhysicalConfig(Section):
 
 
 class MattingConfig(Section):
-    """Reading a photo and cutting its object out. ``frame`` chooses a picture of an animation, counted from 0."""
+    """Reading a photo and cutting its object out. ``frame`` chooses a picture of an animation, counted from 0.
 
+    ``network`` is a learned opinion beside the built-in ones: ``isnet``, once ``manitwin models add isnet`` has fetched it, or an
+    ONNX file of U2-Net, IS-Net or BiRefNet; without one nothing is loaded.
+    """
+
+    network: str | None = Field(default=None, min_length=1, max_length=4096)
     frame: int | None = Field(default=None, ge=0)
     photo_side_px: int = Field(default=2048, ge=256)
     working_side_px: int = Field(default=512, ge=128)

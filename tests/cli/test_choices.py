@@ -19,6 +19,7 @@ from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
 from manitwin.errors import UsageError
 from manitwin.models.fakes.catalog import REHEARSALS
 from manitwin.models.registry import backends
+from manitwin.models.weights.catalog import KNOWN_WEIGHTS
 from manitwin.pipeline.manifest import Units, Up
 from manitwin.robots.grippers.gripper import shipped_grippers
 from manitwin.robots.load import load_robot, shipped_robots
@@ -50,6 +51,8 @@ def literal(section: type, name: str) -> set[str]:
         (choices.REHEARSALS, set(REHEARSALS)),
         (choices.ANNOTATORS, set(backends()["annotator"])),
         (choices.GENERATORS, set(backends()["generator"])),
+        (choices.MATTING, {"none", *KNOWN_WEIGHTS}),
+        (choices.WEIGHTS, set(KNOWN_WEIGHTS)),
         (choices.GRASPERS, set(backends()["grasper"])),
     ],
     ids=lambda value: value.kind if isinstance(value, choices.Choices) else "",

@@ -99,6 +99,12 @@ PAGES: dict[str, Arrangement] = {
     "docs/imports.md": Arrangement(),
     "docs/json.md": Arrangement(blocks={"nothing_here": "answer manitwin build nothing_here.png -o out --json"}),
     "docs/layouts.md": Arrangement(rewritten={"layout_1_000017": "layout_1_000001"}),
+    "docs/photos.md": Arrangement(
+        not_run={
+            r"^manitwin models add": NO_NETWORK,
+            r"--matting (isnet|my-u2net)": "wants weights, which only a person adds",
+        },
+    ),
     "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}),
     "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),
     "docs/programs.md": Arrangement(

@@ -28,6 +28,7 @@ from manitwin.cli.commands.fake import fake
 from manitwin.cli.commands.import_ import import_
 from manitwin.cli.commands.layout import layout
 from manitwin.cli.commands.maintenance import check, index, retry
+from manitwin.cli.commands.models import models
 from manitwin.cli.commands.prompts import prompts
 from manitwin.cli.commands.publish import publish
 from manitwin.cli.commands.query import query
@@ -88,7 +89,7 @@ register(app, reported(run, own_log=True), "run", hidden=True)
 for making in (index, stats, publish, export):
     register(app, reported(making))
 register(app, reported(import_), "import")
-for other in (status, retry, check, query, doctor, fake, prompts, audit, carve):
+for other in (status, retry, check, query, doctor, models, fake, prompts, audit, carve):
     register(app, other)
 
 

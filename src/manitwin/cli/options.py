@@ -62,6 +62,13 @@ Grasper = Annotated[
         help="Who proposes grasps: graspgen@tcp://HOST:PORT, graspgenx@..., antipodal.", metavar="SPEC"
     ),
 ]
+Matting = Annotated[
+    str | None,
+    choices.MATTING.option(
+        help="A learned opinion on photos' cut-outs: isnet (manitwin models add isnet), a .onnx file, or none.",
+        metavar="NETWORK",
+    ),
+]
 MaxCost = Annotated[
     float | None,
     typer.Option(
@@ -102,7 +109,7 @@ OF_INPUTS: dict[str, tuple[Any, Any]] = {
 
 FLAGS: dict[str, tuple[Any, Any]] = {
     "seed": (Seed, None), "grippers": (Grippers, None), "vlm": (Vlm, None), "generator": (Generator, None),
-    "grasper": (Grasper, None), "max_cost_usd": (MaxCost, None), "record": (Record, None),
+    "grasper": (Grasper, None), "matting": (Matting, None), "max_cost_usd": (MaxCost, None), "record": (Record, None),
     "require_agreement": (RequireAgreement, False), "quick": (Quick, False),
 }  # fmt: skip
 """What is said on top of the configuration: the options of ``pipeline.settings.Flags``, by its names."""

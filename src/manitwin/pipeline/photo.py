@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,22 +13,25 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import InputError
 from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
+from manitwin.models.matting.learned import Network
 from manitwin.pipeline.item import Item
 
 
-@dataclass(frozen=True)
 class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
-    settings: MattingConfig
-
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
-    backend: ClassVar[str] = "classical"
-    model: ClassVar[str | None] = None
+
+    def __init__(self, settings: MattingConfig, network: Network | None = None):
+        """Take the settings, and the network that they name: it decides by its content, wherever its file is."""
+        self.settings = settings.model_copy(update={"network": None})
+        self.network = network
+        self.backend: str = "classical" if network is None else "classical+learned"
+        self.model: str | None = None if network is None else network.model
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
@@ -44,13 +46,21 @@ class PhotoStage:
             min_confidence=settings.min_confidence,
             min_area_share=settings.min_area_share,
             second_object_share=settings.second_object_share,
+            network=self.network,
         )
         Image.fromarray(np.ascontiguousarray(matte.rgba)).save(folder / "photo.png", compress_level=3)
-        return {
-            "matte": {
-                "method": matte.method,
-                "confidence": matte.confidence,
-                "findings": [*photo.findings, *matte.findings],
-                "scores": matte.scores,
-            }
+        field: dict[str, Any] = {
+            "method": matte.method,
+            "confidence": matte.confidence,
+            "findings": [*photo.findings, *matte.findings],
+            "scores": matte.scores,
+            "agreement": matte.agreement,
         }
+        if self.network is not None:
+            field["network"] = {
+                "name": self.network.name,
+                "sha256": self.network.sha256,
+                "source": self.network.source,
+                "licence": self.network.licence,
+            }
+        return {"matte": field}

@@ -17,6 +17,7 @@ from manitwin.errors import InputChanged, Rejected, UsageError
 from manitwin.formats.sniff import sniff
 from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.annotators.given import KeepsGiven
+from manitwin.models.matting.learned import Network, find_network, require_working
 from manitwin.models.registry import create, target, without_url
 from manitwin.pipeline.assembly import assemble, name_hint
 from manitwin.pipeline.candidates import CandidatesStage
@@ -58,6 +59,9 @@ def check_names(config: BuildConfig) -> None:
     grippers = [gripper for gripper, _ in _grippers(config)]
     if config.second_opinion.require_agreement:
         _check_agreement(grippers, config)
+    network = _network(config)
+    if network is not None:
+        require_working(network)
 
 
 def log_choices(config: BuildConfig) -> None:
@@ -134,9 +138,15 @@ def _trials(gripper: Gripper, suffix: str, config: BuildConfig) -> list[Stage]:
 def _generation(kind: Kind, config: BuildConfig) -> list[Stage]:
     if kind == "mesh":
         return []
-    photo: list[Stage] = [PhotoStage(config.matting), NameStage(config.naming)] if kind == "image" else []
+    photo: list[Stage] = []
+    if kind == "image":
+        photo = [PhotoStage(config.matting, _network(config)), NameStage(config.naming)]
     generator = create("generator", config.generator, config)
     return [*photo, GenerateStage(config.generate, generator, config.services.submit_again)]
+
+
+def _network(config: BuildConfig) -> Network | None:
+    return None if config.matting.network is None else find_network(config.matting.network)
 
 
 def config_sha256(config: BuildConfig) -> str:
@@ -147,6 +157,11 @@ def config_sha256(config: BuildConfig) -> str:
     decides = config.model_dump(mode="json", exclude={"seed", "services", "run"})
     decides["grippers"] = [gripper.sha256 for gripper, _ in _grippers(config)]
     decides |= {kind: without_url(decides[kind]) for kind in ("generator", "annotator", "grasper")}
+    network = _network(config)
+    if network is None:
+        del decides["matting"]["network"]
+    else:
+        decides["matting"]["network"] = network.sha256
     del decides["vlm"]["prompts"]  # their content counts, as part of what each stage is asked with
     return sha256_of_json(decides)
 

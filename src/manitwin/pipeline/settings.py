@@ -33,6 +33,8 @@ class Flags(TypedDict, total=False):
     """What makes meshes of photos and texts (docs/generators.md)."""
     grasper: str | None
     """What proposes grasps (docs/served_grasps.md)."""
+    matting: str | None
+    """A learned opinion on the cut-outs of photos: ``isnet``, an ONNX file, or ``none``."""
     max_cost_usd: float | None
     """Once services have charged so much, items that would cost more are left for another run."""
     record: str | Path | None
@@ -57,6 +59,10 @@ def with_flags(settings: BuildConfig, flags: Flags) -> BuildConfig:
     }  # fmt: skip
     services = {"max_cost_usd": max_cost_usd, "record": None if record is None else Path(record).absolute()}
     update: dict[str, Any] = _given(said) | {"services": settings.services.model_copy(update=_given(services))}
+    matting = flags.get("matting")
+    if matting is not None:
+        network = None if matting == "none" else str(Path(matting).absolute()) if "." in matting else matting
+        update["matting"] = settings.matting.model_copy(update={"network": network})
     if agree:
         update["second_opinion"] = settings.second_opinion.model_copy(
             update={"enabled": True, "require_agreement": True}

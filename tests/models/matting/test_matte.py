@@ -150,7 +150,7 @@ def test_no_magenta_survives_from_under_the_alpha(shared_data: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.shared_data
-def test_at_least_eighteen_real_photos_are_accepted(shared_data: Path) -> None:
+def test_real_photos_are_accepted_where_two_opinions_agree(shared_data: Path) -> None:
     accepted, reasons, details = set(), {}, {}
     for path in sorted((shared_data / "photos").glob("*.jpg")):
         try:
@@ -159,10 +159,10 @@ def test_at_least_eighteen_real_photos_are_accepted(shared_data: Path) -> None:
         except Rejected as rejection:
             reasons[path.stem], details[path.stem] = rejection.reason, rejection.detail
     assert len(accepted) + len(reasons) == 28
-    assert len(accepted) >= 18
+    assert len(accepted) >= 16
     # a kitchen behind it, white on white in a reflection, cut by the frame
     assert {"whisk_ai", "cup_and_saucer_ai", "yogurt_carton_box"} <= set(reasons)
     assert set(reasons.values()) == {"low_confidence_matte"}
     assert "the image border cuts it off" in details["yogurt_carton_box"]
     assert "cluttered" in details["whisk_ai"]
-    assert "a clear or grey part of it may be lost" in details["hand_sanitizer"]
+    assert "do not agree" in details["hand_sanitizer"]

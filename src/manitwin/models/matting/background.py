@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -10,6 +11,8 @@ import numpy as np
 FIT_SIDE_PX = 128
 MAX_SURFACES = 3
 BORDER_SHARE = 0.04
+MIN_SHADE, MAX_SHADE = 0.25, 0.985  # ratio of reflected light: darker is no shadow of a lit scene, lighter is none
+NEUTRAL = 0.08  # spread of the channels' ratios in a shadow of one light
 NOISE_FLOOR_LAB = 0.5  # a quantised 8-bit channel: a perfectly flat border still has this much doubt
 
 
@@ -33,6 +36,27 @@ class Background:
     surfaces: int
     border: np.ndarray
     seam: np.ndarray
+
+    @cached_property
+    def light_ratio(self) -> np.ndarray:
+        """Each pixel's linear light (H, W, 3) over that of the expected background."""
+        smooth = np.clip(cv2.cvtColor(cv2.GaussianBlur(self.lab, (0, 0), 0.8), cv2.COLOR_LAB2RGB), 0, 1)
+        expected = np.clip(cv2.cvtColor(self.expected, cv2.COLOR_LAB2RGB), 0, 1)
+        return np.asarray((cv2.pow(smooth, 2.2) + 2e-3) / (cv2.pow(expected, 2.2) + 2e-3))
+
+    @cached_property
+    def shade(self) -> np.ndarray:
+        """Where a photo (H, W) has the background's colour, darkened without tint."""
+        ratio = self.light_ratio
+        mean = ratio.mean(2)
+        neutral = length(ratio / mean[..., None] - 1) / np.sqrt(3) < NEUTRAL
+        return (mean > MIN_SHADE) & (mean < MAX_SHADE) & neutral
+
+
+def length(vectors: np.ndarray) -> np.ndarray:
+    """Return the length (H, W) of vectors (H, W, 3), four times as fast as numpy's."""
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 def border_ring(height: int, width: int) -> np.ndarray:
@@ -126,7 +150,7 @@ def _distance(
     noises = []
     for surface in surfaces:
         residual = smooth - surface
-        used = border & (np.linalg.norm(residual, axis=2) < 12)
+        used = border & (length(residual) < 12)
         covariance = np.eye(3)
         for _ in range(4):
             if used.sum() < 50:
@@ -146,7 +170,9 @@ def _distance(
 
 
 def _mahalanobis(residual: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    return np.sqrt(np.einsum("...i,ij,...j->...", residual, np.linalg.inv(covariance), residual)).astype(np.float32)
+    whitening = np.linalg.cholesky(np.linalg.inv(covariance)).astype(np.float32)
+    white = (residual.reshape(-1, 3) @ whitening).reshape(residual.shape)
+    return length(white)
 
 
 def _explain_seams(
@@ -161,7 +187,7 @@ def _explain_seams(
         for j in range(i):
             step = surfaces[i] - surfaces[j]
             share = ((smooth - surfaces[j]) * step).sum(2) / np.maximum((step**2).sum(2), 1e-6)
-            mixed = np.linalg.norm(smooth - surfaces[j] - np.clip(share, 0, 1)[..., None] * step, axis=2)
+            mixed = length(smooth - surfaces[j] - np.clip(share, 0, 1)[..., None] * step)
             both = [cv2.dilate((plain & (side < 0.5)).astype(np.uint8), near) > 0 for side in (share, 1 - share)]
             seam |= both[0] & both[1] & (mixed < 4 * max(noise, NOISE_FLOOR_LAB))
     return np.where(seam, np.minimum(fine, 3), fine), np.where(seam, np.minimum(coarse, 3), coarse), seam

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from manitwin.models.matting.background import Background, connected_to
+from manitwin.models.matting.background import Background, connected_to, length
 from manitwin.models.matting.hard_shadow import PENUMBRA_PX, edge_width_px
 from manitwin.models.matting.outline import dilated, disk, eroded, opened
 from manitwin.models.matting.segmentation import Segmentation
-from manitwin.models.matting.shadow import could_be_shade
 
+MOST_ZOOM = 1.6  # beyond that a photo's blur, not its pixels, says how fine its outlines are
 FRAME_EDGE = 5.0  # L*a*b* per pixel: an edge in focus of an object, not shading
 
 
@@ -24,10 +24,11 @@ class MatteScores:
     ``on_edges`` share of the outline that lies on an edge of the photo; ``crisp`` how
     sharp it is against the object's own strong edges; ``separable`` how well the colours just inside and
     just outside the outline differ from the background's (Youden's J); ``complete`` nothing else stands out of the
-    background; ``uncut`` share of the outline that the image border does not cut (4 times counted); ``stable``
-    overlap of two graph cuts with other seeds; ``whole`` little lies outside the largest connected part;
+    background; ``uncut`` how little of it the image border cuts; ``stable``
+    agreement of two independent opinions; ``whole`` little lies outside the largest connected part;
     ``plain`` how uniform the background is; ``outermost`` share of the outline with no edge beyond it, in what passes for
-    shade, that is nearly as sharp; ``sharply_bounded`` how little of it is as soft as a shadow's edge with shade inside.
+    shade, that is nearly as sharp; ``sharply_bounded`` how little of it is as soft as a shadow's edge with shade inside;
+    ``thick`` how small its outline is against its area: a third of a pixel off all around is 5 % of a thin thing.
     """
 
     on_edges: float
@@ -40,6 +41,7 @@ class MatteScores:
     plain: float
     outermost: float
     sharply_bounded: float
+    thick: float
 
     @property
     def confidence(self) -> float:
@@ -58,8 +60,8 @@ class MatteScores:
         return min(values, key=lambda name: values[name])
 
 
-def score(segmentation: Segmentation) -> MatteScores:
-    """Score a mask that is not empty."""
+def score(segmentation: Segmentation, *, zoom: float = 1.0) -> MatteScores:
+    """Score a mask that is not empty; ``zoom`` is the photo's size over the mask's."""
     mask, background = segmentation.mask, segmentation.background
     outline = mask & ~eroded(mask, 1)
     border = np.zeros(mask.shape, bool)
@@ -74,7 +76,7 @@ def score(segmentation: Segmentation) -> MatteScores:
     gap = max(
         4, round(0.03 * max(mask.shape))
     )  # light bounced off the object, and a coarse JPEG, tint what is next to it
-    outside = dilated(mask, reach + gap) & ~dilated(mask, gap) & ~segmentation.shadow & ~could_be_shade(background)
+    outside = dilated(mask, reach + gap) & ~dilated(mask, gap) & ~segmentation.shadow & ~background.shade
     hit = float((background.distance[inside] > 4).mean())
     false = float((background.distance[outside] > 4).mean()) if outside.sum() > 0.5 * outline.sum() else 0.0
     _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
@@ -84,12 +86,13 @@ def score(segmentation: Segmentation) -> MatteScores:
         crisp=_ramp(float(np.median(sharpest[free])) / typical if free.any() else 0.0, 0.15, 0.5),
         separable=_ramp(hit - false, 0.1, 0.7),
         complete=_ramp(1 - _left_over(segmentation) / mask.sum(), 0.3, 0.9),
-        uncut=float(np.clip(1 - 4 * (outline & border).sum() / outline.sum(), 0, 1)),
-        stable=_ramp(segmentation.stability, 0.6, 0.95),
+        uncut=_ramp(-float((mask & border).sum()) / 2 / _longest(mask), -0.06, -0.01),
+        stable=_ramp(segmentation.agreement, 0.6, 0.95),
         whole=_ramp(float(areas.max() / areas.sum()), 0.8, 1.0),
         plain=_ramp(-background.noise_lab - 20 * background.unexplained, -12, -3),
         outermost=_ramp(-_overshadowed(segmentation, outline), -0.25, -0.05),
         sharply_bounded=_ramp(-_softly_bounded(segmentation, outline), -0.4, -0.15),
+        thick=_ramp(-outline.sum() / mask.sum() / min(zoom, MOST_ZOOM), -0.25, -0.12),
     )
 
 
@@ -122,7 +125,7 @@ def _overshadowed(segmentation: Segmentation, outline: np.ndarray) -> float:
     """
     mask, gradient = segmentation.mask, segmentation.gradient
     distance, nearest = ndimage.distance_transform_edt(~mask, return_indices=True)
-    shade = (segmentation.shadow | could_be_shade(segmentation.background)) & ~dilated(segmentation.hard, 6)
+    shade = (segmentation.shadow | segmentation.background.shade) & ~dilated(segmentation.hard, 6)
     beside = shade & (distance > 5) & (distance < 0.1 * max(mask.shape))
     beyond = np.zeros(mask.shape, np.float32)
     np.maximum.at(beyond, (nearest[0][beside], nearest[1][beside]), gradient[beside])
@@ -139,9 +142,9 @@ def _softly_bounded(segmentation: Segmentation, outline: np.ndarray) -> float:
     if not inner.any():
         return 0.0
     distance, nearest = ndimage.distance_transform_edt(~inner, return_indices=True)
-    depth = cv2.blur(np.linalg.norm(segmentation.background.residual, axis=2), (3, 3))
+    depth = cv2.blur(length(segmentation.background.residual), (3, 3))
     width_px = edge_width_px(depth[nearest[0], nearest[1]], cv2.dilate(segmentation.gradient, disk(4)))
-    soft = (width_px > PENUMBRA_PX) & could_be_shade(segmentation.background)[nearest[0], nearest[1]]
+    soft = (width_px > PENUMBRA_PX) & segmentation.background.shade[nearest[0], nearest[1]]
     at = outline & (distance < 9)
     return float(soft[at].mean()) if at.any() else 0.0
 
@@ -151,15 +154,19 @@ def _left_over(segmentation: Segmentation) -> float:
     background = segmentation.background
     away = ~dilated(segmentation.mask, 5) & ~background.seam
     limit = max(5.0, 1.5 * float(np.percentile(background.coarse_distance[background.border], 98)))
-    shade = dilated(segmentation.shadow, 3) | could_be_shade(background)
+    shade = dilated(segmentation.shadow, 3) | background.shade
     things = opened(away & ~shade & (background.coarse_distance > limit), 3)
     away &= ~dilated(segmentation.mask, round(0.03 * max(away.shape)))
-    sharp = max(
-        1.6 * segmentation.edge_threshold, 0.25 * float(np.percentile(segmentation.gradient[segmentation.mask], 90))
-    )
+    edges = cv2.dilate(segmentation.gradient, disk(2))[segmentation.mask]
+    sharp = max(1.6 * segmentation.edge_threshold, 0.15 * float(np.percentile(edges, 90)))
     drawn = away & eroded(segmentation.shadow, 4) & (segmentation.gradient > sharp)
     things &= ~connected_to(things, background.border)  # light that the model missed comes in from the border
     return float(things.sum() + 3 * drawn.sum())
+
+
+def _longest(mask: np.ndarray) -> int:
+    rows, columns = np.nonzero(mask)
+    return int(max(np.ptp(rows), np.ptp(columns))) + 1
 
 
 def _ramp(value: float, worst: float, best: float) -> float:

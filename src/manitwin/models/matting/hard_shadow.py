@@ -9,9 +9,9 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
-from manitwin.models.matting.background import Background
+from manitwin.models.matting.background import MAX_SHADE, Background, length
 from manitwin.models.matting.outline import dilated, disk, eroded, opened
-from manitwin.models.matting.shadow import MAX_SHADE, falls_inward, light_ratio
+from manitwin.models.matting.shadow import falls_inward
 
 MIN_LIGHT = 0.10  # of the background's light: deeper than that nothing is left to tell colours by
 TINT, CERTAIN_TINT = 0.10, 0.20  # spread of the channels' ratios: a shadow's at most, and more than any shadow's
@@ -46,7 +46,7 @@ def hard_shadow(background: Background, solid: np.ndarray, gradient: np.ndarray)
     a sharp outline, or lie apart, or hold lights and pieces of it.
     """
     found = np.zeros(solid.shape, bool)
-    ratio = light_ratio(background)
+    ratio = background.light_ratio
     light = ratio.mean(2)
     dim = (light > MIN_LIGHT) & (light < MAX_SHADE)
     tint = _tint(ratio, solid)
@@ -56,7 +56,7 @@ def hard_shadow(background: Background, solid: np.ndarray, gradient: np.ndarray)
         return found
     sharp = cv2.dilate(gradient, disk(4))
     reached = cut_along_edges(~solid, certain, gradient, max(float(np.median(sharp[certain])), 1.0))
-    contrast = np.linalg.norm(background.residual, axis=2)
+    contrast = length(background.residual)
     count, labels = cv2.connectedComponents(opened(reached, 1).astype(np.uint8), connectivity=4)
     for index in range(1, count):
         region = labels == index
@@ -90,14 +90,14 @@ def _tint(ratio: np.ndarray, solid: np.ndarray) -> np.ndarray:
     """
     light = ratio.mean(2)[..., None]
     left = (ratio - light) / np.maximum(light, 0.3) / np.sqrt(3)
-    size = np.linalg.norm(left, axis=2)
+    size = length(left)
     coloured = solid & (size > CERTAIN_TINT)
     if not coloured.any():
         return np.asarray(size)
     own = np.median(left[coloured], axis=0)
     own_size = max(float(np.linalg.norm(own)), 1e-6)
     along = left @ (own / own_size)
-    across = np.linalg.norm(left - np.maximum(along, 0)[..., None] * (own / own_size), axis=2)
+    across = length(left - np.maximum(along, 0)[..., None] * (own / own_size))
     return np.asarray(np.maximum(across, along * (TINT / (BOUNCE * own_size))))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Literal
 
 import cv2
@@ -11,7 +11,10 @@ from scipy import ndimage
 
 from manitwin.errors import Rejected
 from manitwin.models.matting.confidence import MatteScores, frame_cause, score
-from manitwin.models.matting.outline import dilated, soft_outline, without_small_holes
+from manitwin.models.matting.fine_outline import fine_outline
+from manitwin.models.matting.joined import LearnedOpinion, asked
+from manitwin.models.matting.learned import Network, learned_alpha
+from manitwin.models.matting.outline import dilated, without_small_holes
 from manitwin.models.matting.segmentation import Segmentation, segment
 
 TRANSPARENT_SHARE = 0.02
@@ -23,9 +26,10 @@ _CAUSES = {
     "separable": "its colours are too close to the background's",
     "complete": "other things stand out of the background as much",
     "uncut": "the image border cuts it off",
-    "stable": "the outline depends on where the search starts",
+    "stable": "two ways of looking at it do not agree on what it is",
     "whole": "it falls apart into pieces",
     "plain": "the background is too cluttered",
+    "thick": "it is thin for so small a photo, so its outline is a large part of it",
     "sharply_bounded": "it is as grey as a shadow, and part of its outline as soft as one: a shadow may hang on it",
     "outermost": "what looks like its shadow has edges as sharp as its outline, so a clear or grey part of it may be lost",
 }
@@ -34,13 +38,63 @@ _REMEDY = "photograph it whole on a plain surface of another colour, or give an 
 
 @dataclass(frozen=True)
 class Matte:
-    """``rgba (H, W, 4) uint8``, alpha 255 on the object; ``confidence`` in [0, 1]; ``scores`` say where it comes from."""
+    """``rgba (H, W, 4) uint8``, alpha 255 on the object; ``confidence`` in [0, 1]; ``scores`` say where it comes from.
+
+    ``agreement`` is that of each opinion with the matte, in [0, 1], by the opinion's name.
+    """
 
     rgba: np.ndarray
-    method: Literal["alpha", "flat_border", "grabcut"]
+    method: Literal["alpha", "flat_border", "grabcut", "learned"]
     confidence: float
     findings: tuple[str, ...]
     scores: dict[str, float]
+    agreement: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Study:
+    """What was found in a photo before anything is decided: ``alpha (H, W) uint8`` at the photo's size, empty without scores."""
+
+    found: Segmentation
+    scores: MatteScores | None
+    alpha: np.ndarray
+    learned: LearnedOpinion | None = None
+
+    @property
+    def confidence(self) -> float:
+        """The confidence in ``alpha``, 0 where nothing was found."""
+        return 0.0 if self.scores is None else self.scores.confidence
+
+    @property
+    def plain(self) -> bool:
+        """Whether smooth surfaces explain the border."""
+        background = self.found.background
+        return background.noise_lab < PLAIN_NOISE_LAB and background.unexplained < 0.05
+
+    @property
+    def agreement(self) -> dict[str, float]:
+        """The agreement of each opinion with the mask, by the opinion's name."""
+        said = {"surfaces": self.found.agreement, "colours": self.found.known_to_colours}
+        if self.learned is not None:
+            said["network"] = self.learned.agreement
+        return {name: round(value, 4) for name, value in said.items()}
+
+
+def study_photo(rgb: np.ndarray, *, working_side_px: int = 512, network: Network | None = None) -> Study:
+    """Find the object in ``rgb`` (H, W, 3) uint8 upright sRGB and judge what was found; nothing is rejected here."""
+    found = segment(_scaled(rgb, working_side_px))
+    if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
+        found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
+    learned = None
+    if network is not None:
+        found, learned = asked(found, learned_alpha(network, _scaled(rgb, max(network.side_px))))
+    if not found.mask.any():
+        return Study(found, None, np.zeros(rgb.shape[:2], np.uint8), learned)
+    scores = score(found, zoom=max(rgb.shape[:2]) / max(found.mask.shape))
+    alpha = fine_outline(rgb, _largest(found.mask))
+    if max(rgb.shape[:2]) <= 2 * working_side_px:  # of larger photos the first look is finer than is needed
+        alpha = fine_outline(rgb, alpha > 127)
+    return Study(found, scores, alpha, learned)
 
 
 def matte_photo(
@@ -51,42 +105,58 @@ def matte_photo(
     min_confidence: float = 0.5,
     min_area_share: float = 0.002,
     second_object_share: float = 0.12,
+    network: Network | None = None,
 ) -> Matte:
     """Find the object in ``image`` (H, W, 3 or 4) uint8 upright sRGB; ``name`` is used in messages only.
 
-    A real alpha channel (more than 2 % transparent) is believed. Else the background is modelled from the border,
-    flooded up to the photo's edges, and the outline settled by a graph cut: ``flat_border`` where smooth surfaces
-    explain the border, ``grabcut`` where they do not and the cut decides alone.
+    A real alpha channel (more than 2 % transparent) is believed. Else two opinions are asked, of smooth surfaces grown from the
+    border and flooded up to the photo's edges, and of colours alone, and a matte is believed where they agree: ``flat_border``
+    where smooth surfaces explain the border, ``grabcut`` where they do not, ``learned`` where it is that of the ``network``.
 
     Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy.
     """
     if image.shape[2] == 4 and (image[..., 3] < 250).mean() > TRANSPARENT_SHARE:
         return _given_matte(image, name, min_area_share, second_object_share)
     rgb = np.ascontiguousarray(image[..., :3])
-    found = segment(_scaled(rgb, working_side_px))
-    if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
-        found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
-    scale = max(found.mask.shape) / max(rgb.shape[:2])
-    plain = found.background.noise_lab < PLAIN_NOISE_LAB and found.background.unexplained < 0.05
-    if found.mask.mean() < min_area_share:
-        if not plain:
+    study = study_photo(rgb, working_side_px=working_side_px, network=network)
+    scores = decided(
+        study,
+        name,
+        min_confidence=min_confidence,
+        min_area_share=min_area_share,
+        second_object_share=second_object_share,
+    )
+    learned = study.learned is not None and study.learned.chosen
+    return Matte(
+        rgba=np.dstack([rgb, study.alpha]),
+        method="learned" if learned else "flat_border" if study.plain else "grabcut",
+        confidence=round(scores.confidence, 4),
+        findings=tuple(_findings(scores, study.found)),
+        scores={key: round(value, 4) for key, value in asdict(scores).items()},
+        agreement=study.agreement,
+    )
+
+
+def decided(
+    study: Study,
+    name: str,
+    *,
+    min_confidence: float = 0.5,
+    min_area_share: float = 0.002,
+    second_object_share: float = 0.12,
+) -> MatteScores:
+    """Return the scores of a study that is believed; raises Rejected as ``matte_photo`` for any other."""
+    found, scores = study.found, study.scores
+    if scores is None or found.mask.mean() < min_area_share:
+        if not study.plain:
             raise Rejected(
                 "low_confidence_matte", f"{name}: {_CAUSES['plain']} to tell an object from it; {_REMEDY}", "generate"
             )
         raise Rejected(
             "no_object", f"{name}: nothing stands out of the background; photograph the object larger", "generate"
         )
-    scores = score(found)
     _reject_doubtful(name, scores, found, min_confidence, second_object_share)
-    band = max(2, round(2 / scale))
-    alpha = soft_outline(rgb, _largest(found.mask), band)
-    return Matte(
-        rgba=np.dstack([rgb, alpha]),
-        method="flat_border" if plain else "grabcut",
-        confidence=round(scores.confidence, 4),
-        findings=tuple(_findings(scores, found)),
-        scores={key: round(value, 4) for key, value in asdict(scores).items()},
-    )
+    return scores
 
 
 def _scaled(rgb: np.ndarray, side_px: int) -> np.ndarray:

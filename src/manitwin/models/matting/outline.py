@@ -38,6 +38,15 @@ def without_small_holes(mask: np.ndarray) -> np.ndarray:
     return np.asarray(mask | small[labels])
 
 
+def holds(region: np.ndarray) -> int:
+    """Return how many pixels a region (H, W) encloses that are not its own."""
+    height, width = region.shape
+    padded = np.zeros((height + 2, width + 2), np.uint8)
+    padded[1:-1, 1:-1] = region
+    cv2.floodFill(padded, None, (0, 0), 2)
+    return int((padded[1:-1, 1:-1] == 0).sum())
+
+
 def gradient_magnitude(lab: np.ndarray, blur_px: float = 1.0) -> np.ndarray:
     """Return the colour gradient (H, W) in L*a*b* units per pixel."""
     smooth = cv2.GaussianBlur(lab, (0, 0), blur_px)

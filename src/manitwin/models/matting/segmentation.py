@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
-from manitwin.models.matting.background import Background, model_background
+from manitwin.models.matting.background import Background, length, model_background
 from manitwin.models.matting.hard_shadow import hard_shadow
 from manitwin.models.matting.outline import (
     dilated,
@@ -16,17 +16,26 @@ from manitwin.models.matting.outline import (
     edges,
     flood,
     gradient_magnitude,
+    holds,
     opened,
     without_small_holes,
 )
+from manitwin.models.matting.second_opinion import Bracket, colour_opinion
 from manitwin.models.matting.shadow import cast_shadow, gaps
 
+SAME = 0.97  # agreement beyond which there is nothing to settle
+MOST_ISLANDS = 0.04  # of a gap: nothing lies in it
+BLIND = 0.6  # share of the first opinion's object that colours must know of
+CUT_MARGIN_PX = 16
 BALL_SHARE = 0.010  # of the longer side: gaps in an outline narrower than twice this do not let the flood in
 
 
 @dataclass(frozen=True)
 class Segmentation:
-    """A mask (H, W) at working resolution, and what it was made from; ``hard`` is the part of ``shadow`` with an edge."""
+    """A mask (H, W) at working resolution, and what it was made from; ``hard`` is the part of ``shadow`` with an edge.
+
+    ``agreement`` is how far the opinion by surfaces and flood agrees with what both opinions make together.
+    """
 
     mask: np.ndarray
     background: Background
@@ -34,7 +43,13 @@ class Segmentation:
     edge_threshold: float
     shadow: np.ndarray
     hard: np.ndarray
-    stability: float
+    agreement: float
+    colours: Bracket
+
+    @property
+    def known_to_colours(self) -> float:
+        """The share of the mask that colours alone call possible."""
+        return float((self.mask & dilated(self.colours.possible, 2)).sum() / max(int(self.mask.sum()), 1))
 
 
 def segment(rgb: np.ndarray) -> Segmentation:
@@ -56,11 +71,59 @@ def segment(rgb: np.ndarray) -> Segmentation:
     hard = hard_shadow(background, candidate & ~shadow & ~seen_through, gradient)
     shadow |= hard
     solid = candidate & ~shadow & ~seen_through
-    mask = _to_half_contrast(background, _graph_cut(background, solid, core_px=6, doubt=3.0, seed=0))
-    other = _to_half_contrast(background, _graph_cut(background, solid, core_px=9, doubt=4.5, seed=1))
-    union = (mask | other).sum()
-    stability = float((mask & other).sum() / union) if union else 0.0
-    return Segmentation(mask, background, gradient, threshold, shadow, hard, stability)
+    first = _graph_cut(background, solid, core_px=6, doubt=3.0, seed=0)
+    colours = colour_opinion(rgb)
+    joined, agreement = reconciled(first, colours, shadow)
+    second = (
+        first if agreement > SAME else _graph_cut(background, joined, core_px=6, doubt=3.0, seed=0) & ~_away(joined)
+    )
+    mask = to_half_contrast(background, second)
+    return Segmentation(mask, background, gradient, threshold, shadow & ~mask, hard & ~mask, agreement, colours)
+
+
+def reconciled(first: np.ndarray, colours: Bracket, shadow: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the mask that two opinions make together, and how far they agree on it, in [0, 1].
+
+    What has certainly other colours than the background belongs to it, what cannot have does not; between the two the first
+    decides, and of its ``shadow``, which light of another colour may tint: there colours only lower the agreement. Where they
+    tell most of the first's object from nothing, they are blind, and it stands alone with agreement 0.
+    """
+    if not first.any():
+        return colours.certain & ~shadow, 0.0
+    inside = (first & colours.possible).sum() / first.sum()
+    if inside < BLIND:
+        return first, 0.0
+    added = opened(colours.certain & ~first, 1)
+    removed = opened(first & ~colours.possible, 1)
+    empty = _without_islands(removed, first)
+    joined = (first | (added & ~shadow)) & ~empty
+    differs = opened((added & ~first) | removed, 1).sum() / max(int(joined.sum()), 1)
+    return joined, float(np.clip(1 - differs, 0, 1))
+
+
+def _without_islands(regions: np.ndarray, solid: np.ndarray) -> np.ndarray:
+    """Return those ``regions`` of ``solid`` that are open to the outside, or empty: what encloses a print is a label."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(regions.astype(np.uint8), connectivity=4)
+    kept = np.zeros(regions.shape, bool)
+    for index in range(1, count):
+        left, top, width, height, area = stats[index]
+        box = np.s_[max(0, top - 2) : top + height + 2, max(0, left - 2) : left + width + 2]
+        part = labels[box] == index
+        islands = holds(part)
+        open_to_outside = (dilated(part, 2) & ~solid[box]).any()
+        if open_to_outside or islands < MOST_ISLANDS * area:
+            kept[box] |= part
+    return kept
+
+
+def holes_seen_through(found: Segmentation, mask: np.ndarray) -> np.ndarray:
+    """Return the regions of ``mask`` through which the background is seen, as both built-in opinions have them."""
+    seen = gaps(found.background, mask, found.gradient, found.edge_threshold)
+    return seen & ~found.colours.certain
+
+
+def _away(mask: np.ndarray) -> np.ndarray:
+    return ~dilated(mask, 3)
 
 
 def _graph_cut(background: Background, solid: np.ndarray, *, core_px: int, doubt: float, seed: int) -> np.ndarray:
@@ -83,12 +146,29 @@ def _graph_cut(background: Background, solid: np.ndarray, *, core_px: int, doubt
     # residuals amplified: the background becomes one tight cluster at mid-grey whatever the light does
     image = np.clip(128 + 3 * background.residual * [0.7, 1, 1], 0, 255).astype(np.uint8)
     cv2.setRNGSeed(seed)
-    cv2.grabCut(image, labels, (0, 0, 1, 1), np.zeros((1, 65)), np.zeros((1, 65)), 4, cv2.GC_INIT_WITH_MASK)
-    mask = (labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)
-    return _without_specks(mask)
+    box = _around(labels != cv2.GC_BGD, CUT_MARGIN_PX)  # far background says nothing that the near one does not
+    near = np.ascontiguousarray(labels[box])
+    cv2.grabCut(
+        np.ascontiguousarray(image[box]),
+        near,
+        (0, 0, 1, 1),
+        np.zeros((1, 65)),
+        np.zeros((1, 65)),
+        3,
+        cv2.GC_INIT_WITH_MASK,
+    )
+    mask = np.zeros(solid.shape, bool)
+    mask[box] = (near == cv2.GC_FGD) | (near == cv2.GC_PR_FGD)
+    return without_specks(mask)
 
 
-def _to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8) -> np.ndarray:
+def _around(mask: np.ndarray, margin_px: int) -> tuple[slice, slice]:
+    rows, columns = np.nonzero(mask)
+    top, left = max(0, rows.min() - margin_px), max(0, columns.min() - margin_px)
+    return slice(top, rows.max() + margin_px + 1), slice(left, columns.max() + margin_px + 1)
+
+
+def to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8) -> np.ndarray:
     """Take the outline back to where a pixel is half object.
 
     The background B is known and the object's colour F is that of the nearest pixel well inside, so the share of the object is
@@ -104,18 +184,18 @@ def _to_half_contrast(background: Background, mask: np.ndarray, band_px: int = 8
     residual = cv2.GaussianBlur(background.residual, (0, 0), 0.6)
     own = residual[nearest[0], nearest[1]]
     share = (residual * own).sum(2) / np.maximum((own**2).sum(2), 1e-6)
-    visible = np.linalg.norm(own, axis=2) > 8 * max(background.noise_lab, 0.5)
+    visible = length(own) > 8 * max(background.noise_lab, 0.5)
     # a mixture lies between B and F; a rim of another colour does not, and stays
-    off_line = np.linalg.norm(residual - share[..., None] * own, axis=2)
-    mixed = off_line < 0.12 * np.linalg.norm(own, axis=2) + 4 * max(background.noise_lab, 0.5)
+    off_line = length(residual - share[..., None] * own)
+    mixed = off_line < 0.12 * length(own) + 4 * max(background.noise_lab, 0.5)
     thin = mask & ~inner & visible & mixed & (share < 0.5)
     reached = ~mask
     for _ in range(band_px):
         reached |= dilated(reached, 1) & thin
-    return _without_specks(mask & ~reached)
+    return without_specks(mask & ~reached)
 
 
-def _without_specks(mask: np.ndarray) -> np.ndarray:
+def without_specks(mask: np.ndarray) -> np.ndarray:
     _, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[:, cv2.CC_STAT_AREA].copy()
     areas[0] = 0

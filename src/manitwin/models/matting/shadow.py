@@ -5,32 +5,14 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from manitwin.models.matting.background import Background
-from manitwin.models.matting.outline import dilated, eroded, flood, opened
+from manitwin.models.matting.background import MAX_SHADE, MIN_SHADE, NEUTRAL, Background, length
+from manitwin.models.matting.outline import dilated, eroded, flood, holds, opened
 
-MIN_SHADE, MAX_SHADE = (
-    0.25,
-    0.985,
-)  # ratio of reflected light: darker is no cast shadow of a lit scene, lighter is none at all
 MAX_PENUMBRA = 3.5  # L*a*b* units per pixel at working size; cast shadows of the studied photos have 1.5 to 3.3
-NEUTRAL = 0.08  # spread of the channels' ratios in a shadow of one light
+MOST_HELD = 0.04  # of a gap: what encloses a print is a label
+CLEARLY = 2.5  # times what a gap's colour is off the background's: its rim is off by as much at least
 RISE = 0.05  # of the background's light: what shading and noise add on a way into a shadow
 TINTED = 0.25  # the same where a second, coloured light fills the shadow
-
-
-def light_ratio(background: Background) -> np.ndarray:
-    """Return each pixel's linear light (H, W, 3) over that of the expected background."""
-    smooth = np.clip(cv2.cvtColor(cv2.GaussianBlur(background.lab, (0, 0), 0.8), cv2.COLOR_LAB2RGB), 0, 1) ** 2.2
-    expected = np.clip(cv2.cvtColor(background.expected, cv2.COLOR_LAB2RGB), 0, 1) ** 2.2
-    return (smooth + 2e-3) / (expected + 2e-3)
-
-
-def could_be_shade(background: Background) -> np.ndarray:
-    """Return where a photo (H, W) has the background's colour, darkened without tint."""
-    ratio = light_ratio(background)
-    mean = ratio.mean(2)
-    neutral = np.linalg.norm(ratio / mean[..., None] - 1, axis=2) / np.sqrt(3) < NEUTRAL
-    return (mean > MIN_SHADE) & (mean < MAX_SHADE) & neutral
 
 
 def cast_shadow(background: Background, candidate: np.ndarray, gradient: np.ndarray, threshold: float) -> np.ndarray:
@@ -40,11 +22,11 @@ def cast_shadow(background: Background, candidate: np.ndarray, gradient: np.ndar
     what cannot be a shadow: a third as sharp where the chroma stays (up to the tint of light bounced off the object), an
     eighth where several lights tint the shadow. A glow differs from the background by less than 15 % of what the object does.
     """
-    ratio = light_ratio(background)
+    ratio = background.light_ratio
     darkening = ratio.mean(2)
     tint = ratio / darkening[..., None] - 1
     shady = (darkening > MIN_SHADE) & (darkening < MAX_SHADE)
-    tinted = np.linalg.norm(tint, axis=2) / np.sqrt(3)
+    tinted = length(tint) / np.sqrt(3)
     certain = opened(candidate & ~(shady & (tinted < TINTED)) & (background.distance > 4), 2)
     edge = _object_edge(certain, candidate, gradient)
     shady &= falls_inward(darkening, ~candidate)
@@ -53,7 +35,7 @@ def cast_shadow(background: Background, candidate: np.ndarray, gradient: np.ndar
     soft = (plain & (gradient < max(threshold, min(0.3 * edge, MAX_PENUMBRA)))) | ((tinted < TINTED) & softest)
     outside = ~candidate
     lit = dilated(shady, 3) & (background.distance < 3.5) & dilated(outside, 4)  # the outer flank of a penumbra
-    contrast = np.linalg.norm(background.residual, axis=2)
+    contrast = length(background.residual)
     faint = contrast < 0.15 * (np.median(contrast[certain]) if certain.any() else 0.0)
     glow = faint & softest
     reached = flood(outside | ((shady | lit) & soft) | glow, outside, ball_px=2, regrow_px=4) & candidate
@@ -67,12 +49,20 @@ def falls_inward(light: np.ndarray, outside: np.ndarray) -> np.ndarray:
     or the near wall of a transparent one. Grey reconstruction by dilation (Vincent 1993) gives the best way's darkest pixel.
     """
     smooth = cv2.GaussianBlur(light, (0, 0), 1.0).astype(np.float32)
-    darkest = np.where(outside, smooth, 0).astype(np.float32)
-    cross = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    rows, columns = np.nonzero(~outside)
+    if not len(rows):
+        return np.ones(light.shape, bool)
+    box = np.s_[max(0, rows.min() - 2) : rows.max() + 3, max(0, columns.min() - 2) : columns.max() + 3]
+    near, free = smooth[box], np.where(outside[box], smooth[box], 0).astype(np.float32)
+    darkest, cross = free, cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
+    falling = np.ones(light.shape, bool)
     while True:
-        grown = np.where(outside, smooth, np.minimum(cv2.dilate(darkest, cross), smooth))
+        grown = darkest
+        for _ in range(8):
+            grown = np.maximum(np.minimum(cv2.dilate(grown, cross), near), free)
         if np.array_equal(grown, darkest):
-            return np.asarray(smooth - darkest < RISE)
+            falling[box] = near - darkest < RISE
+            return falling
         darkest = grown
 
 
@@ -86,7 +76,7 @@ def _without_bounce(tint: np.ndarray, object_ratio: np.ndarray) -> np.ndarray:
         if size > 0.1:
             along = np.maximum(tint @ (own / size), 0)
             left = tint - along[..., None] * (own / size)
-    return np.linalg.norm(left, axis=2) / np.sqrt(3)
+    return length(left) / np.sqrt(3)
 
 
 def _object_edge(certain: np.ndarray, candidate: np.ndarray, gradient: np.ndarray) -> float:
@@ -100,25 +90,35 @@ def _object_edge(certain: np.ndarray, candidate: np.ndarray, gradient: np.ndarra
 def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, threshold: float) -> np.ndarray:
     """Return enclosed regions through which the background is seen: the hole of a ring, the eye of a handle.
 
-    Such a region has the expected colour without bias, or that colour evenly shaded, and its rim has not.
+    Such a region has the expected colour, or that colour evenly shaded, no more drawing than the border has, and a rim that
+    differs from both clearly.
     """
-    ratio = light_ratio(background)
+    ratio = background.light_ratio
     shade = ratio.mean(2)
-    even = (shade > 0.55) & (shade < MAX_SHADE) & (np.linalg.norm(ratio / shade[..., None] - 1, axis=2) < 0.12)
+    even = (shade > 0.45) & (shade < MAX_SHADE) & (length(ratio / shade[..., None] - 1) < 0.12 * np.sqrt(3))
     quiet = candidate & (gradient < 4 * threshold) & ((background.distance < 4) | even)
+    contrast = length(background.residual)
+    usual = float(np.median(gradient[background.border])) + threshold
     count, labels, stats, _ = cv2.connectedComponentsWithStats(quiet.astype(np.uint8), connectivity=4)
     found = np.zeros(candidate.shape, bool)
     for index in range(1, count):
-        if stats[index, cv2.CC_STAT_AREA] < max(12, 3e-5 * candidate.size):
+        left, top, width, height, area = stats[index]
+        if area < max(12, 3e-5 * candidate.size):
             continue
-        part = labels == index
-        residual = np.median(background.residual[part], 0)
+        box = np.s_[max(0, top - 5) : top + height + 5, max(0, left - 5) : left + width + 5]
+        part = labels[box] == index
+        residual = np.median(background.residual[box][part], 0)
         bias = float(np.linalg.norm(residual * [0.7, 1, 1]))
-        shaded = stats[index, cv2.CC_STAT_AREA] > 0.01 * candidate.sum() and np.linalg.norm(residual[1:]) < 3
         rim = dilated(part, 4) & ~dilated(part, 1)
-        clear = np.percentile(background.distance[rim], 20)
-        if (bias < 1.5 and np.median(background.distance[rim]) > 5) or (shaded and clear > 12):
-            found |= part
+        rim_contrast = contrast[box][rim]
+        inner = eroded(part, 2)
+        drawn = float(np.percentile(gradient[box][inner], 75)) if inner.any() else 0.0
+        own = max(1.5, 0.8 * background.noise_lab)
+        clear = float(np.percentile(rim_contrast, 25))
+        same = bias < own and np.median(rim_contrast) > CLEARLY * max(own, bias)
+        shaded = residual[0] < own and np.hypot(*residual[1:]) < own + 1.5 and clear > CLEARLY * max(own, bias)
+        if drawn < usual and holds(part) < MOST_HELD * area and (same or (shaded and area > 4e-4 * candidate.size)):
+            found[box] |= part
     see_through = even | (background.distance < 4)
     for _ in range(6):  # up to the rim's own edge
         found |= dilated(found, 1) & see_through & candidate

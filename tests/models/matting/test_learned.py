@@ -1,0 +1,100 @@
+"""A network is one of the opinions: a tiny one, made by the test, that calls red things objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from manitwin.errors import UsageError
+from manitwin.models.matting import matte_photo
+from manitwin.models.matting.learned import find_network, learned_alpha, require_working
+from manitwin.models.weights.store import FOLDER
+from tiny_networks import tiny_network
+
+SIZE = (240, 320)
+
+
+@pytest.fixture(autouse=True)
+def forget() -> None:
+    find_network.cache_clear()
+
+
+def _network(tmp_path: Path, **more: object) -> str:
+    path = tmp_path / "tiny-isnet.onnx"
+    path.write_bytes(tiny_network(**more))  # type: ignore[arg-type]
+    return str(path)
+
+
+def _photo(color: tuple[int, int, int]) -> tuple[np.ndarray, np.ndarray]:
+    truth = np.zeros(SIZE, np.uint8)
+    cv2.ellipse(truth, (160, 120), (70, 45), 20, 0, 360, 1, -1)
+    scene = np.full((*SIZE, 3), (205.0, 200.0, 190.0)) + np.random.default_rng(0).normal(0, 1.5, (*SIZE, 3))
+    scene[truth > 0] = color
+    return np.clip(cv2.GaussianBlur(scene, (0, 0), 0.8), 0, 255).astype(np.uint8), truth > 0
+
+
+@pytest.mark.parametrize("logistic", [True, False])
+def test_the_share_of_object_of_each_pixel_is_read(tmp_path: Path, logistic: bool) -> None:
+    network = find_network(_network(tmp_path, logistic=logistic, weights=(12.0, -6.0, -6.0)))
+    photo, truth = _photo((220, 30, 30))
+    alpha = learned_alpha(network, photo)
+    assert alpha.shape == SIZE and alpha.min() >= 0 and alpha.max() <= 1
+    found = alpha > 0.8
+    assert (found & truth).sum() / (found | truth).sum() > 0.9
+
+
+def test_a_network_that_agrees_is_one_of_the_opinions(tmp_path: Path) -> None:
+    photo, truth = _photo((220, 30, 30))
+    matte = matte_photo(photo, "x.png", network=find_network(_network(tmp_path, weights=(40.0, -30.0, -30.0))))
+    assert matte.agreement["network"] > 0.9 and matte.confidence > 0.9
+    found = matte.rgba[..., 3] > 127
+    assert (found & truth).sum() / (found | truth).sum() > 0.97
+
+
+def test_a_network_that_nothing_bears_out_is_not_believed(tmp_path: Path) -> None:
+    """It calls the whole picture an object but for the object."""
+    from manitwin.errors import Rejected
+
+    photo, _ = _photo((30, 30, 220))
+    network = find_network(_network(tmp_path, weights=(20.0, 20.0, 0.0)))
+    with pytest.raises(Rejected):
+        matte_photo(photo, "x.png", network=network)
+
+
+def test_networks_are_run_once_before_a_build(tmp_path: Path) -> None:
+    require_working(find_network(_network(tmp_path)))
+
+
+@pytest.mark.parametrize(
+    ("content", "cause"),
+    [
+        (b"\x00" * 100, "no ONNX network"),
+        (tiny_network(side_px=16), "64 to 2048"),
+        (tiny_network(outside=True), "another file"),
+    ],
+)
+def test_a_file_that_cannot_be_run_is_refused_in_one_line(tmp_path: Path, content: bytes, cause: str) -> None:
+    path = tmp_path / "net.onnx"
+    path.write_bytes(content)
+    with pytest.raises(UsageError, match=cause) as caught:
+        require_working(find_network(str(path)))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_network_that_opencv_cannot_run_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "net.onnx"
+    path.write_bytes(tiny_network().replace(b"Conv", b"Konv"))
+    with pytest.raises(UsageError, match="cannot be run here") as caught:
+        require_working(find_network(str(path)))
+    assert "\n" not in str(caught.value)
+
+
+def test_names_without_weights_say_how_to_get_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER, str(tmp_path))
+    with pytest.raises(UsageError, match="manitwin models add isnet"):
+        find_network("isnet")
+    with pytest.raises(UsageError, match="did you mean 'isnet'"):
+        find_network("isnett")
