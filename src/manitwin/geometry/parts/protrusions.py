@@ -19,13 +19,14 @@ class Protrusion:
     """A part that sticks out of the body in one direction.
 
     ``azimuth_rad`` is where, about the vertical through ``axis_xy_m``; ``reach_m`` how far out it goes beyond the body;
-    ``share`` its share of the surface samples.
+    ``share`` its share of the surface samples; ``height_m`` how tall its outer half is.
     """
 
     azimuth_rad: float
     half_width_rad: float
     reach_m: float
     share: float
+    height_m: float
 
 
 @dataclass(frozen=True)
@@ -113,6 +114,7 @@ def _protrusions(body: RoundBody, surface_m: np.ndarray) -> tuple[Protrusion, ..
             continue
         members = np.isin(sector, run % _DIRECTIONS)
         reach = float(outside[out][members].max())
+        outer = surface_m[out][members & (outside[out] >= 0.5 * reach), 2]
         middle = run[0] + (len(run) - 1) / 2
         found.append(
             Protrusion(
@@ -120,6 +122,7 @@ def _protrusions(body: RoundBody, surface_m: np.ndarray) -> tuple[Protrusion, ..
                 half_width_rad=(len(run) / 2 + 0.5) / _DIRECTIONS * 2 * np.pi,
                 reach_m=reach,
                 share=float(counts[run % _DIRECTIONS].sum() / len(surface_m)),
+                height_m=float(np.ptp(outer)),
             )
         )
     return tuple(sorted(found, key=lambda p: -p.reach_m * p.share))

@@ -123,6 +123,7 @@ def _head_share(width: np.ndarray) -> float:
 
 _SAMPLES = 6000
 LEAST_HANDLE_REACH = 0.08  # of the body's radius, beyond the outline's own margin: less is relief, no handle
+_TALLER, _STEEPER = 1.1, 2.0  # a handle beside a long spout: its outer half, and that by its reach
 _ELONGATED, _ELONGATED_LYING = 1.6, 1.15  # length by width from which a thing has ends rather than sides
 
 
@@ -147,11 +148,17 @@ class Shape:
 
     @property
     def side_handle(self) -> Protrusion | None:
-        """The largest thing that sticks out of an upright body, if it is large enough to be held."""
-        for protrusion in self.body.protrusions if self.upright else ():
-            if protrusion.reach_m > LEAST_HANDLE_REACH * self.body.radius_m.max():
-                return protrusion
-        return None
+        """What sticks out of an upright body and is large enough to be held: the largest, or one that is taller and steeper.
+
+        A spout may reach farther than the handle opposite, but ends in a tip; a handle comes back to the body lower down.
+        """
+        least_m = LEAST_HANDLE_REACH * self.body.radius_m.max()
+        large = [p for p in self.body.protrusions if p.reach_m > least_m] if self.upright else []
+        if not large:
+            return None
+        first, tallest = large[0], max(large, key=lambda p: p.height_m)
+        steeper = tallest.height_m / tallest.reach_m > _STEEPER * first.height_m / first.reach_m
+        return tallest if steeper and tallest.height_m > _TALLER * first.height_m else first
 
     @property
     def has_ends(self) -> bool:
