@@ -282,3 +282,4 @@ def _answer(function: str, arguments: tuple[Any, ...]) -> Answer:
 
 if __name__ == "__main__":
     _serve()
+    os._exit(0)  # who asked is gone: taking down the libraries would outlive it by a second

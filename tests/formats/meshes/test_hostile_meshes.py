@@ -36,14 +36,14 @@ FACET = "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 
 
 
 @pytest.fixture(autouse=True)
-def ten_seconds_of_processor_time() -> Iterator[None]:
+def a_minute_of_processor_time() -> Iterator[None]:
     """End a test that takes more: a hang, not a figure of speed."""
 
     def out_of_time(*_: object) -> None:
-        raise TimeoutError("more than 10 CPU-seconds")
+        raise TimeoutError("more than 60 CPU-seconds")
 
     before = signal.signal(signal.SIGPROF, out_of_time)
-    signal.setitimer(signal.ITIMER_PROF, 10)
+    signal.setitimer(signal.ITIMER_PROF, 60)
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)
         yield
@@ -165,8 +165,8 @@ REFUSED: list[Case] = [
     ("count.ply", lambda: ply("binary_little_endian", rows(1, 1, "float"), bytes(12) + struct.pack("<f", np.nan)),
      "unreadable", "broken"),
     ("long.ply", lambda: ply("binary_big_endian", rows(1, 1, "uint"), bytes(12) + b"\xff" * 8), "unreadable", "end early"),
-    ("corners.obj", lambda: OBJ + "f " + "1 2 3 " * 1_400_000, "too_large", "faces are more than the limit"),
-    ("points.obj", lambda: OBJ + "f 1\n" * 4_000_000, "too_large", "faces are more than the limit"),
+    ("corners.obj", lambda: OBJ + "f " + "1 2 3 " * 140_000, "too_large", "faces are more than the limit"),
+    ("points.obj", lambda: OBJ + "f 1\n" * 400_000, "too_large", "faces are more than the limit"),
     ("numbers.obj", lambda: OBJ + "v " + "0 " * 5_000_000, "unreadable", "line 21 is too long"),
     ("line.obj", lambda: OBJ + "o " + "x" * (65 << 20), "too_large", "line of more than"),
     ("groups.obj", lambda: OBJ + "".join(f"usemtl {i}\nf 1 2 3\n" for i in range(20_001)), "too_large", "parts"),
@@ -194,14 +194,18 @@ REFUSED: list[Case] = [
 ]  # fmt: skip
 
 
+FEWER_FACES = MeshLimits(max_faces=400_000)
+"""So that no case takes seconds to count to the limit."""
+
+
 @pytest.mark.parametrize(("name", "content", "reason", "said"), REFUSED, ids=[case[0] for case in REFUSED])
 def test_what_asks_for_too_much_is_refused_in_one_line(
     tmp_path: Path, name: str, content: Callable[[], bytes | str], reason: str, said: str
 ) -> None:
     path = written(tmp_path, name, content())
     with pytest.raises(InputError) as caught:
-        read_mesh(path)
-    assert caught.value.reason == reason and said in caught.value.detail
+        read_mesh(path, limits=FEWER_FACES if name in ("corners.obj", "points.obj") else MeshLimits())
+    assert (caught.value.reason, said in caught.value.detail) == (reason, True), caught.value.detail
     assert caught.value.detail.startswith(f"{name}: ") and len(caught.value.detail) < 600
     assert caught.value.detail.isprintable()
 
