@@ -16,7 +16,7 @@ import json
 import tempfile
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 import cv2
@@ -184,10 +184,15 @@ def page(results: Sequence[Result], command: str) -> str:
     return PAGE_TEXT.format(
         command=command,
         elevation=table(results, "elevation_deg"),
-        primitive=table(sorted(results, key=lambda r: r.primitive), "primitive"),
+        primitive=table(sorted(families(results), key=lambda r: r.primitive), "primitive"),
         category=table(sorted(results, key=lambda r: r.category), "category"),
         reasons="\n".join(f"- {count}: {reason}" for reason, count in reasons) or "- none",
     )
+
+
+def families(results: Sequence[Result]) -> list[Result]:
+    """Return the results with all templates as one way to make a shape."""
+    return [replace(r, primitive=r.primitive.split(":")[0]) for r in results]
 
 
 def summary_reasons(results: Sequence[Result]) -> list[tuple[str, int]]:
@@ -210,7 +215,7 @@ elevations of the camera, and built from the photo. The seeds are none that anyt
 - **named right, wrong**: of all photos; the rest are `unknown`. **CPU-s**: matting, naming and shape together.
 - Figures are medians over what was accepted. Identical meshes measure 0.90 to 0.99 (IoU) and 0.80 to 0.97 (IoU solid).
 
-Written by `{command}`.
+Written by {command}.
 
 ## By the camera's elevation
 
@@ -246,11 +251,13 @@ def main() -> None:
         write_results(run(options), options.out / "results.csv")
     results = read_results(options.out / "results.csv")
     for by in ("category", "primitive", "elevation_deg"):
-        print(table(results, by), end="\n\n")
+        print(table(families(results), by), end="\n\n")
     print(*(f"{count:4d} {reason}" for reason, count in summary_reasons(results)), sep="\n")
     if options.docs:
         words = " --nameless" if any(not r.named for r in results) else ""
-        PAGE.write_text(page(results, f"python benchmarks/photo_generation.py OUT --held-out{words}"))
+        things = len({(r.category, r.seed) for r in results})
+        command = f"python benchmarks/photo_generation.py OUT --held-out{words} --docs"
+        PAGE.write_text(page(results, f"`{command}` from {len(results)} photos of {things} things"))
 
 
 def run(options: argparse.Namespace) -> list[Result]:

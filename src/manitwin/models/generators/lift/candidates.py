@@ -31,7 +31,8 @@ UPRIGHT_TILT_DEG = 20.0  # an axis that leans less stands in the photo
 LEANING_DEG = 3.0  # what leans more is set upright about its own axis, as if seen from the side
 LEAST_BODY_SHARE = 0.55  # of the outline: the body that a round container's handles and spouts stick out of
 LEAST_TURNED_IOU = 0.92
-LYING_TIP_ANGLE_DEG = 5.0
+LEAST_TIP_ANGLE_DEG = 5.0
+STANDING_CUTS = (0.015, 0.03, 0.05, 0.08, 0.12)  # shares of the height tried for a flat base
 _RELIEF_RISE = 1.5  # a bar of radius r lies as a relief this many r high: between a half bar and a whole one
 _COMPACT = (
     1.5  # round things no longer than this are set on their base, whatever else is usual: it is flat, they do not roll
@@ -160,14 +161,16 @@ def inflated(view: View, hint: ShapeHint) -> Made:
     sturdy = silhouette.elongation < 2.5 and not (silhouette.holes and silhouette.solidity < 0.6)
     if hint.stands or (hint.stands is None and sturdy):
         body = inflate(silhouette.mask, depth_limit_px=limit, rise=1.0, flat_back=False)
-        standing = stood(body, 2.0 if hint.stands else UPRIGHT_TIP_ANGLE_DEG)
+        standing = stood(body, LEAST_TIP_ANGLE_DEG if hint.stands else UPRIGHT_TIP_ANGLE_DEG, STANDING_CUTS)
+        if standing is None and hint.stands:
+            standing = stood(body, 2.0)
         if standing is not None:
             return Made(standing, view.explained(body), {"rests": "standing", **notes})
     rise = 1.0 if source == "prior" else _RELIEF_RISE / 2
     body = inflate(silhouette.mask, depth_limit_px=limit, rise=rise, flat_back=False)
     found = view.explained(body)
     lying = laid_round(body)
-    if tip_angle_deg(lying) < LYING_TIP_ANGLE_DEG:
+    if tip_angle_deg(lying) < LEAST_TIP_ANGLE_DEG:
         relief = inflate(silhouette.mask, depth_limit_px=limit, rise=_RELIEF_RISE, flat_back=True)
         return Made(laid(relief), found, {"rests": "lying", **notes})
     return Made(lying, found, {"rests": "lying", **notes})
