@@ -73,7 +73,7 @@ def segment(rgb: np.ndarray) -> Segmentation:
     solid = candidate & ~shadow & ~seen_through
     first = _graph_cut(background, solid, core_px=6, doubt=3.0, seed=0)
     colours = colour_opinion(rgb)
-    joined, agreement = reconciled(first, colours, shadow)
+    joined, agreement = reconciled(first, colours, shadow | seen_through)
     second = (
         first if agreement > SAME else _graph_cut(background, joined, core_px=6, doubt=3.0, seed=0) & ~_away(joined)
     )

@@ -117,7 +117,13 @@ def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, th
         clear = float(np.percentile(rim_contrast, 25))
         same = bias < own and np.median(rim_contrast) > CLEARLY * max(own, bias)
         shaded = residual[0] < own and np.hypot(*residual[1:]) < own + 1.5 and clear > CLEARLY * max(own, bias)
-        if drawn < usual and holds(part) < MOST_HELD * area and (same or (shaded and area > 4e-4 * candidate.size)):
+        distant = background.distance[box][rim]
+        certain = (bias < 1.5 and np.median(distant) > 5) or (
+            area > 0.01 * candidate.sum() and np.hypot(*residual[1:]) < 3 and np.percentile(distant, 20) > 12
+        )
+        if certain or (
+            drawn < usual and holds(part) < MOST_HELD * area and (same or (shaded and area > 4e-4 * candidate.size))
+        ):
             found[box] |= part
     see_through = even | (background.distance < 4)
     for _ in range(6):  # up to the rim's own edge
