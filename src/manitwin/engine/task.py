@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Generic, Self, TypeVar
 
 
@@ -24,7 +24,7 @@ class Payload(ABC):
 
     def to_json(self) -> dict[str, Any]:
         """Return the fields as a ledger keeps them: the same payload gives the same ones in every version."""
-        return asdict(self)
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @classmethod
     def from_json(cls, fields: Mapping[str, Any]) -> Self:
