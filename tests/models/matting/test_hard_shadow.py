@@ -80,7 +80,7 @@ def test_hard_shadow_is_left_out(
 @pytest.mark.parametrize("light", [0.45, 0.7])
 def test_object_as_grey_as_its_hard_shadow_is_rejected_for_it(grey: float, light: float) -> None:
     scene = _painted(_plain(0) * _shadow(BODY, (light, light, light)), BODY, (1.12 * grey, grey, 0.87 * grey))
-    with pytest.raises(Rejected, match="a shadow may hang on it") as caught:
+    with pytest.raises(Rejected, match=r"a shadow may hang on it|what looks like its shadow") as caught:
         matte_photo(_photo(scene), "x.png")
     assert caught.value.reason == "low_confidence_matte"
 

@@ -16,7 +16,6 @@ from manitwin.models.matting.outline import (
     edges,
     flood,
     gradient_magnitude,
-    holds,
     opened,
     without_small_holes,
 )
@@ -24,7 +23,6 @@ from manitwin.models.matting.second_opinion import Bracket, colour_opinion
 from manitwin.models.matting.shadow import cast_shadow, gaps
 
 SAME = 0.97  # agreement beyond which there is nothing to settle
-MOST_ISLANDS = 0.04  # of a gap: nothing lies in it
 BLIND = 0.6  # share of the first opinion's object that colours must know of
 CUT_MARGIN_PX = 16
 BALL_SHARE = 0.010  # of the longer side: gaps in an outline narrower than twice this do not let the flood in
@@ -86,7 +84,8 @@ def reconciled(first: np.ndarray, colours: Bracket, shadow: np.ndarray) -> tuple
 
     What has certainly other colours than the background belongs to it, what cannot have does not; between the two the first
     decides, and of its ``shadow``, which light of another colour may tint: there colours only lower the agreement. Where they
-    tell most of the first's object from nothing, they are blind, and it stands alone with agreement 0.
+    tell most of the first's object from nothing, they are blind, and it stands alone with agreement 0. What colours take out
+    within the object stays, and lowers the agreement: only ``gaps`` tells a hole from a label of the background's colours.
     """
     if not first.any():
         return colours.certain & ~shadow, 0.0
@@ -95,23 +94,21 @@ def reconciled(first: np.ndarray, colours: Bracket, shadow: np.ndarray) -> tuple
         return first, 0.0
     added = opened(colours.certain & ~first, 1)
     removed = opened(first & ~colours.possible, 1)
-    empty = _without_islands(removed, first)
+    empty = _open_to_outside(removed, first)
     joined = (first | (added & ~shadow)) & ~empty
     differs = opened((added & ~first) | removed, 1).sum() / max(int(joined.sum()), 1)
     return joined, float(np.clip(1 - differs, 0, 1))
 
 
-def _without_islands(regions: np.ndarray, solid: np.ndarray) -> np.ndarray:
-    """Return those ``regions`` of ``solid`` that are open to the outside, or empty: what encloses a print is a label."""
+def _open_to_outside(regions: np.ndarray, solid: np.ndarray) -> np.ndarray:
+    """Return those ``regions`` of ``solid`` that reach its outline: a label of the background's colours lies within it."""
     count, labels, stats, _ = cv2.connectedComponentsWithStats(regions.astype(np.uint8), connectivity=4)
     kept = np.zeros(regions.shape, bool)
     for index in range(1, count):
-        left, top, width, height, area = stats[index]
+        left, top, width, height, _area = stats[index]
         box = np.s_[max(0, top - 2) : top + height + 2, max(0, left - 2) : left + width + 2]
         part = labels[box] == index
-        islands = holds(part)
-        open_to_outside = (dilated(part, 2) & ~solid[box]).any()
-        if open_to_outside or islands < MOST_ISLANDS * area:
+        if (dilated(part, 2) & ~solid[box]).any():
             kept[box] |= part
     return kept
 
