@@ -59,9 +59,6 @@ stands for its kinds: a can may be a drink can where that explains the photo bet
 - **What it cannot do**: walls thinner than a pixel keep the usual thickness; a box seen at one face alone has the usual
   depth; what the template has no measure for (a bent handle, a crushed can) is not followed.
 
-In Python, `manitwin.models.generators.templates.fitting.fit.fit` takes measures to start from, `fit_several` several photos
-of one thing.
-
 ## Texts and points, measured
 
 `python benchmarks/texts.py`: of one text each for 60 categories, ten a group, with `--quick` and seed 0, 59 became verified
