@@ -93,7 +93,9 @@ Record = Annotated[
 Count = Annotated[
     int,
     typer.Option(
-        min=1, help="Make so many variations of each text: measures, colours and materials that it leaves open."
+        min=1,
+        max=100_000,
+        help="Make so many variations of each text: measures, colours and materials that it leaves open.",
     ),
 ]
 Name = Annotated[str | None, typer.Option(help="What the object is ('mug'): the key to the priors.")]
