@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from manitwin.errors import UsageError
-from manitwin.models.matting import matte_photo
+from manitwin.formats.isolated import Limits, run_isolated
+from manitwin.models.matting import learned, matte_photo
 from manitwin.models.matting.learned import find_network, learned_alpha, require_working
 from manitwin.models.weights.store import FOLDER
 from tiny_networks import tiny_network
@@ -64,8 +66,16 @@ def test_a_network_that_nothing_bears_out_is_not_believed(tmp_path: Path) -> Non
         matte_photo(photo, "x.png", network=network)
 
 
-def test_networks_are_run_once_before_a_build(tmp_path: Path) -> None:
+def test_networks_are_run_once_before_a_build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ran: list[str] = []
+
+    def run(function: str, *arguments: Any, limits: Limits) -> Any:
+        ran.append(function)
+        return run_isolated(function, *arguments, limits=limits)
+
+    monkeypatch.setattr(learned, "run_isolated", run)
     require_working(find_network(_network(tmp_path)))
+    assert ran == ["manitwin.models.matting.learned:learned_alpha"]
 
 
 @pytest.mark.parametrize(
