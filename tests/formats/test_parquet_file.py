@@ -2,6 +2,8 @@
 
 import os
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import pyarrow as pa
@@ -37,6 +39,21 @@ def test_rows_are_those_of_the_file(tmp_path: Path, how: dict[str, object]) -> N
     with open_parquet(path, TwinError, remedy=REMEDY) as file:
         assert file.names == ["name", "numbers", "more"]
         assert file.read(["more"], row_group=0).to_pydict() == {"more": [1, 2, 3]}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="threads are counted in /proc")
+def test_no_thread_of_pyarrow_holds_the_stream(tmp_path: Path) -> None:
+    """One that lets go of it while the interpreter ends would abort the process."""
+    written(tmp_path / "a.parquet", pa.table({f"c{number}": list(range(1000)) for number in range(100)}))
+    program = (
+        "import os, pathlib, manitwin.formats.parquet_file as formats\n"
+        "before = len(os.listdir('/proc/self/task'))\n"
+        "with formats.open_parquet(pathlib.Path('a.parquet'), ValueError, remedy='') as file:\n"
+        "    file.read(); file.read(row_group=0)\n"
+        "print(len(os.listdir('/proc/self/task')) - before)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert done.stdout == "0\n"
 
 
 def test_table_without_rows_is_read(tmp_path: Path) -> None:

@@ -66,7 +66,9 @@ class ParquetTable:
             groups = None if row_group is None else [row_group]
             names = self.names if columns is None else list(columns)
             table = (
-                self._file.read(columns=names) if groups is None else self._file.read_row_groups(groups, columns=names)
+                self._file.read(columns=names, use_threads=False)
+                if groups is None
+                else self._file.read_row_groups(groups, columns=names, use_threads=False)
             )
             self._hold_texts(table)
             plain = table.cast(_plain(table.schema))
@@ -112,7 +114,9 @@ def open_parquet(
             _check_pages(stream, footer, wanted, unreadable, max_bytes)
             stream.seek(0)
             texts = [".".join(leaf.path) for leaf in footer.leaves if leaf.is_text]
-            file = pq.ParquetFile(stream, read_dictionary=texts, arrow_extensions_enabled=False)
+            # without threads of pyarrow's own, here and in read: one that lets go of the Python stream while the interpreter
+            # ends takes the process down, "terminate called without an active exception" (apache/arrow#34314)
+            file = pq.ParquetFile(stream, read_dictionary=texts, arrow_extensions_enabled=False, pre_buffer=False)
             if schema is not None:
                 _check_types(file.schema_arrow, schema, wanted or schema.names, unreadable)
         yield ParquetTable(file, unreadable, max_bytes)
