@@ -20,6 +20,7 @@ from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.quality import (
     UNKNOWN,
+    filled_checks,
     likeliest_words,
     naming_checks,
     rehearsal_checks,
@@ -96,7 +97,7 @@ def _provenance(stage: Stage, draft: Draft[Item]) -> dict[str, Any]:
 
 def _checks_so_far(draft: Draft[Item]) -> list[dict[str, Any]]:
     """Return the checks of a twin that was rejected; those of an accepted one take their place."""
-    made = [*rehearsal_checks(draft), *naming_checks(draft), *size_checks(draft)]
+    made = [*rehearsal_checks(draft), *naming_checks(draft), *size_checks(draft), *filled_checks(draft)]
     return [*(check.model_dump() for check in made), *draft.fields.get("gate", {}).get("checks", [])]
 
 

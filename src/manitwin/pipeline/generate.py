@@ -32,13 +32,18 @@ class GenerateStage:
         self.backend: str = generator.name
         self.model: str | None = generator.model
         self.needs: Resource = generator.needs
-        self.expected_usd = generator.usd_per_job
+        # of one that asks a model itself, which is charged by its tokens
+        self.expected_usd: float = getattr(generator, "expected_usd", generator.usd_per_job)
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Generate; raises Rejected ``generator_failed``, or BackendError where the generator cannot work now."""
         rgba = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
         request = GenerationRequest(
-            rgba=rgba, text=draft.payload.text, name=object_name(draft), seed=generator_seed(draft)
+            rgba=rgba,
+            text=draft.payload.text,
+            name=object_name(draft),
+            seed=generator_seed(draft),
+            guessed=draft.payload.name is None,
         )
         made = run_generator(
             self.generator, request, folder, settings=self.settings, jobs=draft.jobs, submit_again=self._submit_again

@@ -10,10 +10,21 @@ from typing import Any
 
 from manitwin.config import BuildConfig
 from manitwin.errors import Unavailable
-from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked
+from manitwin.models.annotators.protocol import Annotator
+from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generator
 from manitwin.models.registry import backends, create, factory
 from manitwin.pipeline.inspection import is_image
 from manitwin.pipeline.item import Item
+
+
+def chosen_generator(config: BuildConfig, annotator: Annotator) -> Generator:
+    """Return the generator of a build; a built-in one that has templates is guided by an annotator that can fill them in."""
+    generator: Generator = create("generator", config.generator, config)
+    reader = getattr(annotator, "template_reader", None)
+    if reader is None or not hasattr(generator, "guided_by"):
+        return generator
+    guided: Generator = generator.guided_by(reader)
+    return guided
 
 
 def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
@@ -45,7 +56,7 @@ def refusal(config: BuildConfig) -> Callable[[Item], str | None]:
 
 def _without_template(config: BuildConfig, text: str) -> str | None:
     """Return why a generator that makes only some texts never makes this one, and which ones make any."""
-    generator = create("generator", config.generator, config)
+    generator = chosen_generator(config, create("annotator", config.annotator, config))
     reason = generator.why_not(text) if hasattr(generator, "why_not") else None
     if reason is None:
         return None

@@ -45,6 +45,7 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
         )
     checks += size_checks(draft)
     checks += _unseen(draft)
+    checks += filled_checks(draft)
     findings = draft.field("geometry")["findings"]
     checks.append(
         Check(
@@ -100,6 +101,16 @@ def _unseen(draft: Draft) -> list[Check]:
         return []
     message = "share of the surface that the photo does not show: its shape and colours are a guess" if share else ""
     return [Check(name="every_side_seen", passed=not share, value=share, limit=0.0, message=message)]
+
+
+def filled_checks(draft: Draft) -> list[Check]:
+    """Return what a model said of the template that a thing was made of; none where no model was asked."""
+    filled = (draft.fields.get("generation") or {}).get("notes", {}).get("filled")
+    if filled is None:
+        return []
+    said = f"{filled['source']} filled in {filled['category'] or 'no template'}"
+    message = "; ".join([said, *filled["findings"]])
+    return [Check(name="template_filled", passed=not filled["findings"], value=filled["category"], message=message)]
 
 
 def rehearsal_checks(draft: Draft) -> list[Check]:

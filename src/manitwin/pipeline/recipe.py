@@ -17,6 +17,7 @@ from manitwin.errors import InputChanged, Rejected, UsageError
 from manitwin.formats.sniff import sniff
 from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.annotators.given import KeepsGiven
+from manitwin.models.annotators.protocol import Annotator
 from manitwin.models.matting.learned import Network, find_network, require_working
 from manitwin.models.registry import create, target, without_url
 from manitwin.pipeline.assembly import assemble, name_hint
@@ -26,6 +27,7 @@ from manitwin.pipeline.collision import CollisionStage
 from manitwin.pipeline.finish import FinishStage
 from manitwin.pipeline.gate import GateStage
 from manitwin.pipeline.generate import GenerateStage
+from manitwin.pipeline.generator_input import chosen_generator
 from manitwin.pipeline.grasps import GraspsStage
 from manitwin.pipeline.gripper_kinds import KINDS
 from manitwin.pipeline.item import Item, require_readable_size, twin_id
@@ -88,11 +90,12 @@ def _check_agreement(grippers: list[Gripper], config: BuildConfig) -> None:
 
 def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
     """Return the stages of the paper's pipeline for a kind of input, in order."""
-    annotator = KeepsGiven(create("annotator", config.annotator, config))
+    own = create("annotator", config.annotator, config)
+    annotator = KeepsGiven(own)
     grippers = _grippers(config)
     first = grippers[0][0]
     return [
-        *_generation(kind, config),
+        *_generation(kind, config, own),
         MeshStage(config.mesh),
         ViewsStage(config.views, annotator.picture_px),
         *([NameStage(config.naming)] if kind == "mesh" else []),
@@ -135,13 +138,13 @@ def _trials(gripper: Gripper, suffix: str, config: BuildConfig) -> list[Stage]:
     return stages
 
 
-def _generation(kind: Kind, config: BuildConfig) -> list[Stage]:
+def _generation(kind: Kind, config: BuildConfig, annotator: Annotator) -> list[Stage]:
     if kind == "mesh":
         return []
     photo: list[Stage] = []
     if kind == "image":
         photo = [PhotoStage(config.matting, _network(config)), NameStage(config.naming)]
-    generator = create("generator", config.generator, config)
+    generator = chosen_generator(config, annotator)
     return [*photo, GenerateStage(config.generate, generator, config.services.submit_again)]
 
 

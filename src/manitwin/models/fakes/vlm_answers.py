@@ -26,6 +26,7 @@ _MATERIAL = re.compile(r"material was estimated as (.+?)\.(?:\s|$)")
 _LISTED = re.compile(r"\b(\d+): (\d+) mm(?:, (\d+) mm)?(?=[;.])")
 _BOX = re.compile(r"smallest box has 1 : ([\d.]+) : ([\d.]+)")
 _DENSITY = re.compile(r"is ([\d.e+-]+) kg/m3, but a thing of .* has ([\d.e+-]+) to ([\d.e+-]+) kg/m3")
+_ASKED_FOR = re.compile(r"somebody asks for (['\"])(.+?)\1\.(?:\s|$)")
 _TOO_WIDE = re.compile(r"marker (\d+), .*fingers")
 _ONE_MATTER = ("food skin", "foam", "wax", "wood")  # surfaces of things that are full of one matter, not of contents
 _USUAL_WALL_M = 0.003
@@ -45,6 +46,10 @@ def rehearsal_answer(schema_name: str, schema: dict[str, Any], text: str, pngs: 
         return _captions(prior or unknown_prior(), found is not None, text, pngs)
     if schema_name in ("functional_points", "grasp_points"):
         return _points(schema_name, schema, text, prior or unknown_prior())
+    if schema_name == "template":
+        return _template(schema, found.group(1) if found else None, text)
+    if schema_name in ("template_measures", "template_likeness"):
+        return _unchanged(schema_name, schema)
     if schema_name == "probe":
         return {"color": _color(pngs)}
     answer = _of_form(schema)
@@ -201,6 +206,26 @@ def _grasps(listed: dict[str, tuple[int, int]], prior: Prior, text: str) -> list
             (others[0], f"hand over the {prior.category}", 0.6),
         )
     ]
+
+
+def _template(schema: dict[str, Any], name: str | None, text: str) -> dict[str, Any]:
+    """Return the template of what the thing is called, or of the last words of a text that call it something; else none."""
+    categories = schema["properties"]["category"]["enum"]
+    asked = _ASKED_FOR.search(text)
+    words = (asked.group(2) if asked else name or "").lower().split()
+    phrases = [" ".join(words[start:end]) for end in range(len(words), 0, -1) for start in range(end)]
+    called = [phrase for phrase in phrases if phrase in categories]
+    called += [prior.category for phrase in phrases if (prior := lookup(phrase)) and prior.category in categories]
+    return {"shown": f"One {called[0] if called else 'thing'}.", "category": called[0] if called else categories[-1]}
+
+
+def _unchanged(schema_name: str, schema: dict[str, Any]) -> dict[str, Any]:
+    """Return that a template's usual measures and looks are right."""
+    first = schema_name == "template_measures"
+    measures = dict.fromkeys(schema["properties"]["measures" if first else "corrected"]["properties"])
+    if first:
+        return {"shown": "It is as such things are.", "measures": measures, "looks": []}
+    return {"shown": "Both show the same thing.", "differences": [], "right": "yes", "corrected": measures, "looks": []}
 
 
 def _color(pngs: list[bytes]) -> str:

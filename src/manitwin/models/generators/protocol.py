@@ -21,13 +21,15 @@ class GenerationRequest:
     """A request for a mesh of a photo or a text.
 
     ``rgba`` is the matted photo, ``(H, W, 4) uint8`` upright sRGB whose alpha is the object's mask, or None where ``text`` is
-    given. ``name`` is what the user says it is. ``seed`` makes the answer repeatable where the generator can.
+    given. ``name`` is what the user says it is, or with ``guessed`` what a classifier takes it for. ``seed`` makes the answer
+    repeatable where the generator can.
     """
 
     rgba: np.ndarray | None
     text: str | None
     name: str | None
     seed: int
+    guessed: bool = False
 
 
 @dataclass(frozen=True)

@@ -176,7 +176,7 @@ class _Drive:
         if not generated.path.is_file() or generated.path.stat().st_size == 0:
             generated.path.unlink(missing_ok=True)
             raise BadReply(f"{self.generator.name}: its job is done but left no mesh; run it again")
-        wrong = None if self.generator.needs == "cpu" else flaw(generated.path)
+        wrong = None if self.generator.needs in ("cpu", "vlm") else flaw(generated.path)
         if wrong is not None:
             generated.path.unlink()
             raise _Failed(wrong)

@@ -42,6 +42,7 @@ from manitwin.models.annotators.vlm.points import (
 )
 from manitwin.models.annotators.vlm.prompt_files import Prompt, load_prompts
 from manitwin.models.annotators.vlm.quality import QualityAnswer, examine_quality, quality_question, quality_verdict
+from manitwin.models.annotators.vlm.template_reader import TemplateReader
 from manitwin.models.vlm.chat_from_spec import anthropic_from_spec, openai_from_spec, replay_from_spec
 from manitwin.models.vlm.prices import expected_usd
 from manitwin.models.vlm.protocol import ChatModel, Question
@@ -110,6 +111,11 @@ class VlmAnnotator:
     def probe(self) -> str:
         """Ask one small question with a picture; return what works, as a short phrase."""
         return probe(self.chat)
+
+    @cached_property
+    def template_reader(self) -> TemplateReader:
+        """What fills in templates for built-in generators."""
+        return TemplateReader(self.chat, self.config.vlm, self.prompts)
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:
         """Judge the two criteria; what is unsure when asked twice is a no."""

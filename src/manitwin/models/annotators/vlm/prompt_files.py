@@ -18,6 +18,11 @@ PLACEHOLDERS: dict[str, frozenset[str]] = {
     "captions": frozenset({"count", "name", "size", "material", "pictures"}),
     "functional_points": frozenset({"count", "name", "size", "ids", "pictures"}),
     "grasp_points": frozenset({"count", "name", "size", "opening", "ids", "pictures"}),
+    "template": frozenset({"given", "name", "categories", "pictures"}),
+    "template_measures": frozenset({"given", "name", "category", "about", "measures", "parts", "colors", "pictures"}),
+    "template_likeness": frozenset(
+        {"given", "name", "category", "about", "round", "measures", "parts", "colors", "pictures"}
+    ),
 }
 """The prompts that there are, and what is put in for ``{placeholder}`` in each."""
 

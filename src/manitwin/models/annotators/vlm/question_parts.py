@@ -15,6 +15,9 @@ from manitwin.models.vlm.protocol import Picture
 from manitwin.render.cameras import Camera, project
 from manitwin.render.markers import draw_markers, font_px
 from manitwin.render.raycast import merged, silhouette
+from manitwin.render.renderer import BACKDROP
+
+_FILLED = 0.9  # of a picture's side by the object cut out of a photo
 
 
 def read_picture(path: Path) -> np.ndarray:
@@ -36,6 +39,29 @@ def clean_views(subject: Subject) -> list[str | Picture]:
     for number, (path, camera) in enumerate(zip(subject.views, subject.cameras, strict=True), 1):
         parts += [f"{view_caption(number, len(subject.views), camera)}:", Picture(png_of(read_picture(path)))]
     return parts
+
+
+def cut_out_picture(rgba: np.ndarray, side_px: int) -> Picture:
+    """Return the object of ``rgba (H, W, 4) uint8``, whose alpha is its mask, on the views' plain ground, ``side_px`` wide."""
+    rows, columns = np.nonzero(rgba[..., 3] > 127)
+    top, left = int(rows.min()), int(columns.min())
+    height, width = int(rows.max()) + 1 - top, int(columns.max()) + 1 - left
+    side = round(max(height, width) / _FILLED)
+    seen = rgba[top : top + height, left : left + width].astype(np.float32)
+    alpha = seen[..., 3:] / 255
+    ground = np.empty((side, side, 3), np.float32)
+    ground[...] = BACKDROP
+    y, x = (side - height) // 2, (side - width) // 2
+    ground[y : y + height, x : x + width] *= 1 - alpha
+    ground[y : y + height, x : x + width] += alpha * seen[..., :3]
+    whole = Image.fromarray(np.rint(ground).astype(np.uint8))
+    return Picture(
+        png_of(
+            np.asarray(
+                whole.resize((side_px, side_px), Image.Resampling.BOX if side > side_px else Image.Resampling.BILINEAR)
+            )
+        )
+    )
 
 
 def marked_views(request: PointsRequest, numbers: np.ndarray) -> list[str | Picture]:

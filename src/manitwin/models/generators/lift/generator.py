@@ -3,110 +3,70 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-import trimesh
-from PIL import Image
-from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
 
 from manitwin.config import Resource
-from manitwin.errors import Rejected, Unavailable, Unsupported, UsageError
-from manitwin.formats.glb import write_glb
-from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.geometry.solids.shapes import SolidError
-from manitwin.models.generators.lift.lifting import Lifted, hint_from_name, lift
-from manitwin.models.generators.lift.surface import unseen_share
-from manitwin.models.generators.lift.texture import beside
+from manitwin.errors import Unavailable
+from manitwin.models.annotators.vlm.template_reader import TemplateReader
+from manitwin.models.generators.lift import made_text
+from manitwin.models.generators.lift.guided_photo import guided_from_photo
+from manitwin.models.generators.lift.guided_text import guided_from_text
+from manitwin.models.generators.lift.made_photo import Job, from_photo
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
-from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.fitting.fit import (
-    LEAST_AGAINST_INFLATION,
-    LEAST_CONFIDENCE,
-    LEAST_IOU,
-    MOST_OUTLINE,
-    Fitted,
-    fit,
-    kinds_of,
-    template_for,
-)
-from manitwin.models.generators.templates.fitting.generated import (
-    known_of_fitted,
-    notes_of,
-    texture_of,
-    visual_part,
-)
-from manitwin.models.generators.templates.known import known_of
-from manitwin.models.generators.templates.made import make, visual_parts
-from manitwin.models.generators.templates.template import Template
-from manitwin.models.generators.templates.text import Wanted, read_text
-from manitwin.twin.import_record import ImportRecord
-
-ROUGHNESS = 0.6
-
-
-@dataclass(frozen=True)
-class _Job:
-    glb: bytes
-    notes: dict[str, Any]
-    unseen_share: float | None
-    known: ImportRecord | None = None
-    metric: bool = False
+from manitwin.models.generators.templates.text import MAX_CHARACTERS
 
 
 class LiftGenerator:
     """Fit the template that a photo's name means, else lift its silhouette; or build the template that a text names.
 
     Of a photo it sees one side only and no depth: a stand-in for tests, demonstrations and machines without a GPU, not to
-    be compared with learned generators. ``submit`` does all the work; jobs live as long as this object.
+    be compared with learned generators. ``submit`` does all the work; jobs live as long as this object. With a ``reader`` a
+    vision-language model chooses and fills in the template of every photo, and of a text that is not understood in full.
     """
 
     name = "lift"
-    model: str | None = None
-    needs: Resource = "cpu"
     asked_with: frozenset[Asked] = IMAGE_OR_TEXT
     usd_per_job = 0.0
 
-    def __init__(self) -> None:
-        self._jobs: dict[str, _Job] = {}
+    def __init__(self, reader: TemplateReader | None = None) -> None:
+        self._reader = reader
+        self.model: str | None = None if reader is None else reader.model
+        self.needs: Resource = "cpu" if reader is None else "vlm"
+        self.expected_usd = 0.0 if reader is None else reader.expected_usd
+        self._jobs: dict[str, Job] = {}
+
+    def guided_by(self, reader: TemplateReader) -> LiftGenerator:
+        """Return this generator with a model that fills in its templates."""
+        return LiftGenerator(reader)
 
     def why_not(self, text: str) -> str | None:
-        """Return why no template makes what a text asks for; None where one does."""
-        try:
-            make(*_template_and_wish(text), np.random.default_rng(0))
-        except (UsageError, SolidError) as error:
-            return str(error)
-        return None
+        """Return why no template makes what a text asks for; None where one does, or a model is to be asked."""
+        if self._reader is not None and len(text) <= MAX_CHARACTERS:
+            return None
+        return made_text.why_not(text)
 
     def submit(self, request: GenerationRequest) -> str:
-        """Make the mesh; raises Unsupported for a text that no template makes, Rejected for what ``lift`` cannot make."""
-        if request.rgba is None:
-            return self._from_text(request.text or "", request.seed)
-        digest = hashlib.sha256(np.ascontiguousarray(request.rgba).tobytes() + (request.name or "").encode())
-        job_id = digest.hexdigest()[:16]
-        self._jobs[job_id] = _from_photo(request.rgba, request.name)
+        """Make the mesh; raises Unsupported for a text that no template makes, Rejected for what ``lift`` cannot make.
+
+        With a reader: also what its model raises, and Rejected where the model says twice that the result is wrong.
+        """
+        asked = f"{request.seed} {request.text}" if request.rgba is None else request.name or ""
+        pixels = b"" if request.rgba is None else np.ascontiguousarray(request.rgba).tobytes()
+        job_id = hashlib.sha256(pixels + asked.encode()).hexdigest()[:16]
+        self._jobs[job_id] = self._made(request)
         return job_id
 
-    def _from_text(self, text: str, seed: int) -> str:
-        job_id = hashlib.sha256(f"{seed} {text}".encode()).hexdigest()[:16]
-        try:
-            template, wanted = _template_and_wish(text)
-            made = make(template, wanted, np.random.default_rng(seed))
-        except (UsageError, SolidError) as error:
-            raise Unsupported(str(error)) from error
-        notes = {
-            "primitive": f"template:{made.category}",
-            "category": made.category,
-            "measures": {name: round(value, 6) for name, value in made.measures.items()},
-            "materials": {part: look.material for part, look in made.looks.items()},
-            "masses_kg": {part: round(mass, 6) for part, mass in made.masses_kg.items()},
-            "unused_words": list(wanted.unused),
-        }
-        self._jobs[job_id] = _Job(write_glb(visual_parts(made)), notes, None, known_of(made, text), metric=True)
-        return job_id
+    def _made(self, request: GenerationRequest) -> Job:
+        if request.rgba is None:
+            text = request.text or ""
+            if self._reader is None:
+                return made_text.from_text(text, request.seed)
+            return guided_from_text(text, request.seed, self._reader)
+        if self._reader is None:
+            return from_photo(request.rgba, request.name)
+        return guided_from_photo(request, self._reader)
 
     def poll(self, job_id: str) -> JobState:
         """Return ``done``, or ``failed`` where this object does not know the job."""
@@ -130,66 +90,3 @@ class LiftGenerator:
             unseen_share=job.unseen_share,
             known=job.known,
         )
-
-
-def _from_photo(rgba: np.ndarray, name: str | None) -> _Job:
-    """Return the template that the name means where its fit explains the photo, else the photo lifted."""
-    template = template_for(name)
-    fitted = None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category))
-    if fitted is not None and fitted.confidence >= LEAST_CONFIDENCE:
-        return _from_fit(fitted, rgba, name)
-    try:
-        lifted = lift(rgba, hint_from_name(name))
-    except Rejected as error:
-        if fitted is None:
-            raise
-        residual = fitted.residual
-        raise Rejected(
-            error.reason,
-            f"{error.detail}; and no {fitted.category} that the template makes has this outline: overlap {residual.iou:.2f}"
-            f" (at least {LEAST_IOU}), outlines {residual.outline:.4f} of its length apart (at most {MOST_OUTLINE});"
-            " check the name and the cut-out",
-            error.stage,
-        ) from error
-    flat = lifted.notes["primitive"] == "inflation"  # knows nothing of the back
-    if fitted is not None and flat and fitted.confidence >= LEAST_AGAINST_INFLATION:
-        return _from_fit(fitted, rgba, name)
-    notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
-    return _Job(write_glb([textured_part(lifted)]), notes, unseen_share(lifted.surface))
-
-
-def _from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> _Job:
-    surface = texture_of(fitted, rgba)
-    known = known_of_fitted(fitted, name or fitted.category)
-    return _Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)
-
-
-def _template_and_wish(text: str) -> tuple[Template, Wanted]:
-    templates = load_templates()
-    wanted = read_text(text, templates)
-    return templates[wanted.category], wanted
-
-
-def textured_part(lifted: Lifted) -> trimesh.Trimesh:
-    """Return the mesh in the object frame (Z up) with its texture: the photo, and beside it what it does not show."""
-    surface, seen = lifted.surface, lifted.surface.seen()
-    # a vertex on the border of both has a place in each
-    corners = np.where(seen[:, None], surface.faces, surface.faces + len(surface.vertices))
-    used, faces = np.unique(corners, return_inverse=True)
-    source = used % len(surface.vertices)
-    texture, uv = beside(lifted.texture, lifted.unseen, surface.uv[source], used >= len(surface.vertices))
-    material = PBRMaterial(
-        name="photo",
-        baseColorFactor=[255, 255, 255, 255],
-        baseColorTexture=Image.fromarray(texture),
-        metallicFactor=0.0,
-        roughnessFactor=ROUGHNESS,
-    )
-    vertices = surface.vertices[source] @ GLTF_TO_OBJECT[:3, :3].T
-    return trimesh.Trimesh(
-        vertices,
-        faces.reshape(-1, 3),
-        visual=TextureVisuals(uv=uv, material=material),
-        process=False,
-        metadata={"name": "lift"},
-    )

@@ -40,10 +40,13 @@ class Made:
     masses_kg: dict[str, float]
 
 
-def make(template: Template, wanted: Wanted, rng: np.random.Generator) -> Made:
-    """Make one thing of a template; raises UsageError for a size that no such thing has or a part that it has not."""
+def make(template: Template, wanted: Wanted, rng: np.random.Generator, said: Mapping[str, float] | None = None) -> Made:
+    """Make one thing of a template; raises UsageError for a size that no such thing has or a part that it has not.
+
+    ``said`` are measures that are known, in place of drawn ones.
+    """
     looks_by_slot = _looks(template, wanted, rng)
-    measures = template.drawn(rng)
+    measures = template.drawn(rng) | dict(said or {})
     if "wall_m" in measures:
         measures["wall_m"] = max(LEAST_WALL_M, measures["wall_m"] * next(iter(looks_by_slot.values())).wall)
     model = template.build(**measures)

@@ -71,10 +71,7 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
     """Return what a text asks for; raises UsageError where it names no category that there is a template of, or several."""
     if len(text) > MAX_CHARACTERS:
         raise UsageError(f"a text of {len(text)} characters; at most {MAX_CHARACTERS} describe an object")
-    plain = " ".join(text.lower().replace(",", " , ").replace("-", " ").split())
-    lengths: dict[str, float] = {}
-    for number, unit, direction in _LENGTH.findall(plain):
-        lengths[DIRECTIONS.get(direction, "")] = float(number) * _METRES[unit]
+    plain, lengths = _plain(text), lengths_in(text)
     rest = _LENGTH.sub(lambda m: "" if m[3] in DIRECTIONS else m[3], plain)
     main, *features = re.split(r" with | having | and a | and an ", rest.replace(" ,", " "))
     category, around = _category(main.split(), text, templates)
@@ -88,6 +85,16 @@ def read_text(text: str, templates: Mapping[str, Template]) -> Wanted:
         wishes[words[-1].removesuffix("s")] = wish
         unused += left
     return Wanted(category, wishes, lengths, relative, tuple(unused))
+
+
+def lengths_in(text: str) -> dict[str, float]:
+    """Return the lengths (m) that a text states by their direction, '' for the longest."""
+    found = _LENGTH.findall(_plain(text))
+    return {DIRECTIONS.get(direction, ""): float(number) * _METRES[unit] for number, unit, direction in found}
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.lower().replace(",", " , ").replace("-", " ").split())
 
 
 def _category(words: list[str], text: str, templates: Mapping[str, Template]) -> tuple[str, list[str]]:

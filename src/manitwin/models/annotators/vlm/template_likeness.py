@@ -1,0 +1,115 @@
+"""The likeness question: a model beside the photo, or the words, that it was made from; and what has to change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, create_model
+
+from manitwin.models.annotators.vlm.prompt_files import Prompt
+from manitwin.models.annotators.vlm.quality import Decision
+from manitwin.models.annotators.vlm.question_parts import name_line
+from manitwin.models.annotators.vlm.template_choice import Shown
+from manitwin.models.annotators.vlm.template_measures import (
+    MOST_LOOKS,
+    MeasuresAnswer,
+    PartLook,
+    examine_measures,
+    filled_of,
+    look_answer,
+    measures_answer,
+    template_values,
+)
+from manitwin.models.generators.templates.filled import Filled
+from manitwin.models.vlm.protocol import Picture, Question
+from manitwin.models.vlm.strict_schema import strict_schema
+
+FIRST_LOOK = "You see it for the first time."
+
+
+class Difference(BaseModel):
+    """One way in which the model differs from what it was made from."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    aspect: Literal["kind", "parts", "proportions", "colors", "materials", "other"]
+    evidence: str = Field(description="what is seen of it, and in which pictures")
+    severity: Literal["minor", "severe"]
+
+
+class LikenessAnswer(BaseModel):
+    """The answer: what is seen, the differences, the decision, and what has to change."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    shown: str = Field(description="what both show, in one or two sentences")
+    differences: list[Difference] = Field(max_length=8)
+    right: Decision = Field(description="the model is like what it was made from")
+    corrected: MeasuresAnswer
+    looks: list[PartLook] = Field(max_length=MOST_LOOKS, description="those that have to change")
+
+    @property
+    def severe(self) -> list[str]:
+        """The severe differences, in words."""
+        return [f"{said.aspect}: {said.evidence}" for said in self.differences if said.severity == "severe"]
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """Whether a thing is like what it was made from, why not, and what is said instead; ``findings`` stayed when asked again."""
+
+    right: bool
+    detail: str
+    corrected: Filled
+    findings: tuple[str, ...] = ()
+
+
+@cache
+def likeness_answer(category: str) -> type[LikenessAnswer]:
+    """Return the model of an answer for a template."""
+    look = look_answer(category)
+    looks = Annotated[list[look], Field(max_length=MOST_LOOKS, description="those that have to change")]  # type: ignore[valid-type]
+    return create_model(
+        "LikenessAnswer", __base__=LikenessAnswer, corrected=(measures_answer(category), ...), looks=(looks, ...)
+    )
+
+
+def likeness_question(
+    shown: Shown,
+    category: str,
+    measures: Mapping[str, float],
+    pictures: Sequence[str | Picture],
+    prompt: Prompt,
+    picture_px: int,
+    *,
+    round_line: str,
+) -> Question:
+    """Ask whether a thing with these measures, as ``pictures`` show it, is like what is shown."""
+    values = {"given": shown.given, "name": name_line(shown.name), "round": round_line}
+    values |= template_values(category, measures)
+    instructions, parts = prompt.filled(values, [*shown.pictures(picture_px), *pictures])
+    return Question("template_likeness", instructions, parts, strict_schema(likeness_answer(category)))
+
+
+def examine_likeness(category: str, answer: LikenessAnswer) -> list[str]:
+    """Return what keeps the answer from being a decision: doubt, a decision against the evidence, measures of no such thing."""
+    findings = []
+    if answer.right == "unsure":
+        findings.append("right is unsure: look at every picture again and answer yes or no")
+    if answer.right == "yes" and answer.severe:
+        findings.append("right is yes, but a difference is severe: one of the two is wrong")
+    if answer.right == "no" and not answer.severe:
+        findings.append("right is no, but no difference is severe: name the severe one, or answer yes")
+    return findings + examine_measures(category, answer.corrected)
+
+
+def likeness_of(category: str, answer: LikenessAnswer, findings: tuple[str, ...]) -> Likeness:
+    """Turn the last answer into the verdict; doubt that is left, and a yes against the evidence, is a no."""
+    right = answer.right == "yes" and not answer.severe
+    said = "; ".join(answer.severe) or answer.shown
+    if answer.right == "unsure":
+        said = f"unsure when asked twice: {said}"
+    return Likeness(right, said, filled_of(category, answer.corrected, answer.looks), findings)

@@ -1,0 +1,160 @@
+"""The measures question: a template's measures, and the colours and materials of its parts, by a form of its own."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, create_model
+
+from manitwin.models.annotators.vlm.prompt_files import Prompt
+from manitwin.models.annotators.vlm.question_parts import name_line
+from manitwin.models.annotators.vlm.template_choice import Shown
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.filled import Filled, color_said, parts_of
+from manitwin.models.generators.templates.looks import COLORS, MATERIALS
+from manitwin.models.generators.templates.template import Template
+from manitwin.models.generators.templates.text import Wish
+from manitwin.models.vlm.protocol import Question
+from manitwin.models.vlm.strict_schema import strict_schema
+
+UNSAID = "unsaid"
+MOST_LOOKS = 8
+_ROUNDING = 0.02  # a bound that is given to three digits may be answered with two
+
+
+def _known_color(text: str) -> str:
+    if text != UNSAID and color_said(text) is None:
+        raise ValueError(f"no color: give a word of {', '.join(COLORS)}, #rrggbb, or {UNSAID!r}")
+    return text
+
+
+class MeasuresAnswer(BaseModel):
+    """Measures by name; null for one that is not said."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def said(self) -> dict[str, float]:
+        """Return the measures that are said."""
+        return {name: float(value) for name, value in self if value is not None}
+
+
+class PartLook(BaseModel):
+    """The colour and material of a part."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    part: str
+    color: Annotated[
+        str, Field(max_length=32, description="a color word, #rrggbb, or unsaid"), AfterValidator(_known_color)
+    ]
+    material: Literal[(*MATERIALS, UNSAID)]  # type: ignore[valid-type]
+
+    @property
+    def wish(self) -> Wish:
+        """What is wished for."""
+        return Wish(color_said(self.color), MATERIALS.get(self.material))
+
+
+class FilledAnswer(BaseModel):
+    """The answer: what is seen or read, then measures and looks."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    shown: str = Field(description="proportions, parts and matter, in one or two sentences")
+    measures: MeasuresAnswer
+    looks: list[PartLook] = Field(max_length=MOST_LOOKS, description="of the parts that are seen or named")
+
+
+@cache
+def measures_answer(category: str) -> type[MeasuresAnswer]:
+    """Return the model of a template's measures."""
+    template = load_templates()[category]
+    fields = {
+        name: (Annotated[float, Field(gt=0, strict=True, allow_inf_nan=False)] | None, Field(description=said))
+        for name, said in measures_in_words(template).items()
+    }
+    return create_model("MeasuresAnswer", __base__=MeasuresAnswer, **fields)  # type: ignore[call-overload]
+
+
+@cache
+def look_answer(category: str) -> type[PartLook]:
+    """Return the model of the looks of a template's parts."""
+    one_of = Literal[tuple(parts_of(load_templates()[category]))]  # type: ignore[valid-type]
+    return create_model("PartLook", __base__=PartLook, part=(one_of, ...))  # type: ignore[arg-type]
+
+
+@cache
+def filled_answer(category: str) -> type[FilledAnswer]:
+    """Return the model of an answer for a template."""
+    look = look_answer(category)
+    looks = Annotated[list[look], Field(max_length=MOST_LOOKS, description="of the parts that are seen or named")]  # type: ignore[valid-type]
+    return create_model(
+        "FilledAnswer", __base__=FilledAnswer, measures=(measures_answer(category), ...), looks=(looks, ...)
+    )
+
+
+def measures_in_words(template: Template) -> dict[str, str]:
+    """Return what each measure is and the interval that it is in: 'a ratio, 0.75 to 1, usually 0.85'."""
+    kinds = {"m": "metres", "": "a ratio"}
+    return {
+        name: f"{kinds[measure.unit]}, {measure.low:g} to {measure.high:g}, usually {measure.typical:g}"
+        for name, measure in template.measures.items()
+    }
+
+
+def about(template: Template) -> str:
+    """Return what the template builds and what its ratios are of, by its builder's own words."""
+    words = " ".join((template.build.__doc__ or "").replace("``", "").split())
+    return re.sub(r"^Build ", "It is ", words)
+
+
+def template_values(category: str, measures: Mapping[str, float] | None = None) -> dict[str, str]:
+    """Return what prompts are told of a template, ``measures`` of the thing as it is besides."""
+    template = load_templates()[category]
+    listed = [
+        f"{name} ({said})" if measures is None else f"{name} {measures[name]:.3g} ({said})"
+        for name, said in measures_in_words(template).items()
+    ]
+    return {
+        "category": category,
+        "about": about(template),
+        "measures": "; ".join(listed),
+        "parts": ", ".join(parts_of(template)),
+        "colors": ", ".join(COLORS),
+    }
+
+
+def measures_question(shown: Shown, category: str, prompt: Prompt, picture_px: int) -> Question:
+    """Ask for a template's measures and looks."""
+    values = {"given": shown.given, "name": name_line(shown.name), **template_values(category)}
+    instructions, parts = prompt.filled(values, shown.pictures(picture_px))
+    return Question("template_measures", instructions, parts, strict_schema(filled_answer(category)))
+
+
+def filled_of(category: str, measures: MeasuresAnswer, looks: Sequence[PartLook]) -> Filled:
+    """Return what an answer says of a template; measures beyond their interval are left out."""
+    template, said = load_templates()[category], measures.said()
+    kept = {name: value for name, value in said.items() if _within(template, name, value)}
+    filled = Filled(category, kept, {look.part: look.wish for look in looks})
+    return filled if filled.why_no_solid() is None else Filled(category, {}, filled.wishes)
+
+
+def examine_measures(category: str, measures: MeasuresAnswer) -> list[str]:
+    """Return which measures no such thing has, and why they give no solid."""
+    template, said = load_templates()[category], measures.said()
+    words = measures_in_words(template)
+    findings = [
+        f"{name} {value:.3g}, but nearly every {category} has {words[name]}"
+        for name, value in said.items()
+        if not _within(template, name, value)
+    ]
+    why = None if findings else Filled(category, said).why_no_solid()
+    return findings if why is None else [f"these measures give no {category}: {why}"]
+
+
+def _within(template: Template, name: str, value: float) -> bool:
+    measure = template.measures[name]
+    return (1 - _ROUNDING) * measure.low <= value <= (1 + _ROUNDING) * measure.high

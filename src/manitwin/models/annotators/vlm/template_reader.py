@@ -1,0 +1,143 @@
+"""The reader that asks a vision-language model to choose and fill in a template, and to compare what was built of it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from manitwin.config import VlmConfig
+from manitwin.models.annotators.vlm.prompt_files import Prompt
+from manitwin.models.annotators.vlm.template_choice import (
+    NONE_OF_THESE,
+    Shown,
+    choice_answer,
+    choice_question,
+    examine_choice,
+)
+from manitwin.models.annotators.vlm.template_likeness import (
+    Likeness,
+    examine_likeness,
+    likeness_answer,
+    likeness_of,
+    likeness_question,
+)
+from manitwin.models.annotators.vlm.template_measures import (
+    about,
+    examine_measures,
+    filled_answer,
+    filled_of,
+    measures_question,
+)
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.filled import Filled
+from manitwin.models.vlm.prices import expected_usd
+from manitwin.models.vlm.protocol import ChatModel, Picture
+from manitwin.models.vlm.strict_schema import strict_schema
+from manitwin.models.vlm.structured import ask
+
+PROMPTS = ("template", "template_measures", "template_likeness")
+MODEL_VIEWS = 3
+"""How many pictures of a model are compared with what it was made from."""
+_USUAL = "mug"  # a template of usual size, for the estimate
+_PICTURES = {"template": 1, "template_measures": 1, "template_likeness": 1 + MODEL_VIEWS}
+_ANSWER_TOKENS = {
+    "template": 80,
+    "template_measures": 200,
+    "template_likeness": 250,
+}  # those of fakes.vlm_answers, or so
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A template's category, None for none of them; ``findings`` stayed when the question was asked again."""
+
+    category: str | None
+    findings: tuple[str, ...]
+
+
+class TemplateReader:
+    """Ask a chat model three questions about a photo or a text: which template, its measures, and whether the result is like it.
+
+    Each raises what the chat model raises, and BadReply for an answer that twice has another form than was asked for.
+    """
+
+    def __init__(self, chat: ChatModel, settings: VlmConfig, prompts: Mapping[str, Prompt]):
+        self.chat, self.settings = chat, settings
+        self._prompts = {name: prompts[name] for name in PROMPTS}
+
+    @property
+    def source(self) -> str:
+        """Who says what is said, as an Estimate names it."""
+        return f"vlm:{self.chat.model}"
+
+    @cached_property
+    def model(self) -> str:
+        """'MODEL, prompt template v1 and ... 0123abcd': model, prompts, and a digest of all that is asked with."""
+        settings = self.settings.model_dump(mode="json", include={"picture_px", "max_tokens", "temperature"})
+        forms = [
+            strict_schema(choice_answer()),
+            strict_schema(filled_answer(_USUAL)),
+            strict_schema(likeness_answer(_USUAL)),
+        ]
+        templates = [
+            [category, about(each), {name: vars(measure) for name, measure in each.measures.items()}, dict(each.slots)]
+            for category, each in load_templates().items()
+        ]
+        asked = [[prompt.instructions, prompt.question] for prompt in self._prompts.values()]
+        text = json.dumps([asked, forms, templates, settings], sort_keys=True)
+        versions = " and ".join(f"{name} v{prompt.version}" for name, prompt in self._prompts.items())
+        return f"{self.chat.model}, prompt {versions} {hashlib.sha256(text.encode()).hexdigest()[:8]}"
+
+    @property
+    def expected_usd(self) -> float:
+        """About what a photo costs that needs one round; 0 where the chat model has no price."""
+        price = getattr(self.chat, "price", None)
+        if price is None:
+            return 0.0
+        forms = (choice_answer(), filled_answer(_USUAL), likeness_answer(_USUAL))
+        return sum(
+            expected_usd(
+                price,
+                characters=len(prompt.instructions)
+                + len(prompt.question)
+                + len(json.dumps(strict_schema(form)))
+                + 1000,
+                pictures=_PICTURES[name],
+                picture_px=self.settings.picture_px,
+                answer_tokens=_ANSWER_TOKENS[name],
+            )
+            for (name, prompt), form in zip(self._prompts.items(), forms, strict=True)
+        )
+
+    def choose(self, shown: Shown) -> Choice:
+        """Choose the template."""
+        question = choice_question(shown, self._prompts["template"], self.settings.picture_px)
+        answered = ask(self.chat, question, choice_answer(), lambda answer: examine_choice(answer, shown.name))
+        category = answered.value.category
+        return Choice(None if category == NONE_OF_THESE else category, answered.findings)
+
+    def fill(self, shown: Shown, category: str) -> tuple[Filled, tuple[str, ...]]:
+        """Fill in a template; returns what stayed wrong when asked again besides: such measures are left out."""
+        question = measures_question(shown, category, self._prompts["template_measures"], self.settings.picture_px)
+        form = filled_answer(category)
+        answered = ask(self.chat, question, form, lambda answer: examine_measures(category, answer.measures))
+        return filled_of(category, answered.value.measures, answered.value.looks), answered.findings
+
+    def compare(
+        self,
+        shown: Shown,
+        category: str,
+        measures: Mapping[str, float],
+        pictures: Sequence[str | Picture],
+        round_line: str,
+    ) -> Likeness:
+        """Compare a thing of these measures with what is shown."""
+        prompt, side_px = self._prompts["template_likeness"], self.settings.picture_px
+        question = likeness_question(shown, category, measures, pictures, prompt, side_px, round_line=round_line)
+        answered = ask(
+            self.chat, question, likeness_answer(category), lambda answer: examine_likeness(category, answer)
+        )
+        return likeness_of(category, answered.value, answered.findings)

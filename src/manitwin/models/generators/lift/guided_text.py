@@ -1,0 +1,71 @@
+"""A text to a finished job with a model that reads what the plain reader does not understand in full."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.errors import Rejected, Unsupported, UsageError
+from manitwin.geometry.solids.shapes import SolidError
+from manitwin.models.annotators.vlm.template_choice import Shown
+from manitwin.models.annotators.vlm.template_likeness import Likeness
+from manitwin.models.annotators.vlm.template_reader import TemplateReader
+from manitwin.models.generators.lift.made_photo import Job
+from manitwin.models.generators.lift.made_text import job_of, made_as_read, why_not
+from manitwin.models.generators.lift.rounds import Agreed, in_two_rounds, noted, pictures_of, require_right
+from manitwin.models.generators.templates.filled import Filled, make_filled
+from manitwin.models.generators.templates.made import Made, visual_parts
+
+_SEEN_FROM_DEG = (-55.0, 25.0)  # azimuth and elevation: the front is towards -Y
+
+
+@dataclass(frozen=True)
+class _Thing:
+    filled: Filled
+    made: Made
+
+
+def guided_from_text(text: str, seed: int, reader: TemplateReader) -> Job:
+    """Return what a text asks for: as the plain reader reads it where it understands every word, else as a model fills it in.
+
+    Raises Unsupported, with the nearest categories, where the model says that it is none of the templates; what the model
+    raises; Rejected where it says in both rounds that the result is not what the text asks for.
+    """
+    try:
+        plain, unused = made_as_read(text, seed)
+    except (UsageError, SolidError):
+        pass
+    else:
+        if not unused:
+            return job_of(plain, text, ())
+    shown = Shown(None, text, None)
+    choice = reader.choose(shown)
+    if choice.category is None:
+        raise Unsupported(
+            f"{why_not(text) or f'no template makes {text!r}'}; {reader.source} says that it is none of them"
+        )
+    filled, left_out = reader.fill(shown, choice.category)
+    first = _Thing(filled, _made(filled, text, seed))
+
+    def compare(thing: _Thing, before: str) -> Likeness:
+        pictures = pictures_of(visual_parts(thing.made), *_SEEN_FROM_DEG, reader.settings.picture_px)
+        return reader.compare(shown, filled.category, thing.made.measures, pictures, before)
+
+    def correct(thing: _Thing, corrected: Filled) -> tuple[_Thing, str]:
+        other = thing.filled.corrected(corrected)
+        if other == thing.filled:
+            return thing, "Nothing was corrected: this is how it is now."
+        return _Thing(other, _made(other, text, seed)), "This is how it is with your corrections."
+
+    agreed: Agreed[_Thing] = in_two_rounds(first, compare, correct)
+    require_right(agreed, f"a {filled.category} made of the words {text!r}", reader)
+    findings = [*choice.findings, *left_out, *agreed.findings]
+    return noted(job_of(agreed.kept.made, text, ()), reader, agreed.kept.filled, findings, agreed)
+
+
+def _made(filled: Filled, text: str, seed: int) -> Made:
+    try:
+        return make_filled(filled, text, np.random.default_rng(seed))
+    except (UsageError, SolidError) as error:
+        raise Rejected("generator_failed", f"lift: {error}; say it in other words", "generate") from error

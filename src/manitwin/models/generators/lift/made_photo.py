@@ -1,0 +1,112 @@
+"""A matted photo to a finished job: the template that its name means, fitted, or its silhouette lifted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.errors import Rejected
+from manitwin.formats.glb import write_glb
+from manitwin.geometry.poses import GLTF_TO_OBJECT
+from manitwin.models.generators.lift.lifting import Lifted, hint_from_name, lift
+from manitwin.models.generators.lift.surface import unseen_share
+from manitwin.models.generators.lift.texture import beside
+from manitwin.models.generators.templates.fitting.fit import (
+    LEAST_AGAINST_INFLATION,
+    LEAST_CONFIDENCE,
+    LEAST_IOU,
+    MOST_OUTLINE,
+    Fitted,
+    fit,
+    kinds_of,
+    template_for,
+)
+from manitwin.models.generators.templates.fitting.generated import (
+    known_of_fitted,
+    notes_of,
+    texture_of,
+    visual_part,
+)
+from manitwin.twin.import_record import ImportRecord
+
+ROUGHNESS = 0.6
+
+
+@dataclass(frozen=True)
+class Job:
+    """A finished job: the mesh as GLB, how it was made, and what is known of it (see ``Generated``)."""
+
+    glb: bytes
+    notes: dict[str, Any]
+    unseen_share: float | None
+    known: ImportRecord | None = None
+    metric: bool = False
+
+
+def from_photo(rgba: np.ndarray, name: str | None) -> Job:
+    """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected."""
+    template = template_for(name)
+    fitted = None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category))
+    return fitted_or_lifted(fitted, rgba, name)
+
+
+def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) -> Job:
+    """Return a fit that explains the photo ``rgba (H, W, 4) uint8``, else the photo lifted; raises Rejected for neither."""
+    if fitted is not None and fitted.confidence >= LEAST_CONFIDENCE:
+        return from_fit(fitted, rgba, name)
+    try:
+        lifted = lift(rgba, hint_from_name(name))
+    except Rejected as error:
+        if fitted is None:
+            raise
+        residual = fitted.residual
+        raise Rejected(
+            error.reason,
+            f"{error.detail}; and no {fitted.category} that the template makes has this outline: overlap {residual.iou:.2f}"
+            f" (at least {LEAST_IOU}), outlines {residual.outline:.4f} of its length apart (at most {MOST_OUTLINE});"
+            " check the name and the cut-out",
+            error.stage,
+        ) from error
+    flat = lifted.notes["primitive"] == "inflation"  # knows nothing of the back
+    if fitted is not None and flat and fitted.confidence >= LEAST_AGAINST_INFLATION:
+        return from_fit(fitted, rgba, name)
+    notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
+    return Job(write_glb([textured_part(lifted)]), notes, unseen_share(lifted.surface))
+
+
+def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
+    """Return a fitted template with the photo on it."""
+    surface = texture_of(fitted, rgba)
+    known = known_of_fitted(fitted, name or fitted.category)
+    return Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)
+
+
+def textured_part(lifted: Lifted) -> trimesh.Trimesh:
+    """Return the mesh in the object frame (Z up) with its texture: the photo, and beside it what it does not show."""
+    surface, seen = lifted.surface, lifted.surface.seen()
+    # a vertex on the border of both has a place in each
+    corners = np.where(seen[:, None], surface.faces, surface.faces + len(surface.vertices))
+    used, faces = np.unique(corners, return_inverse=True)
+    source = used % len(surface.vertices)
+    texture, uv = beside(lifted.texture, lifted.unseen, surface.uv[source], used >= len(surface.vertices))
+    material = PBRMaterial(
+        name="photo",
+        baseColorFactor=[255, 255, 255, 255],
+        baseColorTexture=Image.fromarray(texture),
+        metallicFactor=0.0,
+        roughnessFactor=ROUGHNESS,
+    )
+    vertices = surface.vertices[source] @ GLTF_TO_OBJECT[:3, :3].T
+    return trimesh.Trimesh(
+        vertices,
+        faces.reshape(-1, 3),
+        visual=TextureVisuals(uv=uv, material=material),
+        process=False,
+        metadata={"name": "lift"},
+    )

@@ -1,0 +1,109 @@
+"""What somebody says of a template's thing: its category, some of its measures, and colours and materials of its parts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from manitwin.errors import UsageError
+from manitwin.geometry.solids.shapes import SolidError
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.fitting.fit import Fitted
+from manitwin.models.generators.templates.looks import SHADES, color_of, shaded
+from manitwin.models.generators.templates.made import Made, make
+from manitwin.models.generators.templates.template import Template
+from manitwin.models.generators.templates.text import Wanted, Wish, lengths_in, read_text
+
+_HEX = re.compile(r"#([0-9a-fA-F]{2})([0-9a-fA-F]{2})([0-9a-fA-F]{2})")
+
+
+@dataclass(frozen=True)
+class Filled:
+    """A template's category with the measures that are said of it (metres and ratios) and wishes by part or slot.
+
+    Measures that are not here are drawn or fitted as usual.
+    """
+
+    category: str
+    measures: Mapping[str, float] = field(default_factory=dict)
+    wishes: Mapping[str, Wish] = field(default_factory=dict)
+
+    @property
+    def template(self) -> Template:
+        """The template."""
+        return load_templates()[self.category]
+
+    def corrected(self, other: Filled) -> Filled:
+        """Return this with what another one says besides or instead."""
+        return replace(self, measures={**self.measures, **other.measures}, wishes=_joined(self.wishes, other.wishes))
+
+    def why_no_solid(self) -> str | None:
+        """Return why the measures, usual ones beside them, give no solid; None where they do."""
+        try:
+            self.template.build(**self.template.typical() | dict(self.measures)).assembly.mesh()
+        except SolidError as error:
+            return str(error)
+        return None
+
+
+def parts_of(template: Template) -> list[str]:
+    """Return what colours and materials may be said of: the slots of a template, and the parts of the usual thing."""
+    names = template.build(**template.typical()).assembly.mesh().names
+    return list(dict.fromkeys([*template.slots, *names]))
+
+
+def color_said(text: str) -> tuple[float, float, float] | None:
+    """Return the sRGB colour of a word (blue), of two (dark blue) or of #rrggbb; None where it is none."""
+    found = _HEX.fullmatch(text.strip())
+    if found is not None:
+        red, green, blue = (int(found[channel], 16) / 255 for channel in (1, 2, 3))
+        return red, green, blue
+    *shade, word = text.lower().split() or [""]
+    color = color_of(word)
+    if color is None or len(shade) > 1 or (shade and shade[0] not in SHADES):
+        return None
+    return shaded(color, shade[0]) if shade else color
+
+
+def dressed_as(fitted: Fitted, wishes: Mapping[str, Wish]) -> Fitted:
+    """Return a fitted thing with other looks: those of parts that a photo does not show."""
+    made, template = fitted.made, load_templates()[fitted.category]
+    first, model = next(iter(template.slots)), template.build(**template.typical())
+    looks = dict(made.looks)
+    for part, look in made.looks.items():
+        slot = model.slots.get(part, "") or first
+        for said in ([""] if slot == first else []) + [slot, part]:
+            look = wishes.get(said, Wish()).of(look)
+        looks[part] = look
+    return replace(fitted, made=replace(made, looks=looks))
+
+
+def make_filled(filled: Filled, text: str, rng: np.random.Generator) -> Made:
+    """Make what a text asks for, as it was filled in; what the text says in plain words and lengths comes first.
+
+    Raises UsageError for a size that no such thing has, SolidError for measures that give no solid.
+    """
+    lengths = lengths_in(text)
+    wanted = Wanted(filled.category, filled.wishes, lengths)
+    try:
+        plain = read_text(text, load_templates())
+    except UsageError:
+        plain = wanted
+    if plain.category == filled.category:
+        known = {*filled.template.slots, "", *parts_of(filled.template)}
+        said = {part: wish for part, wish in plain.wishes.items() if part in known and wish != Wish()}
+        wanted = replace(wanted, wishes=_joined(filled.wishes, said), relative=None if lengths else plain.relative)
+    return make(filled.template, wanted, rng, filled.measures)
+
+
+def _joined(wishes: Mapping[str, Wish], later: Mapping[str, Wish]) -> dict[str, Wish]:
+    joined = dict(wishes)
+    for part, wish in later.items():
+        before = joined.get(part, Wish())
+        joined[part] = Wish(
+            before.rgb if wish.rgb is None else wish.rgb, before.material if wish.material is None else wish.material
+        )
+    return joined
