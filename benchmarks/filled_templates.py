@@ -2,9 +2,9 @@
 
     python benchmarks/filled_templates.py OUT [--categories mug,bottle,"frying pan"] [--seeds 1] [--elevation 30]
 
-No model is asked: a chat answers with the true measures of the rendered thing (``template_photos``), or with the end of each interval
-that is farther from the truth. The photo's true outline is given, so that only the shape is measured. ``usual`` is what is built
-without a model. OUT gets the pictures that are compared, and ``results.csv``.
+No model is asked: a chat answers with the true measures of the rendered thing (``template_photos``), or with the end of each
+interval that is farther from the truth. The photo's true outline is given, so that only the shape is measured. ``usual`` is
+what is built without a model. OUT gets the pictures that are compared, and ``results.csv``.
 """
 
 from __future__ import annotations

@@ -59,6 +59,25 @@ stands for its kinds: a can may be a drink can where that explains the photo bet
 - **What it cannot do**: walls thinner than a pixel keep the usual thickness; a box seen at one face alone has the usual
   depth; what the template has no measure for (a bent handle, a crushed can) is not followed.
 
+## With a vision-language model
+
+With `--vlm` a model reads what the plain reader does not. It chooses the template of every photo, named or not, and of
+every text in which a word says nothing to a template, and fills in measures, colours and materials: `a squat blue espresso
+mug with a thick handle` gets its width and its handle. "None of these" is an answer: a photo is then built by its name, a
+text is the error that lists the nearest categories. Only the fields of a form come back, nothing is run; a measure that no
+such thing has is asked for once more, then left out and said (`quality.checks`, `template_filled`). The fit to the outline
+begins at the measures, and at the usual ones too, so that a wrong answer costs little. What a text states in plain words
+and lengths comes before what the model says.
+
+Then the model sees the thing from three sides beside the photo or the words. If it calls it wrong, it corrects measures and
+looks once; of the two fits the one that explains the photo better stays, and is shown again. What it calls wrong twice is
+rejected, with its words. [What is asked, sent and paid](vlm.md#templates).
+
+`python benchmarks/filled_templates.py OUT` (volumetric overlap with the true solid; mug, bottle, frying pan from 30
+degrees, seed 0): 0.99, 0.94 and 0.91 without a model; 0.98, 0.98 and 0.95 with true measures; 0.99, 0.93 and 0.91 with the
+wrong end of every interval; 0.98, 0.98 and 0.95 when these are corrected. A photo costs 2 CPU-s more, and 4 more where it
+is corrected.
+
 ## Texts and points, measured
 
 `python benchmarks/texts.py`: of one text each for 60 categories, ten a group, with `--quick` and seed 0, 59 became verified

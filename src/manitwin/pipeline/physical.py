@@ -19,7 +19,6 @@ from manitwin.models.annotators.priors import Interval, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import findings_of, object_name, read_subject
-from manitwin.twin.import_record import TEMPLATE
 from manitwin.twin.record import OrientedBox, Physical
 from manitwin.twin.record_values import Estimate
 
@@ -151,7 +150,7 @@ def spread_mass(solid: trimesh.Trimesh, mass_kg: float, wall_thickness_m: float 
 def _known_mass(subject: Subject) -> tuple[MassProperties, float] | None:
     """Return the mass properties of a template's parts, which have matter of their own each; None for any other subject."""
     known = subject.given
-    if known is None or known.format != TEMPLATE or known.center_of_mass_m is None or known.inertia_kg_m2 is None:
+    if known is None or not known.made_of_parts or known.center_of_mass_m is None or known.inertia_kg_m2 is None:
         return None
     center, inertia = np.array(known.center_of_mass_m), np.array(known.inertia_kg_m2)
     return MassProperties(center, inertia, float(subject.solid.volume)), 0.0

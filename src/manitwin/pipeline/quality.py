@@ -108,8 +108,8 @@ def filled_checks(draft: Draft) -> list[Check]:
     filled = (draft.fields.get("generation") or {}).get("notes", {}).get("filled")
     if filled is None:
         return []
-    said = f"{filled['source']} filled in {filled['category'] or 'no template'}"
-    message = "; ".join([said, *filled["findings"]])
+    said = [] if filled["category"] is None else [f"{filled['source']} filled in the template {filled['category']}"]
+    message = "; ".join([*said, *filled["findings"]])
     return [Check(name="template_filled", passed=not filled["findings"], value=filled["category"], message=message)]
 
 

@@ -19,6 +19,8 @@ TEMPLATE = "template"
 """The format of what a template knows of the thing that it made."""
 FITTED = "fitted"
 """The format of what a template knows of the thing in a photo that it was fitted to."""
+FILLED = "filled"
+"""The format of what a template knows of the thing whose measures somebody gave: ``attribution`` says who."""
 Positive = Annotated[Finite, Field(gt=0)]
 
 
@@ -79,7 +81,14 @@ class ImportRecord(Record):
         """The source, as an Estimate names it."""
         if self.format == FITTED:
             return f"template:{self.called}, fitted to the photo"
+        if self.format == FILLED:
+            return f"template:{self.name}, filled in by {self.attribution}"
         return f"template:{self.name}" if self.format == TEMPLATE else f"imported:{self.format}"
+
+    @property
+    def made_of_parts(self) -> bool:
+        """Whether mass, centre and inertia are those of parts that were built, with a matter each."""
+        return self.format in (TEMPLATE, FILLED)
 
     @property
     def called(self) -> str:

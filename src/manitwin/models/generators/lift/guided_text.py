@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,10 +12,11 @@ from manitwin.models.annotators.vlm.template_choice import Shown
 from manitwin.models.annotators.vlm.template_likeness import Likeness
 from manitwin.models.annotators.vlm.template_reader import TemplateReader
 from manitwin.models.generators.lift.made_photo import Job
-from manitwin.models.generators.lift.made_text import job_of, made_as_read, why_not
+from manitwin.models.generators.lift.made_text import job_of, made_as_read
 from manitwin.models.generators.lift.rounds import Agreed, in_two_rounds, noted, pictures_of, require_right
 from manitwin.models.generators.templates.filled import Filled, make_filled
 from manitwin.models.generators.templates.made import Made, visual_parts
+from manitwin.twin.import_record import FILLED
 
 _SEEN_FROM_DEG = (-55.0, 25.0)  # azimuth and elevation: the front is towards -Y
 
@@ -29,22 +30,26 @@ class _Thing:
 def guided_from_text(text: str, seed: int, reader: TemplateReader) -> Job:
     """Return what a text asks for: as the plain reader reads it where it understands every word, else as a model fills it in.
 
-    Raises Unsupported, with the nearest categories, where the model says that it is none of the templates; what the model
-    raises; Rejected where it says in both rounds that the result is not what the text asks for.
+    Where the model says that it is none of the templates, it is what the plain reader takes it for, or Unsupported is raised
+    with the nearest categories. Raises what the model raises; Rejected where it says in both rounds that the result is not
+    what the text asks for.
     """
+    plain, why = None, ""
     try:
-        plain, unused = made_as_read(text, seed)
-    except (UsageError, SolidError):
-        pass
+        made, unused = made_as_read(text, seed)
+        plain = job_of(made, text, unused)
+    except (UsageError, SolidError) as error:
+        why = str(error)
     else:
         if not unused:
-            return job_of(plain, text, ())
+            return plain
     shown = Shown(None, text, None)
     choice = reader.choose(shown)
     if choice.category is None:
-        raise Unsupported(
-            f"{why_not(text) or f'no template makes {text!r}'}; {reader.source} says that it is none of them"
-        )
+        finding = f"{reader.source} says that it is none of the templates"
+        if plain is None:
+            raise Unsupported(f"{finding}, and {why}")
+        return noted(plain, reader, None, [*choice.findings, finding])
     filled, left_out = reader.fill(shown, choice.category)
     first = _Thing(filled, _made(filled, text, seed))
 
@@ -61,7 +66,10 @@ def guided_from_text(text: str, seed: int, reader: TemplateReader) -> Job:
     agreed: Agreed[_Thing] = in_two_rounds(first, compare, correct)
     require_right(agreed, f"a {filled.category} made of the words {text!r}", reader)
     findings = [*choice.findings, *left_out, *agreed.findings]
-    return noted(job_of(agreed.kept.made, text, ()), reader, agreed.kept.filled, findings, agreed)
+    job = job_of(agreed.kept.made, text, ())
+    assert job.known is not None
+    known = job.known.model_copy(update={"format": FILLED, "attribution": reader.source})
+    return noted(replace(job, known=known), reader, agreed.kept.filled, findings, agreed)
 
 
 def _made(filled: Filled, text: str, seed: int) -> Made:
