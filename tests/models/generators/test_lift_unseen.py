@@ -13,8 +13,8 @@ from manitwin.config import GenerateConfig
 from manitwin.engine.job_memory import NoMemory
 from manitwin.formats.glb import read_glb, write_glb
 from manitwin.models.generators.lift import LiftGenerator
-from manitwin.models.generators.lift.generator import textured_part
 from manitwin.models.generators.lift.lifting import Lifted, ShapeHint, lift
+from manitwin.models.generators.lift.made_photo import textured_part
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.protocol import GenerationRequest
 from manitwin.models.generators.run import run_generator
