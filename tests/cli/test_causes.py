@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 import manitwin
-from manitwin.cli.causes import REMEDIES, cause_lines, group_causes
+from manitwin.cli.causes import MEASURE_IT, NAME_IT, REMEDIES, cause_lines, group_causes
 from manitwin.engine.ledger.progress import Unaccepted
+from manitwin.pipeline.quality import OF_ANYTHING, SIZE_UNSAID
 from manitwin.twin.record import REJECTION_REASONS
 
 
@@ -120,3 +121,18 @@ def reasons_of_layouts() -> set[str]:
     ]
     branches = chain(*([n.body, n.orelse] if isinstance(n, ast.IfExp) else [n] for n in given))
     return {n.value for n in branches if isinstance(n, ast.Constant)}
+
+
+def too_wide(which: int, of: str = "") -> Unaccepted:
+    return Unaccepted(str(which), "rejected", "too_wide", f"narrowest grip is 150.0 mm, the gripper opens 80 mm{of}")
+
+
+def test_a_size_that_nobody_has_said_asks_for_a_name_before_a_wider_gripper() -> None:
+    nameless = too_wide(1, f", but {SIZE_UNSAID}: 15 cm is what is {OF_ANYTHING} (2 to 60 cm)")
+    named = too_wide(2, f", but {SIZE_UNSAID}: 28 cm is what is usual of a frying pan (20 to 45 cm)")
+    first, second, third = group_causes([nameless, named, too_wide(3)])
+    assert (first.count, second.count, third.count) == (1, 1, 1), "their remedies differ"
+    assert first.remedy == NAME_IT and "--name" in NAME_IT and "gripper" not in NAME_IT
+    assert second.remedy == f"{MEASURE_IT}; else {REMEDIES['too_wide']}" and "--units" in MEASURE_IT
+    assert third.remedy == REMEDIES["too_wide"]
+    assert f"  remedy: {NAME_IT}" in cause_lines([first], again="", others="")

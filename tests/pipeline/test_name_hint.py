@@ -8,7 +8,10 @@ from typing import Any
 
 import pytest
 
+from manitwin.engine.stage import Draft
 from manitwin.pipeline.assembly import NAME_HINT, name_would_help
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.quality import OF_ANYTHING, SIZE_UNSAID, unsaid_size_words
 from manitwin.pipeline.recipe import ending_of
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.record import REJECTION_REASONS, TwinRecord
@@ -82,3 +85,16 @@ def test_the_result_line_says_it(tmp_path: Path) -> None:
     assert ending_of(rejected(tmp_path, "too_wide")).detail_and_hint == f"so; {NAME_HINT}"
     named = ending_of(accepted(tmp_path, "mug", UNKNOWN))
     assert named.detail_and_hint == named.detail and "--name" not in named.detail_and_hint
+
+
+@pytest.mark.parametrize(("source", "of"), [("prior:unknown", OF_ANYTHING), ("prior:orange", "usual of an orange")])
+def test_a_size_from_a_prior_is_told_as_nobodys_statement(source: str, of: str) -> None:
+    size = {"value": 0.15, "low": 0.02, "high": 0.6, "source": source}
+    draft = Draft(item_id="0" * 16, payload=Item(file=None, text="x"), seed=0, fields={"size": size})
+    assert unsaid_size_words(draft) == f"{SIZE_UNSAID}: 15 cm is what is {of} (2 to 60 cm)"
+
+
+@pytest.mark.parametrize("said", [None, {"value": 0.15, "low": 0.15, "high": 0.15, "source": "vlm:qwen"}])
+def test_a_size_that_a_mesh_or_a_model_says_is_no_guess(said: dict[str, Any] | None) -> None:
+    draft = Draft(item_id="0" * 16, payload=Item(file=None, text="x"), seed=0, fields={"size": said})
+    assert unsaid_size_words(draft) is None

@@ -45,6 +45,15 @@ REMEDIES = {
 }
 """What a person can do about a reason: those of twins (``REJECTION_REASONS``), of layouts, and of what failed."""
 
+NAME_IT = (
+    "say what it is (--name mug, or a column name), for a mesh also its unit (--units m, cm or mm, or a column units)"
+)
+"""The remedy where only the usual size of anything made it too wide or too thin."""
+MEASURE_IT = (
+    "give a mesh of its true size (--units m, cm or mm, or a column units), or say more closely what it is (--name)"
+)
+"""The remedy where the usual size of what it is called did: another gripper comes after that."""
+
 LONGEST_MESSAGE = 500  # what a native stack adds is told by status --why
 
 _OWN_ERRORS = "|".join(
@@ -79,11 +88,14 @@ class Cause:
 def group_causes(unaccepted: Iterable[Unaccepted]) -> list[Cause]:
     """Count equal causes, frequent ones first.
 
-    A rejection's cause is its reason; any other cause is what was said, without ids, names, paths and numbers.
+    A rejection's cause is its reason, apart where that rests on a size that nobody has said; any other cause is what was
+    said, without ids, names, paths and numbers.
     """
     found: dict[tuple[str, str], list[Unaccepted]] = {}
     for item in unaccepted:
-        told = item.reason or "" if item.state == "rejected" else _without_what_varies(item.message)
+        told = _without_what_varies(item.message)
+        if item.state == "rejected":
+            told = f"{item.reason or ''} {_of_unsaid_size(item.message) or ''}"
         found.setdefault((item.state, told), []).append(item)
     groups = sorted(found.values(), key=lambda items: -len(items))
     return [_cause(items[0], len(items)) for items in groups]
@@ -114,6 +126,8 @@ def _reason(cause: Cause) -> str:
 
 def _cause(first: Unaccepted, count: int) -> Cause:
     message, remedy = without_prefixes(first.message), REMEDIES.get(first.reason or "")
+    if remedy is not None and (of_size := _of_unsaid_size(first.message)) is not None:
+        remedy = of_size if of_size == NAME_IT else f"{of_size}; else {remedy}"
     if first.reason:
         message = message.removeprefix(f"{first.reason}: ")
     if remedy is None and _is_own(first.message):
@@ -121,6 +135,15 @@ def _cause(first: Unaccepted, count: int) -> Cause:
     elif remedy is not None:
         message = message.removesuffix(f"; {remedy}")  # some messages end with the same words
     return Cause(first.state, first.reason, count, first.which, _shortened(message), remedy)
+
+
+def _of_unsaid_size(message: str) -> str | None:
+    """Return the remedy of a rejection that a merely usual size may have decided, None where somebody has said the size."""
+    from manitwin.pipeline.quality import OF_ANYTHING, SIZE_UNSAID
+
+    if SIZE_UNSAID not in message:
+        return None
+    return NAME_IT if OF_ANYTHING in message else MEASURE_IT
 
 
 def without_prefixes(message: str) -> str:

@@ -25,7 +25,7 @@ from manitwin.pipeline.quality import (
     naming_checks,
     rehearsal_checks,
     size_checks,
-    unknown_size_words,
+    unsaid_size_words,
 )
 from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
 from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
@@ -133,8 +133,9 @@ def _rejection(rejected: Rejected, stage: str | None, draft: Draft[Item]) -> Rej
     if rejected.reason not in REJECTION_REASONS.get(named, frozenset()):
         named = next((s for s, reasons in REJECTION_REASONS.items() if rejected.reason in reasons), named)
     detail = rejected.detail
-    if rejected.reason in OF_SIZE and size_checks(draft):
-        detail += f", but nobody says how large it is: {unknown_size_words(draft.field('size'))}"
+    unsaid = unsaid_size_words(draft)
+    if rejected.reason in OF_SIZE and unsaid is not None:
+        detail += f", but {unsaid}"
     return Rejection(stage=named, reason=rejected.reason, detail=detail)
 
 

@@ -20,8 +20,14 @@ CENTER_OF_MASS_LIMIT = 0.1
 REHEARSAL = "rehearsal"
 """The check that only fails, and is only there, where a rehearsal server stood in for a model."""
 
-UNKNOWN = "prior:unknown"
+PRIOR = "prior:"
+UNKNOWN = f"{PRIOR}unknown"
 """The source of what is only usual of anything."""
+
+SIZE_UNSAID = "nobody says how large it is"
+"""What a rejection's detail says where the size is only a usual one; remedies go by it."""
+OF_ANYTHING = "usual of anything"
+"""What it says besides where nobody has named the thing either."""
 
 ESTIMATES = ("mass_kg", "friction_static", "friction_dynamic", "restitution")
 
@@ -79,14 +85,24 @@ def size_checks(draft: Draft) -> list[Check]:
     size = draft.fields.get("size")
     if size is None or size["source"] != UNKNOWN:
         return []
-    message = f"nobody says how large it is: {unknown_size_words(size)}; say what it is with --name"
+    message = f"{SIZE_UNSAID}: {unknown_size_words(size)}; say what it is with --name"
     return [Check(name="size_known", passed=False, value=size["value"], message=message)]
 
 
 def unknown_size_words(size: dict[str, Any]) -> str:
-    """Say of a size that only the prior of anything gives: '15 cm is what is usual of anything (2 to 60 cm)'."""
+    """Say of a size that only a prior gives: '15 cm is what is usual of anything (2 to 60 cm)', or '... of a mug'."""
     value, low, high = (f"{100 * size[key]:.3g}" for key in ("value", "low", "high"))
-    return f"{value} cm is what is usual of anything ({low} to {high} cm)"
+    category = size["source"].removeprefix(PRIOR)
+    named = f"usual of {'an' if category[0] in 'aeiou' else 'a'} {category}"
+    return f"{value} cm is what is {OF_ANYTHING if size['source'] == UNKNOWN else named} ({low} to {high} cm)"
+
+
+def unsaid_size_words(draft: Draft) -> str | None:
+    """Say that a size is only what is usual of such things, so that nobody has said it; None where somebody has."""
+    size = draft.fields.get("size")
+    if size is None or not size["source"].startswith(PRIOR):
+        return None
+    return f"{SIZE_UNSAID}: {unknown_size_words(size)}"
 
 
 def likeliest_words(naming: dict[str, Any]) -> str:
