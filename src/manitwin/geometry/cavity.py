@@ -18,6 +18,7 @@ from manitwin.geometry.poses import rotation_between
 _MIN_DEPTH_SHARE = 0.04
 _MIN_VOLUME_SHARE = 0.05
 _MIN_VOLUME_SHARE_SIDEWAYS = 0.10
+_LARGEST_DRAIN_SHARE = 0.02  # of the outline's rectangle: a pot's drain, not the hole of a ring or a nut
 _CROSS = np.array([[0, 1, 0], [1, 1, 1], [0, 1, 0]], dtype=np.uint8)  # a cell and the four beside it
 
 
@@ -53,7 +54,8 @@ def find_opening(mesh: trimesh.Trimesh, cells: int = 64) -> Opening | None:
 
     It looks along the mesh's own axes and its principal ones. An opening is a basin of the height field seen from
     outside: at least 4 % of the longest side deep and 5 % of the convex hull's volume large, 10 % where it does not
-    open upward. Source: depressions filled as by priority flood (Barnes, Lehman and Mulla 2014).
+    open upward. Walls thinner than a cell of the grid hold by their edges; a drain in the floor (2 % of the outline's rectangle
+    at most) counts as closed. Source: depressions filled as by priority flood (Barnes, Lehman and Mulla 2014).
     """
     if hull_volume(np.asarray(mesh.vertices)) == 0:
         return None
@@ -68,7 +70,9 @@ def find_opening(mesh: trimesh.Trimesh, cells: int = 64) -> Opening | None:
         heights = grid.heights(mesh_rays)
         if grid.volume_between(heights, grid.heights(hull_rays)) < least_m3:
             continue
-        opening = _basin(grid, heights)
+        # A wall thinner than a cell may fall between two rays; one raised to its edges holds, but takes whole cells.
+        basins = [_basin(grid, grid.with_drains_closed(each)) for each in (heights, grid.with_edges(heights, mesh))]
+        opening = max((b for b in basins if b is not None), key=lambda basin: basin.volume_m3, default=None)
         if (
             opening is not None
             and opening.volume_m3 >= least_m3
@@ -95,6 +99,35 @@ class _LookGrid:
         if len(rays):
             heights[rays] = locations @ self.up
         return heights.reshape(self.shape)
+
+    def with_edges(self, heights: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
+        """Return heights raised to the mesh's edges in each cell: a rim is an edge, however thin its wall."""
+        rotation = rotation_between(self.up, np.array([0.0, 0, 1]))
+        ends = (mesh.vertices @ rotation.T)[mesh.edges_unique]
+        spans = np.linalg.norm(np.diff(ends[:, :, :2], axis=1)[:, 0], axis=1)
+        counts = np.ceil(2 * spans / self.cell_m).astype(int) + 1
+        edge = np.repeat(np.arange(len(ends)), counts)
+        step = np.arange(len(edge)) - np.repeat(np.cumsum(counts) - counts, counts)
+        share = (step / np.maximum(counts[edge] - 1, 1))[:, None]
+        points = ends[edge, 0] * (1 - share) + ends[edge, 1] * share
+        first = (self.origins[0] @ rotation.T)[:2]
+        cell = np.clip(np.round((points[:, :2] - first) / self.cell_m).astype(int), 0, np.array(self.shape) - 1)
+        raised = np.where(np.isnan(heights), -np.inf, heights)
+        np.maximum.at(raised, (cell[:, 0], cell[:, 1]), points[:, 2])
+        return np.where(np.isinf(raised), np.nan, raised)
+
+    def with_drains_closed(self, heights: np.ndarray) -> np.ndarray:
+        """Return heights with small holes in the middle filled to the matter around them: a flower pot's drain."""
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(np.isnan(heights).astype(np.uint8), connectivity=4)
+        closed = heights.copy()
+        for number in range(1, count):
+            left, top, wide, high, area = stats[number]
+            inner = left > 0 and top > 0 and left + wide < heights.shape[1] and top + high < heights.shape[0]
+            if inner and area <= _LARGEST_DRAIN_SHARE * heights.size:
+                hole = labels == number
+                beside = cv2.dilate(hole.astype(np.uint8), _CROSS).astype(bool) & ~hole
+                closed[hole] = np.nanmedian(heights[beside])
+        return closed
 
     def volume_between(self, lower: np.ndarray, upper: np.ndarray) -> float:
         """Return the volume (m3) between two height fields, where both are."""

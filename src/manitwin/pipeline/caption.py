@@ -17,7 +17,7 @@ class CaptionStage:
     """Ask the annotator for words."""
 
     name: ClassVar[str] = "caption"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb",
         "solid.npz",

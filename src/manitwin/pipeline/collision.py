@@ -32,7 +32,7 @@ class CollisionStage:
     settings: CollisionConfig
 
     name: ClassVar[str] = "collision"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz",)
     writes: ClassVar[tuple[str, ...]] = (HULLS, "collision")
     needs: ClassVar[Resource] = "cpu"
