@@ -120,6 +120,13 @@ def test_can_on_its_side_rolls_and_does_not_come_first(tmp_path: Path) -> None:
     assert on_its_side and not any(p["settled"] for p in on_its_side)
 
 
+def test_a_tall_can_stands_though_its_centre_moves_as_it_falls_back_from_a_tilt(tmp_path: Path) -> None:
+    can = trimesh.creation.cylinder(radius=0.08, height=0.36, sections=64).apply_translation((0, 0, 0.18))
+    assert np.hypot(0.08, 0.18) * np.radians(4) > 0.013, "the way back alone is longer than a body may move"
+    found = _placements(_draft(tmp_path, can, 0.5, [np.asarray(can.vertices)]), tmp_path)
+    assert any(p["upright"] and p["settled"] for p in found)
+
+
 def _lying_prism(sides: int) -> trimesh.Trimesh:
     """Return a marker: a regular prism along x, 19 mm across its corners and 12 cm long, on one of its facets."""
     angle = (np.arange(sides) + 0.5) * 2 * np.pi / sides

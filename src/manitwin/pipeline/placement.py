@@ -59,7 +59,7 @@ class PlacementStage:
     settings: PlacementConfig
 
     name: ClassVar[str] = "placement"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = ("hulls.npz", "solid.npz", "physical")
     writes: ClassVar[tuple[str, ...]] = ("placements",)
     needs: ClassVar[Resource] = "cpu"
@@ -173,7 +173,11 @@ class _Shape:
         found = []
         for index, rotation in enumerate(level):
             first, *others = outcomes[index :: len(level)]
-            back = all(self._stayed(other, rotation, back_rad) for other in others)
+            tilts = [tilted[index] for tilted in landings[1:]]
+            back = all(
+                self._stayed(other, rotation, back_rad, self._way_back_m(tilt))
+                for other, tilt in zip(others, tilts, strict=True)
+            )
             stayed = back and self._stayed(first, rotation, most_rad)
             found.append((first, stayed and self._stays_in_second_engine(poses[index], rotation, most_rad)))
         return found
@@ -184,9 +188,19 @@ class _Shape:
         again = settle_on_plane_in_mujoco(self.plane_body, [pose], drop_m=drop_m, seconds=seconds)[0]
         return self._stayed(again, level, most_rad)
 
-    def _stayed(self, outcome: Settled, level: np.ndarray, most_rad: float) -> bool:
+    def _stayed(self, outcome: Settled, level: np.ndarray, most_rad: float, way_back_m: float = 0.0) -> bool:
+        """Tell whether a body ended near ``level``, its centre of mass at most ``way_back_m`` beyond the limit from its start."""
         turned_rad = Rotation.from_matrix(outcome.object_to_plane[:3, :3] @ level.T).magnitude()
-        return bool(outcome.moved_m < self.settings.max_moved_m and turned_rad < most_rad)
+        return bool(outcome.moved_m < self.settings.max_moved_m + way_back_m and turned_rad < most_rad)
+
+    def _way_back_m(self, tilted: np.ndarray) -> float:
+        """Return how far the centre of mass goes where a nudged body falls back over the point that it stands on.
+
+        That is no movement of the body: of a tall one it alone is more than ``max_moved_m``.
+        """
+        offsets = self.corners - self.body.center_of_mass_m
+        pivot = offsets[int((offsets @ tilted[2]).argmin())]
+        return float(np.linalg.norm(pivot)) * np.radians(NUDGE_DEG)
 
     def tried(self, guesses: list[_Rest], loosely: bool) -> list[_Rest]:
         """Set the body down in each pose and say where it stays; again from where it fell to, if that is no worse.
