@@ -70,3 +70,16 @@ def candidates(mesh: trimesh.Trimesh, count: int = 42) -> tuple[np.ndarray, np.n
     points, normals, _ = sample_surface(mesh, 20_000, np.random.default_rng(0))
     chosen = farthest_point_sampling(points, count)
     return points[chosen], normals[chosen]
+
+
+def drill(grip_x_m: float = -0.02, foot: bool = True) -> trimesh.Trimesh:
+    """A lying drill: its barrel along X with the chuck at +X, its grip towards -Y, a battery foot that reaches forward."""
+    forward = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0])
+    parts = [
+        cylinder(0.03, 0.17).apply_transform(forward).apply_translation([-0.08, 0, 0]),
+        cylinder(0.015, 0.06).apply_transform(forward).apply_translation([0.09, 0, 0]),
+        trimesh.creation.box([0.04, 0.11, 0.035]).apply_translation([grip_x_m, -0.08, 0]),
+    ]
+    if foot:
+        parts.append(trimesh.creation.box([0.12, 0.05, 0.05]).apply_translation([grip_x_m + 0.02, -0.15, 0]))
+    return trimesh.boolean.union(parts)

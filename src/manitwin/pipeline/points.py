@@ -23,7 +23,7 @@ class PointsStage:
     """Ask the annotator for points, and see that each is one of the candidates."""
 
     name: ClassVar[str] = "points"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "language", "candidates", "visible_candidates",
         "cameras", "geometry?", "naming?",

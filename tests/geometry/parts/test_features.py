@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from handmade import candidates, cup, cylinder, hammer, mug
+from handmade import candidates, cup, cylinder, drill, hammer, mug
 from manitwin.geometry.parts.features import Feature, feature_scores
 from manitwin.geometry.parts.shape import Shape, SurfacePoints, measure_shape, surface_points
 
@@ -71,3 +71,43 @@ def test_the_front_of_a_slab_is_its_large_upper_face() -> None:
     front, back = best("front", slab, stands=False), best("back", slab, stands=False)
     assert front[2] == pytest.approx(0.01) and back[2] == pytest.approx(-0.01)
     assert abs(front[0]) < 0.05 and abs(front[1]) < 0.05
+
+
+def test_a_working_end_is_away_from_the_grip() -> None:
+    mesh = drill()
+    assert best("muzzle", mesh, stands=False)[0] > 0.12
+    grip, housing = best("grip", mesh, stands=False), best("housing", mesh, stands=False)
+    assert grip[1] < -0.04 and housing[1] > -0.035 and housing[0] < 0.05
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_bristles_are_on_the_side_that_stands_out(side: int) -> None:
+    head = trimesh.creation.box([0.06, 0.05, 0.012]).apply_translation([-0.1, 0, 0])
+    handle = trimesh.creation.box([0.15, 0.02, 0.012])
+    tufts = trimesh.creation.box([0.05, 0.04, 0.025]).apply_translation([-0.1, 0, side * 0.016])
+    brush = trimesh.boolean.union([head, handle, tufts])
+    place = best("bristles", brush, stands=False)
+    assert place[0] < -0.07 and side * place[2] > 0.008
+
+
+def test_a_hammer_strikes_with_the_blunt_end_of_its_head() -> None:
+    shaft = trimesh.creation.box([0.3, 0.02, 0.02])
+    blunt = trimesh.creation.box([0.03, 0.06, 0.03]).apply_translation([-0.14, 0.03, 0])
+    claw = trimesh.creation.box([0.03, 0.065, 0.006]).apply_translation([-0.14, -0.03, 0])
+    assert best("face", trimesh.boolean.union([shaft, blunt, claw]), stands=False)[1] > 0.03
+
+
+def test_a_mouth_is_the_rim_or_where_a_lid_closes_it() -> None:
+    assert best("mouth", cup())[2] == pytest.approx(0.1, abs=0.003)
+    assert best("mouth", cylinder(0.04, 0.05))[2] == pytest.approx(0.05, abs=0.003)
+
+
+def test_a_flat_end_across_the_boxs_corners_is_thin() -> None:
+    flat = trimesh.creation.box([0.02, 0.042, 0.002]).apply_transform(
+        trimesh.transformations.rotation_matrix(np.pi / 4, [1, 0, 0])
+    )
+    body = trimesh.creation.box([0.12, 0.03, 0.03]).apply_translation([0.065, 0, 0])
+    tube = trimesh.boolean.union([flat, body])
+    shape = measure_shape(tube, tube.center_mass, "thin", False, np.random.default_rng(0))
+    assert shape.axis.direction[0] > 0.9, "the thin end comes first"
+    assert shape.axis.thickness_m[0] < 0.01

@@ -14,7 +14,7 @@ from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoin
 
 Feature = Literal[
     "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
-    "top", "base", "side", "center", "front", "back", "end", "ring",
+    "top", "base", "side", "center", "front", "back", "end", "ring", "mouth", "bristles", "muzzle", "grip", "housing",
 ]  # fmt: skip
 """A place on an object that geometry can point out."""
 
@@ -54,6 +54,12 @@ def _opening(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     """The rim where one pours: away from the handle."""
     rim = _rim(shape, points)
     return None if rim is None else rim * _away_from_handle(shape, points)
+
+
+def _mouth(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    """The opening where it is open, else the top, where a lid closes it."""
+    rim = _rim(shape, points) if shape.opening is not None and shape.opening.axis[2] > 0.9 else None
+    return _top(shape, points) if rim is None else rim
 
 
 def _away_from_handle(shape: Shape, points: SurfacePoints) -> np.ndarray:
@@ -109,12 +115,54 @@ def _head(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
 
 
 def _face(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """The outermost point of the head, across the handle: where a hammer strikes."""
+    """The outermost point of the head, across the handle: where a hammer strikes.
+
+    Where the head reaches about as far to both sides, it strikes with the blunt end, which has more surface across the head.
+    """
     along = shape.axis.along(points.positions_m)
     off = shape.axis.off_axis_m(points.positions_m)
     of_head = shape.axis.along(shape.surface_m) < shape.axis.head_share + 0.1
     furthest = float(shape.axis.off_axis_m(shape.surface_m[of_head]).max())
-    return (off / max(furthest, 1e-9)) ** 2 * (along < shape.axis.head_share + 0.12)
+    scores = (off / max(furthest, 1e-9)) ** 2 * (along < shape.axis.head_share + 0.12)
+    sideways = (shape.surface_m[of_head] - _handle_line(shape)) @ shape.axis.across[0]
+    reach = np.array([-sideways.min(), sideways.max()])
+    if reach.min() < _BALANCED_HEAD * reach.max():
+        return scores
+    bluntness = [np.ptp((shape.surface_m[of_head] @ shape.axis.across[1])[side * sideways > _HEAD_END * reach[i]])
+                 for i, side in enumerate((-1, 1))]  # fmt: skip
+    blunt_side = 1 if bluntness[1] > bluntness[0] else -1
+    mine = blunt_side * ((points.positions_m - _handle_line(shape)) @ shape.axis.across[0]) > 0
+    return np.where(mine, scores, 0.5 * scores)
+
+
+_BALANCED_HEAD = 0.6  # shorter by longer reach of a head from which both sides may be the striking one
+_HEAD_END = 0.8  # of a head's reach: beyond is its end
+_LOPSIDED = 1.25  # how much farther a brush's head reaches from the handle's line where its bristles stand out sideways
+
+
+def _handle_line(shape: Shape) -> np.ndarray:
+    """Return the middle of the handle half of a long thing, ``(3,)``."""
+    handle = shape.surface_m[shape.axis.along(shape.surface_m) > 0.5]
+    return (handle.min(0) + handle.max(0)) / 2 if len(handle) else shape.obb_to_object[:3, 3]
+
+
+def _bristles(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    """The side of the head that stands out farthest from the handle's line, else the front of the head."""
+    share = max(shape.axis.head_share, 0.1)
+    along = shape.axis.along(points.positions_m)
+    head = shape.surface_m[shape.axis.along(shape.surface_m) < share]
+    if not len(head):
+        return _head(shape, points)
+    line = _handle_line(shape)
+    directions = np.concatenate([shape.axis.across, -shape.axis.across])
+    reach = ((head - line) @ directions.T).max(0)
+    lopsided = reach / np.maximum(np.roll(reach, 2), 1e-9)
+    best = int(lopsided.argmax())
+    if lopsided[best] < _LOPSIDED:
+        return _near(along - 0.3 * share, 0.3 * share)
+    out = (points.positions_m - line) @ directions[best]
+    facing = 0.6 + 0.4 * points.normals @ directions[best]
+    return _near(along - 0.5 * share, 0.4 * share) * np.clip(out / reach[best], 0, 1) ** 2 * facing
 
 
 def _tip(shape: Shape, points: SurfacePoints) -> np.ndarray:
@@ -213,8 +261,34 @@ def _ring(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     return None if facing.max() < 0.5 else np.maximum(facing, 0)
 
 
+def _muzzle(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    """The working end of a pistol's barrel, away from its grip; of what has none, that of the long axis."""
+    if shape.pistol is None:
+        return _tip(shape, points)
+    along, down = shape.pistol.places(points.positions_m)
+    return _near(along, 0.07) * _near(np.maximum(np.abs(down - 0.5) - 0.5, 0), 0.1)
+
+
+def _grip(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    if shape.pistol is None:
+        return _handle(shape, points)
+    pistol = shape.pistol
+    along, down = pistol.places(points.positions_m)
+    below = (down - 1) / max(pistol.height_m / pistol.barrel_m - 1, 1e-9)
+    return (below > 0) * _near(below - 0.4, 0.25) * _near(along - pistol.grip_share, 0.25)
+
+
+def _housing(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
+    """The barrel behind its working end, above the grip."""
+    if shape.pistol is None:
+        return _head(shape, points)
+    along, down = shape.pistol.places(points.positions_m)
+    return _near(along - 0.65, 0.2) * _near(np.maximum(np.abs(down - 0.4) - 0.4, 0), 0.1)
+
+
 _SCORERS: dict[str, Callable[[Shape, SurfacePoints], np.ndarray | None]] = {
     "opening": _opening, "rim": _rim, "inside": _inside, "handle": _handle, "handle_end": _handle_end, "head": _head,
     "face": _face, "tip": _tip, "edge": _edge, "middle": _middle, "neck": _neck, "spout": _spout, "top": _top,
     "base": _base, "side": _side, "center": _center, "front": _front, "back": _back, "end": _end, "ring": _ring,
+    "mouth": _mouth, "bristles": _bristles, "muzzle": _muzzle, "grip": _grip, "housing": _housing,
 }  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -10,6 +11,7 @@ import trimesh
 
 from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.cavity import Opening, find_opening
+from manitwin.geometry.parts.pistol import Pistol, find_pistol
 from manitwin.geometry.parts.protrusions import Protrusion, RoundBody, round_body
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
@@ -18,6 +20,7 @@ HeadEnd = Literal["wide", "narrow", "thin", "thick", "heavy", "up"]
 """What tells the working end: its width, its thickness, the side of the centre of mass, or being the upper one."""
 
 _SLICES = 32
+_DIRECTIONS = 12
 _END_SHARE = 0.3  # of the length: what is compared to tell the two ends apart
 _DEFAULT_HEAD_SHARE = 0.25  # where the outline shows no step between head and handle
 _STEP_CONTRAST = 1.25  # wider over narrower end: a step that can be located
@@ -82,13 +85,19 @@ def long_axis(
 
 
 def _outline(share: np.ndarray, across_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the extents ``(32,)`` along both cross axes in slices of the long axis; empty ones repeat the nearest."""
+    """Return the width along the wider cross axis and the thickness in slices of the long axis, ``(32,)`` each.
+
+    The thickness of a slice is its least extent in any direction: a tube's flat end may lie across the corners of the box. Empty
+    slices repeat the nearest.
+    """
+    angles = np.arange(_DIRECTIONS) * np.pi / _DIRECTIONS
+    directions = np.stack([np.cos(angles), np.sin(angles)])
     index = np.clip((share * _SLICES).astype(int), 0, _SLICES - 1)
     extents = np.full((_SLICES, 2), np.nan)
     for i in range(_SLICES):
         inside = across_m[index == i]
         if len(inside):
-            extents[i] = np.ptp(inside, axis=0)
+            extents[i] = np.ptp(inside[:, 0]), np.ptp(inside @ directions, axis=0).min()
     filled = np.flatnonzero(np.isfinite(extents[:, 0]))
     nearest = filled[np.abs(np.arange(_SLICES)[:, None] - filled[None]).argmin(1)]
     return extents[nearest, 0], extents[nearest, 1]
@@ -159,6 +168,11 @@ class Shape:
         first, tallest = large[0], max(large, key=lambda p: p.height_m)
         steeper = tallest.height_m / tallest.reach_m > _STEEPER * first.height_m / first.reach_m
         return tallest if steeper and tallest.height_m > _TALLER * first.height_m else first
+
+    @cached_property
+    def pistol(self) -> Pistol | None:
+        """The barrel and grip, where it has the outline of a pistol."""
+        return find_pistol(self.surface_m, self.obb_extents_m, self.obb_to_object)
 
     @property
     def has_ends(self) -> bool:

@@ -219,6 +219,11 @@ _PLACES: dict[str, str] = {
     "back": "face opposite the largest",
     "end": "outermost end",
     "ring": "inner side of the ring",
+    "mouth": "mouth",
+    "bristles": "side of the head that stands out from the handle",
+    "muzzle": "working end, away from the grip",
+    "grip": "grip",
+    "housing": "barrel behind the working end",
 }
 
 

@@ -1,0 +1,241 @@
+"""Where on a template's thing a label of the priors' forms is at its place: on parts, or in regions of the template's own frame.
+
+A template knows its parts, that +Z is up, that what lies points its working end to +X, and that the front of what stands looks
+towards -Y. A place that is a part is judged by the part (``PARTS_OF``); a place that every thing has (its top, a side, the end
+away from the tip) by a region of the surface (``REGIONS``). Nothing here is measured as the rules measure it. A label that names
+neither on a thing is None: not judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from manitwin.geometry.sampling import sample_surface
+from manitwin.models.generators.templates.made import Made
+
+NEAR_SHARE = 0.03
+"""Of the longest side: candidates are that far apart and rarely on a thin rim."""
+_SAMPLES = 12000
+_TURNED_AWAY = -0.3  # cosine: the other side of a thin wall is near, but another place
+
+_BODIES = (
+    "body",
+    "tube",
+    "bulb",
+    "bowl",
+    "cone",
+    "roller",
+    "barrel",
+    "stem",
+    "shaft",
+    "cover",
+    "legs",
+    "neck",
+    "blade",
+)
+PARTS_OF: dict[str, tuple[str, ...]] = {
+    "opening": ("rim", "mouth"), "inside": ("inside",), "rim": ("rim",), "cooking surface": ("inside",),
+    "surface": ("top", "inside"), "handle": ("handle", "knob", "grips"), "handles": ("handle",),
+    "handle end": ("handle",), "base": ("base", "foot"), "foot": ("foot",), "stem": ("stem",), "cap": ("cap",),
+    "neck": ("neck", "collar", "stem"), "lid": ("cap", "lid", "top", "tab"), "spout": ("spout",),
+    "blade": ("blade", "edge"), "wick": ("wick",), "tip": ("tip", "lead", "tines"), "bristles": ("bristles",),
+    "jaw": ("jaw", "jaws", "mouth"), "jaws": ("jaw", "jaws", "mouth"), "joint": ("joint",), "spring joint": ("spring",),
+    "striking face": ("face", "edge"), "tines": ("tines",), "grip": ("handle", "switch"), "housing": ("body",),
+    "head": ("head", "face", "claw", "blade", "bowl", "jaw", "pan", "edge", "wires", "tines", "neck", "glass", "frame"),
+    "working end": ("outlet",), "ear cup": ("cups",), "headband": ("band",), "core": ("core",), "outside": ("body",),
+    "inner side": ("bore", "hole"), "barrel": ("barrel",), "lens": ("lens", "glass"), "switch": ("switch",),
+    "cap end": ("eraser", "button", "ferrule", "cap", "clip"), "nozzle": ("nozzle", "spout", "head"),
+    "tissue": ("tissue",), "end flap": ("top",), "bow": ("bow", "hole"), "cup": ("cup", "inside"), "bulb": ("bulb",),
+    "screw base": ("base",), "roller": ("roller",), "positive end": ("pole",), "body": _BODIES, "shaft": _BODIES,
+}  # fmt: skip
+"""Which parts of templates a label speaks of."""
+
+_BODIES = (
+    "body",
+    "tube",
+    "bulb",
+    "bowl",
+    "cone",
+    "roller",
+    "barrel",
+    "stem",
+    "shaft",
+    "cover",
+    "legs",
+    "neck",
+    "blade",
+)
+_WORKING = ("tip", "lead", "bristles", "head", "jaws", "cap", "outlet", "blade")  # from which the far end is far
+
+
+@dataclass(frozen=True)
+class Known:
+    """A made thing with samples of its surface: positions ``(N, 3)`` m, normals ``(N, 3)``, the part's number ``(N,)``."""
+
+    made: Made
+    positions_m: np.ndarray
+    normals: np.ndarray
+    part: np.ndarray
+
+    @classmethod
+    def of(cls, made: Made) -> Known:
+        """Sample a thing."""
+        solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
+        positions, normals, faces = sample_surface(solid, _SAMPLES, np.random.default_rng(0))
+        return cls(made, positions, normals, made.mesh.part[faces])
+
+    @cached_property
+    def height(self) -> np.ndarray:
+        """The share of the height of each sample."""
+        z = self.positions_m[:, 2]
+        return (z - z.min()) / max(float(np.ptp(z)), 1e-9)
+
+    @cached_property
+    def longest_m(self) -> float:
+        """The longest side of the axis-aligned box."""
+        return float(np.ptp(self.made.mesh.vertices, axis=0).max())
+
+    def on(self, *names: str) -> np.ndarray:
+        """Tell which samples are on one of some parts."""
+        return np.isin(self.part, [self.made.mesh.names.index(name) for name in names if name in self.made.mesh.names])
+
+    def right(self, label: str, chosen: int, positions_m: np.ndarray, normals: np.ndarray) -> bool | None:
+        """Tell whether a label's candidate, ``chosen`` of ``(N, 3)``, is at its place; None: such a thing has no such place.
+
+        At its place is within 3 % of the longest side, or 6 % where no candidate is nearer.
+        """
+        place = self.on(*PARTS_OF.get(label, ()))
+        region = not place.any() and label in REGIONS
+        if region:
+            place = REGIONS[label](self)
+        if not place.any():
+            return None
+        if region or label in _FACES:
+            place = place & (self.normals @ normals[chosen] > _TURNED_AWAY)
+            if not place.any():
+                return False
+        distances_m = cKDTree(self.positions_m[place]).query(positions_m)[0]
+        near_m = NEAR_SHARE * self.longest_m
+        return bool(distances_m[chosen] <= min(max(near_m, float(distances_m.min())), 2 * near_m))
+
+
+_FACES = frozenset({"inside", "cooking surface", "surface", "cup"})
+"""Places that a candidate on the other side of the wall does not stand for."""
+
+Region = Callable[[Known], np.ndarray]
+
+
+def _underside(known: Known) -> np.ndarray:
+    lowest = known.positions_m[:, 2] - known.positions_m[:, 2].min()
+    return (lowest < 0.02 * known.longest_m) & (known.normals[:, 2] < -0.3)
+
+
+def _upper_side(known: Known) -> np.ndarray:
+    return (known.height > 0.75) & (known.normals[:, 2] > 0.3)
+
+
+def _known_opening(known: Known) -> np.ndarray:
+    """The rim's plane of a known opening without a part of its own, else the upper side."""
+    openings = [point for point in known.made.points if point.kind == "opening"]
+    if not openings:
+        return _upper_side(known)
+    along = (known.positions_m - np.array(openings[0].position_m)) @ np.array(openings[0].direction)
+    return np.abs(along) < 0.01 * known.longest_m
+
+
+def _sides(known: Known) -> np.ndarray:
+    return (np.abs(known.normals[:, 2]) < 0.6) & (known.height > 0.05) & (known.height < 0.95)
+
+
+def _lies(known: Known) -> bool:
+    extents = np.ptp(known.positions_m, axis=0)
+    return bool(extents[2] <= extents[:2].min())
+
+
+def _front(known: Known) -> np.ndarray:
+    if _lies(known):
+        return (known.normals[:, 2] > 0.7) & (known.height > 0.4)
+    y = known.positions_m[:, 1]
+    return (known.normals[:, 1] < -0.7) & (y < np.median(y))
+
+
+def _back(known: Known) -> np.ndarray:
+    if _lies(known):
+        return (known.normals[:, 2] < -0.7) & (known.height < 0.6)
+    y = known.positions_m[:, 1]
+    return (known.normals[:, 1] > 0.7) & (y > np.median(y))
+
+
+def _narrow_edge(known: Known) -> np.ndarray:
+    if _lies(known):
+        return np.abs(known.normals[:, 2]) < 0.6
+    return np.abs(known.normals[:, 1]) < 0.6
+
+
+def _far_end(known: Known) -> np.ndarray:
+    working = known.on(*_WORKING)
+    if not working.any():
+        return working
+    distance = np.linalg.norm(known.positions_m - known.positions_m[working].mean(0), axis=1)
+    return distance > 0.85 * distance.max()
+
+
+def _nearer_spring(known: Known) -> np.ndarray:
+    """A clothespin's jaws: its legs on the side of the spring where they are short."""
+    spring, x = known.on("spring"), known.positions_m[:, 0]
+    if not spring.any():
+        return spring
+    at = float(x[spring].mean())
+    beyond = x > at if x.max() - at < at - x.min() else x < at
+    return known.on("legs") & beyond
+
+
+def _away_from_jaws(known: Known) -> np.ndarray:
+    return known.on("legs") & ~_nearer_spring(known) if known.on("spring").any() else known.on("legs")
+
+
+def _hole(known: Known) -> np.ndarray:
+    """The inside of a band: surface that looks at the middle."""
+    inward = known.positions_m.mean(0) - known.positions_m
+    return known.on("band", "body") & (
+        np.einsum("ij,ij->i", known.normals, inward) > 0.2 * np.linalg.norm(inward, axis=1)
+    )
+
+
+def _rim_of_the_band(known: Known) -> np.ndarray:
+    outward = known.positions_m - known.positions_m.mean(0)
+    return np.einsum("ij,ij->i", known.normals, outward) > 0.2 * np.linalg.norm(outward, axis=1)
+
+
+def _working_end(known: Known) -> np.ndarray:
+    """The end of a lying thing that points to +X, which is its working one."""
+    x = known.positions_m[:, 0]
+    along_x = np.ptp(x) >= np.ptp(known.positions_m, axis=0).max() - 1e-9
+    return x > x.max() - 0.08 * np.ptp(x) if along_x else np.zeros(len(x), dtype=bool)
+
+
+def _either_end(known: Known) -> np.ndarray:
+    along = known.positions_m[:, int(np.ptp(known.positions_m, axis=0).argmax())]
+    return (along > along.max() - 0.1 * np.ptp(along)) | (along < along.min() + 0.1 * np.ptp(along))
+
+
+def _outermost(known: Known) -> np.ndarray:
+    radius = np.linalg.norm(known.positions_m[:, :2] - known.positions_m[:, :2].mean(0), axis=1)
+    return radius > 0.93 * radius.max()
+
+
+REGIONS: dict[str, Region] = {
+    "base": _underside, "foot": _underside, "top": _upper_side, "controls": _upper_side, "upper side": _upper_side,
+    "opening": _known_opening, "lid": _upper_side, "cap": _upper_side, "nozzle": _upper_side, "surface": _front,
+    "side": _sides, "outside": _sides, "edge": _narrow_edge, "front": _front, "back": _back,
+    "far end": _far_end, "handle end": _far_end, "seam": _far_end, "inner side": _hole, "outer side": _rim_of_the_band,
+    "jaws": _nearer_spring, "handles": _away_from_jaws, "end": _either_end, "tip": _working_end,
+    "front edge": _working_end, "cup edge": _underside, "inside": _upper_side, "rim": _outermost, "wick": _upper_side,
+}  # fmt: skip
+"""Where a label is that names no part of a thing, by what is true of such a place."""
