@@ -84,9 +84,9 @@ is corrected.
 twins (a trash can tipped over in every pose), 9.9 CPU-s each in the median. `python benchmarks/points.py --held-out`: the
 annotator `rules`, which is told none of a template's points, puts 97.3 % of them at their place (826 of 849; 58 categories x 5
 seeds; 5 are not judged), and 97.8 % in the half by which the rules were improved (980 of 1002; 69 categories; without
-`--held-out`). The same judge gave 94.7 and 92.8 % before. What it takes for right stands in `benchmarks/known_places.py`: a part, or a
-region of the template's frame, where a label speaks of no part. Labels that were wrong of a thing (the lid of a battery) were
-mended in both halves. Most wrong are an umbrella's tip, a flashlight's switch, and a bell's body taken for its clapper.
+`--held-out`). The same judge gave 94.7 and 92.8 % before. What it takes for right stands in `benchmarks/known_places.py`: a
+part, or a region of the template's frame, where a label speaks of no part. Labels that were wrong of a thing (the lid of a
+battery) were mended in both halves. Most wrong are an umbrella's tip, a flashlight's switch, and a bell's clapper.
 
 This page is written by `python docs/make_templates_page.py`.
 """
