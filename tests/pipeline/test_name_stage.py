@@ -13,7 +13,7 @@ from manitwin.engine.stage import Draft
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.naming import NameStage, cut_view
 from manitwin.pipeline.object_state import object_name
-from manitwin.pipeline.quality import naming_checks
+from manitwin.pipeline.quality import filled_checks, naming_checks
 from manitwin.pipeline.recipe import stages_for
 from manitwin.render.renderer import BACKDROP
 from manitwin.twin.record import Naming
@@ -68,6 +68,12 @@ def test_the_finding_names_the_likeliest_and_the_remedy(tmp_path: Path) -> None:
     assert sure.passed and "orange 90 %, lemon 5 %" in sure.message and "--name" in sure.message
     made.fields["naming"] = SURE | {"name": None}
     (unsure,) = naming_checks(made)
+    filled = {"source": "vlm:eyes-1", "category": "mug", "findings": ["width 9, but ..."]}
+    made.fields["generation"] = {"known": {"name": "mug"}, "notes": {"filled": filled}}
+    (told,) = naming_checks(made)
+    assert told.passed and told.message == "vlm:eyes-1 takes it for a mug; --name overrules it"
+    (marked,) = filled_checks(made)
+    assert not marked.passed and marked.message == "vlm:eyes-1 filled in the template mug; width 9, but ..."
     assert unsure.passed is False and "cannot tell what it is (orange 90 %" in unsure.message
 
 

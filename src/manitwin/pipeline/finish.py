@@ -15,8 +15,8 @@ from manitwin.formats.glb import read_glb
 from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.pipeline.item import Item
-from manitwin.pipeline.object_state import load_hulls, load_solid
-from manitwin.pipeline.quality import quality_checks
+from manitwin.pipeline.object_state import load_hulls, load_solid, object_name
+from manitwin.pipeline.quality import filled_in, quality_checks
 from manitwin.render.card import CardText, make_card
 from manitwin.render.card_panels import CardGrasp, CardPoint
 from manitwin.robots.grippers.gripper import Gripper
@@ -94,8 +94,11 @@ def card_text(draft: Draft[Item]) -> CardText:
         ("grasps held", f"{grasps['verified']} of {grasps['simulated']}"),
     )
     made_by = f"made by {draft.field('generation')['generator']}" if "generation" in draft.fields else "mesh given"
-    said = (draft.fields.get("naming") or {}).get("name")
-    made_by += f"   named by {draft.field('naming')['probability']['source']}" if said else ""
+    said, seen = (draft.fields.get("naming") or {}).get("name"), filled_in(draft)
+    if said is not None and said == object_name(draft):
+        made_by += f"   named by {draft.field('naming')['probability']['source']}"
+    elif seen is not None:
+        made_by += f"   template by {seen['source']}"
     footer = f"{draft.item_id}   {made_by}   mass: {mass['source']}   friction: {friction['source']}"
     stamp = "REHEARSAL" if draft.rehearsed else None
     return CardText(language["category"], language["caption"], facts, footer, stamp)

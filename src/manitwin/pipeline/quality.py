@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, cast
 
 from manitwin.engine.stage import Draft
 from manitwin.twin.record_values import Check
@@ -68,10 +68,17 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
 
 
 def naming_checks(draft: Draft) -> list[Check]:
-    """Return what a classifier takes a thing for that nobody has named: a finding, unless it is sure; none for others."""
+    """Return what a thing is taken for that nobody has named, by a model or a classifier: a finding, unless one is sure.
+
+    None for others.
+    """
     naming = draft.fields.get("naming")
     if naming is None:
         return []
+    filled, known = filled_in(draft), (draft.fields.get("generation") or {}).get("known")
+    if filled is not None and filled["category"] is not None and known is not None:
+        message = f"{filled['source']} takes it for a {known['name']}; --name overrules it"
+        return [Check(name="named", passed=True, value=str(known["name"]), message=message)]
     value, source = naming["probability"]["value"], naming["probability"]["source"]
     if naming["name"] is not None:
         message = f"{source} takes it for a {naming['name']} ({likeliest_words(naming)}); --name overrules it"
@@ -119,9 +126,15 @@ def _unseen(draft: Draft) -> list[Check]:
     return [Check(name="every_side_seen", passed=not share, value=share, limit=0.0, message=message)]
 
 
+def filled_in(draft: Draft) -> dict[str, Any] | None:
+    """Return the note of what a model filled in; None where none was asked."""
+    generation = draft.fields.get("generation") or {}
+    return cast(dict[str, Any] | None, generation.get("notes", {}).get("filled"))
+
+
 def filled_checks(draft: Draft) -> list[Check]:
     """Return what a model said of the template that a thing was made of; none where no model was asked."""
-    filled = (draft.fields.get("generation") or {}).get("notes", {}).get("filled")
+    filled = filled_in(draft)
     if filled is None:
         return []
     said = [] if filled["category"] is None else [f"{filled['source']} filled in the template {filled['category']}"]

@@ -113,6 +113,16 @@ def test_wrong_twice_is_rejected_with_its_words_and_never_asked_a_third_time(box
 
 
 @pytest.mark.slow
+def test_name_that_explains_the_outline_better_than_the_model_s_template_wins_and_is_said(
+    boxed: np.ndarray, tmp_path: Path
+) -> None:
+    result = made(guided(Eyes("spoon", {}, YES)), tmp_path, rgba=boxed, name="box")
+    assert result.notes["primitive"] == "template:box"
+    assert result.notes["filled"]["findings"][0].startswith("the user calls it 'box'")
+    assert "a box explains the outline clearly better" in result.notes["filled"]["findings"][1]
+
+
+@pytest.mark.slow
 def test_correction_of_a_photo_is_fitted_and_the_better_fit_stays(boxed: np.ndarray, tmp_path: Path) -> None:
     once = made(guided(Eyes("box", {"width": 0.9}, YES)), tmp_path, rgba=boxed).notes
     eyes = Eyes("box", {"width": 0.9}, no(width=0.5), YES)
@@ -156,6 +166,8 @@ def test_text_of_no_template_lists_the_nearest_ones(tmp_path: Path) -> None:
     with pytest.raises(Unsupported, match=r"vlm:eyes-1 says .*none of the templates.*did you mean spoon"):
         made(guided(eyes), tmp_path, text="a gnarled spon")
     assert guided(eyes).why_not("a mug " + 400 * "x") is not None
+    with pytest.raises(Unsupported, match="at most 400"):
+        made(guided(eyes), tmp_path, text="a mug " + 400 * "x")
     plain = made(guided(eyes), tmp_path, text="a bulbous mug")
     assert plain.notes["category"] == "mug" and "none of the templates" in plain.notes["filled"]["findings"][0]
 

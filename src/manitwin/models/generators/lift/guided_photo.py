@@ -70,6 +70,10 @@ def guided_from_photo(request: GenerationRequest, reader: TemplateReader) -> Job
     agreed: Agreed[_Fit] = in_two_rounds(first, compare, correct)
     findings += agreed.findings
     kept = agreed.kept
+    if kept.fitted.category != filled.category:
+        findings.append(
+            f"{reader.source} says {filled.category}, but a {kept.fitted.category} explains the outline clearly better"
+        )
     job = fitted_or_lifted(kept.fitted, rgba, called)
     if job.known is None:
         findings.append(f"no {kept.fitted.category} explains the outline: the photo was lifted")

@@ -16,6 +16,7 @@ from manitwin.models.generators.lift.made_text import job_of, made_as_read
 from manitwin.models.generators.lift.rounds import Agreed, in_two_rounds, noted, pictures_of, require_right
 from manitwin.models.generators.templates.filled import Filled, make_filled
 from manitwin.models.generators.templates.made import Made, visual_parts
+from manitwin.models.generators.templates.text import MAX_CHARACTERS
 from manitwin.twin.import_record import FILLED
 
 _SEEN_FROM_DEG = (-55.0, 25.0)  # azimuth and elevation: the front is towards -Y
@@ -34,6 +35,8 @@ def guided_from_text(text: str, seed: int, reader: TemplateReader) -> Job:
     with the nearest categories. Raises what the model raises; Rejected where it says in both rounds that the result is not
     what the text asks for.
     """
+    if len(text) > MAX_CHARACTERS:
+        raise Unsupported(f"a text of {len(text)} characters; at most {MAX_CHARACTERS} describe an object")
     plain, why = None, ""
     try:
         made, unused = made_as_read(text, seed)
