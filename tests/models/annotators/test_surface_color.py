@@ -89,3 +89,30 @@ def test_colors_are_the_same_twice() -> None:
     noise = np.random.default_rng(3).integers(0, 255, (64, 64, 3), dtype=np.uint8)
     part = textured_square(noise, (0, 1))
     assert measure_colors((part,), np.random.default_rng(0)) == measure_colors((part,), np.random.default_rng(0))
+
+
+def squares(*stripes: tuple[tuple[int, int, int], float]) -> trimesh.Trimesh:
+    """A square of upright stripes, each a colour and its share of the width."""
+    image = np.zeros((16, 200, 3), np.uint8)
+    start = 0.0
+    for rgb, share in stripes:
+        image[:, round(200 * start) : round(200 * (start + share))] = rgb
+        start += share
+    return textured_square(image, (0.001, 0.999))
+
+
+def test_a_colour_that_tells_comes_before_the_grey_that_is_a_little_more() -> None:
+    assert names(squares(((205, 205, 205), 0.6), ((200, 30, 30), 0.4))) == ["red", "light grey"]
+    assert names(squares(((205, 205, 205), 0.8), ((200, 30, 30), 0.2))) == ["light grey", "red"]
+
+
+def test_shades_of_one_colour_are_one_colour() -> None:
+    assert names(squares(((240, 124, 28), 0.5), ((165, 66, 15), 0.5))) == ["orange"]
+    assert names(squares(((85, 85, 85), 0.5), ((176, 176, 176), 0.5))) == ["grey"]
+
+
+def test_only_metal_is_gold() -> None:
+    part = squares(((199, 154, 43), 1.0))
+    assert names(part) == ["dark yellow"]
+    part.visual.material.metallicFactor = 1.0
+    assert names(part) == ["gold"]

@@ -34,6 +34,19 @@ _SHADES: tuple[tuple[str, str], ...] = (
     ("magenta", "9c2a74"), ("grey-brown", "7d7064"), ("grey-green", "77826f"),
 )  # fmt: skip
 
+_FAMILIES: dict[str, str] = {
+    **{f"{shade} {name}": name for name in ("grey", "red", "orange", "yellow", "green", "blue", "purple", "brown")
+       for shade in ("dark", "light")},
+    "grey-blue": "blue", "grey-green": "green", "yellow-green": "green", "grey-brown": "brown", "tan": "beige",
+}  # fmt: skip
+"""Of shades that are one colour to a person who names an object by it: the colour."""
+_NEUTRAL = frozenset({"black", "dark grey", "grey", "light grey", "white"})
+_TELLING = (
+    1 / 3
+)  # of the largest neutral colour's share: a colour of that much comes first, a red box with white letters is red
+_METALLIC = 0.5
+_YELLOW_HUE_RAD = np.deg2rad(78.0)  # of CIELAB: between the centres of orange (70) and yellow (86)
+
 _WHITE_D65 = np.array([0.95047, 1.0, 1.08883])
 _LINEAR_SRGB_TO_XYZ = np.array(  # IEC 61966-2-1
     [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
@@ -67,9 +80,12 @@ def _srgb_from_hex(text: str) -> list[float]:
 _LAB = lab_from_srgb(np.array([_srgb_from_hex(shade) for _, shade in _SHADES]))
 
 
-def color_name(lab: np.ndarray) -> str:
-    """Return the everyday name of a CIELAB colour ``(3,)``."""
-    return _NAMES[int(np.linalg.norm(_LAB - lab, axis=1).argmin())]
+def color_name(lab: np.ndarray, *, metallic: bool = True) -> str:
+    """Return the everyday name of a CIELAB colour ``(3,)``; only what is ``metallic`` is gold."""
+    name = _NAMES[int(np.linalg.norm(_LAB - lab, axis=1).argmin())]
+    if name != "gold" or metallic:
+        return name
+    return "dark yellow" if np.arctan2(lab[2], lab[1]) > _YELLOW_HUE_RAD else "orange"
 
 
 @dataclass(frozen=True)
@@ -81,8 +97,9 @@ class ColorShare:
 
 
 def measure_colors(parts: tuple[trimesh.Trimesh, ...], rng: np.random.Generator) -> list[ColorShare]:
-    """Return up to three named colours, the largest first; empty where nothing gives the surface a colour.
+    """Return up to three named colours, as people order them; empty where nothing gives the surface a colour.
 
+    The largest comes first, but a colour that tells things apart before black, grey and white that are not much more.
     ``parts`` are visual parts with PBR materials. Colours are the base colours, without light.
     """
     colored = [part for part in parts if _has_color(part)]
@@ -91,7 +108,8 @@ def measure_colors(parts: tuple[trimesh.Trimesh, ...], rng: np.random.Generator)
         return []
     counts = np.maximum(np.round(_SAMPLES * areas / areas.sum()).astype(int), 1)
     samples = np.vstack([_base_colors(part, count, rng) for part, count in zip(colored, counts, strict=True)])
-    return _named_shares(lab_from_srgb(samples))
+    metallic = any(float(material_of(part).metallicFactor or 0.0) > _METALLIC for part in colored)
+    return _named_shares(lab_from_srgb(samples), metallic)
 
 
 def _has_color(part: trimesh.Trimesh) -> bool:
@@ -121,14 +139,31 @@ def _base_colors(part: trimesh.Trimesh, count: int, rng: np.random.Generator) ->
     return np.clip(linear_to_srgb(linear * factor), 0, 1)
 
 
-def _named_shares(lab: np.ndarray) -> list[ColorShare]:
+def _named_shares(lab: np.ndarray, metallic: bool) -> list[ColorShare]:
     centers, labels = _merged(*_k_means(lab))
     shares: dict[str, float] = {}
     for index in range(len(centers)):
-        name = color_name(np.median(lab[labels == index], axis=0))
+        name = color_name(np.median(lab[labels == index], axis=0), metallic=metallic)
         shares[name] = shares.get(name, 0.0) + float((labels == index).mean())
-    ranked = sorted((ColorShare(name, share) for name, share in shares.items()), key=lambda c: (-c.share, c.name))
+    ranked = _ranked(_by_family(shares))
     return [ranked[0], *(c for c in ranked[1:_MOST_NAMES] if c.share >= _LEAST_SHARE)]
+
+
+def _by_family(shares: dict[str, float]) -> dict[str, float]:
+    """Join shades that are one colour to a person; a shade that is alone keeps its name."""
+    members: dict[str, list[str]] = {}
+    for name in shares:
+        members.setdefault(_FAMILIES.get(name, name), []).append(name)
+    return {
+        family if len(names) > 1 else names[0]: sum(shares[name] for name in names) for family, names in members.items()
+    }
+
+
+def _ranked(shares: dict[str, float]) -> list[ColorShare]:
+    neutral = max((share for name, share in shares.items() if name in _NEUTRAL), default=0.0)
+    telling = {n for n, share in shares.items() if n not in _NEUTRAL and share >= max(_LEAST_SHARE, _TELLING * neutral)}
+    order = sorted(shares, key=lambda name: (name not in telling, -shares[name], name))
+    return [ColorShare(name, shares[name]) for name in order]
 
 
 def _k_means(lab: np.ndarray, rounds: int = 15) -> tuple[np.ndarray, np.ndarray]:
