@@ -21,7 +21,7 @@ class GenerateStage:
     """Write ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "6"
+    version: ClassVar[str] = "7"
     reads: ClassVar[tuple[str, ...]] = ("photo.png?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 

@@ -7,7 +7,7 @@ import pytest
 
 from manitwin.geometry.solids.shapes import box, cylinder
 from manitwin.models.generators.templates.catalog import load_templates
-from manitwin.models.generators.templates.known import known_of, mass_properties
+from manitwin.models.generators.templates.known import known_of, mass_properties, material_words
 from manitwin.models.generators.templates.made import make
 from manitwin.models.generators.templates.text import read_text
 
@@ -32,11 +32,26 @@ def test_head_of_steel_draws_the_centre_of_a_hammer_to_it() -> None:
     assert known.center_of_mass_m is not None
     along = np.array(known.center_of_mass_m)[0] / np.ptp(thing.mesh.vertices[:, 0])
     assert along > 0.2, "well on the head's side of the middle"
-    assert known.material in ("steel", "wood") and [p.label for p in known.functional_points] == [
+    assert known.material in ("steel and wood", "wood and steel") and [p.label for p in known.functional_points] == [
         "striking face",
         "claw",
         "handle",
     ]
+
+
+@pytest.mark.parametrize(
+    ("text", "materials"),
+    [
+        ("red ceramic mug", {"ceramic"}),
+        ("tablet", {"plastic", "electronics"}),
+        ("light bulb", {"glass", "brass"}),
+        ("chef's knife with a wooden handle", {"stainless steel", "wood"}),
+    ],
+)
+def test_a_thing_is_made_of_what_most_of_its_mass_and_surface_are(text: str, materials: set[str]) -> None:
+    wanted = read_text(text, TEMPLATES)
+    thing = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
+    assert set(material_words(thing).split(" and ")) == materials
 
 
 def test_point_of_an_opening_is_on_the_rim() -> None:

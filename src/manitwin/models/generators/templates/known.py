@@ -13,6 +13,10 @@ from manitwin.twin.import_record import GivenPoint, ImportRecord
 
 MOST_POINTS = 4
 """As many functional points as an object has (paper)."""
+_TELLING_SHARE = 0.25  # of mass and surface together: less of a material is not what a thing is said to be made of
+_SAID = {
+    "electronics": "plastic and electronics"
+}  # a look's matter is the mean of what is inside, which nobody calls so
 
 
 def known_of(made: Made, text: str) -> ImportRecord:
@@ -22,7 +26,6 @@ def known_of(made: Made, text: str) -> ImportRecord:
     summed over the parts (parallel axis theorem).
     """
     mass_kg, center, inertia = mass_properties(made.solids)
-    heaviest = max(made.masses_kg, key=lambda part: made.masses_kg[part])
     return ImportRecord(
         format="template",
         file=text,
@@ -37,7 +40,7 @@ def known_of(made: Made, text: str) -> ImportRecord:
         friction_static=None,
         friction_dynamic=None,
         restitution=None,
-        material=made.looks[heaviest].material,
+        material=material_words(made),
         captions=[],
         functional_points=[
             GivenPoint(position_m=_on_surface(made, point).tolist(), normal=list(point.direction), label=point.label)
@@ -49,6 +52,21 @@ def known_of(made: Made, text: str) -> ImportRecord:
         missing=["friction", "restitution", "grasps"],
         remarks=[],
     )
+
+
+def material_words(made: Made) -> str:
+    """Say what a thing is made of: one or two materials by their shares of mass and surface, 'steel and wood'."""
+    shares: dict[str, float] = {}
+    total_kg = sum(made.masses_kg.values())
+    corners = made.mesh.vertices[made.mesh.faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    for number, part in enumerate(made.mesh.names):
+        share = made.masses_kg.get(part, 0.0) / total_kg + float(areas[made.mesh.part == number].sum() / areas.sum())
+        shares[made.looks[part].material] = shares.get(made.looks[part].material, 0.0) + share / 2
+    ranked = sorted(shares, key=lambda material: -shares[material])[:2]
+    told = [material for material in ranked if shares[material] >= _TELLING_SHARE] or ranked[:1]
+    said = [_SAID.get(material, material) for material in told]
+    return said[0] if len(said) < 2 or said[1] in said[0] else " and ".join(said)
 
 
 def _on_surface(made: Made, point: KnownPoint) -> np.ndarray:
