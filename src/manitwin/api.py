@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, Unpack
@@ -42,6 +42,8 @@ def build(
     license: str | None = None,
     attribution: str | None = None,
     count: int = 1,
+    views: bool = False,
+    turns_deg: Sequence[float] | None = None,
     strict: bool = False,
     jobs: int | None = None,
     config: BuildConfig | str | Path | None = None,
@@ -60,8 +62,10 @@ def build(
     it changes.
 
     ``name``, ``units`` m|cm|mm|auto, ``up`` y|z|auto, ``license`` and ``attribution`` hold for all inputs whose manifest row
-    does not say otherwise; of each text ``count`` variations are made, which differ in what it leaves open; with ``strict`` a
-    manifest's column that nobody knows is an error. ``config`` None: what the data set was built with, else the defaults.
+    does not say otherwise; of each text ``count`` variations are made, which differ in what it leaves open. With ``views`` the
+    inputs are photos of one thing, which becomes one twin; ``turns_deg`` is the camera's turn about the vertical in each,
+    counter-clockwise seen from above. With ``strict`` a manifest's column that nobody knows is an error. ``config`` None: what
+    the data set was built with, else the defaults.
     ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first one's grasps are the twin's own;
     ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
     have charged ``max_cost_usd``, items that would cost more are left unfinished; ``record`` is a file that a VLM's answers are
@@ -75,8 +79,9 @@ def build(
 
     defaults = {"name": name, "units": units, "up": up, "license": license, "attribution": attribution}
     request = request_build(
-        inputs, out, texts=texts, count=count, strict=strict, jobs=jobs, config=config, defaults=defaults, flags=flags
-    )
+        inputs, out, texts=texts, count=count, views=views, turns_deg=turns_deg, strict=strict, jobs=jobs, config=config,
+        defaults=defaults, flags=flags,
+    )  # fmt: skip
     from manitwin.dataset.index.parts import IndexTables
     from manitwin.engine.drive import drive
     from manitwin.pipeline.build_report import BuildReport, ItemResult

@@ -83,7 +83,9 @@ PAGES: dict[str, Arrangement] = {
         exits={r"PATH\.\.\.": 1, "--fix": 1}
     ),  # the mug there is wrong: its collision shape fills it
     "docs/backends.md": Arrangement(blocks={"entry-points": "entry_point"}),
-    "docs/build.md": Arrangement(blocks={"^file,name": "manifest", "^things: ": "account things"}),
+    "docs/build.md": Arrangement(
+        blocks={"^file,name,units": "manifest", "^file,name,group": "manifest", "^things: ": "account things"}
+    ),
     "docs/cluster.md": Arrangement(
         rewritten={r" --address auto": ""},  # without one, it starts a cluster on this machine
         not_run={r"^pip install": NO_NETWORK},

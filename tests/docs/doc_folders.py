@@ -35,6 +35,8 @@ _, image, out, seed = sys.argv
 trimesh.creation.cylinder(radius=0.12, height=1.0).export(out)
 """
 
+GROUPED = ("mug_front", "mug_side", "spoon")
+
 
 class Folders:
     """Folders that take long to make, each made at its first use and copied to every page that names it."""
@@ -96,7 +98,7 @@ class Folders:
         (page / ".venv").symlink_to(ROOT / ".venv")
         (page / "small.toml").write_text(SMALL)
         (page / "run.toml").write_text(SMALL)
-        for name in ("mug.jpg", "photo.jpg", "photos/bottle.jpg"):
+        for name in ("mug.jpg", "photo.jpg", "photos/bottle.jpg", *(f"photos/{name}.jpg" for name in GROUPED)):
             _copied(ROOT / "samples" / "bottle.jpg", page / name)
         _copied(ROOT / "samples" / "mug.glb", page / "mug.glb")
         for name in ("front.png", "side.png", "back.png"):

@@ -52,6 +52,15 @@ def check_text(called: str, value: str, *, place: bool) -> None:
         raise UsageError(f"{called}: {value[:40]!r}... has {length} bytes; a path has at most {LONGEST_PLACE}")
 
 
+def degrees_of(value: str) -> list[float]:
+    """Return the degrees that stand between commas; raises UsageError for what are none."""
+    try:
+        return [float(turn) for turn in value.split(",")]
+    except ValueError:
+        told = value if len(value) <= 60 else f"{value[:60]}..."
+        raise UsageError(f"--turns {told!r}: no list of degrees; give one a photo, such as 0,90,180") from None
+
+
 def _called(parameter: Any) -> str:
     return str(parameter.opts[0] if parameter.param_type_name == "option" else parameter.metavar or parameter.name)
 

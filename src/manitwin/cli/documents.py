@@ -164,7 +164,8 @@ def plan_document(plan: Plan, place: str) -> Document:
         "out": place,
         "items": [
             {
-                "file": planned.item.file, "text": planned.item.text, "name": planned.item.name, "kind": planned.kind,
+                "file": planned.item.file, "views": list(planned.item.views), "text": planned.item.text,
+                "name": planned.item.name, "kind": planned.kind,
                 "units": planned.item.units, "up": planned.item.up, "twin_id": planned.twin_id, "state": planned.state,
                 "detail": planned.detail,
             }
@@ -187,6 +188,7 @@ def _item(result: ItemResult) -> Document:
     item = result.item
     return {
         "file": item.file,
+        "views": list(item.views),
         "text": item.text,
         "name": item.name,
         "twin_id": result.twin_id,

@@ -98,6 +98,14 @@ Count = Annotated[
         help="Make so many variations of each text: measures, colours and materials that it leaves open.",
     ),
 ]
+Views = Annotated[bool, typer.Option("--views", help="The inputs are photos of one thing: make one twin of them all.")]
+Turns = Annotated[
+    str | None,
+    typer.Option(
+        help="The camera's turn about the vertical in each photo of --views: degrees, counter-clockwise from above.",
+        metavar="0,90,...",
+    ),
+]
 Name = Annotated[str | None, typer.Option(help="What the object is ('mug'): the key to the priors.")]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="Say what would be done, and about what it would cost; write nothing.")

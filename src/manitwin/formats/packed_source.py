@@ -6,7 +6,7 @@ import hashlib
 import os
 import shutil
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -31,14 +31,28 @@ def pack_source(path: Path, folder: Path, beside: Iterable[Path] = ()) -> tuple[
     others = sorted({*side_files(path), *(other.resolve() for other in beside)})
     root = path.parent.resolve()
     files = {_name_in(root, file, path.name): file for file in (path.resolve(), *others)}
+    return _packed(files, folder, path if not others else None)
+
+
+def pack_photos(paths: Sequence[Path], folder: Path) -> tuple[str, str]:
+    """Write photos of one thing into a folder as ``source.zip``, numbered in their order; return its name and sha256.
+
+    Of more than ``MAX_KEPT_BYTES`` a text says the names and sizes. Raises InputError ``unreadable`` for a file that is gone.
+    """
+    files = {f"photo_{number:02d}{path.suffix.lower()}": path for number, path in enumerate(paths)}
+    return _packed(files, folder, None)
+
+
+def _packed(files: Mapping[str, Path], folder: Path, single: Path | None) -> tuple[str, str]:
+    """Keep files by their names in an archive, or one byte for byte."""
     sizes = {called: _size(file) for called, file in files.items()}
     if sum(sizes.values()) > MAX_KEPT_BYTES:
         name = "source.txt"
         lines = [f"{printable_line(called)}: {size} bytes, not kept\n" for called, size in sizes.items()]
         (folder / name).write_text("".join(lines), encoding="utf-8")
-    elif not others:
-        name = f"source{path.suffix.lower()}"
-        with _opened(path) as stream, (folder / name).open("wb") as kept:
+    elif single is not None:
+        name = f"source{single.suffix.lower()}"
+        with _opened(single) as stream, (folder / name).open("wb") as kept:
             shutil.copyfileobj(stream, kept, _BLOCK_BYTES)
     else:
         name = "source.zip"

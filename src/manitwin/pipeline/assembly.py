@@ -14,7 +14,7 @@ from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import Rejected
 from manitwin.formats.installation import installed_version
-from manitwin.formats.packed_source import pack_source
+from manitwin.formats.packed_source import pack_photos, pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
@@ -114,6 +114,8 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path) -> dict[str, Any]
         name, content = "prompt.txt", (item.text or "").encode()
         (folder / name).write_bytes(content)
         sha256 = hashlib.sha256(content).hexdigest()
+    elif item.views:
+        name, sha256 = pack_photos([Path(file) for file in item.files], folder)
     else:
         name, sha256 = pack_source(Path(item.file), folder, [] if item.given is None else [Path(item.given)])
     return {
@@ -122,6 +124,7 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path) -> dict[str, Any]
         "sha256": sha256,
         "prompt": item.text,
         "variation": item.variation,
+        "turns_deg": list(item.turns_deg) or None,
         "license": item.license or "unknown",
         "attribution": item.attribution,
     }

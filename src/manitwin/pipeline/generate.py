@@ -11,7 +11,7 @@ from PIL import Image
 from manitwin.config import GenerateConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.models.generators.generated_mesh import as_glb
-from manitwin.models.generators.protocol import GenerationRequest, Generator
+from manitwin.models.generators.protocol import GenerationRequest, Generator, PhotoView
 from manitwin.models.generators.run import run_generator
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
@@ -22,7 +22,7 @@ class GenerateStage:
 
     name: ClassVar[str] = "generate"
     version: ClassVar[str] = "7"
-    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "naming?")
+    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 
     def __init__(self, settings: GenerateConfig, generator: Generator, submit_again: bool = False):
@@ -38,12 +38,15 @@ class GenerateStage:
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Generate; raises Rejected ``generator_failed``, or BackendError where the generator cannot work now."""
         rgba = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
+        views = read_views(draft)
+        takes_views = getattr(self.generator, "takes_views", False)
         request = GenerationRequest(
             rgba=rgba,
             text=draft.payload.text,
             name=object_name(draft),
             seed=generator_seed(draft),
             guessed=draft.payload.name is None,
+            views=views if takes_views else (),
         )
         made = run_generator(
             self.generator, request, folder, settings=self.settings, jobs=draft.jobs, submit_again=self._submit_again
@@ -51,6 +54,7 @@ class GenerateStage:
         content = as_glb(made.path)
         made.path.unlink()
         (folder / "generated.glb").write_bytes(content)
+        photos = {"photos": {"cut_out": len(views), "used": len(views) if takes_views else 1}} if views else {}
         return {
             "generation": {
                 "generator": self.generator.name,
@@ -58,10 +62,27 @@ class GenerateStage:
                 "metric": made.metric,
                 "rests": made.rests,
                 "unseen_share": made.unseen_share,
-                "notes": made.notes,
+                "notes": made.notes | photos,
                 "known": None if made.known is None else made.known.model_dump(mode="json"),
             }
         }
+
+
+def read_views(draft: Draft[Item]) -> tuple[PhotoView, ...]:
+    """Return the cut-outs of several photos of one thing, with their stated turns; none where fewer than two are left."""
+    pictures = sorted(draft.path("photos/").glob("*.png")) if "photos/" in draft.paths else []
+    if len(pictures) < 2:
+        return ()
+    files, turns = draft.payload.files, draft.payload.turns_deg
+    return tuple(
+        PhotoView(
+            name=Path(files[number]).name,
+            rgba=np.asarray(Image.open(picture)),
+            turn_deg=turns[number] if turns else None,
+        )
+        for picture in pictures
+        for number in [int(picture.stem)]
+    )
 
 
 def generator_seed(draft: Draft[Item]) -> int:

@@ -127,8 +127,8 @@ def read_identity(recipe: Recipe, item: Item, frame: int | None) -> tuple[Identi
 
     identity = recipe.identify(item)
     try:
-        if identity.kind == "image" and item.file is not None:
-            check_header(Path(item.file), frame=frame)
+        for file in item.files if identity.kind in ("image", "photos") else ():
+            check_header(Path(file), frame=frame)
     except Rejected as answer:
         return identity, answer
     return identity, None

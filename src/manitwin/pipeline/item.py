@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import os
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from io import BufferedReader
 from pathlib import Path
-from typing import Any, Literal, cast
+from typing import Any, Literal, Self, cast
 
 from manitwin.engine.task import Payload
 from manitwin.errors import InputError
@@ -31,7 +32,9 @@ class Item(Payload):
 
     ``file`` is an absolute path, or None where ``text`` is given. ``units`` and ``up`` are what the user said ('auto': unsaid).
     ``given`` is the import.json beside an imported mesh: what another tool says of it. ``variation`` counts the things that are
-    made of one text: each is drawn from a seed of its own.
+    made of one text: each is drawn from a seed of its own. ``views`` are the absolute paths of further photos of the thing that
+    the photo ``file`` shows; ``turns_deg`` is the camera's turn about the vertical in each photo, counter-clockwise seen from
+    above, that of the first 0; empty where nobody states them.
     """
 
     file: str | None
@@ -43,20 +46,28 @@ class Item(Payload):
     attribution: str | None = None
     given: str | None = None
     variation: int = 0
+    views: tuple[str, ...] = ()
+    turns_deg: tuple[float, ...] = ()
+
+    @property
+    def files(self) -> tuple[str, ...]:
+        """All files that were given: the mesh, or the photos in order; none of a text."""
+        return () if self.file is None else (self.file, *self.views)
 
     @property
     def title(self) -> str:
-        """The name of the file, or the begin of the text, with the number of a variation."""
+        """The name of the file and the number of further photos, or the begin of the text, with the number of a variation."""
         if self.file:
-            return Path(self.file).name
+            more = f" and {len(self.views)} more" if self.views else ""
+            return f"{Path(self.file).name}{more}"
         number = f" ({self.variation + 1})" if self.variation else ""
         return f"'{(self.text or '')[:40]}'{number}"
 
     @property
     def modified_at(self) -> float | None:
-        """When its file was last changed (st_ctime, which nobody sets), None where it has none now."""
+        """When its files were last changed (st_ctime, which nobody sets), None where it has none now."""
         try:
-            return None if self.file is None else os.stat(self.file).st_ctime
+            return max((os.stat(file).st_ctime for file in self.files), default=None)
         except (OSError, ValueError):
             return None
 
@@ -64,17 +75,31 @@ class Item(Payload):
         """Return the fields as a ledger keeps them; of those that came later, only what is said: old rows stay equal."""
         fields = super().to_json()
         later = {"given": self.given is None, "variation": not self.variation}
-        return {name: value for name, value in fields.items() if not later.get(name, False)}
+        later |= {"views": not self.views, "turns_deg": not self.turns_deg}
+        kept = {name: value for name, value in fields.items() if not later.get(name, False)}
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in kept.items()}
+
+    @classmethod
+    def from_json(cls, fields: Mapping[str, Any]) -> Self:
+        """Return the item that a ledger of this version or an earlier one keeps."""
+        told: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in fields.items()
+        }
+        return cls(**told)
 
 
 def twin_id(item: Item) -> str:
     """Return the id of the twin that an item makes: a hash of the input's bytes, name, units and up axis, and of nothing else.
 
-    What another tool says of an imported mesh is part of the input. Another configuration is another revision of the same twin.
+    Of several photos of one thing it covers all, in their order, and the stated turns. What another tool says of an imported mesh
+    is part of the input. Another configuration is another revision of the same twin.
     Raises InputError ``unreadable`` where a file has gone since the input was listed, or is no regular one now.
     """
     if item.file is None:
         content: object = {"text": item.text}
+    elif item.views:
+        photos = [{"suffix": Path(file).suffix.lower(), "sha256": _digest(Path(file))} for file in item.files]
+        content = {"photos": photos, "turns_deg": list(item.turns_deg)}
     else:
         path = Path(item.file)
         digest, root = _digest(path), path.parent.resolve()

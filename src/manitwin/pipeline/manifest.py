@@ -21,6 +21,7 @@ from manitwin.formats.source_files import IMAGE_SUFFIXES, MESH_SUFFIXES
 from manitwin.pipeline.folder_listing import FolderListing, list_folder
 from manitwin.pipeline.inspection import imported
 from manitwin.pipeline.item import Item
+from manitwin.pipeline.photo_groups import PhotoGroups, one_of_photos
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.import_record import IMPORT_RECORD, IMPORTED_MESH, is_imported
 
@@ -31,7 +32,7 @@ LONGEST = {"name": 200, "text": 4000, "license": 200, "attribution": 4000, "file
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 """What changes a terminal or the order of what is read, and lone surrogates; a tab and an end of line do not."""
 _LINES = re.compile(r"[\r\n\t\u2028\u2029]")
-COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution")
+COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution", "group", "turn_deg")
 
 Units = Literal["m", "cm", "mm", "auto"]
 Up = Literal["y", "z", "auto"]
@@ -69,16 +70,41 @@ def iterate_items(
     *,
     strict: bool = False,
     count: int = 1,
+    views: bool = False,
+    turns_deg: Sequence[float] | None = None,
     refusal: Refusal = lambda item: None,
 ) -> Iterator[Item]:
-    """Yield as ``_given_items`` does, of each text ``count`` variations.
+    """Yield as ``_given_items`` does, of each text ``count`` variations; with ``views`` one item of all photos.
 
-    Raises UsageError as it does, and for a photo or a mesh where more than one is asked for.
+    Raises UsageError as it does, for a photo or a mesh where more than one is asked for, and for views that are not all photos.
     """
+    if views:
+        yield from _one_of_views(list(inputs), defaults, notes, list(texts), turns_deg, refusal)
+        return
+    if turns_deg is not None:
+        raise UsageError("turns are those of several photos of one thing; give --views too")
     for item in _given_items(inputs, defaults, notes, texts, strict, refusal):
         if item.file is not None and count > 1:
             raise UsageError(f"{item.title}: count makes variations of texts, and this is a file; build it by itself")
         yield from (replace(item, variation=number) for number in range(count))
+
+
+def _one_of_views(
+    inputs: Sequence[str | Path],
+    defaults: dict[str, str | None],
+    notes: Notes,
+    texts: Sequence[str],
+    turns_deg: Sequence[float] | None,
+    refusal: Refusal,
+) -> Iterator[Item]:
+    listed = next(
+        (path for path in inputs if Path(path).is_dir() or Path(path).suffix.lower() in MANIFEST_SUFFIXES), None
+    )
+    if texts or not inputs or listed is not None:
+        told = "a text" if texts else "no photo" if listed is None else shortened(str(listed))
+        raise UsageError(f"--views: {told}; name the photos of one thing, such as --views front.jpg side.jpg")
+    items = list(_given_items(inputs, defaults, notes, (), False, refusal))
+    yield one_of_photos(items, turns_deg, "--views")
 
 
 def _given_items(
@@ -139,6 +165,7 @@ def _manifest_items(
     path: Path, defaults: dict[str, Any], notes: Notes, strict: bool, refusal: Refusal
 ) -> Iterator[Item]:
     unknown: dict[str, str] = {}
+    groups = PhotoGroups(path)
     line = None
     for line, row in _rows(path):
         for column in sorted(map(str, row.keys() - set(COLUMNS) - unknown.keys())):
@@ -148,7 +175,10 @@ def _manifest_items(
             if strict:
                 raise UsageError(f"{path}: unknown column {unknown[column]}; valid: {', '.join(COLUMNS)}")
         where = f"{path}:{line}"
-        yield from _allowed([_item(row, path.parent, defaults, where, unknown)], where, refusal)
+        if not groups.takes(line, row):
+            yield from _allowed([_item(row, path.parent, defaults, where, unknown)], where, refusal)
+    for item, where in groups.items(lambda row, where: _item(row, path.parent, defaults, where, unknown)):
+        yield from _allowed([item], where, refusal)
     if line is None:
         raise UsageError(
             f"{path}: no rows; a manifest has a column 'file' or 'text', and optionally {', '.join(COLUMNS[2:])}"

@@ -27,7 +27,7 @@ class NameStage:
 
     name: ClassVar[str] = "name"
     version: ClassVar[str] = "1"
-    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "views/?")
+    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "views/?")
     writes: ClassVar[tuple[str, ...]] = ("naming",)
     needs: ClassVar[Resource] = "cpu"
     backend: ClassVar[str] = NAME
@@ -40,7 +40,9 @@ class NameStage:
         """Classify; raises Unavailable without the classifier's weights."""
         if object_name(draft) is not None or not self.settings.enabled:
             return {"naming": None}
-        if "photo.png" in draft.paths:
+        if "photos/" in draft.paths:
+            shown = [np.asarray(Image.open(picture)) for picture in sorted(draft.path("photos/").glob("*.png"))]
+        elif "photo.png" in draft.paths:
             shown = [np.asarray(Image.open(draft.path("photo.png")))]
         else:
             views = pictures(draft.path("views/"), "rgb")

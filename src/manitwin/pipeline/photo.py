@@ -10,7 +10,7 @@ from PIL import Image
 
 from manitwin.config import MattingConfig, Resource
 from manitwin.engine.stage import Draft
-from manitwin.errors import InputError
+from manitwin.errors import InputError, Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.learned import Network
@@ -37,7 +37,13 @@ class PhotoStage:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
         if draft.payload.file is None:
             raise InputError("empty", "no image file; give one")
-        path, settings = Path(draft.payload.file), self.settings
+        rgba, field = self.cut_out(Path(draft.payload.file))
+        _save(rgba, folder / "photo.png")
+        return {"matte": field | self._network_field()}
+
+    def cut_out(self, path: Path) -> tuple[np.ndarray, dict[str, Any]]:
+        """Return a photo ``(H, W, 4) uint8`` with its matte, and what is known of that."""
+        settings = self.settings
         photo = read_image(path, frame=settings.frame, max_side_px=settings.photo_side_px)
         matte = matte_photo(
             photo.pixels,
@@ -48,19 +54,58 @@ class PhotoStage:
             second_object_share=settings.second_object_share,
             network=self.network,
         )
-        Image.fromarray(np.ascontiguousarray(matte.rgba)).save(folder / "photo.png", compress_level=3)
-        field: dict[str, Any] = {
+        return np.ascontiguousarray(matte.rgba), {
             "method": matte.method,
             "confidence": matte.confidence,
             "findings": [*photo.findings, *matte.findings],
             "scores": matte.scores,
             "agreement": matte.agreement,
         }
-        if self.network is not None:
-            field["network"] = {
-                "name": self.network.name,
-                "sha256": self.network.sha256,
-                "source": self.network.source,
-                "licence": self.network.licence,
-            }
-        return {"matte": field}
+
+    def _network_field(self) -> dict[str, Any]:
+        if self.network is None:
+            return {}
+        network = {name: getattr(self.network, name) for name in ("name", "sha256", "source", "licence")}
+        return {"network": network}
+
+
+class PhotosStage(PhotoStage):
+    """Cut several photos of one thing out: ``photos/`` has each by its number, ``photo.png`` is the first of them.
+
+    One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
+    """
+
+    version: ClassVar[str] = "1"
+    writes: ClassVar[tuple[str, ...]] = ("photo.png", "photos/", "matte")
+
+    def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
+        """Read and matte; raises InputError of a photo that cannot be read, Rejected where none can be cut out."""
+        (folder / "photos").mkdir()
+        kept: list[tuple[str, dict[str, Any]]] = []
+        refused: list[Rejected] = []
+        for number, file in enumerate(draft.payload.files):
+            path = Path(file)
+            try:
+                rgba, field = self.cut_out(path)
+            except InputError:  # no photo: what was given is not what was meant
+                raise
+            except Rejected as answer:
+                refused.append(answer)
+                continue
+            _save(rgba, folder / "photos" / f"{number:02d}.png")
+            if not kept:
+                _save(rgba, folder / "photo.png")
+            kept.append((path.name, field))
+        left_out = [f"left out: {answer.detail}" for answer in refused]
+        if not kept:
+            raise Rejected(refused[0].reason, "; ".join(answer.detail for answer in refused), refused[0].stage)
+        if len(kept) == 1:
+            left_out.append(f"{kept[0][0]} is the only photo that could be cut out: the rest is a guess")
+        findings = [f"{name}: {finding}" for name, field in kept for finding in field["findings"]]
+        worst = min((field for _, field in kept), key=lambda field: field["confidence"])
+        matte = worst | {"findings": [*left_out, *findings], "photos": [field["confidence"] for _, field in kept]}
+        return {"matte": matte | self._network_field()}
+
+
+def _save(rgba: np.ndarray, path: Path) -> None:
+    Image.fromarray(rgba).save(path, compress_level=3)

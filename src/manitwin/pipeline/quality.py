@@ -52,6 +52,7 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
     checks += size_checks(draft)
     checks += _unseen(draft)
     checks += filled_checks(draft)
+    checks += photos_checks(draft)
     findings = draft.field("geometry")["findings"]
     checks.append(
         Check(
@@ -140,6 +141,23 @@ def filled_checks(draft: Draft) -> list[Check]:
     said = [] if filled["category"] is None else [f"{filled['source']} filled in the template {filled['category']}"]
     message = "; ".join([*said, *filled["findings"]])
     return [Check(name="template_filled", passed=not filled["findings"], value=filled["category"], message=message)]
+
+
+def photos_checks(draft: Draft) -> list[Check]:
+    """Return of several photos how many the mesh was made of; none for a single one."""
+    given = len(draft.payload.files)
+    if given < 2 or "generation" not in draft.fields:
+        return []
+    generation = draft.field("generation")
+    photos = generation["notes"].get("photos", {"cut_out": 1, "used": 1})
+    used, cut_out = photos["used"], photos["cut_out"]
+    said = [f"{given - cut_out} of {given} photos could not be cut out"] if cut_out < given else []
+    if used < cut_out:
+        said.append(
+            f"the generator {generation['generator']} takes one photo, the first: the others are not in the mesh"
+        )
+    value = float(used)
+    return [Check(name="every_photo_used", passed=not said, value=value, limit=float(given), message="; ".join(said))]
 
 
 def rehearsal_checks(draft: Draft) -> list[Check]:

@@ -6,7 +6,7 @@ import logging
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal, cast
+from typing import cast
 
 from manitwin.config import BuildConfig
 from manitwin.engine.folder_recipe import FolderRecipe
@@ -14,8 +14,6 @@ from manitwin.engine.recipe import Ending, Identity, Tables
 from manitwin.engine.stage import INPUT, Draft, PaidStage, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import InputChanged, Rejected, UsageError
-from manitwin.formats.sniff import sniff
-from manitwin.formats.source_files import MESH_SUFFIXES
 from manitwin.models.annotators.given import KeepsGiven
 from manitwin.models.annotators.protocol import Annotator
 from manitwin.models.matting.learned import Network, find_network, require_working
@@ -30,10 +28,11 @@ from manitwin.pipeline.generate import GenerateStage
 from manitwin.pipeline.generator_input import chosen_generator
 from manitwin.pipeline.grasps import GraspsStage
 from manitwin.pipeline.gripper_kinds import KINDS
+from manitwin.pipeline.input_kind import KINDS_OF_INPUT, Kind, claimed_kind, kind_of
 from manitwin.pipeline.item import Item, require_readable_size, twin_id
 from manitwin.pipeline.mesh import MeshStage
 from manitwin.pipeline.naming import NameStage
-from manitwin.pipeline.photo import PhotoStage
+from manitwin.pipeline.photo import PhotosStage, PhotoStage
 from manitwin.pipeline.physical import PhysicalStage
 from manitwin.pipeline.placement import PlacementStage
 from manitwin.pipeline.points import PointsStage
@@ -49,8 +48,6 @@ from manitwin.twin.store import RECORD, parse_record, sha256_of_json
 from manitwin.twin.wholeness import size_damage
 
 RUN = logging.getLogger("manitwin.run")
-Kind = Literal["image", "text", "mesh"]
-KINDS_OF_INPUT: tuple[Kind, ...] = ("image", "text", "mesh")
 
 
 def check_names(config: BuildConfig) -> None:
@@ -142,8 +139,9 @@ def _generation(kind: Kind, config: BuildConfig, annotator: Annotator) -> list[S
     if kind == "mesh":
         return []
     photo: list[Stage] = []
-    if kind == "image":
-        photo = [PhotoStage(config.matting, _network(config)), NameStage(config.naming)]
+    if kind != "text":
+        cut_out = PhotosStage if kind == "photos" else PhotoStage
+        photo = [cut_out(config.matting, _network(config)), NameStage(config.naming)]
     generator = chosen_generator(config, annotator)
     return [*photo, GenerateStage(config.generate, generator, config.services.submit_again)]
 
@@ -226,16 +224,18 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
         identity = None
         try:
             identity = twin_id(payload)
-            require_readable_size(Path(payload.file))
-            return Identity(identity, sniff(Path(payload.file)).kind)
+            for file in payload.files:
+                require_readable_size(Path(file))
+            return Identity(identity, kind_of(payload))
         except (OSError, Rejected) as answer:
-            if not Path(payload.file).exists():
+            gone = next((Path(file) for file in payload.files if not Path(file).exists()), None)
+            if gone is not None:
                 raise InputChanged(
-                    f"{payload.title}: is not there any more; put it back, then run the same command again"
+                    f"{gone.name}: is not there any more; put it back, then run the same command again"
                 ) from answer
             if identity is None or not isinstance(answer, Rejected):
                 raise
-            return Identity(identity, _claimed_kind(payload), answer)
+            return Identity(identity, claimed_kind(payload), answer)
 
     def stages(self, kind: str) -> list[Stage]:
         """Return the stages of the paper's pipeline for a kind of input, in order."""
@@ -280,13 +280,6 @@ def ending_of(record: TwinRecord) -> Ending:
     if record.provenance.rehearsed:
         detail += "; a rehearsal"
     return Ending(record.status, record.revision, reason, detail, name_hint(record))
-
-
-def _claimed_kind(item: Item) -> Kind:
-    """Return what an input claims to be: for a file, by its suffix."""
-    if item.file is None:
-        return "text"
-    return "mesh" if Path(item.file).suffix.lower() in MESH_SUFFIXES else "image"
 
 
 def estimate_usd(config: BuildConfig) -> dict[str, float]:

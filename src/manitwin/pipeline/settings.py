@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -121,6 +121,8 @@ def request_build(
     defaults: dict[str, str | None],
     flags: Flags,
     count: int = 1,
+    views: bool = False,
+    turns_deg: Sequence[float] | None = None,
 ) -> BuildRequest:
     """Check the arguments of ``build``; ``defaults`` hold for all inputs. Raises UsageError for wrong ones."""
     if jobs is not None and not 1 <= jobs <= MOST_SLOTS:
@@ -144,5 +146,15 @@ def request_build(
         notes.remarks.append(
             "the settings are those that the data set was built with; --config and options change them"
         )
-    items = iterate_items(given, defaults, notes, words, strict=strict, count=count, refusal=refusal(settings))
+    items = iterate_items(
+        given,
+        defaults,
+        notes,
+        words,
+        strict=strict,
+        count=count,
+        views=views,
+        turns_deg=turns_deg,
+        refusal=refusal(settings),
+    )
     return BuildRequest(settings, root, items, notes)

@@ -61,13 +61,18 @@ class Rejection(Record):
 
 
 class Source(Record):
-    """The input that the twin was made of; ``variation`` counts the things made of one text."""
+    """The input that the twin was made of; ``variation`` counts the things made of one text.
 
-    kind: Literal["image", "text", "mesh"]
+    ``photos``: several photos of one thing, in the archive ``file`` in their order; ``turns_deg`` is the camera's turn about the
+    vertical in each, counter-clockwise seen from above, where they were stated.
+    """
+
+    kind: Literal["image", "photos", "text", "mesh"]
     file: FileBelow
     sha256: str
     prompt: str | None = None
     variation: int = 0
+    turns_deg: list[float] | None = None
     license: str
     attribution: str | None = None
 

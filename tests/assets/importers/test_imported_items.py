@@ -17,6 +17,9 @@ from manitwin.errors import UsageError
 from manitwin.formats.packed_source import pack_source
 from manitwin.pipeline.item import Item, twin_id
 
+EARLIER = ("file", "text", "name", "units", "up", "license", "attribution")
+"""What an item was before it could be imported, varied or shown by several photos."""
+
 
 def imported(folder: Path, **mug: float) -> Path:
     (one,) = import_assets([mug_urdf(folder / "in", **mug)], folder / "out")  # type: ignore[arg-type]
@@ -69,7 +72,7 @@ def test_what_is_given_is_part_of_the_identity_and_only_there(tmp_path: Path) ->
 def test_ledger_of_before_knows_its_items_again(tmp_path: Path) -> None:
     item = Item(file="/data/mug.glb", name="mug")
     ledger = Ledger(tmp_path / "ledger.sqlite")
-    fields = {name: value for name, value in dataclasses.asdict(item).items() if name not in ("given", "variation")}
+    fields = {name: value for name, value in dataclasses.asdict(item).items() if name in EARLIER}
     ledger.connection.execute("INSERT INTO items (item) VALUES (?)", (json.dumps(fields, sort_keys=True),))
     ledger.add_items([item, dataclasses.replace(item, given="/data/import.json")])
     assert [Item.from_json(open_item.payload) for open_item in ledger.next_open(0, 10)] == [

@@ -16,7 +16,9 @@ from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.lift.carved_photos import carve_photos
 from manitwin.models.generators.lift.carving import BOXY_POWER, ROUND_POWER, Carved, carve
+from manitwin.models.generators.lift.several import from_views
 from manitwin.models.generators.lift.surface import to_manifold
+from manitwin.models.generators.protocol import PhotoView
 from manitwin.render.cameras import framing_camera
 from manitwin.render.raycast import cast_camera
 
@@ -97,6 +99,31 @@ def test_the_command_writes_a_mesh_with_each_side_from_its_photo(tmp_path: Path)
         at = np.clip(uv * texture.shape[1::-1], 0, np.array(texture.shape[1::-1]) - 1)
         seen = texture[(texture.shape[0] - 1 - at[:, 1]).astype(int), at[:, 0].astype(int)]
         assert faces.sum() > 20 and np.abs(np.median(seen, axis=0) - color).max() < 12
+
+
+def _views(mesh: trimesh.Trimesh, turns: tuple[float, ...], *, stated: bool) -> list[PhotoView]:
+    return [PhotoView(f"{turn:.0f}.png", _photo(mesh, turn), turn if stated else None) for turn in turns]
+
+
+def test_views_of_a_nameless_thing_are_carved_at_their_stated_turns() -> None:
+    made = from_views(_views(BOX, (0.0, 90.0, 180.0), stated=True), None)
+    assert made.notes["primitive"] == "visual hull" and made.notes["confidence"] > 0.95
+    assert np.ptp(made.part.vertices, axis=0) == pytest.approx([10 / 12, 5 / 12, 1.0], abs=0.03)
+    assert made.unseen_share < 0.6
+
+
+def test_outlines_alone_do_not_tell_turns_but_a_round_thing_needs_none() -> None:
+    for mesh, name in ((BOX, None), (CYLINDER, None), (BOX, "pumpkin")):
+        with pytest.raises(Rejected, match=r"0\.png, 90\.png: .*state the camera's turns with --turns"):
+            from_views(_views(mesh, (0.0, 90.0), stated=False), name)
+    made = from_views(_views(CYLINDER, (0.0, 90.0), stated=False), "pumpkin")
+    assert made.notes["primitive"] == "revolution"
+    assert made.part.volume == pytest.approx(np.pi * 0.25**2, rel=0.06)
+
+
+def test_views_from_one_direction_and_its_opposite_are_refused() -> None:
+    with pytest.raises(Rejected, match="from the side"):
+        from_views(_views(BOX, (0.0, 180.0), stated=True), None)
 
 
 def test_the_command_says_what_it_needs(tmp_path: Path) -> None:

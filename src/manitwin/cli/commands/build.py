@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 import typer
 
 from manitwin.cli import choices, options
+from manitwin.cli.arguments import degrees_of
 from manitwin.cli.causes import print_causes
 from manitwin.cli.console import err_console, error_console, out_console, print_error, print_estimate
 from manitwin.cli.documents import Json, print_document
@@ -39,6 +40,8 @@ def build(
     out: Annotated[str, options.output_folder("The data set: a folder, or a URL (s3://, gs://).")] = "",
     text: options.Text = None,
     count: options.Count = 1,
+    views: options.Views = False,
+    turns: options.Turns = None,
     strict: options.Strict = False,
     config: options.Config = None,
     executor: options.Executor = "local",
@@ -54,7 +57,10 @@ def build(
 
     if not out:
         raise UsageError("no data set to write twins into; give a folder or URL with -o")
-    arguments: dict[str, Any] = {"texts": text or [], "count": count, "strict": strict, "jobs": jobs, "config": config}
+    arguments: dict[str, Any] = {
+        "texts": text or [], "count": count, "strict": strict, "jobs": jobs, "config": config, "views": views,
+        "turns_deg": None if turns is None else degrees_of(turns),
+    }  # fmt: skip
     if dry_run:
         _print_dry_run(inputs or [], out, arguments, said, as_json=json)
         return

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from manitwin.cli import options
+from manitwin.cli.arguments import degrees_of
 from manitwin.cli.console import out_console
 
 
@@ -36,11 +37,7 @@ def carve(
         raise UsageError(f"{out}: the mesh is a GLB file; give a name that ends in .glb")
     if not out.parent.is_dir():
         raise UsageError(f"{out.parent}: no folder there; make it, or give another place with -o")
-    try:
-        degrees = [float(turn) for turn in turns.split(",")]
-    except ValueError:
-        raise UsageError(f"--turns {turns!r}: no list of degrees; give one a photo, such as 0,90,180") from None
-    carved = carve_photos(paths, degrees, name)
+    carved = carve_photos(paths, degrees_of(turns), name)
     write_bytes_atomically(out, write_glb([carved_part(carved)]))
     filled = ", ".join(f"{o.name} {share:.0%}" for o, share in zip(carved.outlines, carved.covered, strict=True))
     said = f' --name "{name}"' if name else ""

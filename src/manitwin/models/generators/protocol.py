@@ -17,12 +17,26 @@ IMAGE_OR_TEXT: frozenset[Asked] = frozenset({"image", "text"})
 
 
 @dataclass(frozen=True)
+class PhotoView:
+    """One of several photos of a thing: its file's name, ``rgba (H, W, 4) uint8`` matted, and where it was taken from.
+
+    ``turn_deg`` is the camera's turn about the vertical, counter-clockwise seen from above, that of the first given photo 0; None
+    where nobody states it.
+    """
+
+    name: str
+    rgba: np.ndarray
+    turn_deg: float | None
+
+
+@dataclass(frozen=True)
 class GenerationRequest:
-    """A request for a mesh of a photo or a text.
+    """A request for a mesh of a photo, several photos of one thing, or a text.
 
     ``rgba`` is the matted photo, ``(H, W, 4) uint8`` upright sRGB whose alpha is the object's mask, or None where ``text`` is
     given. ``name`` is what the user says it is, or with ``guessed`` what a classifier takes it for. ``seed`` makes the answer
-    repeatable where the generator can.
+    repeatable where the generator can. ``views`` are all photos where there are several, ``rgba`` the first of them; only a
+    generator that ``takes_views`` is given them.
     """
 
     rgba: np.ndarray | None
@@ -30,6 +44,7 @@ class GenerationRequest:
     name: str | None
     seed: int
     guessed: bool = False
+    views: tuple[PhotoView, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -63,6 +78,8 @@ class Generator(Protocol):
 
     ``asked_with`` says which of the two it takes; one that does not say takes both. What it cannot take is refused before
     anything is built.
+
+    One that makes a mesh of several photos of a thing has ``takes_views = True``; any other is given the first of them alone.
 
     One that makes only some texts has ``why_not(text)`` too, which says why it never makes one; None where it does.
 

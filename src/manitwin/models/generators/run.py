@@ -93,7 +93,11 @@ def request_digest(generator: Generator, request: GenerationRequest, settings: G
         "seed": request.seed,
         "shape": None if request.rgba is None else request.rgba.shape,
     }
+    if request.views:
+        asked["views"] = [(view.turn_deg, view.rgba.shape) for view in request.views]
     digest = hashlib.sha256(json.dumps(asked, sort_keys=True).encode())
+    for view in request.views:
+        digest.update(np.ascontiguousarray(view.rgba).tobytes())
     if request.rgba is not None:
         digest.update(np.ascontiguousarray(request.rgba).tobytes())
     return digest.hexdigest()[:32]

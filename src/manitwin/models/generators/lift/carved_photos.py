@@ -92,6 +92,13 @@ def carved_part(carved: Carved) -> trimesh.Trimesh:
     )
 
 
+def seen_area_share(carved: Carved) -> float:
+    """Return how much of a carved surface's area a photo shows."""
+    mesh = bare_mesh(carved.surface)
+    areas = np.asarray(mesh.area_faces)
+    return float(areas[_best_views(carved) < len(carved.outlines)].sum() / areas.sum())
+
+
 def _best_views(carved: Carved) -> np.ndarray:
     """Return for each face the photo that shows it best; plus the number of photos where none does."""
     mesh = bare_mesh(carved.surface)

@@ -23,6 +23,7 @@ HEIGHT_PX = 128
 CELLS = 64  # of the grid along the height or the widest side
 LEAST_COVERED = 0.93
 """Share of an outline that the common hull must fill; set on rendered templates: right turns fill 0.95 and more of all."""
+WIDTH_SPREAD = 0.06  # of round things' outlines, seen by different lenses
 OFFSETS = 21  # places of the axis tried in each photo
 OFFSET_SHARE = 0.25  # of the outline's width, to each side
 ROUND_POWER, USUAL_POWER, BOXY_POWER = 2.0, 4.0, 8.0  # of the superellipse at each level (Barr 1981)
@@ -97,6 +98,18 @@ def _outline(name: str, rgba: np.ndarray, turn_deg: float) -> Outline:
     width = max(3, round(box.shape[1] * HEIGHT_PX / box.shape[0]))
     mask = cv2.resize(box, (width, HEIGHT_PX), interpolation=cv2.INTER_AREA) > 0.5
     return Outline(name, crop, mask, turn_deg % 360.0, (width - 1) / 2)
+
+
+def same_from_every_side(photos: Sequence[tuple[str, np.ndarray]]) -> bool:
+    """Tell whether all outlines are about the same one, and their own mirror images: those of a round thing are."""
+    masks = [_outline(name, rgba, 0.0).mask for name, rgba in photos]
+    widths = [mask.shape[1] for mask in masks]
+    if max(widths) > (1 + WIDTH_SPREAD) * min(widths):
+        return False
+    size = (min(widths), HEIGHT_PX)
+    flat = [cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) > 0 for mask in masks]
+    others = [flat[0][:, ::-1], *flat[1:]]
+    return min(float((flat[0] & other).sum() / (flat[0] | other).sum()) for other in others) > LEAST_COVERED
 
 
 def _placed(outlines: list[Outline]) -> list[Outline]:

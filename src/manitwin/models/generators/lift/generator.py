@@ -9,11 +9,13 @@ import numpy as np
 
 from manitwin.config import Resource
 from manitwin.errors import Unavailable
+from manitwin.formats.glb import write_glb
 from manitwin.models.annotators.vlm.template_reader import TemplateReader
 from manitwin.models.generators.lift import made_text
 from manitwin.models.generators.lift.guided_photo import guided_from_photo
 from manitwin.models.generators.lift.guided_text import guided_from_text
 from manitwin.models.generators.lift.made_photo import Job, from_photo
+from manitwin.models.generators.lift.several import from_views
 from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated, GenerationRequest, JobState
 from manitwin.models.generators.templates.text import MAX_CHARACTERS
 
@@ -28,6 +30,7 @@ class LiftGenerator:
 
     name = "lift"
     asked_with: frozenset[Asked] = IMAGE_OR_TEXT
+    takes_views = True
     usd_per_job = 0.0
 
     def __init__(self, reader: TemplateReader | None = None) -> None:
@@ -54,7 +57,10 @@ class LiftGenerator:
         """
         asked = f"{request.seed} {request.text}" if request.rgba is None else request.name or ""
         pixels = b"" if request.rgba is None else np.ascontiguousarray(request.rgba).tobytes()
-        job_id = hashlib.sha256(pixels + asked.encode()).hexdigest()[:16]
+        digest = hashlib.sha256(pixels + asked.encode())
+        for view in request.views:
+            digest.update(f"{view.turn_deg}".encode() + np.ascontiguousarray(view.rgba).tobytes())
+        job_id = digest.hexdigest()[:16]
         self._jobs[job_id] = self._made(request)
         return job_id
 
@@ -64,6 +70,9 @@ class LiftGenerator:
             if self._reader is None:
                 return made_text.from_text(text, request.seed)
             return guided_from_text(text, request.seed, self._reader)
+        if request.views:  # which the photos themselves settle
+            made = from_views(request.views, request.name)
+            return Job(write_glb([made.part]), made.notes, made.unseen_share, made.known)
         if self._reader is None:
             return from_photo(request.rgba, request.name)
         return guided_from_photo(request, self._reader)

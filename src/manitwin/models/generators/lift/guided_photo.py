@@ -49,7 +49,7 @@ def guided_from_photo(request: GenerationRequest, reader: TemplateReader) -> Job
         fitted = this.fitted
         toward = fitted.view.object_to_camera[2]
         azimuth, elevation = np.degrees(np.arctan2(toward[1], toward[0])), np.degrees(np.arcsin(toward[2]))
-        parts = [visual_part(texture_of(fitted, rgba))]
+        parts = [visual_part(texture_of([fitted], [rgba]))]
         pictures = pictures_of(parts, float(azimuth), float(elevation), reader.settings.picture_px)
         return reader.compare(shown, fitted.category, fitted.made.measures, pictures, before)
 

@@ -13,17 +13,18 @@ from manitwin.errors import Rejected
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.lift import LiftGenerator
-from manitwin.models.generators.protocol import Generated, GenerationRequest
+from manitwin.models.generators.lift.several import from_views
+from manitwin.models.generators.protocol import Generated, GenerationRequest, PhotoView
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.drawing import edges_between, seen_faces, silhouette, to_pixels
 from manitwin.models.generators.templates.fitting.fit import (
     LEAST_CONFIDENCE,
     fit,
-    fit_several,
     kinds_of,
     template_for,
 )
 from manitwin.models.generators.templates.fitting.generated import texture_of
+from manitwin.models.generators.templates.fitting.several import fit_several
 from manitwin.models.generators.templates.fitting.view import View, boxed, normalised
 
 SIDE_PX = 480
@@ -99,13 +100,31 @@ def test_several_photos_share_their_measures_and_have_views_of_their_own() -> No
         photo_of("box", View(0.5 + turn, np.radians(elevation), 0.0, 0.2), measures)
         for turn, elevation in enumerate(elevations)
     ]
-    fits = fit_several("box", photos)
-    assert fits is not None and len(fits) == 2 and fits[0].made is fits[1].made
+    turn = np.degrees(-1.0) % 360  # the camera goes round the other way than the box turns
+    found = fit_several("box", photos, turns_deg=[0.0, turn])
+    assert found is not None and found.confidence > 0.9
+    fits = found.fits
+    assert len(fits) == 2 and fits[0].made is fits[1].made
+    assert found.turns_deg == pytest.approx([0.0, turn], abs=4)
     for fitted, elevation in zip(fits, elevations, strict=True):
-        assert fitted.confidence > 0.9
         assert np.degrees(fitted.view.elevation_rad) == pytest.approx(elevation, abs=3)
     sides = np.sort(np.ptp(fits[0].made.mesh.vertices, axis=0))
     assert sides[:2] / sides[2] == pytest.approx([0.55, 0.85], rel=0.04)
+    # a second photo shows a side, and the lid, that the first does not
+    both, alone = texture_of(fits, photos), texture_of(fits[:1], photos[:1])
+    assert both.unseen_share < alone.unseen_share - 0.1
+
+
+@pytest.mark.slow  # three searches
+def test_turns_that_the_photos_contradict_are_refused_by_the_photo() -> None:
+    photos = [photo_of("mug", View(-0.7 - turn, 0.3, 0.0, 0.2), {}) for turn in (0.0, np.pi / 2)]
+    named = [PhotoView(f"{turn}.png", rgba, turn) for turn, rgba in zip((0.0, 200.0), photos, strict=True)]
+    with pytest.raises(Rejected, match=r"200\.0\.png shows the mug from \d+ degrees, not 200"):
+        from_views(named, "mug")
+    right = [PhotoView(view.name, view.rgba, turn) for view, turn in zip(named, (0.0, 90.0), strict=True)]
+    made = from_views(right, "mug")
+    assert made.notes["primitive"] == "template:mug" and made.known is not None
+    assert [view["turn_deg"] for view in made.notes["views"]] == pytest.approx([0, 90], abs=8)
 
 
 def test_bottle_that_leans_in_the_photo_stands_on_its_base() -> None:
@@ -142,7 +161,7 @@ def test_texture_has_neither_background_nor_mirrored_letters() -> None:
     rgba = photo_of("can", View(0.0, np.radians(12), 0.0, 0.15), {"width": 0.7}, letters=True)
     fitted = fit("can", rgba)
     assert fitted is not None
-    surface = texture_of(fitted, rgba)
+    surface = texture_of([fitted], [rgba])
     height, width = surface.texture.shape[:2]
     middle = surface.uv.mean(axis=1)
     at = np.column_stack([(1 - middle[:, 1]) * height, middle[:, 0] * width]).astype(int)

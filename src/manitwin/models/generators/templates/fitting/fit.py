@@ -11,9 +11,9 @@ from manitwin.geometry.solids.shapes import SolidError
 from manitwin.models.annotators.priors import Prior, lookup, named
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.evidence import Evidence, evidence_of
-from manitwin.models.generators.templates.fitting.least_squares import Placed, Problem
-from manitwin.models.generators.templates.fitting.residual import Residual, residual
-from manitwin.models.generators.templates.fitting.search import is_round, search
+from manitwin.models.generators.templates.fitting.least_squares import Placed
+from manitwin.models.generators.templates.fitting.residual import Residual
+from manitwin.models.generators.templates.fitting.search import search
 from manitwin.models.generators.templates.fitting.shape import Family
 from manitwin.models.generators.templates.fitting.view import View
 from manitwin.models.generators.templates.looks import Look, look_of
@@ -98,47 +98,15 @@ def fit(
     families = [Family(templates[category], initial_measures), *(Family(templates[other]) for other in or_of)]
     for best in search(families, evidence):
         try:
-            made = _made(best.family.template, best.family.measures(best.spreads))
+            made = made_of(best.family.template, best.family.measures(best.spreads))
         except SolidError:
             continue
-        return _fitted(made, Placed(best.view, best.upright), best.residual, evidence)
+        return fitted(made, Placed(best.view, best.upright), best.residual, evidence)
     return None
 
 
-def fit_several(
-    category: str, photos: Sequence[np.ndarray], initial_measures: Mapping[str, float] | None = None
-) -> list[Fitted] | None:
-    """Fit one thing of a category to several photos ``(H, W, 4) uint8`` of it, whose alphas are its masks.
-
-    The measures are common, the views each photo's own. Returns a fit for each photo, all with the same ``made``; the thing is
-    sure where the least sure of them is. None where no measures give a solid.
-    """
-    template, evidences = load_templates()[category], [evidence_of(rgba) for rgba in photos]
-    alone = [found[0] for evidence in evidences if (found := search([Family(template, initial_measures)], evidence))]
-    if len(alone) < len(photos):
-        return None
-    # which way round the thing is seen is settled by the photo that is explained best: a box has two widths to swap
-    best = min(alone, key=lambda candidate: candidate.residual.cost)
-    family = Family(template, best.family.measures(best.spreads))
-    together = [search([family], evidence)[0] for evidence in evidences]
-    start = np.zeros(len(family.free))
-    solid = family.solid(start)
-    assert solid is not None  # the best fit is one
-    problem = Problem(family, evidences, is_round(solid))
-    placed = [Placed(candidate.view, candidate.upright) for candidate in together]
-    spreads, placed = problem.solve(start, placed, measures=True, rounds=8)
-    final = family.solid(spreads)
-    try:
-        made = _made(family.template, family.measures(spreads))
-    except SolidError:
-        return None
-    return [
-        _fitted(made, each, residual(final or solid, each.view, evidence), evidence)
-        for each, evidence in zip(placed, evidences, strict=True)
-    ]
-
-
-def _fitted(made: Made, placed: Placed, left: Residual, evidence: Evidence) -> Fitted:
+def fitted(made: Made, placed: Placed, left: Residual, evidence: Evidence) -> Fitted:
+    """Return what a fit found of one photo."""
     return Fitted(
         category=made.category,
         made=made,
@@ -157,7 +125,8 @@ def confidence_of(residual: Residual) -> float:
     return float(1 / (1 + np.exp(-score)))
 
 
-def _made(template: Template, measures: dict[str, float]) -> Made:
+def made_of(template: Template, measures: dict[str, float]) -> Made:
+    """Return a template with these measures and its first looks, its longest side the usual one of its category."""
     looks: dict[str, Look] = {}
     for slot, choices in template.slots.items():
         looks[slot] = look_of(choices[0]) if choices[0] else looks[next(iter(template.slots))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,17 +13,19 @@ from trimesh.visual.material import PBRMaterial
 
 from manitwin.formats.meshes.triangles import with_creased_normals
 from manitwin.models.generators.templates.fitting.fit import Fitted
-from manitwin.models.generators.templates.fitting.texturing import Textured, textured
+from manitwin.models.generators.templates.fitting.texturing import Shot, Textured, textured
 from manitwin.models.generators.templates.known import known_of
 from manitwin.twin.import_record import FITTED, ImportRecord
 
 ROUGHNESS = 0.6
 
 
-def texture_of(fitted: Fitted, rgba: np.ndarray) -> Textured:
-    """Return the fitted solid with the photo ``rgba (H, W, 4) uint8`` on what it shows."""
-    colours = {part: look.rgb for part, look in fitted.made.looks.items()}
-    return textured(fitted.made.mesh, fitted.view, rgba, fitted.center_px, fitted.box_px, colours)
+def texture_of(fitted: Sequence[Fitted], photos: Sequence[np.ndarray]) -> Textured:
+    """Return the solid that was fitted to photos ``(H, W, 4) uint8`` with each of them on what it shows best."""
+    made = fitted[0].made
+    colours = {part: look.rgb for part, look in made.looks.items()}
+    shots = [Shot(fit.view, rgba, fit.center_px, fit.box_px) for fit, rgba in zip(fitted, photos, strict=True)]
+    return textured(made.mesh, shots, colours)
 
 
 def visual_part(surface: Textured) -> trimesh.Trimesh:

@@ -1,4 +1,4 @@
-"""The texture of a fitted template: the photo where it shows the surface, and quiet colours where it does not.
+"""The texture of a fitted template: the photos where they show the surface, and quiet colours where none does.
 
 Unseen places take what the photo shows of their own part: the ring of the same height where the part is turned about Z, else
 the nearest places that are seen. A median over many of them keeps the ground and drops letters, which a copy would mirror.
@@ -6,7 +6,7 @@ the nearest places that are seen. A median over many of them keeps the ground an
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -20,7 +20,7 @@ from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.models.generators.bleeding import bled
 from manitwin.models.generators.templates.fitting.view import View, normalised
 
-TEXTURE_PX = 1024
+TEXTURE_PX, MOST_WIDTH_PX = 1024, 4096
 _CELL_PX = 48
 _LONGEST_EDGE = 0.05  # of the half diagonal: no face is larger than what one decides about
 _GRAZING_COSINE = 0.17  # beyond 80 degrees the photo shows streaks
@@ -34,10 +34,20 @@ _MARGIN = 0.05
 
 
 @dataclass(frozen=True)
+class Shot:
+    """A photo ``rgba (H, W, 4) uint8`` and the view that it shows; ``center_px`` and ``box_px`` place the photo frame in it."""
+
+    view: View
+    rgba: np.ndarray
+    center_px: tuple[float, float]
+    box_px: float
+
+
+@dataclass(frozen=True)
 class Textured:
     """A refined solid ``vertices (V, 3)`` m, ``faces (F, 3)``, ``uv (F, 3, 2)`` (v upward) into ``texture (H, W, 3) uint8``.
 
-    ``seen (F,)`` is where the photo shows it."""
+    ``seen (F,)`` is where a photo shows it."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -53,33 +63,43 @@ class Textured:
 
     @property
     def unseen_share(self) -> float:
-        """How much of the area the photo does not show."""
+        """How much of the area no photo shows."""
         a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
         areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         return float(areas[~self.seen].sum() / areas.sum())
 
 
-def textured(
-    mesh: PartedMesh,
-    view: View,
-    rgba: np.ndarray,
-    center_px: tuple[float, float],
-    box_px: float,
-    colours: Mapping[str, tuple[float, float, float]],
-) -> Textured:
-    """Texture a solid seen from ``view`` in a photo ``rgba (H, W, 4) uint8``; ``colours`` (sRGB, 0..1) are those of parts
-    that the photo shows nothing of.
+def textured(mesh: PartedMesh, shots: Sequence[Shot], colours: Mapping[str, tuple[float, float, float]]) -> Textured:
+    """Texture a solid with what photos show of it, each face from the one that looks at it most directly.
+
+    ``colours`` (sRGB, 0..1) are those of parts that the photos show nothing of.
     """
     fine = refined(mesh)
     points, center, half = normalised(fine.vertices)
-    seen = _seen(points, fine, view)
-    photo, origin, scale = _crop(rgba)
-    flat, _ = view.project(points)
-    pixels = (flat * box_px + np.array(center_px) - origin + 0.5) * scale - 0.5
-    tones = _unseen_colours(points + center / half, fine, seen, _sampled(photo, pixels), colours)
+    cosines = np.array([_seen(points, fine, shot.view) for shot in shots])
+    best, seen = cosines.argmax(axis=0), cosines.max(axis=0) > 0
+    side_px = min(TEXTURE_PX, MOST_WIDTH_PX // len(shots))
+    pictures, places, shown = [], np.zeros((*fine.faces.shape, 2)), np.zeros((len(fine.faces), 3), np.float32)
+    left = 0
+    for number, shot in enumerate(shots):
+        photo, origin, scale = _crop(shot.rgba, side_px)
+        flat, _ = shot.view.project(points)
+        pixels = (flat * shot.box_px + np.array(shot.center_px) - origin + 0.5) * scale - 0.5
+        own = fine.faces[best == number]
+        places[best == number] = pixels[own] + (left, 0)
+        shown[best == number] = _sampled(photo, pixels)[own].mean(axis=1)
+        pictures.append(photo)
+        left += photo.shape[1]
+    tones = _unseen_colours(points + center / half, fine, seen, shown, colours)
     cells, cell_uv = _charts(points, fine, ~seen, tones)
-    texture, uv = _laid_out(photo, pixels, cells, cell_uv, fine.faces, seen)
+    texture, uv = _laid_out(_side_by_side(pictures), places, cells, cell_uv)
     return Textured(fine.vertices, fine.faces, uv, texture, seen)
+
+
+def _side_by_side(pictures: Sequence[np.ndarray]) -> np.ndarray:
+    height = max(picture.shape[0] for picture in pictures)
+    rows = [np.pad(picture, ((0, height - picture.shape[0]), (0, 0), (0, 0)), mode="edge") for picture in pictures]
+    return np.concatenate(rows, axis=1)
 
 
 def refined(mesh: PartedMesh) -> PartedMesh:
@@ -102,7 +122,7 @@ def refined(mesh: PartedMesh) -> PartedMesh:
 
 
 def _seen(points: np.ndarray, mesh: PartedMesh, view: View) -> np.ndarray:
-    """Return which faces ``(F,)`` the camera sees well and whole."""
+    """Return the cosine ``(F,)`` at which the camera sees each face, 0 where not well and whole."""
     solid = trimesh.Trimesh(points, mesh.faces, process=False)
     caster, eye = RayCaster(solid), view.camera_position
     corners = points[mesh.faces]
@@ -120,17 +140,17 @@ def _seen(points: np.ndarray, mesh: PartedMesh, view: View) -> np.ndarray:
         length = np.linalg.norm(ray, axis=1)
         distance, _ = caster.first_hits(np.broadcast_to(eye, ray.shape), ray / length[:, None])
         free[some] &= ~(distance < length - slack)
-    return free
+    return np.asarray(np.where(free, cosine, 0.0))
 
 
-def _crop(rgba: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _crop(rgba: np.ndarray, side_px: int) -> tuple[np.ndarray, np.ndarray, float]:
     """Return the object's colours without those of the background, the crop's corner in the photo (x, y), and its scale."""
     solid = rgba[..., 3] > 127
     rows, columns = np.nonzero(solid.any(axis=1))[0], np.nonzero(solid.any(axis=0))[0]
     margin = int(np.ceil(_MARGIN * max(np.ptp(rows), np.ptp(columns)))) + 2
     top, left = max(0, rows[0] - margin), max(0, columns[0] - margin)
     box = rgba[top : rows[-1] + margin + 1, left : columns[-1] + margin + 1]
-    scale = min(1.0, TEXTURE_PX / max(box.shape[:2]))
+    scale = min(1.0, side_px / max(box.shape[:2]))
     if scale < 1:
         size = (round(box.shape[1] * scale), round(box.shape[0] * scale))
         box = cv2.resize(box, size, interpolation=cv2.INTER_AREA)
@@ -148,12 +168,11 @@ def _unseen_colours(
     points: np.ndarray,
     mesh: PartedMesh,
     seen: np.ndarray,
-    shown: np.ndarray,
+    of_face: np.ndarray,
     colours: Mapping[str, tuple[float, float, float]],
 ) -> np.ndarray:
-    """Return a colour ``(F, 3)`` for each face, from those that the photo shows of its part."""
+    """Return a colour ``(F, 3)`` for each face, from those, ``of_face (F, 3)``, that the photos show of its part."""
     centers = points[mesh.faces].mean(axis=1)
-    of_face = shown[mesh.faces].mean(axis=1)
     tones = np.zeros((len(centers), 3))
     shown_as: dict[tuple[float, float, float], np.ndarray] = {}  # what is seen of a part speaks for others of its look
     for name in mesh.names:
@@ -232,14 +251,9 @@ def _charts(
 
 
 def _laid_out(
-    photo: np.ndarray,
-    pixels: np.ndarray,
-    cells: list[np.ndarray],
-    places: dict[int, tuple[int, np.ndarray]],
-    faces: np.ndarray,
-    seen: np.ndarray,
+    photo: np.ndarray, at: np.ndarray, cells: list[np.ndarray], places: dict[int, tuple[int, np.ndarray]]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Put the photo and the cells beside each other; return the picture and the corners' coordinates in it ``(F, 3, 2)``."""
+    """Put the cells beside the photo, where the corners are ``at (F, 3, 2)``; return the picture and the coordinates in it."""
     rows = max(1, photo.shape[0] // _CELL_PX)
     columns = -(-len(cells) // rows)
     height, width = max(photo.shape[0], _CELL_PX), photo.shape[1] + columns * _CELL_PX
@@ -248,7 +262,7 @@ def _laid_out(
     corners = np.array([(photo.shape[1] + (k // rows) * _CELL_PX, (k % rows) * _CELL_PX) for k in range(len(cells))])
     for cell, (x, y) in zip(cells, corners, strict=True):
         picture[y : y + _CELL_PX, x : x + _CELL_PX] = np.clip(cell + 0.5, 0, 255)
-    at = pixels[faces]
+    at = at.copy()
     for face, (cell_number, inside) in places.items():
         at[face] = inside + corners[cell_number]
     uv = (at + 0.5) / (width, height)

@@ -1,0 +1,187 @@
+"""Several photos of one thing to a textured mesh: the template of its name fitted to all, else what the outlines carve."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from manitwin.errors import Rejected
+from manitwin.models.generators.lift.carved_photos import carved_part, seen_area_share
+from manitwin.models.generators.lift.carving import (
+    BOXY_POWER,
+    ROUND_POWER,
+    USUAL_POWER,
+    carve,
+    same_from_every_side,
+)
+from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
+from manitwin.models.generators.lift.lifting import lift
+from manitwin.models.generators.lift.made_photo import textured_part
+from manitwin.models.generators.lift.surface import unseen_share
+from manitwin.models.generators.protocol import PhotoView
+from manitwin.models.generators.templates.fitting.fit import LEAST_CONFIDENCE, fit, kinds_of, template_for
+from manitwin.models.generators.templates.fitting.generated import known_of_fitted, notes_of, texture_of, visual_part
+from manitwin.models.generators.templates.fitting.several import SeveralFitted, fit_several
+from manitwin.twin.import_record import ImportRecord
+
+LEAST_CROSSING = 0.3
+"""The sine of the widest angle between two photos' directions, below which they say the same."""
+MOST_TURN_ERROR_DEG = 30.0
+"""A template that stands is seen from within so much of what was stated, or the statement is wrong."""
+
+
+@dataclass(frozen=True)
+class MadeOfViews:
+    """A mesh ``part`` in the object frame, notes, how much of its area no photo shows, and what a template knows."""
+
+    part: trimesh.Trimesh
+    notes: dict[str, Any]
+    unseen_share: float
+    known: ImportRecord | None = None
+
+
+def from_views(views: Sequence[PhotoView], name: str | None) -> MadeOfViews:
+    """Make the thing that two photos or more show.
+
+    Raises Rejected ``generator_failed`` where no shape explains every photo, where the stated turns are not those of the photos,
+    and where the turns are neither stated nor told by the photos.
+    """
+    template = template_for(name)
+    poor: SeveralFitted | None = None
+    if template is not None:
+        found = _fitted(template.category, views)
+        if found is not None and found.confidence >= LEAST_CONFIDENCE:
+            return _from_fit(found, views, name)
+        poor = found
+    hint = hint_from_name(name)
+    try:
+        if hint.container:
+            raise Rejected("generator_failed", "outlines do not show the hollow of an open container", "generate")
+        return _carved(views, hint)
+    except Rejected as error:
+        if poor is None:
+            raise
+        worst = min(range(len(views)), key=lambda k: poor.fits[k].confidence)
+        left = poor.fits[worst].residual
+        raise Rejected(
+            error.reason,
+            f"{error.detail}; and no {poor.fits[0].category} that the template makes explains all photos: the worst,"
+            f" {views[worst].name}, by an overlap of {left.iou:.2f}, outlines {left.outline:.4f} of its length apart",
+            error.stage,
+        ) from error
+
+
+def _stated(views: Sequence[PhotoView]) -> list[float] | None:
+    turns = [view.turn_deg for view in views if view.turn_deg is not None]
+    return turns if len(turns) == len(views) else None
+
+
+def _fitted(category: str, views: Sequence[PhotoView]) -> SeveralFitted | None:
+    """Fit the kind of thing that explains the first photo best; at the stated turns where there are any."""
+    kinds, photos, turns = kinds_of(category), [view.rgba for view in views], _stated(views)
+    meant = fit(category, photos[0], or_of=kinds) if kinds else None
+    category = category if meant is None else meant.category
+    found = fit_several(category, photos, turns_deg=turns)
+    if turns is None or (found is not None and found.confidence >= LEAST_CONFIDENCE and not _wrong(found, views)):
+        return found
+    free = fit_several(category, photos)
+    if free is None or free.confidence < LEAST_CONFIDENCE:
+        return found
+    wrong = _wrong(free, views, told_only=True)
+    if wrong:
+        raise Rejected(
+            "generator_failed",
+            f"the stated turns are not those of the photos: {'; '.join(wrong)}; correct --turns (degrees, counter-clockwise"
+            " seen from above), or leave them out to have them estimated",
+            "generate",
+        )
+    return found if _wrong(free, views) else free
+
+
+def _wrong(found: SeveralFitted, views: Sequence[PhotoView], *, told_only: bool = False) -> list[str]:
+    """Say which photos of a thing that stands upright were fitted, or clearly show it, at another turn than is stated."""
+    first = views[0].turn_deg or 0.0
+    said = []
+    for view, fit_, turn, told in zip(views, found.fits, found.turns_deg, found.told, strict=True):
+        stated = ((view.turn_deg or 0.0) - first) % 360.0
+        away = abs((turn - stated + 180.0) % 360.0 - 180.0)
+        clear = not told_only or (told and found.told[0])
+        if clear and fit_.upright and found.fits[0].upright and away > MOST_TURN_ERROR_DEG:
+            said.append(f"{view.name} shows the {fit_.category} from {turn:.0f} degrees, not {stated:.0f}")
+    return said
+
+
+def _from_fit(found: SeveralFitted, views: Sequence[PhotoView], name: str | None) -> MadeOfViews:
+    stated = _stated(views) is not None
+    # whose turn nobody knows might show any side: its colours are not taken
+    shown = [number == 0 or stated or (found.told[0] and found.told[number]) for number in range(len(views))]
+    fits = [fit_ for fit_, taken in zip(found.fits, shown, strict=True) if taken]
+    surface = texture_of(fits, [view.rgba for view, taken in zip(views, shown, strict=True) if taken])
+    worst = min(found.fits, key=lambda fit_: fit_.confidence)
+    photos = [
+        {
+            "turn_deg": turn if told or stated else None,
+            "turn_stated": stated,
+            "colours": taken,
+            **{key: notes_of(fit_)[key] for key in ("confidence", "residual", "view")},
+        }
+        for fit_, turn, told, taken in zip(found.fits, found.turns_deg, found.told, shown, strict=True)
+    ]
+    notes = notes_of(worst) | {"source": f"template fitted to {len(views)} photos", "views": photos}
+    known = known_of_fitted(found.fits[0], name or worst.category)
+    return MadeOfViews(visual_part(surface), notes, surface.unseen_share, known)
+
+
+def _carved(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
+    photos = [(view.name, view.rgba) for view in views]
+    turns = _stated(views)
+    if turns is None:
+        return _round(views, hint)
+    power = ROUND_POWER if hint.round else BOXY_POWER if hint.boxy else USUAL_POWER
+    if np.abs(np.sin(np.deg2rad(np.subtract.outer(turns, turns)))).max() < LEAST_CROSSING:
+        names = ", ".join(view.name for view in views)
+        raise Rejected(
+            "generator_failed",
+            f"{names}: all from one direction or its opposite, and outlines from there say nothing of the depth; add a photo"
+            " from the side",
+            "generate",
+        )
+    carved = carve(photos, turns, power=power)
+    notes = {
+        "primitive": "visual hull",
+        "source": f"carved out of {len(views)} photos",
+        "rests": "standing",
+        "confidence": min(carved.covered),
+        "views": [
+            {"turn_deg": turn, "turn_stated": True, "covered": share, "colours": True}
+            for turn, share in zip(turns, carved.covered, strict=True)
+        ],
+    }
+    return MadeOfViews(carved_part(carved), notes, 1.0 - seen_area_share(carved))
+
+
+def _round(views: Sequence[PhotoView], hint: ShapeHint) -> MadeOfViews:
+    """Return what the first photo of a round thing shows: its outline is the same from every side, so no turn is needed.
+
+    Of all else outlines do not tell the turns: two of one height are those of some solid at any turn, and more are still those of
+    its mirror image (Koenderink and van Doorn 1991: orthographic views tell a shape up to such changes).
+    """
+    names = ", ".join(view.name for view in views)
+    if not (hint.round and same_from_every_side([(view.name, view.rgba) for view in views])):
+        raise Rejected(
+            "generator_failed",
+            f"{names}: without a template that fits, outlines alone do not tell from where the photos were taken; state the"
+            " camera's turns with --turns, or in a column turn_deg (degrees, counter-clockwise from above, such as 0,90,180)",
+            "generate",
+        )
+    lifted = lift(views[0].rgba, hint)
+    seen = [
+        {"turn_deg": None, "turn_stated": False, "covered": None, "colours": number == 0}
+        for number in range(len(views))
+    ]
+    notes = lifted.notes | {"source": "a round thing's outline, the same in all photos", "views": seen}
+    return MadeOfViews(textured_part(lifted), notes, unseen_share(lifted.surface))

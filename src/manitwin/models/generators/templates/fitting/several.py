@@ -1,0 +1,175 @@
+"""Fit one template to several photos of one thing: common measures, a view of each photo, and the turns between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manitwin.geometry.solids.shapes import SolidError
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.fitting.drawing import silhouette, to_pixels
+from manitwin.models.generators.templates.fitting.evidence import BOX_SHARE, SIDE_PX, Evidence, evidence_of
+from manitwin.models.generators.templates.fitting.fit import Fitted, confidence_of, fitted, made_of
+from manitwin.models.generators.templates.fitting.least_squares import Placed, Problem
+from manitwin.models.generators.templates.fitting.residual import iou, residual
+from manitwin.models.generators.templates.fitting.search import ELEVATIONS_DEG, Candidate, is_round, search
+from manitwin.models.generators.templates.fitting.shape import CoarseSolid, Family
+from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View, boxed
+
+_YAWS = 24
+_TIED_STARTS, _RIVALS = 3, 3
+_SURE = 0.9
+_FAR_DEG, _CLEARLY_WORSE = 40.0, 0.03
+"""Another turn is a rival where it is farther than this and its cost not higher by this much."""
+
+
+@dataclass(frozen=True)
+class SeveralFitted:
+    """A fit of each photo, all with the same ``made``; ``told (N,)``: no far-apart turn explains the photo about as well."""
+
+    fits: tuple[Fitted, ...]
+    told: tuple[bool, ...]
+
+    @property
+    def confidence(self) -> float:
+        """The thing is as sure as the least sure of its photos."""
+        return min(fit.confidence for fit in self.fits)
+
+    @property
+    def turns_deg(self) -> tuple[float, ...]:
+        """The camera's turn about the thing's vertical in each photo, counter-clockwise, in 0..360, that of the first 0."""
+        first = self.fits[0].view.yaw_rad
+        return tuple(round(float(np.degrees(first - fit.view.yaw_rad)) % 360.0, 1) % 360.0 for fit in self.fits)
+
+
+def fit_several(
+    category: str,
+    photos: Sequence[np.ndarray],
+    initial_measures: Mapping[str, float] | None = None,
+    *,
+    turns_deg: Sequence[float] | None = None,
+) -> SeveralFitted | None:
+    """Fit one thing of a category to several photos ``(H, W, 4) uint8`` of it, whose alphas are its masks.
+
+    The measures are common, the views each photo's own; ``turns_deg``, the camera's counter-clockwise turns about the vertical,
+    say where the views' search starts. None where no measures give a solid.
+    """
+    template, evidences = load_templates()[category], [evidence_of(rgba) for rgba in photos]
+    usual = Family(template, initial_measures)
+    searched = range(len(photos)) if turns_deg is None else [0, _most_crossing(turns_deg)]
+    alone = [found[0] for number in searched if (found := search([usual], evidences[number]))]
+    if len(alone) < len(searched):
+        return None
+    # which way round the thing is seen is settled by the photo that is explained best: a box has two widths to swap
+    best = min(alone, key=lambda candidate: candidate.residual.cost)
+    family = Family(template, best.family.measures(best.spreads))
+    start = np.zeros(len(family.free))
+    solid = family.solid(start)
+    assert solid is not None  # the best fit is one
+    round_about = is_round(solid)
+    problem = Problem(family, evidences, round_about)
+    if turns_deg is None:
+        placed = [_seen_as(family, solid, candidate, evidences[k]) for k, candidate in enumerate(alone)]
+    else:
+        start, placed = _tied(problem, family, solid, evidences, alone, turns_deg)
+    spreads, placed = problem.solve(start, placed, measures=True, rounds=8)
+    final = family.solid(spreads) or solid
+    try:
+        made = made_of(family.template, family.measures(spreads))
+    except SolidError:
+        return None
+    fits = [
+        fitted(made, each, residual(final, each.view, evidence), evidence)
+        for each, evidence in zip(placed, evidences, strict=True)
+    ]
+    told = [
+        not round_about and _is_told(Family(template, family.measures(spreads)), fit, evidence)
+        for fit, evidence in zip(fits, evidences, strict=True)
+    ]
+    return SeveralFitted(tuple(fits), tuple(told))
+
+
+def _most_crossing(turns_deg: Sequence[float]) -> int:
+    """Return the photo whose direction is nearest to a right angle to that of the first."""
+    return int(np.argmax(np.abs(np.sin(np.radians(np.subtract(turns_deg, turns_deg[0]))))[1:])) + 1
+
+
+def _seen_as(family: Family, solid: CoarseSolid, candidate: Candidate, evidence: Evidence) -> Placed:
+    """Return the view of a photo that a common solid has: that of its own fit, or a new one where it explains less."""
+    begin = Placed(_boxed(solid, candidate.view), candidate.upright)
+    _, (placed,) = Problem(family, [evidence], False).solve(
+        np.zeros(len(family.free)), [begin], measures=False, rounds=3
+    )
+    left = residual(solid, placed.view, evidence)
+    if left.cost < candidate.residual.cost + _CLEARLY_WORSE and confidence_of(left) > _SURE:
+        return placed
+    again = search([family], evidence)[0]
+    return Placed(again.view, again.upright)
+
+
+def _tied(
+    problem: Problem,
+    family: Family,
+    solid: CoarseSolid,
+    evidences: Sequence[Evidence],
+    alone: Sequence[Candidate],
+    turns_deg: Sequence[float],
+) -> tuple[np.ndarray, list[Placed]]:
+    """Return measures and views at the stated turns that explain all photos best, from any first turn; cameras stand upright."""
+    elevations = {*np.radians(ELEVATIONS_DEG), *(each.view.elevation_rad for each in alone if each.upright)}
+    usual = [np.clip(each.perspective / 1.6, LEAST_PERSPECTIVE, MOST_PERSPECTIVE) for each in evidences]
+    scored: list[tuple[float, list[View]]] = []
+    for yaw in np.arange(_YAWS) * 2 * np.pi / _YAWS:
+        total, views = 0.0, []
+        for turn, perspective, evidence in zip(turns_deg, usual, evidences, strict=True):
+            tried = [
+                _boxed(solid, View(yaw - np.radians(turn), elevation, 0.0, float(perspective)))
+                for elevation in sorted(elevations)
+            ]
+            agreed = [_iou(solid, view, evidence) for view in tried]
+            total += max(agreed)
+            views.append(tried[int(np.argmax(agreed))])
+        scored.append((-total, views))
+    scored.sort(key=lambda each: each[0])
+    found = []
+    for _, views in scored[:_TIED_STARTS]:
+        # one photo says little of the sides that another shows: the measures follow, or a right turn would look wrong
+        begin = [Placed(view, True) for view in views]
+        spreads, placed = problem.solve(np.zeros(len(family.free)), begin, measures=True, rounds=4)
+        other = family.solid(spreads) or solid
+        left = [residual(other, each.view, evidence) for each, evidence in zip(placed, evidences, strict=True)]
+        found.append((sum(each.cost for each in left), spreads, placed))
+    _, spreads, placed = min(found, key=lambda each: each[0])
+    return spreads, placed
+
+
+def _boxed(solid: CoarseSolid, view: View) -> View:
+    plain = replace(view, scale=1.0, x=0.0, y=0.0)
+    scale, x, y = boxed(plain.project(solid.vertices)[0])
+    return replace(view, scale=scale, x=x, y=y)
+
+
+def _iou(solid: CoarseSolid, view: View, evidence: Evidence) -> float:
+    flat, _ = view.project(solid.vertices)
+    return iou(silhouette(to_pixels(flat, SIDE_PX, BOX_SHARE), solid.faces, solid.edges, SIDE_PX), evidence)
+
+
+def _is_told(family: Family, fit: Fitted, evidence: Evidence) -> bool:
+    """Tell whether every far-apart turn explains a photo clearly worse than the one that was found."""
+    at = np.zeros(len(family.free))
+    solid = family.solid(at)
+    if solid is None:
+        return False
+    problem, rivals = Problem(family, [evidence], False), []
+    for turn in np.arange(_FAR_DEG, 360.0 - _FAR_DEG + 1, 20.0):
+        view = _boxed(solid, replace(fit.view, yaw_rad=fit.view.yaw_rad + float(np.radians(turn))))
+        rivals.append((-_iou(solid, view, evidence), turn, view))
+    for _, _, view in sorted(rivals, key=lambda each: each[:2])[:_RIVALS]:
+        _, (placed,) = problem.solve(at, [Placed(view, fit.upright)], measures=False, rounds=3)
+        away = (np.degrees(placed.view.yaw_rad - fit.view.yaw_rad) + 180) % 360 - 180
+        cost = residual(solid, placed.view, evidence).cost
+        if abs(away) > _FAR_DEG / 2 and cost < fit.residual.cost + _CLEARLY_WORSE:
+            return False
+    return True

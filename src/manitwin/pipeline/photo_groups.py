@@ -1,0 +1,127 @@
+"""Several photos of one thing as one item: what their rows, or the command line, may say of it."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from manitwin.errors import UsageError
+from manitwin.formats.printable import printable_line
+from manitwin.formats.source_files import MESH_SUFFIXES
+from manitwin.pipeline.item import Item
+
+MOST_PHOTOS = 24
+OF_THE_THING = ("name", "units", "up", "license", "attribution")
+"""Columns that say something of the thing, not of a photo: rows of one group may not contradict each other."""
+
+Row = Mapping[str, Any]
+ToItem = Callable[[dict[str, Any], str], Item]
+"""Makes the item of one row; the second argument says where the row is."""
+
+
+def one_of_photos(items: Sequence[Item], turns_deg: Sequence[float] | None, where: str) -> Item:
+    """Return the item of one thing that the photos of ``items`` show, in their order.
+
+    ``turns_deg`` is the camera's turn in each photo; kept relative to the first, in 0..360. One photo is an item of its own.
+    Raises UsageError for meshes, texts, a photo that is given twice, too many photos, and turns that are not one a photo.
+    """
+    meshes = [item.title for item in items if item.file is not None and _is_mesh(item)]
+    if meshes or any(item.file is None for item in items):
+        told = f"{meshes[0]} is a mesh" if meshes else "a text is no photo"
+        raise UsageError(f"{where}: {told}; the views of one thing are all photos: give a mesh or a text by itself")
+    files = [str(item.file) for item in items]
+    twice = next((file for number, file in enumerate(files) if file in files[:number]), None)
+    if twice is not None:
+        raise UsageError(f"{where}: {Path(twice).name} is given twice; give each photo once")
+    if len(items) > MOST_PHOTOS:
+        raise UsageError(f"{where}: {len(items)} photos of one thing; give at most {MOST_PHOTOS}")
+    turns = [] if turns_deg is None else list(turns_deg)
+    if turns and (len(turns) != len(items) or not all(map(isfinite, turns))):
+        raise UsageError(
+            f"{where}: {len(items)} photos and the turns {', '.join(f'{turn:g}' for turn in turns)}: give one a photo, in"
+            " degrees, counter-clockwise seen from above, such as 0,90,180"
+        )
+    if len(items) == 1:
+        return items[0]
+    relative = tuple(round((turn - turns[0]) % 360.0, 6) % 360.0 for turn in turns)
+    return replace(items[0], views=tuple(files[1:]), turns_deg=relative)
+
+
+def _is_mesh(item: Item) -> bool:
+    return item.given is not None or Path(item.file or "").suffix.lower() in MESH_SUFFIXES
+
+
+@dataclass
+class PhotoGroups:
+    """The rows of a manifest that have a group, kept until its end; ``turn_deg`` is a column of theirs."""
+
+    manifest: Path
+    rows: dict[str, list[tuple[int, Row]]] = field(default_factory=lambda: defaultdict(list))
+
+    def takes(self, line: int, row: Row) -> bool:
+        """Keep a row that has a group; tell whether it has. Raises UsageError for a turn without a group."""
+        group = _said(row, "group")
+        if not group and _said(row, "turn_deg"):
+            raise UsageError(
+                f"{self.manifest}:{line}: turn_deg is the camera's turn in a photo of several; give the row a group too"
+            )
+        if group:
+            self.rows[group].append((line, row))
+        return bool(group)
+
+    def items(self, to_item: ToItem) -> Iterator[tuple[Item, str]]:
+        """Yield each group's item, and where its rows are, in the order of their first rows.
+
+        Raises UsageError naming the rows where they contradict each other, and as ``one_of_photos`` does.
+        """
+        for group, rows in self.rows.items():
+            shown = printable_line(group, max_characters=60)
+            where = f"{self.manifest}: group {shown!r} ({_numbered([line for line, _ in rows])})"
+            said = {column: _agreed(where, column, rows) for column in OF_THE_THING}
+            known = {column: value for column, value in said.items() if value}
+            items = [to_item({**row, **known}, f"{self.manifest}:{line}") for line, row in rows]
+            yield one_of_photos(items, _turns(where, rows), where), where
+
+
+def _said(row: Row, column: str) -> str:
+    value = row.get(column)
+    return "" if value is None else str(value).strip()
+
+
+def _agreed(where: str, column: str, rows: Iterable[tuple[int, Row]]) -> str:
+    """Return what the rows that say it say in a column; raises UsageError where they differ."""
+    values: dict[str, int] = {}
+    for line, row in rows:
+        value = _said(row, column)
+        if value:
+            values.setdefault(value, line)
+    if len(values) > 1:
+        told = " and ".join(
+            f"{printable_line(value, max_characters=40)!r} (row {line})" for value, line in values.items()
+        )
+        raise UsageError(f"{where}: one thing has one {column}, and its rows say {told}; correct one of them")
+    return next(iter(values), "")
+
+
+def _turns(where: str, rows: Sequence[tuple[int, Row]]) -> list[float] | None:
+    said = {line: _said(row, "turn_deg") for line, row in rows}
+    missing = [line for line, value in said.items() if not value]
+    if len(missing) == len(said):
+        return None
+    if missing:
+        raise UsageError(
+            f"{where}: {_numbered(missing)} without a turn_deg; give one in every row of a group, or in none"
+        )
+    try:
+        return [float(value) for value in said.values()]
+    except ValueError:
+        values = ", ".join(printable_line(value, max_characters=20) for value in said.values())
+        raise UsageError(f"{where}: turn_deg is {values}; give degrees, such as 0, 90 and 180") from None
+
+
+def _numbered(lines: Sequence[int]) -> str:
+    return f"row{'s' if len(lines) > 1 else ''} {', '.join(map(str, lines[:6]))}{', ...' if len(lines) > 6 else ''}"
