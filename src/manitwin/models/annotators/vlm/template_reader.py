@@ -6,7 +6,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 from manitwin.config import VlmConfig
 from manitwin.models.annotators.vlm.prompt_files import Prompt
@@ -43,6 +43,8 @@ MODEL_VIEWS = 3
 """How many pictures of a model are compared with what it was made from."""
 _USUAL = "mug"  # a template of usual size, for the estimate
 _PICTURES = {"template": 1, "template_measures": 1, "template_likeness": 1 + MODEL_VIEWS}
+# about what form and placeholders of a mug have
+_FORM_CHARACTERS = {"template": 5600, "template_measures": 2500, "template_likeness": 3200}
 _ANSWER_TOKENS = {
     "template": 80,
     "template_measures": 200,
@@ -56,6 +58,17 @@ class Choice:
 
     category: str | None
     findings: tuple[str, ...]
+
+
+@cache
+def _forms() -> str:
+    """Return all forms and what is told of each template, as JSON: forms of other templates differ in nothing else."""
+    forms = [strict_schema(form) for form in (choice_answer(), filled_answer(_USUAL), likeness_answer(_USUAL))]
+    templates = [
+        [category, about(each), {name: vars(measure) for name, measure in each.measures.items()}, dict(each.slots)]
+        for category, each in load_templates().items()
+    ]
+    return json.dumps([forms, templates], sort_keys=True)
 
 
 class TemplateReader:
@@ -77,17 +90,8 @@ class TemplateReader:
     def model(self) -> str:
         """'MODEL, prompt template v1 and ... 0123abcd': model, prompts, and a digest of all that is asked with."""
         settings = self.settings.model_dump(mode="json", include={"picture_px", "max_tokens", "temperature"})
-        forms = [
-            strict_schema(choice_answer()),
-            strict_schema(filled_answer(_USUAL)),
-            strict_schema(likeness_answer(_USUAL)),
-        ]
-        templates = [
-            [category, about(each), {name: vars(measure) for name, measure in each.measures.items()}, dict(each.slots)]
-            for category, each in load_templates().items()
-        ]
         asked = [[prompt.instructions, prompt.question] for prompt in self._prompts.values()]
-        text = json.dumps([asked, forms, templates, settings], sort_keys=True)
+        text = json.dumps([asked, _forms(), settings], sort_keys=True)
         versions = " and ".join(f"{name} v{prompt.version}" for name, prompt in self._prompts.items())
         return f"{self.chat.model}, prompt {versions} {hashlib.sha256(text.encode()).hexdigest()[:8]}"
 
@@ -97,19 +101,15 @@ class TemplateReader:
         price = getattr(self.chat, "price", None)
         if price is None:
             return 0.0
-        forms = (choice_answer(), filled_answer(_USUAL), likeness_answer(_USUAL))
         return sum(
             expected_usd(
                 price,
-                characters=len(prompt.instructions)
-                + len(prompt.question)
-                + len(json.dumps(strict_schema(form)))
-                + 1000,
+                characters=len(prompt.instructions) + len(prompt.question) + _FORM_CHARACTERS[name],
                 pictures=_PICTURES[name],
                 picture_px=self.settings.picture_px,
                 answer_tokens=_ANSWER_TOKENS[name],
             )
-            for (name, prompt), form in zip(self._prompts.items(), forms, strict=True)
+            for name, prompt in self._prompts.items()
         )
 
     def choose(self, shown: Shown) -> Choice:

@@ -57,7 +57,7 @@ def guided_from_photo(request: GenerationRequest, reader: TemplateReader) -> Job
         other = replace(this.filled, category=corrected.category).corrected(corrected)
         begin = replace(other, measures={**this.fitted.made.measures, **corrected.measures})
         second = _fit(begin, rgba, name) if corrected.measures else None
-        if second is not None and second.fitted.residual.cost <= this.fitted.residual.cost:
+        if second is not None and second.fitted.residual.cost < this.fitted.residual.cost:
             return replace(
                 second, filled=other
             ), "Your correction explains the outline in the photo better: this is how it is now."
@@ -65,7 +65,7 @@ def guided_from_photo(request: GenerationRequest, reader: TemplateReader) -> Job
         dressed = replace(this, fitted=dressed_as(this.fitted, corrected.wishes), filled=said)
         if second is None:
             return dressed, "Nothing of its shape was corrected: this is how it is now."
-        return dressed, "Your correction explains the outline in the photo less well: its shape is as before."
+        return dressed, "Your correction explains the outline in the photo no better: its shape is as before."
 
     agreed: Agreed[_Fit] = in_two_rounds(first, compare, correct)
     findings += agreed.findings

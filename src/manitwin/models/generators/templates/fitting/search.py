@@ -25,6 +25,7 @@ _TILTED_COST = 0.04  # of IoU: most things are photographed as they rest
 _STARTS, _STARTS_OF_OTHERS = 7, 3
 _REFINED, _RIVALS = 2, 2
 _OTHER_KIND_COST = 0.02
+_OTHER_MEASURES_COST = 0.005  # the same kind from other measures: enough to settle what an outline leaves open
 _USUAL_ELEVATION_DEG, _STEEP_COST = 30.0, 0.0005  # a degree more: what stands is seldom seen from above
 
 
@@ -42,7 +43,8 @@ class Candidate:
 def search(families: Sequence[Family], evidence: Evidence) -> list[Candidate]:
     """Return fits to a photo, the best first; empty where no usual measures give a solid.
 
-    The first family is what the photo is said to show, the others what may be meant: they have to explain it better.
+    The first family is what the photo is said to show, the others what may be meant: they have to explain it better; less so
+    where only the expected measures are others.
     """
     found: list[_Start] = []
     usual: dict[int, _Start] = {}
@@ -53,10 +55,11 @@ def search(families: Sequence[Family], evidence: Evidence) -> list[Candidate]:
             continue
         turns = is_round(solid)
         problem = Problem(family, [evidence], turns)
-        for start, upright in grid(solid, evidence, turns)[: _STARTS if number == 0 else _STARTS_OF_OTHERS]:
+        same_kind = family.template is families[0].template
+        for start, upright in grid(solid, evidence, turns)[: _STARTS if same_kind else _STARTS_OF_OTHERS]:
             _, (placed,) = problem.solve(spreads, [Placed(start, upright)], measures=False, rounds=2)
             view = placed.view
-            cost = residual(solid, view, evidence).cost + _prejudice(family, number, view, upright)
+            cost = residual(solid, view, evidence).cost + _prejudice(family, families[0], view, upright)
             found.append(_Start(cost, number, problem, view, upright))
             if upright and np.degrees(start.elevation_rad) < _USUAL_ELEVATION_DEG:
                 usual.setdefault(number, _Start(cost, number, problem, start, upright))
@@ -69,7 +72,7 @@ def search(families: Sequence[Family], evidence: Evidence) -> list[Candidate]:
         view, final = placed.view, family.solid(at)
         if final is not None:
             left = residual(final, view, evidence)
-            cost = left.cost + _prejudice(family, chosen.number, view, upright)
+            cost = left.cost + _prejudice(family, families[0], view, upright)
             candidates.append((cost, Candidate(family, at, view, upright, left)))
     return [candidate for _, candidate in sorted(candidates, key=lambda each: each[0])]
 
@@ -99,11 +102,14 @@ def _refined(found: list[_Start], usual: dict[int, _Start]) -> list[_Start]:
     return [*said, *rivals, *(usual[number] for number in (0, *(rival.number for rival in rivals)) if number in usual)]
 
 
-def _prejudice(family: Family, number: int, view: View, upright: bool) -> float:
-    """Return what a fit has to explain better for being a rarer view, or another kind than is said."""
+def _prejudice(family: Family, said: Family, view: View, upright: bool) -> float:
+    """Return what a fit has to explain better for being a rarer view, or another kind or other measures than are said."""
     steep = max(0.0, float(np.degrees(view.elevation_rad)) - _USUAL_ELEVATION_DEG)
     rare = _STEEP_COST * steep if family.stands and upright else 0.0
-    return rare + (0.0 if upright else _TILTED_COST) + (_OTHER_KIND_COST if number else 0.0)
+    other = 0.0 if family is said else _OTHER_KIND_COST
+    if family is not said and family.template is said.template:
+        other = _OTHER_MEASURES_COST
+    return rare + (0.0 if upright else _TILTED_COST) + other
 
 
 def is_round(solid: CoarseSolid) -> bool:
