@@ -120,3 +120,18 @@ def test_the_unknown_prior_is_wide_and_says_so() -> None:
     unknown = priors.unknown_prior()
     assert unknown.source == "prior:unknown"
     assert unknown.bulk_density_kg_m3.high / unknown.bulk_density_kg_m3.low >= 20
+
+
+@pytest.mark.parametrize(
+    ("said", "category", "like"),
+    [("an old clock", "clock", "radio"), ("mustard", "mustard bottle", "ketchup bottle"), ("two towels", "towel", "shirt"),
+     ("a black stapler", "stapler", None)],
+)  # fmt: skip
+def test_what_is_only_about_as_large_is_a_thing_of_its_own(said: str, category: str, like: str | None) -> None:
+    prior = lookup(said)
+    assert prior is not None and (prior.category, prior.like) == (category, like)
+    if like is not None:
+        relative = load_priors()[like]
+        assert prior.mass_kg == relative.mass_kg and prior.function != relative.function
+        assert prior.sources == (f"as a {like}",) and not prior.measured
+        assert f" {like}" not in prior.functional[0].description

@@ -104,7 +104,8 @@ class Prior(Form):
 
     ``longest_axis_m`` is that of the oriented box. ``bulk_density_kg_m3`` is mass per volume of a repaired scan, not of
     the matter; None where a scan's volume says nothing of the mass. ``stands``: whether it is put down upright (None:
-    either). ``counter`` is what such things are counted by ('pair of'). ``measured`` names the published measurements;
+    either). ``like`` is the category whose numbers it has for want of its own.
+    ``counter`` is what such things are counted by ('pair of'). ``measured`` names the published measurements;
     ``sources`` says where the rest is from.
     """
 
@@ -120,6 +121,7 @@ class Prior(Form):
     friction_dynamic: LowTypicalHigh
     restitution: LowTypicalHigh
     function: str
+    like: str | None = None
     counter: str | None = None
     sources: tuple[str, ...] = Field(min_length=1)
     measured: tuple[str, ...]
@@ -179,10 +181,19 @@ def load_priors() -> dict[str, Prior]:
         table = _read(domain)
         defaults = table.pop("defaults", {})
         for category, row in table.items():
-            if category in priors:
-                raise ManiTwinError(f"{domain}.toml [{category}]: is already in {priors[category].domain}.toml")
-            priors[category] = _prior(category, row, domain, defaults, forms)
+            kin = row.pop("kin", {})
+            rows = {category: row} | {name: _kin_row(category, row, own) for name, own in kin.items()}
+            for name, each in rows.items():
+                if name in priors:
+                    raise ManiTwinError(f"{domain}.toml [{name}]: is already in {priors[name].domain}.toml")
+                priors[name] = _prior(name, each, domain, defaults, forms)
     return priors
+
+
+def _kin_row(category: str, row: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+    """Return the row of a thing that is another one, but about as large and heavy: what it does not say is the category's."""
+    said = {key: value for key, value in row.items() if key not in ("aliases", "measured", "sources")}
+    return {**said, "sources": [f"as a {category}"], "like": category, **own}
 
 
 @cache
