@@ -1,6 +1,6 @@
 """Cut the object out of composites whose mask is known, and print what was accepted, how right it is, and what it cost.
 
-    python benchmarks/matting.py [--part held-out|tuning] [--count 300] [--jobs 1] [--network isnet]
+    python benchmarks/matting.py [--part held-out|tuning] [--first 0] [--count 300] [--jobs 1] [--network isnet]
                                  [--photos FOLDER] [--sheet PNG]
 
 The pictures are made here (``composites.py``), of templates on grounds of the project's own making; the held-out part has other
@@ -142,6 +142,9 @@ def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--part", choices=("held-out", "tuning"), default="held-out")
+    parser.add_argument(
+        "--first", type=int, default=0, help="number of the first composite: others than were measured before"
+    )
     parser.add_argument("--count", type=int, default=300)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--network", help="isnet or an ONNX file, as --matting of manitwin build")
@@ -153,7 +156,7 @@ def main() -> None:
     if given.count:
         with ProcessPoolExecutor(given.jobs, mp_context=get_context("spawn")) as pool:
             work = partial(judged_by_number, given.part, network=given.network)
-            report(list(pool.map(work, range(given.count), chunksize=4)))
+            report(list(pool.map(work, range(given.first, given.first + given.count), chunksize=4)))
     if given.photos is not None:
         photos(given.photos, network, given.sheet)
 
