@@ -221,6 +221,7 @@ def test_numbers_and_their_sources_are_in_the_record(samples: dict[str, Twin]) -
         assert "visual_quality" in not_judged
 
 
+@pytest.mark.slow
 def test_killed_build_leaves_no_half_twin_and_goes_on(tmp_path: Path) -> None:
     out = tmp_path / "out"
     command = [

@@ -124,6 +124,7 @@ def test_a_bad_manifest_leaves_no_new_ledger_and_no_folder(tmp_path: Path) -> No
     assert not (tmp_path / "data").exists()
 
 
+@pytest.mark.slow
 def test_check_names_and_repairs(tmp_path: Path, manifest: Path) -> None:
     manitwin("build", manifest, "-o", "data", "--quick", folder=tmp_path)
     lost = next((tmp_path / "data" / "twins").glob("*/*/twin.json"))
@@ -147,6 +148,7 @@ def test_the_old_name_says_so_in_one_line_and_builds(tmp_path: Path, manifest: P
     assert "│ run " not in manitwin("--help", folder=tmp_path).stdout
 
 
+@pytest.mark.slow
 def test_other_settings_make_again_what_is_given_and_without_inputs_all(tmp_path: Path, manifest: Path) -> None:
     here = ("-o", "data", "--executor", "inline")
     manitwin("build", "empty.png", *here, folder=tmp_path)

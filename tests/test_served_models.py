@@ -174,6 +174,7 @@ def assert_shown_as_a_rehearsal(twin: Twin, stages: set[str]) -> None:
     assert page.getvalue().splitlines()[1].startswith("REHEARSAL: a rehearsal server (manitwin fake), not a model")
 
 
+@pytest.mark.slow
 def test_a_photo_and_a_text_become_twins_while_every_server_fails(tmp_path: Path) -> None:
     vlm = Faults(dict.fromkeys(("rate_limited", "server_error", "disconnects", "not_json", "wrong_schema"), 1))
     faults = ("rate_limited", "server_error", "truncated_mesh", "expired_link", "job_fails")
@@ -206,6 +207,7 @@ def test_a_photo_and_a_text_become_twins_while_every_server_fails(tmp_path: Path
     assert all(cost_usd(twin) > cost_usd(twin, "generate") for twin in twins(tmp_path)), "tokens cost as well"
 
 
+@pytest.mark.slow
 def test_a_model_that_is_down_leaves_the_twin_waiting_and_nothing_is_paid_twice(tmp_path: Path) -> None:
     down = Faults({"server_error": ALWAYS})
     with servers(vlm=down) as served:

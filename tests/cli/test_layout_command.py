@@ -60,6 +60,7 @@ def test_upright_is_what_the_scenes_are_and_who_lies_is_said(bottles: Path, tmp_
         assert {(each.category, each.placement) for each in scene.objects} == {("bottle", 1), ("ruler", 0)}
 
 
+@pytest.mark.slow
 def test_scenes_of_other_settings_stay_as_they_are(bottles: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     made = [str(bottles), "-o", str(out), "--jobs", "1", "--objects", "1..1", "--seed", "3"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import tomllib
@@ -83,7 +84,9 @@ def _tree(text: str, folder: Path, pattern: str) -> None:
 def _manifest(text: str, folder: Path, argument: str) -> None:
     (folder / "manifest.csv").write_text(text)
     items, notes = collect_items([folder / "manifest.csv"])
-    assert len(items) == len(text.splitlines()) - 1 and not notes.remarks
+    rows = list(csv.DictReader(text.splitlines()))
+    grouped = [row["group"] for row in rows if row.get("group")]
+    assert len(items) == len(rows) - len(grouped) + len(set(grouped)) and not notes.remarks
 
 
 def _account(text: str, folder: Path, name: str) -> None:

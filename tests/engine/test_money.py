@@ -22,7 +22,7 @@ def recorded_usd(done: Rehearsed, twin_id: str) -> float:
     return float(sum(stage["cost_usd"] for stage in run["stages"].values()))
 
 
-@pytest.mark.parametrize("processes", [False, True])
+@pytest.mark.parametrize("processes", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_run_stops_asking_at_its_limit_and_goes_on_where_it_was_left(tmp_path: Path, processes: bool) -> None:
     recipe = RehearsalRecipe(PLAN, usd=0.02)
     first = rehearse(tmp_path, TEXTS, recipe=recipe, max_cost_usd=0.07, processes=processes)

@@ -16,6 +16,7 @@ from rehearsal_recipe import RehearsalRecipe
 pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::ResourceWarning")
 
 
+@pytest.mark.slow
 def test_a_run_on_an_object_store_ends_every_item_and_finds_its_results_again(s3: str, tmp_path: Path) -> None:
     recipe = RehearsalRecipe(log=tmp_path / "log", size=1000)
     texts = [f"item {n}" for n in range(4)] + ["bad reject:b"]

@@ -125,6 +125,7 @@ def test_what_is_no_place_of_twins_is_said(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_pictures_are_drawn_afterwards_and_join_the_set(bricks: Path, tmp_path: Path) -> None:
     make_episodes(bricks, tmp_path, 2, CONFIG, executor="inline")
     config = PicturesConfig(cameras=("front", "wrist"), size_px=64)

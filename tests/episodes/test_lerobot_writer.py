@@ -66,6 +66,7 @@ def test_features_are_named_and_typed(found: LeRobotSet) -> None:
     assert (found.info["robot_type"], found.info["fps"], found.info["video_path"]) == ("panda", 20, None)
 
 
+@pytest.mark.slow
 def test_every_instruction_is_a_task_and_frames_have_one_of_their_own(found: LeRobotSet, tmp_path: Path) -> None:
     given = episodes()
     assert set(found.tasks) == {task for one in given for task in one.attempt.instructions}

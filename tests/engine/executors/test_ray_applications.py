@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from grasped_twins import write_brick
 from manitwin.engine.drive import ExecutorName
 from manitwin.episodes.episodes_run import make_episodes
@@ -18,6 +20,7 @@ def files(root: Path) -> dict[str, bytes]:
     return {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.name in names}
 
 
+@pytest.mark.slow
 def test_a_cluster_makes_the_layouts_and_episodes_of_one_process(connected: str, tmp_path: Path) -> None:
     twins = tmp_path / "twins"
     for number in range(3):

@@ -16,6 +16,7 @@ from manitwin.errors import Unavailable, UsageError
 from rehearsal_recipe import RehearsalRecipe
 
 
+@pytest.mark.slow
 def test_a_crash_costs_its_item_alone(connected: str, tmp_path: Path, recipe: RehearsalRecipe) -> None:
     failing = {"poisoned segfault:b": "failed", "broken raise:a": "failed", "poor reject:b": "rejected"}
     texts = [f"good {n}" for n in range(8)] + ["once segfault-once:c", *failing]

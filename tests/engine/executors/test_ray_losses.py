@@ -20,6 +20,7 @@ from manitwin.engine.jobs import Failure
 from rehearsal_recipe import RehearsalRecipe
 
 
+@pytest.mark.slow
 def test_a_node_that_dies_takes_no_item_along(
     connected: str, machines: Any, tmp_path: Path, recipe: RehearsalRecipe
 ) -> None:
@@ -66,6 +67,7 @@ with RayExecutor(WorkerSetup(root, recipe, Path(root) / "cache", True), settings
 """
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_where_its_driver_was_killed(connected: str, tmp_path: Path, recipe: RehearsalRecipe) -> None:
     log, gate, count = tmp_path / "log", tmp_path / "gate", 12
     driver = subprocess.Popen([sys.executable, "-c", DRIVE, connected, str(tmp_path), str(log), str(count), str(gate)])

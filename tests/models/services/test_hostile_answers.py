@@ -38,7 +38,13 @@ def good_answers(name: str, folder: Path) -> dict[str, Any]:
     return {place: answer.body for place, answer in service.seen.items() if not isinstance(answer.body, bytes)}
 
 
-@pytest.mark.parametrize("kind", sorted(WRONG))
+QUICK = ("huge", "null", "object", "text")
+"""The kinds that differ most; all others are tried by the slow tests."""
+
+
+@pytest.mark.parametrize(
+    "kind", [kind if kind in QUICK else pytest.param(kind, marks=pytest.mark.slow) for kind in sorted(WRONG)]
+)
 def test_each_part_of_each_good_answer_replaced_by_another_kind(name: str, kind: str, tmp_path: Path) -> None:
     good, wrong = good_answers(name, tmp_path), WRONG[kind]
     assert good
