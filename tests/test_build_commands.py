@@ -190,6 +190,7 @@ def flat(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_flat_layout_is_read_and_said_to_be_old(tmp_path: Path, flat: Path) -> None:
     old = f"{flat.name}: in the flat layout of earlier versions, which is read and not added to"
     for words, said in (

@@ -221,6 +221,7 @@ def test_a_model_that_is_down_leaves_the_twin_waiting_and_nothing_is_paid_twice(
     assert cost_usd(twin, "generate") == pytest.approx(USD_PER_JOB)
 
 
+@pytest.mark.slow
 def test_a_build_killed_at_the_generator_finds_its_job_again(tmp_path: Path) -> None:
     slow = Faults({"job_never_ends": ALWAYS})
     with servers(generator=slow) as served:

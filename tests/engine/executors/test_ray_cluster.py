@@ -31,6 +31,7 @@ def test_a_crash_costs_its_item_alone(connected: str, tmp_path: Path, recipe: Re
     assert ran.wrong == []
 
 
+@pytest.mark.slow
 def test_a_stage_that_hangs_is_given_up(
     connected: str, tmp_path: Path, recipe: RehearsalRecipe, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -66,6 +67,7 @@ def test_items_that_wait_for_a_service_hold_no_core(connected: str, tmp_path: Pa
     assert {ran.attempts[text, "b"] for text in waiting} == {1}, "which is nobody's attempt"
 
 
+@pytest.mark.slow
 def test_of_the_threads_of_a_worker_only_the_one_that_crashed_it_is_blamed(connected: str, tmp_path: Path) -> None:
     recipe = RehearsalRecipe((("a", "vlm"),), log=tmp_path / "log")
     with executor_for(tmp_path, recipe, connected) as executor:
@@ -77,6 +79,7 @@ def test_of_the_threads_of_a_worker_only_the_one_that_crashed_it_is_blamed(conne
     assert not any(isinstance(answers[n], Failure) for n in (1, 2, 3))
 
 
+@pytest.mark.slow
 def test_of_the_threads_of_a_worker_only_the_one_that_hangs_is_given_up(connected: str, tmp_path: Path) -> None:
     recipe = RehearsalRecipe((("a", "vlm"),), log=tmp_path / "log")
     with executor_for(tmp_path, recipe, connected, stage_timeout_s=3.0) as executor:
@@ -91,6 +94,7 @@ def test_of_the_threads_of_a_worker_only_the_one_that_hangs_is_given_up(connecte
     assert set(times_run(tmp_path / "log").values()) == {1}
 
 
+@pytest.mark.slow
 def test_workers_of_another_version_are_refused(
     connected: str, tmp_path: Path, recipe: RehearsalRecipe, monkeypatch: pytest.MonkeyPatch
 ) -> None:
