@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from fuzz_harness import all_targets, fuzz
 
-CASES, SLOW_CASES = 20, 10_000
+CASES, SLOW_CASES = 40, 10_000
 SHARED_CASES = 1_000
 TARGETS = all_targets()
 

@@ -214,7 +214,7 @@ def test_every_accepted_photo_becomes_a_solid_that_rests(shared_data: Path) -> N
             lifted[path.stem] = _lifted_photo(path)
         except Rejected:
             continue
-    assert len(lifted) >= 14
+    assert len(lifted) >= 16
     for result in lifted.values():
         _check_contract(result)
     expected = {
