@@ -134,4 +134,5 @@ def test_what_is_only_about_as_large_is_a_thing_of_its_own(said: str, category: 
         relative = load_priors()[like]
         assert prior.mass_kg == relative.mass_kg and prior.function != relative.function
         assert prior.sources == (f"as a {like}",) and not prior.measured
+        assert prior.source == f"prior:{like}", "an estimate names whose number it is"
         assert f" {like}" not in prior.functional[0].description

@@ -104,9 +104,8 @@ class Prior(Form):
 
     ``longest_axis_m`` is that of the oriented box. ``bulk_density_kg_m3`` is mass per volume of a repaired scan, not of
     the matter; None where a scan's volume says nothing of the mass. ``stands``: whether it is put down upright (None:
-    either). ``like`` is the category whose numbers it has for want of its own.
-    ``counter`` is what such things are counted by ('pair of'). ``measured`` names the published measurements;
-    ``sources`` says where the rest is from.
+    either). ``like`` is the category whose numbers it has for want of its own. ``counter`` is what such things are counted
+    by ('pair of'). ``measured`` names the published measurements; ``sources`` says where the rest is from.
     """
 
     category: str
@@ -128,8 +127,8 @@ class Prior(Form):
 
     @property
     def source(self) -> str:
-        """The source of its Estimates."""
-        return f"prior:{self.category}"
+        """The source of its Estimates: whose numbers they are."""
+        return f"prior:{self.like or self.category}"
 
 
 def _read(name: str) -> dict[str, Any]:
@@ -190,10 +189,15 @@ def load_priors() -> dict[str, Prior]:
     return priors
 
 
+_NUMBERS = frozenset({"longest_axis_m", "mass_kg"})
+"""With both of these an entry below another one has its own numbers, and borrows none."""
+
+
 def _kin_row(category: str, row: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
     """Return the row of a thing that is another one, but about as large and heavy: what it does not say is the category's."""
     said = {key: value for key, value in row.items() if key not in ("aliases", "measured", "sources")}
-    return {**said, "sources": [f"as a {category}"], "like": category, **own}
+    borrowed = {} if own.keys() >= _NUMBERS else {"sources": [f"as a {category}"], "like": category}
+    return {**said, **borrowed, **own}
 
 
 @cache
