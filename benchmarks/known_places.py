@@ -25,20 +25,8 @@ _SAMPLES = 12000
 _TURNED_AWAY = -0.3  # cosine: the other side of a thin wall is near, but another place
 
 _BODIES = (
-    "body",
-    "tube",
-    "bulb",
-    "bowl",
-    "cone",
-    "roller",
-    "barrel",
-    "stem",
-    "shaft",
-    "cover",
-    "legs",
-    "neck",
-    "blade",
-)
+    "body", "tube", "bulb", "bowl", "cone", "roller", "barrel", "stem", "shaft", "cover", "legs", "neck", "blade",
+)  # fmt: skip
 PARTS_OF: dict[str, tuple[str, ...]] = {
     "opening": ("rim", "mouth"), "inside": ("inside",), "rim": ("rim",), "cooking surface": ("inside",),
     "surface": ("top", "inside"), "handle": ("handle", "knob", "grips"), "handles": ("handle",),
@@ -56,21 +44,6 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Which parts of templates a label speaks of."""
 
-_BODIES = (
-    "body",
-    "tube",
-    "bulb",
-    "bowl",
-    "cone",
-    "roller",
-    "barrel",
-    "stem",
-    "shaft",
-    "cover",
-    "legs",
-    "neck",
-    "blade",
-)
 _WORKING = ("tip", "lead", "bristles", "head", "jaws", "cap", "outlet", "blade")  # from which the far end is far
 
 

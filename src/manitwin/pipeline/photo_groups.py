@@ -12,9 +12,9 @@ from typing import Any
 from manitwin.errors import UsageError
 from manitwin.formats.printable import printable_line
 from manitwin.formats.source_files import MESH_SUFFIXES
+from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.pipeline.item import Item
 
-MOST_PHOTOS = 24
 OF_THE_THING = ("name", "units", "up", "license", "attribution")
 """Columns that say something of the thing, not of a photo: rows of one group may not contradict each other."""
 

@@ -7,9 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
-from PIL import Image
 from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
 
 from manitwin.config import MattingConfig
 from manitwin.errors import UsageError
@@ -28,11 +26,11 @@ from manitwin.models.generators.lift.carving import (
 from manitwin.models.generators.lift.hint import hint_from_name
 from manitwin.models.generators.lift.surface import bare_mesh
 from manitwin.models.generators.lift.texture import paint_unseen
+from manitwin.models.generators.photo_material import photo_material
+from manitwin.models.generators.protocol import MOST_PHOTOS
 from manitwin.models.matting import matte_photo
 
-MOST_PHOTOS = 24
 SEEN_COSINE = 0.2  # a face seen at less than 12 degrees takes painted colours
-ROUGHNESS = 0.6
 
 
 def carve_photos(paths: Sequence[Path], turns_deg: Sequence[float], name: str | None = None) -> Carved:
@@ -76,13 +74,7 @@ def carved_part(carved: Carved) -> trimesh.Trimesh:
         uv[own] = np.column_stack(
             [(left + at[:, 0] * width) / atlas.shape[1], 1 - (top + at[:, 1] * height) / atlas.shape[0]]
         )
-    material = PBRMaterial(
-        name="photos",
-        baseColorFactor=[255, 255, 255, 255],
-        baseColorTexture=Image.fromarray(atlas),
-        metallicFactor=0.0,
-        roughnessFactor=ROUGHNESS,
-    )
+    material = photo_material(atlas)
     return trimesh.Trimesh(
         surface.vertices[vertex] @ GLTF_TO_OBJECT[:3, :3].T,
         faces.reshape(-1, 3),

@@ -7,9 +7,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from PIL import Image
 from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
 
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
@@ -17,6 +15,7 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT
 from manitwin.models.generators.lift.lifting import Lifted, hint_from_name, lift
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
+from manitwin.models.generators.photo_material import photo_material
 from manitwin.models.generators.templates.fitting.fit import (
     LEAST_AGAINST_INFLATION,
     LEAST_CONFIDENCE,
@@ -34,8 +33,6 @@ from manitwin.models.generators.templates.fitting.generated import (
     visual_part,
 )
 from manitwin.twin.import_record import ImportRecord
-
-ROUGHNESS = 0.6
 
 
 @dataclass(frozen=True)
@@ -95,13 +92,7 @@ def textured_part(lifted: Lifted) -> trimesh.Trimesh:
     used, faces = np.unique(corners, return_inverse=True)
     source = used % len(surface.vertices)
     texture, uv = beside(lifted.texture, lifted.unseen, surface.uv[source], used >= len(surface.vertices))
-    material = PBRMaterial(
-        name="photo",
-        baseColorFactor=[255, 255, 255, 255],
-        baseColorTexture=Image.fromarray(texture),
-        metallicFactor=0.0,
-        roughnessFactor=ROUGHNESS,
-    )
+    material = photo_material(texture)
     vertices = surface.vertices[source] @ GLTF_TO_OBJECT[:3, :3].T
     return trimesh.Trimesh(
         vertices,

@@ -7,17 +7,14 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from PIL import Image
 from trimesh.visual import TextureVisuals
-from trimesh.visual.material import PBRMaterial
 
 from manitwin.formats.meshes.triangles import with_creased_normals
+from manitwin.models.generators.photo_material import photo_material
 from manitwin.models.generators.templates.fitting.fit import Fitted
 from manitwin.models.generators.templates.fitting.texturing import Shot, Textured, textured
 from manitwin.models.generators.templates.known import known_of
 from manitwin.twin.import_record import FITTED, ImportRecord
-
-ROUGHNESS = 0.6
 
 
 def texture_of(fitted: Sequence[Fitted], photos: Sequence[np.ndarray]) -> Textured:
@@ -31,13 +28,7 @@ def texture_of(fitted: Sequence[Fitted], photos: Sequence[np.ndarray]) -> Textur
 def visual_part(surface: Textured) -> trimesh.Trimesh:
     """Return the mesh in the object frame with its texture."""
     vertices, faces, uv = surface.mesh()
-    material = PBRMaterial(
-        name="photo",
-        baseColorFactor=[255, 255, 255, 255],
-        baseColorTexture=Image.fromarray(surface.texture),
-        metallicFactor=0.0,
-        roughnessFactor=ROUGHNESS,
-    )
+    material = photo_material(surface.texture)
     visual = TextureVisuals(uv=uv, material=material)
     mesh = trimesh.Trimesh(vertices, faces, visual=visual, process=False, metadata={"name": "fitted"})
     return with_creased_normals(mesh)
