@@ -42,7 +42,8 @@ from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import AccessDenied, RateLimited, Rejected, Unavailable
 from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
-from manitwin.twin.record import SCHEMA_VERSION, TwinRecord
+from manitwin.twin.migration import SCHEMA_VERSION
+from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import RECORD, RUN, canonical_json, parse_record, seal, sha256_of_json, write_bytes_atomically
 from manitwin.twin.wholeness import note_sizes, size_damage
 from rehearsal_cube import CUBE, cube_files

@@ -30,7 +30,8 @@ from manitwin.models.generators.protocol import IMAGE_OR_TEXT, Asked, Generated,
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest
 from manitwin.physics.trial import GraspTrial, TrialResult, TrialSettings
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.twin.record import FunctionalPoint, GraspPoint, Language
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint
+from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
 
 __all__ = [

@@ -19,7 +19,8 @@ from manitwin.pipeline.caption import CaptionStage
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.points import PointsStage
 from manitwin.robots.grippers.parallel import ParallelGripper
-from manitwin.twin.record import FunctionalPoint, GraspPoint, Language
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint
+from manitwin.twin.record import Language
 
 GRIPPER = ParallelGripper("test", "0", 0.08, 0.1, 50.0, 1.0, (0.01, 0.01), (), (), "a test")
 

@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 
 from manitwin.errors import TwinError
+from manitwin.twin.migration import SCHEMA_VERSION
 from manitwin.twin.store import read_record, replace_folder, revision_of, seal, write_bytes_atomically
 
 
@@ -56,7 +57,7 @@ def test_altered_twin_is_refused(sealed: Path, alter: str) -> None:
 
 def test_unknown_schema_version_is_named(sealed: Path) -> None:
     path = sealed / "twin.json"
-    path.write_text(path.read_text().replace('"schema_version": 1', '"schema_version": 99'))
+    path.write_text(path.read_text().replace(f'"schema_version": {SCHEMA_VERSION}', '"schema_version": 99'))
     with pytest.raises(TwinError, match="99"):
         read_record(sealed)
 

@@ -13,7 +13,7 @@ from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints
 from manitwin.pipeline.object_state import findings_of, pictures, read_subject
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.twin.record import FunctionalPoint, GraspPoint
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint
 
 FUNCTIONAL, GRASP = (2, 4), (2, 3)
 """How many points an object has (paper: 2-4 functional and 2-3 grasp points)."""

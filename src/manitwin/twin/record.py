@@ -10,6 +10,8 @@ from typing import Literal
 from pydantic import Field, model_validator
 
 from manitwin.twin.grasp_summary import GraspSummary
+from manitwin.twin.migration import SCHEMA_VERSION
+from manitwin.twin.point_records import Points
 from manitwin.twin.record_values import (
     LARGEST_KG,
     LARGEST_M,
@@ -26,10 +28,7 @@ from manitwin.twin.record_values import (
     Vector3,
 )
 
-SCHEMA_VERSION = 1
-
 Status = Literal["accepted", "rejected"]
-GraspType = Literal["parallel_jaw", "pinch", "power", "three_finger", "enveloping"]  # the paper's five
 
 _OF_EVERY_STAGE = frozenset({"too_large"})  # any stage's process has a limit of memory
 REJECTION_REASONS: dict[str, frozenset[str]] = {
@@ -199,47 +198,6 @@ class Language(Record):
     function: str = Field(min_length=1)
     caption: str = Field(min_length=1)
     captions: list[str]
-
-
-class Candidates(Record):
-    """The points among which functional and grasp points are chosen (the paper: 42)."""
-
-    positions_m: list[Vector3]
-    normals: list[Vector3]
-
-
-class FunctionalPoint(Record):
-    """A point with a specific function."""
-
-    id: str
-    candidate: int
-    position_m: Vector3
-    normal: Vector3
-    label: str
-    description: str
-    confidence: Unit
-    rationale: str
-
-
-class GraspPoint(Record):
-    """A point that is good to hold the object by."""
-
-    id: str
-    candidate: int
-    position_m: Vector3
-    normal: Vector3
-    type: GraspType
-    scenario: str
-    confidence: Unit
-    rationale: str
-
-
-class Points(Record):
-    """Candidate, functional and grasp points."""
-
-    candidates: Candidates
-    functional: list[FunctionalPoint]
-    grasp: list[GraspPoint]
 
 
 class Placement(Record):

@@ -17,7 +17,8 @@ from manitwin.errors import TwinError
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable, printable_line
-from manitwin.twin.record import SCHEMA_VERSION, TwinRecord
+from manitwin.twin.migration import SCHEMA_VERSION, migrated
+from manitwin.twin.record import TwinRecord
 from manitwin.twin.record_values import CONTROLS
 from manitwin.twin.twin_files import require_plain
 
@@ -201,14 +202,18 @@ def read_record(folder: Path, verify: bool = False) -> TwinRecord:
 
 
 def parse_record(content: bytes, path: str | Path = RECORD, *, sealed: bool = False) -> TwinRecord:
-    """Read the content of a twin.json, with ``sealed`` one that its revision is of; raises TwinError naming ``path``."""
+    """Read the content of a twin.json, with ``sealed`` one that its revision is of; raises TwinError naming ``path``.
+
+    A record of an earlier schema version is brought to this one; its ``revision`` stays that of the file.
+    """
     data = parse_json_object(content, str(path), TwinError, remedy=REMEDY)
+    said, data = data, migrated(data)
     if data.get("schema_version") != SCHEMA_VERSION:
         version = printable_line(str(data.get("schema_version")), max_characters=_SHOWN_CHARACTERS)
-        raise TwinError(f"{path}: schema version {version}, this package reads {SCHEMA_VERSION}; {REMEDY}")
+        raise TwinError(f"{path}: schema version {version}, this package reads 1 to {SCHEMA_VERSION}; {REMEDY}")
     if (found := _with_controls(data)) is not None:
         raise TwinError(f"{path}: {printable_line(found)!r} holds control characters; {REMEDY}")
-    if sealed and revision_of(data) != data.get("revision"):
+    if sealed and revision_of(said) != said.get("revision"):
         raise TwinError(f"{path}: altered since it was written (its revision does not match); {REMEDY}")
     try:
         return TwinRecord(**data)

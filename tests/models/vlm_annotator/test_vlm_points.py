@@ -21,7 +21,7 @@ from manitwin.models.annotators.vlm.question_parts import marked_views
 from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.render.cameras import project
 from manitwin.render.markers import DOT
-from manitwin.twin.record import GraspPoint
+from manitwin.twin.point_records import GraspPoint
 
 
 @pytest.fixture(scope="module")

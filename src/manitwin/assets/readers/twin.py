@@ -16,7 +16,7 @@ from manitwin.formats.meshes.source import MeshSource
 from manitwin.geometry.poses import rotation_between, rotation_from_quaternion_wxyz, transform
 from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.loaded_twin import Twin
-from manitwin.twin.record import FunctionalPoint, GraspPoint
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint
 
 
 def read(path: Path) -> Asset:

@@ -25,7 +25,8 @@ from manitwin.formats.markdown import one_line
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.geometry.grasp_diversity import fingertips
 from manitwin.geometry.poses import OBJECT_TO_GLTF, rotation_between, rotation_from_quaternion_wxyz, transform
-from manitwin.twin.record import FunctionalPoint, Language, Placement
+from manitwin.twin.point_records import FunctionalPoint
+from manitwin.twin.record import Language, Placement
 from manitwin.twin.store import canonical_json
 
 MAX_GRASPS = (

@@ -20,7 +20,8 @@ from manitwin.pipeline.stage_order import place_in_pipeline
 from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.grasp_table import read_grasp_table
 from manitwin.twin.loaded_twin import read_visual
-from manitwin.twin.record import Points, TwinRecord
+from manitwin.twin.point_records import Points
+from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import RECORD, REMEDY, RUN, read_record
 
 VISUAL, GRASPS = "visual.glb", "grasps.parquet"

@@ -18,7 +18,8 @@ from manitwin.models.annotators.protocol import (
     Subject,
 )
 from manitwin.twin.import_record import GivenPoint, ImportRecord
-from manitwin.twin.record import FunctionalPoint, GraspPoint, GraspType, Language
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint, GraspType
+from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
 
 NEAR_M, NEAR_SHARE = 0.02, 0.1

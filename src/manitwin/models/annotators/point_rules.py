@@ -15,7 +15,7 @@ from manitwin.geometry.parts.features import Feature, feature_scores
 from manitwin.geometry.parts.shape import Shape, SurfacePoints, measure_shape, surface_points
 from manitwin.models.annotators.priors import FunctionalPart, GraspPart, Prior, unknown_prior
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
-from manitwin.twin.record import FunctionalPoint, GraspPoint
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint
 
 MOST_FUNCTIONAL, MOST_GRASPS, LEAST = 4, 3, 2  # the paper: 2-4 functional and 2-3 grasp points
 

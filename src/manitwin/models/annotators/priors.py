@@ -19,7 +19,7 @@ from manitwin.errors import ManiTwinError, choose_from
 from manitwin.formats.toml_file import parse_toml
 from manitwin.geometry.parts.features import Feature
 from manitwin.geometry.parts.shape import HeadEnd
-from manitwin.twin.record import GraspType
+from manitwin.twin.point_records import GraspType
 from manitwin.twin.record_values import Estimate, Finite, Record
 
 TABLES = resources.files("manitwin.models.annotators") / "prior_tables"

@@ -12,7 +12,8 @@ import trimesh
 from manitwin.config import Resource
 from manitwin.render.cameras import Camera
 from manitwin.twin.import_record import ImportRecord
-from manitwin.twin.record import FunctionalPoint, GraspPoint, Language
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint
+from manitwin.twin.record import Language
 from manitwin.twin.record_values import Estimate
 
 

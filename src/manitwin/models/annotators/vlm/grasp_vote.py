@@ -15,7 +15,7 @@ from manitwin.models.annotators.vlm.points import (
     PointsAnswer,
     contradiction,
 )
-from manitwin.twin.record import GraspPoint
+from manitwin.twin.point_records import GraspPoint
 
 
 @dataclass(frozen=True)

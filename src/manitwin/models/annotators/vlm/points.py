@@ -21,7 +21,7 @@ from manitwin.models.annotators.vlm.question_parts import (
 )
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
-from manitwin.twin.record import FunctionalPoint, GraspType
+from manitwin.twin.point_records import FunctionalPoint, GraspType
 
 FUNCTIONAL, GRASP = (2, 4), (2, 3)
 """How many points an object has (paper)."""

@@ -1,0 +1,32 @@
+"""Records of earlier schema versions, brought to the present one when they are read; the files stay as they are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+SCHEMA_VERSION = 2
+
+
+def migrated(record: dict[str, Any]) -> dict[str, Any]:
+    """Return the content of a twin.json in the present schema version; of an unknown version it is returned as it is.
+
+    What an earlier version did not say stays unsaid (null, empty): nothing is computed.
+    """
+    while (step := _STEPS.get(_version(record))) is not None:
+        record = step(record)
+    return record
+
+
+def _version(record: dict[str, Any]) -> int | None:
+    version = record.get("schema_version")
+    return version if type(version) is int else None
+
+
+def _to_2(record: dict[str, Any]) -> dict[str, Any]:
+    """Version 2: functional points have a ``frame``, candidates say which were ``refined``; both have a value for unsaid."""
+    return {**record, "schema_version": 2}
+
+
+_STEPS: dict[int | None, Callable[[dict[str, Any]], dict[str, Any]]] = {1: _to_2}
+"""By the version that each step begins from."""
