@@ -12,11 +12,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from manitwin.errors import TwinError
-from manitwin.formats.parquet_file import read_parquet
+from manitwin.formats.parquet_file import open_parquet, read_parquet
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.twin.store import REMEDY
 
 JITTERED = ":jittered"
+PART = "part_id"
 JOINTS = ("pregrasp_joints_rad", "grasp_joints_rad")
 """The arrays of ``proposals.npz`` that hands with more joints have: ``(N, J)`` each."""
 SCHEMA = pa.schema(
@@ -31,6 +32,7 @@ SCHEMA = pa.schema(
         ("proposer", pa.string()),
         ("grasp_point_id", pa.string()),
         ("functional_point_id", pa.string()),
+        (PART, pa.string()),
         ("distance_to_point_m", pa.float64()),
         ("outcome", pa.string()),
         ("verified", pa.bool_()),
@@ -43,6 +45,7 @@ SCHEMA = pa.schema(
         *((name, pa.list_(pa.float64())) for name in JOINTS),
     ]
 )
+_OF_VERSION_1 = [name for name in SCHEMA.names if name != PART]
 FROM_PROPOSALS = (
     *("width_m", "depth_m", "score", "proposer"),
     *("grasp_point_id", "functional_point_id", "distance_to_point_m"),
@@ -76,6 +79,7 @@ class GripperRows:
             "position_m": poses[:, :3, 3].tolist(),
             "quaternion_wxyz": quaternion_wxyz(poses[:, :3, :3]).tolist(),
             **{name: self.proposals[name][order].tolist() for name in FROM_PROPOSALS},
+            PART: [None] * len(order),
             "outcome": self.outcome[order].tolist(),
             "verified": (self.outcome[order] == "held").tolist(),
             "displacement_m": self.displacement_m[order].tolist(),
@@ -93,9 +97,17 @@ class GripperRows:
 
 
 def read_grasp_table(path: Path) -> pa.Table:
-    """Return the rows of a twin's ``grasps.parquet`` with the columns of ``SCHEMA``; raises TwinError."""
+    """Return the rows of a twin's ``grasps.parquet`` with the columns of ``SCHEMA``; raises TwinError.
+
+    Tables of schema version 1 have no ``part_id``: it is null in all of their rows.
+    """
     if not os.path.lexists(path):
         raise TwinError(f"{path}: missing; {REMEDY}")
+    with open_parquet(path, TwinError, schema=SCHEMA, columns=_OF_VERSION_1, remedy=REMEDY, inside=path.parent) as file:
+        if PART not in file.names:
+            table = file.read(_OF_VERSION_1)
+            place, field = SCHEMA.get_field_index(PART), SCHEMA.field(PART)
+            return table.add_column(place, field, pa.nulls(len(table), field.type))
     return read_parquet(path, TwinError, schema=SCHEMA, remedy=REMEDY, inside=path.parent)
 
 

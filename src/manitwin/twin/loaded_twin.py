@@ -16,11 +16,13 @@ import trimesh
 from manitwin.errors import InputError, TwinError, UsageError
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.glb import read_glb
+from manitwin.formats.npy_file import MAX_LABEL_BYTES, parse_labels
 from manitwin.formats.xml_file import MAX_NUMBER
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.twin.dataset_root import MAX_FILE_BYTES, DatasetRoot
 from manitwin.twin.grasp_table import read_grasp_table
+from manitwin.twin.part_records import FACE_PARTS, NO_PART
 from manitwin.twin.record import Physical, TwinRecord
 from manitwin.twin.store import RECORD, REMEDY, read_record
 
@@ -77,6 +79,28 @@ class Twin:
         """The convex collision hulls."""
         self.physical  # noqa: B018
         return [_hull(path, self.folder) for path in sorted((self.folder / "collision").glob("hull_*.obj"))]
+
+    def face_parts(self) -> np.ndarray:
+        """Return of each face of the visual meshes, one after the other, the place of its part in ``record.parts``.
+
+        ``(F,) uint8``, 255 where it is of none: all of a twin without parts. Raises TwinError where the file has another number
+        of faces or names parts that the record has not.
+        """
+        faces = sum(len(mesh.faces) for mesh in self.visual)
+        parts = len(self.record.parts)
+        if not parts:
+            return np.full(faces, NO_PART, np.uint8)
+        path = self.folder / FACE_PARTS
+        content = read_bytes(path, MAX_LABEL_BYTES, TwinError, inside=self.folder, name=str(path))
+        labels = parse_labels(content, str(path), TwinError, remedy=REMEDY)
+        if len(labels) != faces:
+            raise TwinError(f"{path}: tells the parts of {len(labels)} faces, visual.glb has {faces}; {REMEDY}")
+        unknown = (labels != NO_PART) & (labels >= parts)
+        if unknown.any():
+            raise TwinError(
+                f"{path}: names part {labels[unknown][0]}, the record has {parts}, counted from 0; {REMEDY}"
+            )
+        return labels
 
     def read_bytes(self, file: str) -> bytes:
         """Return the content of one of the twin's files; raises TwinError where it is no file of its folder."""

@@ -24,7 +24,7 @@ def _version(record: dict[str, Any]) -> int | None:
 
 
 def _to_2(record: dict[str, Any]) -> dict[str, Any]:
-    """Version 2: functional points have a ``frame``, candidates say which were ``refined``; both have a value for unsaid."""
+    """Version 2: points have frames, candidates say which were refined, the surface has parts: each has a value for unsaid."""
     return {**record, "schema_version": 2}
 
 

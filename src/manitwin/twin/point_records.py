@@ -73,7 +73,7 @@ class FunctionalPoint(Record):
 
 
 class GraspPoint(Record):
-    """A point that is good to hold the object by."""
+    """A point that is good to hold the object by; ``label`` is the part as whoever chose it says, None where nobody did."""
 
     id: str
     candidate: int
@@ -83,6 +83,7 @@ class GraspPoint(Record):
     scenario: str
     confidence: Unit
     rationale: str
+    label: str | None = None
 
 
 class Points(Record):

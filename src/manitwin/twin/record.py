@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 
 from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.migration import SCHEMA_VERSION
+from manitwin.twin.part_records import FACE_PARTS, NO_PART, Part
 from manitwin.twin.point_records import Points
 from manitwin.twin.record_values import (
     LARGEST_KG,
@@ -218,7 +219,10 @@ class Quality(Record):
 
 
 class TwinRecord(Record):
-    """twin.json: everything that a person wants to read about a twin."""
+    """twin.json: everything that a person wants to read about a twin.
+
+    ``parts`` is empty where geometry tells none, and of twins of schema version 1.
+    """
 
     schema_version: int = SCHEMA_VERSION
     twin_id: FolderName
@@ -234,6 +238,7 @@ class TwinRecord(Record):
     physical: Physical | None = None
     language: Language | None = None
     points: Points | None = None
+    parts: list[Part] = Field(default_factory=list, max_length=NO_PART)
     grasps: GraspSummary | None = None
     placements: list[Placement] | None = None
     quality: Quality
@@ -247,4 +252,8 @@ class TwinRecord(Record):
         ]
         if self.status == "accepted" and missing:
             raise ValueError(f"an accepted twin lacks {', '.join(missing)}")
+        if bool(self.parts) != (FACE_PARTS in self.files):
+            raise ValueError(f"a twin with parts has the file {FACE_PARTS}, one without has none")
+        if [part.id for part in self.parts] != [f"p{place}" for place in range(len(self.parts))]:
+            raise ValueError("parts are called p0, p1 ... in their order")
         return self

@@ -110,6 +110,7 @@ def _cut(root: DatasetRoot, name: str, size: int | None) -> str | None:
         ".glb": len(head) == 12 and struct.unpack("<I", head[8:])[0] == size,
         ".webp": len(head) == 12 and struct.unpack("<I", head[4:8])[0] + 8 == size,
         ".png": tail == _PNG_END,
+        ".npy": head.startswith(b"\x93NUMPY"),
     }
     return None if whole.get(path.suffix, True) else f"{called} is cut off or no {path.suffix[1:]} file"
 

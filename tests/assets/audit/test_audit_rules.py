@@ -15,8 +15,11 @@ from manitwin.assets.asset import AnnotatedFrame, Asset, Contact, Inertial
 from manitwin.assets.audit.check import audit_asset, audit_path
 from manitwin.assets.audit.finding import Finding
 from manitwin.assets.audit.rules import RULES, RULES_BY_CODE
+from manitwin.formats.npy_file import labels_to_npy
 from manitwin.geometry.poses import transform
-from manitwin.twin.store import RECORD
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.part_records import FACE_PARTS
+from manitwin.twin.store import RECORD, parse_record, seal
 from twin_folders import write_rejected
 
 Break = Callable[[Asset], Asset]
@@ -174,7 +177,7 @@ BROKEN: dict[str, Break] = {
     "TEX002": lambda a: replace(a, visual=(textured(solid(), 500, 300),)),
 }
 
-ON_DISK = {"FIL001", "FIL003", "FIL004", "FIL008", "TWN001", "TWN002"}
+ON_DISK = {"FIL001", "FIL003", "FIL004", "FIL008", "TWN001", "TWN002", "TWN003"}
 """Tested below, with files."""
 
 
@@ -241,3 +244,22 @@ def test_twin_whose_candidates_are_off_its_surface(tmp_path: Path) -> None:
 def test_twin_whose_record_has_another_size(tmp_path: Path) -> None:
     changes = {"physical": {"extents_m": [0.2, 0.1, 0.1]}}
     assert errors(audit_path(write_twin(tmp_path, changes), RULES).findings) == {"TWN002"}
+
+
+def test_twin_whose_parts_have_other_faces_than_the_record_says(tmp_path: Path) -> None:
+    folder = write_twin(tmp_path)
+    labels = np.zeros(len(Twin(folder).face_parts()), np.uint8)
+    (folder / FACE_PARTS).write_bytes(labels_to_npy(labels))
+    record = parse_record((folder / RECORD).read_bytes()).model_dump(mode="json")
+    part = {
+        "id": "p0",
+        "name": "body",
+        "source": "geometry",
+        "confidence": 0.8,
+        "area_share": 1.0,
+        "centroid_m": [0, 0, 0],
+    }
+    for faces, found in ((len(labels), set()), (len(labels) - 1, {"TWN003"})):
+        record.pop("revision", None)
+        seal(folder, {**record, "parts": [part | {"faces": faces}]})
+        assert errors(audit_path(folder, RULES).findings) == found

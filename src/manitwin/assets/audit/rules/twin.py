@@ -8,6 +8,9 @@ import numpy as np
 
 from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
+from manitwin.errors import TwinError
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.part_records import NO_PART
 
 CANDIDATE_M, CANDIDATE_SHARE = 0.005, 0.03
 """How far a candidate may be from the visual surface: it was sampled on the repaired solid, which repair may move."""
@@ -47,6 +50,25 @@ def extents_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
         )
 
 
+def face_parts_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of parts whose faces are not those of the visual mesh, or are not as many as the record says."""
+    if measured.record is None or not measured.record.parts:
+        return
+    path = measured.asset.path
+    try:
+        labels = Twin(path.parent if path.is_file() else path).face_parts()
+    except TwinError as error:
+        yield Complaint(str(error).rpartition("; ")[0])
+        return
+    counts = np.bincount(labels, minlength=NO_PART + 1)
+    for place, part in enumerate(measured.record.parts):
+        if counts[place] != part.faces:
+            yield Complaint(
+                f"part {part.id}, {part.name}, has {counts[place]} faces, the record says {part.faces}",
+                values={"part": part.id, "faces": int(counts[place]), "said": part.faces},
+            )
+
+
 RULES = (
     Rule(
         "TWN001",
@@ -64,5 +86,14 @@ RULES = (
         " of them only.",
         remedy="Build the twin again from its source.",
         check=extents_differ,
+    ),
+    Rule(
+        "TWN003",
+        "face-parts-differ",
+        "error",
+        why="Parts are told face by face in the order of visual.glb: with another number of faces, or parts that the record has"
+        " not, every region of a grasp and every name of a part is wrong.",
+        remedy="Build the twin again from its source.",
+        check=face_parts_differ,
     ),
 )

@@ -142,4 +142,5 @@ def _grasp_point(number: int, place: Elected, checks: PlaceChecks) -> GraspPoint
         scenario=leading.choice.scenario,
         confidence=round(place.confidence, 3),
         rationale=f"{leading.rationale} (chosen by {place.support} of {place.votes} queries)",
+        label=leading.choice.label,
     )
