@@ -258,6 +258,38 @@ def test_proxy_that_cannot_be_used_is_wrong_use_and_not_shown(environment: pytes
     assert "pass-word" not in str(caught.value)
 
 
+@pytest.fixture
+def nobody_knows_localhost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine without /etc/hosts."""
+    known = socket.getaddrinfo
+
+    def look_up(host: Any, *arguments: Any, **more: Any) -> Any:
+        if "localhost" in str(host):
+            raise socket.gaierror(-2, "Name or service not known")
+        return known(host, *arguments, **more)
+
+    monkeypatch.setattr(socket, "getaddrinfo", look_up)
+
+
+@pytest.mark.parametrize("host", ["localhost", "LocalHost.", "mesh.localhost"])
+def test_localhost_is_this_machine_where_no_name_service_knows_it(host: str, nobody_knows_localhost: None) -> None:
+    assert addresses_of(host, 80, 5) == ["127.0.0.1", "::1"]
+    with pytest.raises(ForbiddenAddress):
+        Reach("api.vendor.example", 443).checked(host, 80, addresses_of(host, 80, 5))
+    with pytest.raises(UnknownName):
+        addresses_of("localhost.example", 80, 5)
+
+
+def test_proxy_is_not_asked_for_localhost_where_no_name_service_knows_it(
+    environment: pytest.MonkeyPatch, tmp_path: Path, nobody_knows_localhost: None
+) -> None:
+    with raw_server(lambda write: None) as (proxy, seen):
+        environment.setenv("https_proxy", proxy)
+        service = Client("https://api.vendor.example/v1", retries=0).service
+        assert "no public address" in str(error_of(lambda: service.download("https://localhost:1/x", tmp_path / "m")))
+    assert not seen
+
+
 def test_link_inside_is_not_fetched_by_a_proxy_either(environment: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with raw_server(lambda write: None) as (proxy, seen):
         environment.setenv("https_proxy", proxy)

@@ -149,6 +149,7 @@ class Index:
             raise
         finally:
             timer.cancel()
+            timer.join()  # a thread that outlives the program holds the connection, and DuckDB's binding prints that it leaked
 
     def _opened(self) -> tuple[PartList, duckdb.DuckDBPyConnection]:
         if self._open is None:

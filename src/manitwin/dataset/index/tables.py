@@ -74,7 +74,7 @@ TABLES: dict[str, pa.Schema] = {
         position_m=pa.list_(_REAL, 3),
         quaternion_wxyz=pa.list_(_REAL, 4),
         **_named(_REAL, "width_m depth_m score"),
-        **_named(_TEXT, "proposer grasp_point_id functional_point_id"),
+        **_named(_TEXT, "proposer grasp_point_id functional_point_id part_id"),
         distance_to_point_m=_REAL,
         outcome=_TEXT,
         verified=_FLAG,

@@ -13,6 +13,7 @@ from ipaddress import IPv4Address, IPv4Network, IPv6Address, IPv6Network, ip_add
 
 # of IPv4 through a translator (RFC 6052): the last 32 bits are the address that is reached
 _NAT64 = IPv6Network("64:ff9b::/96")
+_LOOPBACK = ("127.0.0.1", "::1")
 # for protocols, and for relays of 6to4, which are no more (RFC 6890, RFC 7526): ipaddress knows them in parts
 _OF_PROTOCOLS = (IPv4Network("192.0.0.0/24"), IPv4Network("192.88.99.0/24"))
 
@@ -80,6 +81,7 @@ def addresses_of(host: str, port: int, timeout_s: float) -> list[str]:
     """Return the addresses of a name, in the order of the system; raises UnknownName.
 
     The system's own resolver has no time limit: it is asked in a thread, which is left behind where it does not answer.
+    ``localhost`` is this machine even where the system does not know it (RFC 6761, section 6.3: a machine without /etc/hosts).
     """
     found: list[str] = []
     why: list[str] = ["no answer from the name service"]
@@ -95,6 +97,13 @@ def addresses_of(host: str, port: int, timeout_s: float) -> list[str]:
     thread = threading.Thread(target=look_up, daemon=True)
     thread.start()
     thread.join(timeout_s)
+    if not found and _is_localhost(host):
+        return list(_LOOPBACK)
     if not found:
         raise UnknownName(f"the name {host} is not known: {why[0]}")
     return list(found)
+
+
+def _is_localhost(host: str) -> bool:
+    name = host.lower().rstrip(".")
+    return name == "localhost" or name.endswith(".localhost")
