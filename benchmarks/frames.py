@@ -1,0 +1,146 @@
+"""Score frames from geometry against those of templates, which are known by construction.
+
+    python benchmarks/frames.py [--seeds N] [--every K] [--held-out] [--pictures FOLDER]
+
+A frame is asked for at the candidate nearest to the known place on its part (of 42 by farthest point sampling), by the known
+point's label, without anything else that the template knows. Categories are split in halves by the CRC-32 of their names, as in
+``points.py``; nothing is set by the ``--held-out`` half. A frame is right within the stated bounds, absent where geometry says
+that it is not clear, of another kind where the label may mean one (a "base" is a face), and wrong else.
+ Holes are compared by their axes' lines: which end of a bore is its place is a convention; tips by their ends,
+which may be as broad as the frame says.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter, defaultdict
+
+import numpy as np
+import trimesh
+from points import CANDIDATES, SAMPLES, held_out
+
+from manitwin.geometry.frames.feature import FeatureFrame, FramedMesh
+from manitwin.geometry.frames.find import find_frame
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.known import mass_properties
+from manitwin.models.generators.templates.known_frames import known_frame
+from manitwin.models.generators.templates.made import Made, make
+from manitwin.models.generators.templates.template import KnownPoint
+from manitwin.models.generators.templates.text import read_text
+
+BARS = {
+    "opening": (0.005, 3.0),
+    "face": (0.003, 3.0),
+    "hole": (0.002, 5.0),
+    "edge": (0.010, 10.0),
+    "tip": (0.005, 10.0),
+    "button": (0.003, 10.0),
+}
+"""Of each kind how far (m) and by what angle (degrees) a frame may be off; an edge's angle is that of its line."""
+
+
+def main() -> None:
+    """Print the score of each kind, and what went wrong."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=2)
+    parser.add_argument("--every", type=int, default=1, help="every Kth category")
+    parser.add_argument("--held-out", action="store_true")
+    parser.add_argument("--kind", choices=sorted(BARS))
+    arguments = parser.parse_args()
+    half = [name for name in sorted(load_templates()) if held_out(name) == arguments.held_out][:: arguments.every]
+    counts, lines = defaultdict(Counter[str]), []
+    errors: dict[str, list[tuple[float, float]]] = defaultdict(list)
+    seconds, asked = 0.0, 0
+    for category in half:
+        for seed in range(arguments.seeds):
+            templates = load_templates()
+            made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))
+            rows, spent = score(made, seed, arguments.kind)
+            seconds, asked = seconds + spent, asked + bool(rows)
+            for kind, verdict, line, off in rows:
+                counts[kind][verdict] += 1
+                if off is not None:
+                    errors[kind].append(off)
+                if verdict != "right":
+                    lines.append(f"  {kind:8} {verdict:7} {category}: {line}")
+    for kind, count in sorted(counts.items()):
+        total = count.total()
+        off = np.array(errors[kind] or [(np.nan, np.nan)])
+        print(
+            f"{kind:8} {total:4} asked: right {count['right']} ({100 * count['right'] / total:.0f} %), wrong "
+            f"{count['wrong']}, absent {count['absent']}, another kind {count['other']}; "
+            f"of those found, median {1000 * np.median(off[:, 0]):.1f} mm "
+            f"and {np.median(off[:, 1]):.1f} degrees"
+        )
+    print(f"{seconds / max(asked, 1):.3f} CPU-s a thing")
+    for line, count in sorted(Counter(lines).items()):
+        print(f"{count} x{line}")
+
+
+def score(
+    made: Made, seed: int, kind: str | None
+) -> tuple[list[tuple[str, str, str, tuple[float, float] | None]], float]:
+    """Return of each known point its kind, the verdict, words, and how far off the frame is; and the CPU seconds."""
+    solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
+    points, normals, faces = sample_surface(solid, SAMPLES, np.random.default_rng(seed))
+    chosen = farthest_point_sampling(points, CANDIDATES, 0)
+    part = made.mesh.part[faces]
+    center = mass_properties(made.solids)[1]
+    rows = []
+    started = time.process_time()
+    surface = FramedMesh(solid, center, seed)
+    for known in made.points:
+        if known.kind not in BARS or (kind is not None and known.kind != kind):
+            continue
+        at = candidate_of(made, known, points, part, chosen)
+        found = find_frame(surface, points[at], normals[at], known.label)
+        rows.append((known.kind, *judged(made, known, center, found)))
+    return rows, time.process_time() - started
+
+
+def candidate_of(made: Made, known: KnownPoint, points: np.ndarray, part: np.ndarray, chosen: np.ndarray) -> int:
+    """Return the candidate on a known point's part that is nearest to it; where none is, the nearest sample of the part."""
+    mine = np.flatnonzero(part == made.mesh.names.index(known.part))
+    own = np.intersect1d(mine, chosen)
+    pool = own if len(own) else (mine if len(mine) else chosen)
+    return int(pool[np.linalg.norm(points[pool] - known.position_m, axis=1).argmin()])
+
+
+def judged(
+    made: Made, known: KnownPoint, center: np.ndarray, found: object
+) -> tuple[str, str, tuple[float, float] | None]:
+    """Return the verdict on a frame, in words, and how far (m, degrees) it is off."""
+    name = f"{known.label} [{known.part}]"
+    if not isinstance(found, FeatureFrame):
+        return "absent", f"{name}: {getattr(found, 'reason', '')}", None
+    truth = known_frame(made, known, center)
+    rotation = rotation_from_quaternion_wxyz(np.array(truth.quaternion_wxyz))
+    offset = found.position_m - np.array(truth.position_m)
+    if found.kind != known.kind:
+        return "other", f"{name}: a {found.kind}, which the label may mean too", None
+    compared = 0 if known.kind == "edge" else 2
+    cosine = float(found.rotation[:, compared] @ rotation[:, compared])
+    if known.kind in ("hole", "edge"):
+        cosine = abs(cosine)
+    if known.kind == "hole":
+        offset = offset - (offset @ rotation[:, 2]) * rotation[:, 2]
+    if known.kind == "edge":
+        offset = offset - (offset @ rotation[:, 0]) * rotation[:, 0]
+    if known.kind == "tip":  # across, a place of the end is as good as its middle
+        along = float(offset @ rotation[:, 2])
+        across = float(np.linalg.norm(offset - along * rotation[:, 2]))
+        offset = np.array([along, max(0.0, across - max(truth.size_m, found.size_m)), 0.0])
+    away, angle = float(np.linalg.norm(offset)), float(np.degrees(np.arccos(np.clip(cosine, -1, 1))))
+    turned = ""
+    if known.kind == "opening" and truth.free == "none" and not found.roll_free:
+        roll = np.degrees(np.arccos(np.clip(found.x @ rotation[:, 0], -1, 1)))
+        turned = f", pour direction {roll:.0f} degrees off" if roll > 15 else ""
+    right = away <= BARS[known.kind][0] and angle <= BARS[known.kind][1]
+    return "right" if right else "wrong", f"{name}: {1000 * away:.0f} mm, {angle:.0f} degrees{turned}", (away, angle)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""The axis of a handle, shaft or stem: a straight line through the middle of what is long around a point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
+
+_STEP_SHARE = 0.025  # of the longest side: the distance between slices
+_WIDER, _THINNER = 1.7, 0.45  # times the median radius of the slices so far: there another part begins
+_SLENDER = 2.2  # length by width from which a part has an axis
+_BENT_SHARE = 0.1  # of the length: how far a straight part's middle may be off its line
+_LEAST_SAMPLES = 5
+
+
+def axis_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
+    """Return the axis of the long part that a surface point is on: its middle, Z along it to the bulk of the object, length.
+
+    Slices are followed from the point to both sides as long as they are about as wide; their middles must lie on a line.
+    """
+    positions, _ = surface.samples
+    deep, _ = surface.caster.first_hits((point_m - 1e-5 * normal)[None], -normal[None])
+    matter = float(deep[0]) if np.isfinite(deep[0]) else 0.02 * surface.size_m
+    center = point_m - normal * min(matter, 0.3 * surface.size_m) / 2
+    best: np.ndarray | None = None
+    for share in (0.1, 0.18, 0.3):
+        around = surface.near(center, max(share * surface.size_m, 1.3 * matter))
+        if len(around) < 3 * _LEAST_SAMPLES:
+            continue
+        values, vectors = np.linalg.eigh(np.cov((positions[around] - positions[around].mean(0)).T))
+        if values[2] < 1.6 * values[1]:
+            continue
+        slices = _followed(surface, center, vectors[:, 2])
+        if best is None or len(slices) > len(best):
+            best = slices
+    if best is None or len(best) < 3:
+        return Unclear("nothing long is where the point is")
+    return _line(surface, best)
+
+
+def _followed(surface: FramedMesh, center: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Return the middles and radii of slices ``(S, 4)`` along a part, from one end to the other."""
+    first = _slice(surface, center, direction, 0.3 * surface.size_m)
+    if first is None:
+        return np.zeros((0, 4))
+    ahead, behind = (_march(surface, first, sign * direction) for sign in (1.0, -1.0))
+    return np.array([*behind[::-1], first, *ahead])
+
+
+def _march(surface: FramedMesh, first: np.ndarray, direction: np.ndarray) -> list[np.ndarray]:
+    step = _STEP_SHARE * surface.size_m
+    found = [first]
+    while len(found) < 60:
+        here = found[-1]
+        if len(found) > 3:
+            along = here[:3] - found[-4][:3]
+            direction = along / np.linalg.norm(along)
+        radius = float(np.median([each[3] for each in found]))
+        ahead = _slice(surface, here[:3] + step * direction, direction, 2.2 * radius + surface.spacing_m)
+        if ahead is None or not _THINNER * radius < ahead[3] < _WIDER * radius:
+            break
+        if (ahead[:3] - here[:3]) @ direction < 0.3 * step:
+            break
+        found.append(ahead)
+    return found[1:]
+
+
+def _slice(surface: FramedMesh, center: np.ndarray, direction: np.ndarray, reach_m: float) -> np.ndarray | None:
+    """Return the middle of a slice across a direction and its radius ``(4,)``; None where hardly anything is there."""
+    positions, _ = surface.samples
+    half = max(_STEP_SHARE * surface.size_m, 1.2 * surface.spacing_m) / 2
+    around = surface.near(center, float(np.hypot(reach_m, half)))
+    offset = positions[around] - center
+    inside = offset[np.abs(offset @ direction) < half]
+    if len(inside) < _LEAST_SAMPLES:
+        return None
+    basis = rotation_of(direction)
+    flat = inside @ basis[:, :2]
+    middle = (flat.min(0) + flat.max(0)) / 2
+    radius = float(np.linalg.norm(flat - middle, axis=1).max())
+    return np.concatenate([center + basis[:, :2] @ middle, [radius]])
+
+
+def _line(surface: FramedMesh, slices: np.ndarray) -> Found:
+    middles = slices[:, :3]
+    mean = middles.mean(0)
+    _, _, vectors = np.linalg.svd(middles - mean, full_matrices=False)
+    direction = vectors[0]
+    along = (middles - mean) @ direction
+    length = float(np.ptp(along)) + _STEP_SHARE * surface.size_m
+    off = np.linalg.norm(middles - mean - along[:, None] * direction, axis=1)
+    width = 2 * float(np.median(slices[:, 3]))
+    if length < _SLENDER * width:
+        return Unclear("what is around the point is about as wide as long")
+    if off.max() > _BENT_SHARE * length:
+        return Unclear("the part at the point is bent: it has no straight axis")
+    middle = mean + direction * (along.min() + along.max()) / 2
+    bulk = surface.mesh.bounds.mean(0) + surface.center_of_mass_m - 2 * middle
+    z = direction if bulk @ direction > 0 else -direction
+    return FeatureFrame("axis", middle, rotation_of(z, UP), length, True)

@@ -1,0 +1,142 @@
+"""Faces, buttons and places of the surface as frames."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
+from manitwin.geometry.frames.patch import Patch, flat_patch
+
+_ANGLE_RAD = np.radians(20.0)  # of the patch's normal: a scanned mallet's face, flat to 0.9 mm, is within that
+_SLAB_SHARE, _LEAST_SLAB_M = 0.012, 0.0008  # of the longest side: half of a patch's thickness
+_SEARCH_SHARE = 0.12  # of the longest side: a candidate for a face may lie on the side next to it, at its border
+_ROUGH_SHARE = 0.12  # RMS distance from the plane by the patch's radius: a ball's cap is rounder
+_LEAST_RADIUS_SHARE = 0.012  # of the longest side: a smaller flat is a facet of something round
+_OBLONG = 1.15  # longer by shorter side from which a face's roll is not free
+_RAISED_M = 0.0002  # a button stands out, or lies deeper, by more
+_END_ON = 1.1  # matter behind an end by the end's width
+_BUTTON_SEARCH = 0.05  # of the longest side
+_BUTTON_SHARE = 0.3  # of the longest side: a larger radius is a face
+
+
+def face_frame(
+    surface: FramedMesh,
+    point_m: np.ndarray,
+    normal: np.ndarray,
+    towards: np.ndarray | None = None,
+    end_on: bool = False,
+) -> Found:
+    """Return the flat face that a surface point with a normal ``(3,)`` is on or beside: centre, Z out, radius.
+
+    ``towards (3,)`` is the direction that the face must look in (within 45 degrees) where the word for it says so. ``end_on``:
+    it is the end of something, with more matter behind it than it is wide, as a hammer's face is and its cheeks are not.
+    """
+    found = [p for p in _patches(surface, point_m, normal, towards, _SEARCH_SHARE) if _is_face(surface, p)]
+    if end_on:
+        found = [patch for patch in found if _depth(surface, patch) > _END_ON]
+    if not found:
+        return Unclear("no flat end is where the point is" if end_on else "nothing flat is where the point is")
+    if end_on:
+        best = max(found, key=lambda patch: _depth(surface, patch) - _away(patch, surface, point_m) / _radius(patch))
+    else:
+        best = max(found, key=lambda patch: _fit(surface, patch, point_m, normal if towards is None else towards))
+    oblong = best.elongation > _OBLONG
+    x = best.long_axis * (1 if best.long_axis @ np.array([1.0, 0.1, 0.01]) > 0 else -1) if oblong else UP
+    return FeatureFrame("face", best.center_m, rotation_of(best.normal, x), _radius(best), not oblong)
+
+
+def button_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
+    """Return the top of the button that a surface point is on: a small patch that stands out of what is around it."""
+    found = [patch for patch in _patches(surface, point_m, normal, None, _BUTTON_SEARCH) if _is_button(surface, patch)]
+    if not found:
+        return Unclear("no small patch stands out of what is around it")
+    best = max(found, key=lambda patch: _fit(surface, patch, point_m, normal))
+    x = best.long_axis if best.elongation > _OBLONG else UP
+    return FeatureFrame("button", best.center_m, rotation_of(best.normal, x), _radius(best), best.elongation <= _OBLONG)
+
+
+def surface_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
+    """Return a place of the surface: the point itself, Z the mean normal around it, the radius of what is flat there."""
+    positions, normals = surface.samples
+    reach = max(0.02 * surface.size_m, 2.5 * surface.spacing_m)
+    around = surface.near(point_m, reach)
+    same = around[normals[around] @ normal > 0]
+    mean = normals[same].mean(0) if len(same) else normal
+    if np.linalg.norm(mean) < 0.85 or mean @ normal < 0.7 * np.linalg.norm(mean):
+        return Unclear("the surface turns too sharply where the point is")
+    z = mean / np.linalg.norm(mean)
+    near = surface.near(point_m, 0.25 * surface.size_m)
+    near = near[np.argsort(np.linalg.norm(positions[near] - point_m, axis=1), kind="stable")]
+    side = near[normals[near] @ z > 0]
+    off = np.abs((positions[side] - point_m) @ z) > max(_LEAST_SLAB_M, 0.1 * reach)
+    turned = normals[side] @ z < np.cos(_ANGLE_RAD)
+    bent = np.flatnonzero(off | turned)
+    last = side[bent[0]] if len(bent) else (side[-1] if len(side) else None)
+    radius = reach if last is None else float(np.linalg.norm(positions[last] - point_m))
+    return FeatureFrame("surface", point_m, rotation_of(z), max(radius, 0.002 * surface.size_m), True)
+
+
+def _patches(
+    surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, towards: np.ndarray | None, share: float
+) -> list[Patch]:
+    """Return the flat patches that begin at samples around a point, one a direction."""
+    positions, normals = surface.samples
+    thick = max(_LEAST_SLAB_M, _SLAB_SHARE * surface.size_m)
+    seeds: list[tuple[np.ndarray, np.ndarray]] = [(point_m, normal)]
+    around = surface.near(point_m, share * surface.size_m)
+    around = around[np.argsort(np.linalg.norm(positions[around] - point_m, axis=1), kind="stable")]
+    while len(around):
+        seeds.append((positions[around[0]], normals[around[0]]))
+        around = around[normals[around] @ normals[around[0]] < np.cos(2 * _ANGLE_RAD)]
+    if towards is not None:
+        seeds = [(p, n) for p, n in seeds if n @ towards > np.cos(np.pi / 4)]
+    grown = (flat_patch(surface, p, n, angle_rad=_ANGLE_RAD, thick_m=thick) for p, n in seeds[:9])
+    return [patch for patch in grown if patch is not None]
+
+
+def _is_face(surface: FramedMesh, patch: Patch) -> bool:
+    return _radius(patch) > _LEAST_RADIUS_SHARE * surface.size_m and _rough(patch) < _ROUGH_SHARE
+
+
+def _radius(patch: Patch) -> float:
+    return float(np.sqrt(patch.area_m2 / np.pi))
+
+
+def _rough(patch: Patch) -> float:
+    return patch.rough_m / max(_radius(patch), 1e-9)
+
+
+def _is_button(surface: FramedMesh, patch: Patch) -> bool:
+    small = _LEAST_RADIUS_SHARE / 3 * surface.size_m < _radius(patch) < _BUTTON_SHARE * surface.size_m
+    return small and _rough(patch) < _ROUGH_SHARE and _stands_out(surface, patch)
+
+
+def _depth(surface: FramedMesh, patch: Patch) -> float:
+    """Return how much matter is behind a patch by its width."""
+    deep, _ = surface.caster.first_hits((patch.center_m - 1e-5 * patch.normal)[None], -patch.normal[None])
+    return float(deep[0]) / (2 * _radius(patch)) if np.isfinite(deep[0]) else 0.0
+
+
+def _away(patch: Patch, surface: FramedMesh, point_m: np.ndarray) -> float:
+    corners = surface.mesh.triangles[patch.faces].reshape(-1, 3)
+    return float(np.linalg.norm(np.concatenate([corners, patch.center_m[None]]) - point_m, axis=1).min())
+
+
+def _fit(surface: FramedMesh, patch: Patch, point_m: np.ndarray, wanted: np.ndarray) -> float:
+    """Score a patch: it looks where it should, is flat, and is near."""
+    away = _away(patch, surface, point_m) / (0.5 * _SEARCH_SHARE * surface.size_m)
+    return float(patch.normal @ wanted) - away - 2 * _rough(patch)
+
+
+def _stands_out(surface: FramedMesh, patch: Patch) -> bool:
+    """Tell whether the surface just around a patch lies below its plane, on most sides."""
+    positions, _ = surface.samples
+    radius = _radius(patch)
+    around = surface.near(patch.center_m, 2.2 * radius + 2 * surface.spacing_m)
+    offset = positions[around] - patch.center_m
+    height = offset @ patch.normal
+    across = np.linalg.norm(offset - height[:, None] * patch.normal, axis=1)
+    ring = (across > 1.05 * radius * max(1.0, np.sqrt(patch.elongation))) & (height > -2 * radius)
+    if ring.sum() < 6:
+        return True
+    return bool(np.mean(height[ring] < -_RAISED_M) > 0.8)

@@ -1,0 +1,47 @@
+"""The frame of the feature that a point and its label mean."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.geometry.frames.axis import axis_frame
+from manitwin.geometry.frames.edge import edge_frame
+from manitwin.geometry.frames.face import button_frame, face_frame, surface_frame
+from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Kind, Unclear
+from manitwin.geometry.frames.hole import hole_frame
+from manitwin.geometry.frames.opening import opening_frame
+from manitwin.geometry.frames.tip import tip_frame
+from manitwin.geometry.frames.words import direction_for, is_end, kinds_for
+
+
+def find_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label: str) -> Found:
+    """Return the frame of the feature at a surface point with an outward normal ``(3,)``, of a kind that fits its label.
+
+    The kinds that fit are tried in their order. Where none is clear, the reason of the first is returned: the frame of a
+    feature is never replaced by that of another one.
+    """
+    reasons = []
+    for kind in kinds_for(label):
+        found = _of_kind(surface, point_m, normal, label, kind)
+        if isinstance(found, FeatureFrame):
+            return found
+        reasons.append(f"{kind}: {found.reason}")
+    return Unclear("; ".join(reasons[:2]))
+
+
+def _of_kind(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label: str, kind: Kind) -> Found:
+    if kind == "face":
+        return face_frame(surface, point_m, normal, direction_for(label), is_end(label))
+    if kind == "opening":
+        return opening_frame(surface, point_m)
+    return _BY_PLACE[kind](surface, point_m, normal)
+
+
+_BY_PLACE = {
+    "tip": tip_frame,
+    "edge": edge_frame,
+    "hole": hole_frame,
+    "axis": axis_frame,
+    "button": button_frame,
+    "surface": surface_frame,
+}

@@ -1,0 +1,170 @@
+"""Holes: a bore, a ring, a handle's loop, by the walls that look at its axis."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Unclear, rotation_of
+
+_TURNS = 48  # rays around the axis
+_CLOSED_SHARE = 0.9  # of them must meet a wall: else it is a notch or a jaw
+_ROUNDS = 6
+_EVEN = 4.5  # the wall's far parts by its near ones: a loop or a slot may be oblong
+_SLOT = 0.9  # of the largest circle's radius: as much room as the middle of a slot must have
+_LEAST_RADIUS_M = 0.0008
+_FAR = 0.6  # of the longest side: walls beyond are not a hole's
+
+
+def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
+    """Return the hole whose wall or rim a surface point is on: its axis by the walls' normals, the inscribed circle's radius.
+
+    A through hole's frame is in its middle, Z towards the side that looks up or along +X; a blind one's at its mouth, Z out.
+    X leads to the centre of mass. The axis is the direction across the normals of the walls that are seen from inside: exact
+    for a cylinder and for a torus.
+    """
+    best: tuple[float, np.ndarray, np.ndarray, float] | None = None
+    for center, axis in _starts(surface, point_m, normal):
+        fitted = _fitted(surface, center, axis)
+        if fitted is None:
+            continue
+        center, axis, radius = fitted
+        beside = float(np.linalg.norm(np.cross(point_m - center, axis)))
+        score = abs(beside - radius) / radius
+        if beside < 4.0 * radius + 0.02 * surface.size_m and (best is None or score < best[0]):
+            best = (score, center, axis, radius)
+    if best is None:
+        return Unclear("no wall around the point closes to a hole")
+    return _framed(surface, *best[1:])
+
+
+def _starts(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return centres and axes to begin with: midway to walls opposite, from the point and from samples around it."""
+    positions, normals = surface.samples
+    starts = []
+    around = surface.near(point_m, 0.12 * surface.size_m)
+    order = np.argsort(np.linalg.norm(positions[around] - point_m, axis=1), kind="stable")
+    alike = around[normals[around] @ normal > 0.5]  # a ring's wall is round across too: its mean looks at the axis
+    mean = normals[alike].mean(0) if len(alike) else normal
+    seeds = np.concatenate([point_m[None], point_m[None], positions[around[order][:: max(1, len(order) // 40)]]])
+    outward = np.concatenate(
+        [normal[None], mean[None] / np.linalg.norm(mean), normals[around[order][:: max(1, len(order) // 40)]]]
+    )
+    distance, face = surface.caster.first_hits(seeds + 1e-5 * outward, outward)
+    for seed, out, far, hit in zip(seeds, outward, distance, face, strict=True):
+        if hit < 0 or far > surface.size_m or surface.caster.face_normals[hit] @ out > -0.3:
+            continue
+        center = seed + out * far / 2
+        axis = _open_axis(surface, center, out)
+        if axis is not None:
+            starts.append((center, axis))
+    return starts
+
+
+def _open_axis(surface: FramedMesh, center: np.ndarray, across: np.ndarray) -> np.ndarray | None:
+    """Return the direction across ``across`` in which one looks farthest to both sides, None where nothing is open."""
+    basis = rotation_of(across)
+    angle = np.arange(12) * np.pi / 12
+    around = np.cos(angle)[:, None] * basis[:, 0] + np.sin(angle)[:, None] * basis[:, 1]
+    ahead, _ = surface.caster.first_hits(np.repeat(center[None], 12, 0), around)
+    behind, _ = surface.caster.first_hits(np.repeat(center[None], 12, 0), -around)
+    open_ends = np.isinf(ahead).astype(int) + np.isinf(behind)
+    if not open_ends.any():
+        return None
+    many = np.flatnonzero(open_ends == open_ends.max())
+    span = np.minimum(ahead, surface.size_m) + np.minimum(behind, surface.size_m)
+    if len(many) == len(angle):
+        return None
+    gap = many[int(len(many) / 2)] if np.ptp(many) < 11 else many[int(span[many].argmax())]
+    return np.asarray(around[gap])
+
+
+def _fitted(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """Return centre, axis and inscribed radius of the hole around a start, None where its walls do not close."""
+    for _ in range(_ROUNDS):
+        walls, normals, closed = _walls(surface, center, axis)
+        if closed < _CLOSED_SHARE:
+            return None
+        values, vectors = np.linalg.eigh(normals.T @ normals / len(normals))
+        if values[0] > 0.3 * values[1]:
+            return None
+        turned = vectors[:, 0] * np.sign(vectors[:, 0] @ axis or 1.0)
+        if turned @ axis < np.cos(np.radians(50)):
+            return None
+        axis = turned
+        flat = (walls - center) - ((walls - center) @ axis)[:, None] * axis
+        shift = _widest(flat, axis)
+        center = center + shift
+        if np.linalg.norm(shift) < 1e-5:
+            break
+    walls, _, closed = _walls(surface, center, axis)
+    if closed < _CLOSED_SHARE:
+        return None
+    flat = np.linalg.norm((walls - center) - ((walls - center) @ axis)[:, None] * axis, axis=1)
+    radius = float(flat.min())
+    if radius < _LEAST_RADIUS_M or np.quantile(flat, 0.9) > _EVEN * np.quantile(flat, 0.1):
+        return None
+    return center, axis, radius
+
+
+def _walls(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return what rays around an axis meet: places, the walls' normals, and the share of rays that meet a wall nearby."""
+    basis = rotation_of(axis)
+    angle = np.arange(_TURNS) * 2 * np.pi / _TURNS
+    out = np.cos(angle)[:, None] * basis[:, 0] + np.sin(angle)[:, None] * basis[:, 1]
+    distance, face = surface.caster.first_hits(np.repeat(center[None], _TURNS, 0), out)
+    facing = np.einsum("ij,ij->i", surface.caster.face_normals[face], out) < 0
+    met = (face >= 0) & (distance < _FAR * surface.size_m) & facing
+    return center + out[met] * distance[met, None], surface.caster.face_normals[face[met]], float(met.mean())
+
+
+def _widest(flat: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Return the step ``(3,)`` from the origin to the centre of the largest circle within walls ``(N, 3)``.
+
+    Of a slot, in which that circle may slide, to the middle of its box.
+    """
+    basis = rotation_of(axis)
+    points = flat @ basis[:, :2]
+    best, reach = np.zeros(2), float(np.linalg.norm(points, axis=1).min())
+    angle = np.arange(8) * np.pi / 4
+    ring = np.concatenate([np.zeros((1, 2)), np.stack([np.cos(angle), np.sin(angle)], axis=1)])
+    for _ in range(14):  # coarse to fine
+        tried = best + reach * 0.5 * ring
+        room = np.linalg.norm(points[None] - tried[:, None], axis=2).min(1)
+        best = tried[int(room.argmax())]
+        reach *= 0.7
+    middle = np.array(cv2.minAreaRect(points.astype(np.float32))[0])
+    rooms = [float(np.linalg.norm(points - each, axis=1).min()) for each in (best, middle)]
+    return np.asarray(basis[:, :2] @ (middle if rooms[1] > _SLOT * rooms[0] else best))
+
+
+def _framed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: float) -> Found:
+    """Place a hole's frame in its middle, or at its mouth where one end is closed."""
+    both = np.stack([axis, -axis])
+    ring = rotation_of(axis)
+    angle = np.arange(8) * np.pi / 4
+    spokes = np.cos(angle)[:, None] * ring[:, 0] + np.sin(angle)[:, None] * ring[:, 1]
+    from_m = center + 0.4 * radius * np.concatenate([np.zeros((1, 3)), spokes])
+    ends = [surface.caster.first_hits(from_m, np.repeat(d[None], 9, 0))[0] for d in both]
+    closed = [bool(np.mean(np.isfinite(end)) > 0.7) for end in ends]
+    if all(closed):
+        return Unclear("the hollow at the point has no mouth")
+    reach = [_mouth_m(surface, center, d, radius) for d in both]
+    if any(closed):
+        out = 1 if closed[0] else 0
+        position, z = center + both[out] * reach[out], both[out]
+    else:
+        z = axis if axis @ np.array([0.1, -0.01, 1.0]) > 0 else -axis
+        position = center + axis * (reach[0] - reach[1]) / 2
+    return FeatureFrame("hole", position, rotation_of(z, surface.center_of_mass_m - position), radius, False)
+
+
+def _mouth_m(surface: FramedMesh, center: np.ndarray, direction: np.ndarray, radius: float) -> float:
+    """Return how far along a direction the walls still close, by halving."""
+    low, high = 0.0, surface.size_m
+    for _ in range(12):
+        middle = (low + high) / 2
+        walls, _, closed = _walls(surface, center + middle * direction, direction)
+        near = np.linalg.norm(walls - center - middle * direction, axis=1) < 3.0 * radius + 1e-3
+        low, high = (middle, high) if closed * near.sum() > 0.6 * len(walls) > 0 else (low, middle)
+    return low

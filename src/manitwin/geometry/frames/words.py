@@ -1,0 +1,50 @@
+"""Which kinds of frame the word for a place may have: 'rim' an opening, 'blade' an edge."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from manitwin.geometry.frames.feature import Kind
+
+_KINDS: tuple[tuple[str, tuple[Kind, ...]], ...] = (
+    (r"button|switch|trigger|\bkeys?\b|knob|dial|wheel|space bar|pump head|pushbutton|lever|bump", ("button", "surface")),
+    (r"spout|nozzle|\bnose\b|tip\b|tips\b|\bpoint\b|tines?|prongs?|claw|wick|pole\b|plug|\bend\b|corner|needle|bit\b", ("tip",)),
+    (r"finger|\bhole|holes\b|\bbore\b|\bcore\b|socket|keyhole|\beye\b|\bring\b|\bloops?\b|\bbow\b|inner side", ("hole",)),
+    (r"opening|mouth|\brim\b|inside|interior|cavity|hollow|basin|pour|\blip\b|outlet", ("opening",)),
+    (r"edge|blade|teeth|cutter|serration", ("edge",)),
+    (
+        r"striking|face\b|base\b|bottom|underside|\bfoot\b|sole|screen|display|lens|cover|panel|front|back\b|\btop\b"
+        r"|surface|flat|label|scourer|scouring|glass|cone\b|spine|picture|mirror|anvil",
+        ("face", "surface"),
+    ),
+    (r"jaws?\b|bristles|wires", ("tip", "face", "surface")),
+    (r"bowl|scoop|cup\b", ("opening", "surface")),
+    (r"handle|grip|shaft|stem|barrel|shank|\brod\b|stick|temple|\barm\b|\bneck\b", ("axis", "hole", "surface")),
+)  # fmt: skip
+_UNSAID: tuple[Kind, ...] = ("surface",)
+_DOWN = re.compile(r"base\b|bottom|underside|\bfoot\b|sole", re.IGNORECASE)
+_END_ON = re.compile(r"striking|strike|hit|pound", re.IGNORECASE)
+_UPWARD = re.compile(r"\btop\b|upper", re.IGNORECASE)
+
+
+def kinds_for(label: str) -> tuple[Kind, ...]:
+    """Return the kinds of frame that fit a label, the likeliest first; a place of the surface for words that say none."""
+    text = label.lower()
+    for pattern, kinds in _KINDS:
+        if re.search(pattern, text):
+            return kinds
+    return _UNSAID
+
+
+def direction_for(label: str) -> np.ndarray | None:
+    """Return the direction ``(3,)`` in which a face of that name looks in the upright pose, None where the word says none."""
+    if _DOWN.search(label):
+        return np.array([0.0, 0.0, -1.0])
+    return np.array([0.0, 0.0, 1.0]) if _UPWARD.search(label) else None
+
+
+def is_end(label: str) -> bool:
+    """Tell whether a face of that name is the end of something, as a striking face is that of a head."""
+    return _END_ON.search(label) is not None
