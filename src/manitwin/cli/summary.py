@@ -10,6 +10,7 @@ from manitwin.cli.console import shown_text
 from manitwin.pipeline.quality import rehearsed_words
 from manitwin.twin.grasp_summary import GraspSummary, OtherGripper, SecondOpinion
 from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.point_records import FunctionalPoint
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.record_values import Estimate
 from manitwin.twin.resting import RestingPose, resting_poses
@@ -67,12 +68,21 @@ def _rows(record: TwinRecord) -> list[tuple[str, str]]:
         )
         rows += [("repair", repair) for repair in record.mesh.repairs]
     if record.points is not None:
-        rows += [(f"point {p.id}", f"{p.label}: {p.description}") for p in record.points.functional]
+        rows += [(f"point {p.id}", f"{p.label}: {p.description}; {_frame_words(p)}") for p in record.points.functional]
         rows += [(f"point {p.id}", f"{p.type}: {p.scenario}") for p in record.points.grasp]
     if record.grasps is not None:
         rows += _grasp_rows(record.grasps)
     poses = resting_poses(record.placements or [])
     return rows + [("rests" if pose.placement.settled else "did not settle", _resting(pose)) for pose in poses]
+
+
+def _frame_words(point: FunctionalPoint) -> str:
+    """Say what a point's frame is of: 'opening of 41 mm radius', 'edge of 92 mm'."""
+    frame = point.frame
+    if frame is None:
+        return "no frame"
+    of = "" if frame.kind in ("edge", "axis") else " radius"
+    return f"{frame.kind} of {1000 * frame.size_m:.0f} mm{of} ({frame.source})"
 
 
 def _resting(pose: RestingPose) -> str:

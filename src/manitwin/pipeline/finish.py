@@ -30,10 +30,10 @@ class FinishStage:
     gripper: Gripper
 
     name: ClassVar[str] = "finish"
-    version: ClassVar[str] = "5"
+    version: ClassVar[str] = "6"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb", "solid.npz", "hulls.npz", "grasps.parquet", "photo.png?", "matte?", "naming?", "generation?", "geometry",
-        "gate", "physical", "size", "collision", "language", "points", "grasps", "placements",
+        "gate", "physical", "size", "collision", "language", "points", "frames_missing", "grasps", "placements",
     )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = ("card.png", "quality")
     needs: ClassVar[Resource] = "cpu"
@@ -74,13 +74,20 @@ class FinishStage:
 
 def _card_points(points: dict[str, Any]) -> list[CardPoint]:
     functional = [
-        CardPoint(np.array(p["position_m"]), np.array(p["normal"]), p["label"], True) for p in points["functional"]
+        CardPoint(np.array(p["position_m"]), np.array(p["normal"]), p["label"], True, _frame_to_object(p["frame"]))
+        for p in points["functional"]
     ]
     grasp = [
         CardPoint(np.array(p["position_m"]), np.array(p["normal"]), p["type"].replace("_", " "), False)
         for p in points["grasp"]
     ]
     return functional + grasp
+
+
+def _frame_to_object(frame: dict[str, Any] | None) -> np.ndarray | None:
+    if frame is None:
+        return None
+    return transform(rotation_from_quaternion_wxyz(np.array(frame["quaternion_wxyz"])), np.array(frame["position_m"]))
 
 
 def card_text(draft: Draft[Item]) -> CardText:

@@ -11,6 +11,7 @@ from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints
+from manitwin.pipeline.frames import with_frames
 from manitwin.pipeline.object_state import findings_of, pictures, read_subject
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint
@@ -20,15 +21,18 @@ FUNCTIONAL, GRASP = (2, 4), (2, 3)
 
 
 class PointsStage:
-    """Ask the annotator for points, and see that each is one of the candidates."""
+    """Ask the annotator for points, see that each is one of the candidates, and give the functional ones their frames.
+
+    ``frames_missing`` says of each functional point without a frame why it has none.
+    """
 
     name: ClassVar[str] = "points"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "language", "candidates", "visible_candidates",
         "cameras", "geometry?", "naming?",
     )  # fmt: skip
-    writes: ClassVar[tuple[str, ...]] = ("points", "points_findings")
+    writes: ClassVar[tuple[str, ...]] = ("points", "points_findings", "frames_missing")
 
     settings = NO_SETTINGS
 
@@ -56,12 +60,16 @@ class PointsStage:
         )
         selected = self._annotator.select_points(request)
         check_selection(selected, request.positions_m)
+        functional, missing = with_frames(
+            selected.functional, request.subject.solid, request.center_of_mass_m, request.subject.seed
+        )
         return {
             "points": {
-                "functional": [point.model_dump() for point in selected.functional],
+                "functional": [point.model_dump() for point in functional],
                 "grasp": [point.model_dump() for point in selected.grasp],
             },
             "points_findings": findings_of(selected),
+            "frames_missing": missing,
         }
 
 

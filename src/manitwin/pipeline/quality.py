@@ -63,7 +63,7 @@ def quality_checks(draft: Draft) -> list[dict[str, Any]]:
             message="; ".join(findings),
         )
     )
-    for checks_of in (_physical_checks, _examined, _collision_checks, _grasp_checks, _placement_checks):
+    for checks_of in (_physical_checks, _examined, _frame_checks, _collision_checks, _grasp_checks, _placement_checks):
         checks += checks_of(draft)
     return [check.model_dump() for check in checks]
 
@@ -214,6 +214,14 @@ def _examined(draft: Draft) -> list[Check]:
                 Check(name=name, passed=not findings, value=float(len(findings)), message="; ".join(findings))
             )
     return checks
+
+
+def _frame_checks(draft: Draft) -> list[Check]:
+    """Return which functional points have no frame, and why."""
+    missing = draft.field("frames_missing")
+    framed = sum(point["frame"] is not None for point in draft.field("points")["functional"])
+    message = "; ".join(missing)
+    return [Check(name="functional_frames", passed=not missing, value=float(framed), message=message)]
 
 
 def _collision_checks(draft: Draft) -> list[Check]:

@@ -14,7 +14,7 @@ from manitwin.geometry.hulls.reduction import convex_corners, hull_mesh
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.render.cameras import Camera, framing_camera, project, silhouette_area_px
-from manitwin.render.markers import draw_markers
+from manitwin.render.markers import draw_frames, draw_markers
 from manitwin.render.overlays import ground_shadow, visible_edges
 from manitwin.render.raycast import cast_camera, merged, visible_points
 from manitwin.render.renderer import BACKDROP, shared_renderer
@@ -30,6 +30,7 @@ HULL_COLORS = (
     (252, 205, 229), (255, 237, 111), (188, 128, 189), (204, 235, 197), (217, 217, 217), (255, 255, 179),
 )  # fmt: skip
 DRAWN_GRASPS = 12
+FRAME_SHARE = 0.16  # of the longest side: the length of a drawn frame's Z
 
 Boxes = Sequence[tuple[np.ndarray, np.ndarray]]
 """``(box_to_gripper (4, 4), half_extents_m (3,))`` of each box of palm and fingers, grasp frame: +Z approach, X
@@ -43,12 +44,16 @@ STEM_SHARE = 0.5  # the stem's length, in that of the fingers
 
 @dataclass(frozen=True)
 class CardPoint:
-    """A functional or grasp point: its place and outward normal in the object frame, and what to write beside it."""
+    """A functional or grasp point: its place and outward normal in the object frame, and what to write beside it.
+
+    ``frame_to_object (4, 4)`` is the functional point's frame, of which Z and X are drawn; None: it has none.
+    """
 
     position_m: np.ndarray
     normal: np.ndarray
     label: str
     functional: bool
+    frame_to_object: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -101,6 +106,8 @@ def grasp_panel(
     shown = [point for point, visible in zip(points, seen, strict=True) if visible]
     pixels, _ = project(np.array([point.position_m for point in shown]).reshape(-1, 3), camera)
     colors = [FUNCTIONAL if point.functional else GRASP for point in shown]
+    frames = [point.frame_to_object for point in points if point.frame_to_object is not None]
+    picture = draw_frames(picture, frames, camera, FRAME_SHARE * float(mesh.extents.max()))
     return draw_markers(
         picture, pixels, [point.label for point in shown], colors=colors, font_px=max(10, hero.height_px // 27)
     )

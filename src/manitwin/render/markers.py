@@ -9,10 +9,13 @@ import cv2
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from manitwin.render.cameras import Camera, project
+
 Font = ImageFont.FreeTypeFont | ImageFont.ImageFont
 DOT = (226, 26, 92)
 INK = (18, 22, 30)
 PAPER = (255, 255, 255)
+X_AXIS, Z_AXIS = (214, 48, 49), (30, 80, 220)
 DIRECTIONS = 16
 RINGS = (1.0, 1.35, 1.8, 2.4, 3.2, 4.2)  # how far a number may move from its dot, in heights of the number's box
 _SUBPIXEL = 4  # bits: OpenCV draws at sixteenths of a pixel
@@ -51,6 +54,25 @@ def draw_markers(
         draw.rounded_rectangle((*low, *(low + extent - 1)), radius=font_px / 4, fill=fill, outline=PAPER)
         draw.text(tuple(low + extent / 2), label, fill=PAPER, font=font_of(font_px), anchor="mm")
     return np.asarray(image)
+
+
+def draw_frames(
+    picture: np.ndarray, frames_to_object: Sequence[np.ndarray], camera: Camera, length_m: float
+) -> np.ndarray:
+    """Draw the Z (blue, ``length_m`` long) and X (red, half of it) of frames ``(4, 4)`` over a picture, seen through matter."""
+    canvas = picture.copy()
+    for frame in frames_to_object:
+        for axis, share, color in ((0, 0.5, X_AXIS), (2, 1.0, Z_AXIS)):
+            ends = frame[:3, 3] + np.outer([0.0, share * length_m], frame[:3, axis])
+            start, tip = project(ends, camera)[0]
+            for shade, width in ((PAPER, 5), (color, 3)):
+                cv2.arrowedLine(canvas, _whole(start), _whole(tip), shade, width, cv2.LINE_AA, tipLength=0.25)
+    return canvas
+
+
+def _whole(pixel: np.ndarray) -> tuple[int, int]:
+    column, row = np.clip(np.rint(pixel), -10_000, 10_000)
+    return int(column), int(row)
 
 
 def font_px(height_px: int) -> int:

@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.printable import printable_line
+from manitwin.twin.point_records import FunctionalFrame
 from manitwin.twin.record_values import Finite, Matrix3, Matrix4, Record, Vector3
 
 IMPORT_RECORD, IMPORTED_MESH = "import.json", "asset.glb"
@@ -28,6 +29,7 @@ class GivenPoint(Record):
     """An annotated point: where, which way is out of the object (None: unsaid), what it is for.
 
     For a place to hold, ``position_m`` is between the fingertips, and ``approach`` and ``closing`` are unit vectors.
+    ``frame`` is the functional frame where whoever made the thing knows it.
     """
 
     position_m: Vector3
@@ -35,6 +37,7 @@ class GivenPoint(Record):
     label: str = ""
     approach: Vector3 | None = None
     closing: Vector3 | None = None
+    frame: FunctionalFrame | None = None
 
 
 class GivenGrasps(Record):
@@ -124,7 +127,12 @@ class ImportRecord(Record):
         return self.model_copy(
             update={
                 name: [
-                    point.model_copy(update={"position_m": (factor * np.array(point.position_m)).tolist()})
+                    point.model_copy(
+                        update={
+                            "position_m": (factor * np.array(point.position_m)).tolist(),
+                            "frame": None if point.frame is None else point.frame.scaled(factor),
+                        }
+                    )
                     for point in getattr(self, name)
                 ]
                 for name in ("functional_points", "grasp_points")
@@ -138,7 +146,8 @@ def _moved(point: GivenPoint, transform: np.ndarray) -> GivenPoint:
         for name in ("normal", "approach", "closing")
     }
     position = transform[:3, :3] @ point.position_m + transform[:3, 3]
-    return point.model_copy(update={"position_m": position.tolist(), **directions})
+    frame = None if point.frame is None else point.frame.moved(transform)
+    return point.model_copy(update={"position_m": position.tolist(), "frame": frame, **directions})
 
 
 def is_imported(folder: Path) -> bool:

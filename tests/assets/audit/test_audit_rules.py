@@ -177,7 +177,7 @@ BROKEN: dict[str, Break] = {
     "TEX002": lambda a: replace(a, visual=(textured(solid(), 500, 300),)),
 }
 
-ON_DISK = {"FIL001", "FIL003", "FIL004", "FIL008", "TWN001", "TWN002", "TWN003"}
+ON_DISK = {"FIL001", "FIL003", "FIL004", "FIL008", "TWN001", "TWN002", "TWN003", "TWN004", "TWN005"}
 """Tested below, with files."""
 
 
@@ -263,3 +263,29 @@ def test_twin_whose_parts_have_other_faces_than_the_record_says(tmp_path: Path) 
         record.pop("revision", None)
         seal(folder, {**record, "parts": [part | {"faces": faces}]})
         assert errors(audit_path(folder, RULES).findings) == found
+
+
+def test_twin_whose_frames_are_beside_their_feature_or_of_another_kind(tmp_path: Path) -> None:
+    folder = write_twin(tmp_path)
+    record = parse_record((folder / RECORD).read_bytes()).model_dump(mode="json")
+    on_surface = np.asarray(solid().triangles_center[0])
+    frame_of = {"quaternion_wxyz": [1, 0, 0, 0], "kind": "tip", "size_m": 0.01, "free": "roll", "source": "geometry"}
+    point = {
+        "id": "f0",
+        "candidate": 0,
+        "position_m": [0, 0, 0],
+        "normal": [0, 0, 1],
+        "description": "a place",
+        "confidence": 1,
+        "rationale": "for a test",
+    }
+    for label, kind, lifted_m, found in (
+        ("tip", "tip", 0.0, set()),
+        ("tip", "tip", 0.05, {"TWN004"}),
+        ("base", "edge", 0.0, {"TWN005"}),
+    ):
+        frame = frame_of | {"kind": kind, "position_m": (on_surface + np.array([0, 0, lifted_m])).tolist()}
+        record.pop("revision", None)
+        record["points"]["functional"] = [point | {"label": label, "frame": frame}]
+        seal(folder, record)
+        assert {code for code in codes(audit_path(folder, RULES).findings) if code in ("TWN004", "TWN005")} == found

@@ -142,6 +142,13 @@ class MeasuredAsset:
         return sample_surface(self.body, SURFACE_SAMPLES, np.random.default_rng(0))[0]
 
     @cached_property
+    def spacing_m(self) -> float:
+        """How far apart neighbouring samples are in the mean."""
+        return (
+            float(np.sqrt(self.body.area / len(self.samples))) if self.body is not None and len(self.samples) else 0.0
+        )
+
+    @cached_property
     def _near(self) -> cKDTree:
         return cKDTree(self.samples)
 

@@ -122,7 +122,13 @@ def _model_data(twin: TwinContent, grasps: GraspRows) -> dict[str, Any]:
 
 
 def _functional_frame(point: FunctionalPoint) -> np.ndarray:
-    """Return a functional point's frame, Y up: its Z points out of the object, where the interaction comes from."""
+    """Return a functional point's frame, Y up: its Z points out of the object, where the interaction comes from.
+
+    It is that of the feature where the twin has one, else that of the point with its normal.
+    """
+    if point.frame is not None:
+        rotation = rotation_from_quaternion_wxyz(np.array(point.frame.quaternion_wxyz))
+        return OBJECT_TO_GLTF @ transform(rotation, np.array(point.frame.position_m))
     outward = OBJECT_TO_GLTF[:3, :3] @ np.array(point.normal)
     return transform(rotation_between(np.array([0.0, 0.0, 1.0]), outward), OBJECT_TO_GLTF[:3, :3] @ point.position_m)
 

@@ -17,6 +17,7 @@ _THIN_FACTOR = 1.6  # times the thickness at the point's own plate: more is anot
 _STRAIGHT_SHARE = 0.12  # of the length: how far an edge may be off its chord
 _CLEAR = 1.08  # the score of the best side by that of the next
 _REACH_SHARES = (
+    0.6,
     0.3,
     0.18,
     0.1,

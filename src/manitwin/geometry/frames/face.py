@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
+from manitwin.geometry.distance import closest_points_on_triangles
 from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
 from manitwin.geometry.frames.patch import Patch, flat_patch
 
 _ANGLE_RAD = np.radians(20.0)  # of the patch's normal: a scanned mallet's face, flat to 0.9 mm, is within that
 _SLAB_SHARE, _LEAST_SLAB_M = 0.012, 0.0008  # of the longest side: half of a patch's thickness
 _SEARCH_SHARE = 0.12  # of the longest side: a candidate for a face may lie on the side next to it, at its border
+_WIDE_SHARE = 0.35  # of the longest side, where the word says which side the face is on
 _ROUGH_SHARE = 0.12  # RMS distance from the plane by the patch's radius: a ball's cap is rounder
 _LEAST_RADIUS_SHARE = 0.012  # of the longest side: a smaller flat is a facet of something round
 _OBLONG = 1.15  # longer by shorter side from which a face's roll is not free
 _RAISED_M = 0.0002  # a button stands out, or lies deeper, by more
 _END_ON = 1.1  # matter behind an end by the end's width
 _BUTTON_SEARCH = 0.05  # of the longest side
+_ON_BUTTON = 0.012  # of the longest side: how far the point may be from the patch
 _BUTTON_SHARE = 0.3  # of the longest side: a larger radius is a face
 
 
@@ -31,15 +34,18 @@ def face_frame(
     ``towards (3,)`` is the direction that the face must look in (within 45 degrees) where the word for it says so. ``end_on``:
     it is the end of something, with more matter behind it than it is wide, as a hammer's face is and its cheeks are not.
     """
-    found = [p for p in _patches(surface, point_m, normal, towards, _SEARCH_SHARE) if _is_face(surface, p)]
+    share = _SEARCH_SHARE if towards is None else _WIDE_SHARE
+    found = [p for p in _patches(surface, point_m, normal, towards, share) if _is_face(surface, p)]
     if end_on:
         found = [patch for patch in found if _depth(surface, patch) > _END_ON]
     if not found:
         return Unclear("no flat end is where the point is" if end_on else "nothing flat is where the point is")
     if end_on:
         best = max(found, key=lambda patch: _depth(surface, patch) - _away(patch, surface, point_m) / _radius(patch))
+    elif towards is not None:  # the word says which side: there it is the largest, not the ring around a recess
+        best = max(found, key=lambda patch: patch.area_m2 * max(float(patch.normal @ towards), 0.0) ** 4)
     else:
-        best = max(found, key=lambda patch: _fit(surface, patch, point_m, normal if towards is None else towards))
+        best = max(found, key=lambda patch: _fit(surface, patch, point_m, normal))
     oblong = best.elongation > _OBLONG
     x = best.long_axis * (1 if best.long_axis @ np.array([1.0, 0.1, 0.01]) > 0 else -1) if oblong else UP
     return FeatureFrame("face", best.center_m, rotation_of(best.normal, x), _radius(best), not oblong)
@@ -47,7 +53,11 @@ def face_frame(
 
 def button_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
     """Return the top of the button that a surface point is on: a small patch that stands out of what is around it."""
-    found = [patch for patch in _patches(surface, point_m, normal, None, _BUTTON_SEARCH) if _is_button(surface, patch)]
+    found = [
+        patch
+        for patch in _patches(surface, point_m, normal, None, _BUTTON_SEARCH)
+        if _is_button(surface, patch) and _away(patch, surface, point_m) < _ON_BUTTON * surface.size_m
+    ]
     if not found:
         return Unclear("no small patch stands out of what is around it")
     best = max(found, key=lambda patch: _fit(surface, patch, point_m, normal))
@@ -89,9 +99,27 @@ def _patches(
         seeds.append((positions[around[0]], normals[around[0]]))
         around = around[normals[around] @ normals[around[0]] < np.cos(2 * _ANGLE_RAD)]
     if towards is not None:
-        seeds = [(p, n) for p, n in seeds if n @ towards > np.cos(np.pi / 4)]
+        seeds = _at_heights(surface, surface.near(point_m, share * surface.size_m), towards)
     grown = (flat_patch(surface, p, n, angle_rad=_ANGLE_RAD, thick_m=thick) for p, n in seeds[:9])
     return [patch for patch in grown if patch is not None]
+
+
+def _at_heights(surface: FramedMesh, around: np.ndarray, towards: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return a place and normal at each height, along a direction, at which much of the surface looks that way."""
+    positions, normals = surface.samples
+    around = around[normals[around] @ towards > np.cos(np.pi / 4)]
+    height = positions[around] @ towards
+    step = max(_LEAST_SLAB_M, _SLAB_SHARE * surface.size_m)
+    level = np.round((height.max() - height) / step).astype(int) if len(around) else np.zeros(0, dtype=int)
+    seeds = []
+    for number in np.argsort(-np.bincount(level), kind="stable")[:4] if len(level) else []:
+        mine = around[level == number]
+        if len(mine):
+            inner = mine[
+                np.linalg.norm(positions[mine] - positions[mine].mean(0), axis=1).argsort()[: len(mine) // 2 + 1]
+            ]
+            seeds.append((positions[inner[0]], normals[inner].mean(0) / np.linalg.norm(normals[inner].mean(0))))
+    return seeds
 
 
 def _is_face(surface: FramedMesh, patch: Patch) -> bool:
@@ -118,8 +146,9 @@ def _depth(surface: FramedMesh, patch: Patch) -> float:
 
 
 def _away(patch: Patch, surface: FramedMesh, point_m: np.ndarray) -> float:
-    corners = surface.mesh.triangles[patch.faces].reshape(-1, 3)
-    return float(np.linalg.norm(np.concatenate([corners, patch.center_m[None]]) - point_m, axis=1).min())
+    corners = surface.mesh.triangles[patch.faces]
+    nearest, _ = closest_points_on_triangles(np.repeat(point_m[None], len(corners), 0), corners)
+    return float(np.linalg.norm(nearest - point_m, axis=1).min())
 
 
 def _fit(surface: FramedMesh, patch: Patch, point_m: np.ndarray, wanted: np.ndarray) -> float:

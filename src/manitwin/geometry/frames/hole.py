@@ -13,6 +13,9 @@ _ROUNDS = 6
 _EVEN = 4.5  # the wall's far parts by its near ones: a loop or a slot may be oblong
 _SLOT = 0.9  # of the largest circle's radius: as much room as the middle of a slot must have
 _LEAST_RADIUS_M = 0.0008
+_SEARCH_SHARE, _SEEDS = 0.2, 60  # of the longest side around the point, and how many samples there are asked
+_LEVEL = 0.01  # by which a place must be narrower for each metre along the axis: a bore is equally narrow everywhere
+_FAN_RAD = np.radians(12)
 _FAR = 0.6  # of the longest side: walls beyond are not a hole's
 
 
@@ -41,24 +44,35 @@ def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> 
 def _starts(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return centres and axes to begin with: midway to walls opposite, from the point and from samples around it."""
     positions, normals = surface.samples
-    starts = []
-    around = surface.near(point_m, 0.12 * surface.size_m)
-    order = np.argsort(np.linalg.norm(positions[around] - point_m, axis=1), kind="stable")
-    alike = around[normals[around] @ normal > 0.5]  # a ring's wall is round across too: its mean looks at the axis
+    starts: list[tuple[np.ndarray, np.ndarray]] = []
+    around = surface.near(point_m, _SEARCH_SHARE * surface.size_m)
+    around = around[np.argsort(np.linalg.norm(positions[around] - point_m, axis=1), kind="stable")]
+    alike = around[: len(around) // 3]
+    alike = alike[normals[alike] @ normal > 0.5]  # a ring's wall is round across too: its mean looks at the axis
     mean = normals[alike].mean(0) if len(alike) else normal
-    seeds = np.concatenate([point_m[None], point_m[None], positions[around[order][:: max(1, len(order) // 40)]]])
-    outward = np.concatenate(
-        [normal[None], mean[None] / np.linalg.norm(mean), normals[around[order][:: max(1, len(order) // 40)]]]
-    )
+    spread = around[:: max(1, len(around) // _SEEDS)]
+    seeds = np.concatenate([point_m[None], point_m[None], positions[spread]])
+    outward = np.concatenate([normal[None], mean[None] / np.linalg.norm(mean), normals[spread]])
+    seeds = np.repeat(seeds, 5, axis=0)
+    outward = np.concatenate([_fan(each) for each in outward])
     distance, face = surface.caster.first_hits(seeds + 1e-5 * outward, outward)
     for seed, out, far, hit in zip(seeds, outward, distance, face, strict=True):
         if hit < 0 or far > surface.size_m or surface.caster.face_normals[hit] @ out > -0.3:
             continue
         center = seed + out * far / 2
+        if any(np.linalg.norm(center - other) < 0.2 * far for other, _ in starts):
+            continue
         axis = _open_axis(surface, center, out)
         if axis is not None:
             starts.append((center, axis))
     return starts
+
+
+def _fan(direction: np.ndarray) -> np.ndarray:
+    """Return a direction and four that are 12 degrees off it: a facet of a ring's wall looks past the wall opposite."""
+    basis = rotation_of(direction)
+    tilts = np.stack([basis[:, 0], -basis[:, 0], basis[:, 1], -basis[:, 1]])
+    return np.concatenate([basis[:, 2][None], np.cos(_FAN_RAD) * basis[:, 2] + np.sin(_FAN_RAD) * tilts])
 
 
 def _open_axis(surface: FramedMesh, center: np.ndarray, across: np.ndarray) -> np.ndarray | None:
@@ -82,7 +96,7 @@ def _open_axis(surface: FramedMesh, center: np.ndarray, across: np.ndarray) -> n
 def _fitted(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float] | None:
     """Return centre, axis and inscribed radius of the hole around a start, None where its walls do not close."""
     for _ in range(_ROUNDS):
-        walls, normals, closed = _walls(surface, center, axis)
+        walls, normals, closed = _throat(surface, center, axis)
         if closed < _CLOSED_SHARE:
             return None
         values, vectors = np.linalg.eigh(normals.T @ normals / len(normals))
@@ -93,11 +107,11 @@ def _fitted(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[
             return None
         axis = turned
         flat = (walls - center) - ((walls - center) @ axis)[:, None] * axis
-        shift = _widest(flat, axis)
+        shift = _widest(flat, axis) + float(np.median((walls - center) @ axis)) * axis
         center = center + shift
         if np.linalg.norm(shift) < 1e-5:
             break
-    walls, _, closed = _walls(surface, center, axis)
+    walls, _, closed = _throat(surface, center, axis)
     if closed < _CLOSED_SHARE:
         return None
     flat = np.linalg.norm((walls - center) - ((walls - center) @ axis)[:, None] * axis, axis=1)
@@ -107,15 +121,42 @@ def _fitted(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[
     return center, axis, radius
 
 
-def _walls(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return what rays around an axis meet: places, the walls' normals, and the share of rays that meet a wall nearby."""
+def _throat(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return the narrowest place of the walls at each turn, looked for a third of the radius up and down the axis.
+
+    There the wall of a ring, which is round across, looks at the axis as that of a bore does.
+    """
+    first, _, closed = _walls(surface, center, axis)
+    if closed < _CLOSED_SHARE:
+        return first, first, closed
+    reach = float(np.linalg.norm(first - center, axis=1).min()) / 3
+    shifts = reach * np.linspace(-1, 1, 7)
+    layers = [_rays(surface, center + shift * axis, axis) for shift in shifts]
+    distance = np.stack([np.where(met, far, np.inf) for far, _, met, _ in layers])
+    narrowest = (distance + _LEVEL * np.abs(shifts)[:, None]).argmin(0)
+    turn = np.flatnonzero(np.isfinite(distance.min(0)))
+    faces = np.stack([face for _, face, _, _ in layers])[narrowest[turn], turn]
+    places = np.stack([place for _, _, _, place in layers])[narrowest[turn], turn]
+    return places, surface.caster.face_normals[faces], len(turn) / _TURNS
+
+
+def _rays(
+    surface: FramedMesh, center: np.ndarray, axis: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return of rays around an axis the distance, the face, whether that is a wall nearby, and the place."""
     basis = rotation_of(axis)
     angle = np.arange(_TURNS) * 2 * np.pi / _TURNS
     out = np.cos(angle)[:, None] * basis[:, 0] + np.sin(angle)[:, None] * basis[:, 1]
     distance, face = surface.caster.first_hits(np.repeat(center[None], _TURNS, 0), out)
     facing = np.einsum("ij,ij->i", surface.caster.face_normals[face], out) < 0
     met = (face >= 0) & (distance < _FAR * surface.size_m) & facing
-    return center + out[met] * distance[met, None], surface.caster.face_normals[face[met]], float(met.mean())
+    return distance, face, met, center + out * np.where(met, distance, 0.0)[:, None]
+
+
+def _walls(surface: FramedMesh, center: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return what rays around an axis meet: places, the walls' normals, and the share of rays that meet a wall nearby."""
+    _, face, met, place = _rays(surface, center, axis)
+    return place[met], surface.caster.face_normals[face[met]], float(met.mean())
 
 
 def _widest(flat: np.ndarray, axis: np.ndarray) -> np.ndarray:

@@ -14,7 +14,10 @@ _HANDLE_SECTOR_RAD = np.radians(50)  # around a handle the rim is not asked: a p
 _OBLONG = 1.15  # longer by shorter width of a rim from which the roll is not free
 _MOST_TILT_RAD = np.radians(20)  # of the rim's plane from the direction in which the hollow was found
 _NEAR_RADII = 1.6  # a point this many rim radii from the middle belongs to another feature
-_OUTWARD = 1.3  # times the rim's radius: what sticks out farther below the rim is a handle or a spout
+_BESIDE, _JUMP = (
+    4,
+    1.3,
+)  # of 72 azimuths to each side: a wall this many times farther than these is a handle behind a low rim
 
 
 def opening_frame(surface: FramedMesh, point_m: np.ndarray) -> Found:
@@ -62,8 +65,10 @@ def rim_points(surface: FramedMesh, opening: Opening) -> np.ndarray:
         hit, _ = _meets(surface, opening, out, middle)
         below, over = np.where(hit, middle, below), np.where(hit, over, middle)
     _, distance = _meets(surface, opening, out, below)
-    rim = opening.center_m + below[:, None] * opening.axis + distance[:, None] * out
-    rim[~found | ~np.isfinite(distance)] = np.nan
+    around = np.stack([np.roll(distance, turn) for turn in range(-_BESIDE, _BESIDE + 1)])
+    found &= np.isfinite(distance) & (distance < _JUMP * np.median(around, axis=0))
+    rim = opening.center_m + below[:, None] * opening.axis + np.where(found, distance, 0.0)[:, None] * out
+    rim[~found] = np.nan
     return np.asarray(rim)
 
 

@@ -10,7 +10,14 @@ from scipy.sparse.csgraph import connected_components
 
 from manitwin.geometry.frames.feature import FramedMesh
 
-_ROUNDS = 4  # of fitting the plane to the patch and growing the patch again
+_WIDTHS = (
+    2.0,
+    1.5,
+    1.5,
+    1.0,
+    1.0,
+    1.0,
+)  # of slab and angle, by rounds of fitting the plane and growing the patch again
 
 
 @dataclass(frozen=True)
@@ -39,8 +46,7 @@ def flat_patch(
     """
     corners, centers, normals, areas = surface.corners
     origin, chosen = point_m, np.zeros(0, dtype=int)
-    for step in range(_ROUNDS):
-        wide = 2.0 if step == 0 else 1.0
+    for wide in _WIDTHS:
         inside = (normals @ normal > np.cos(wide * angle_rad)) & (np.abs((centers - origin) @ normal) < wide * thick_m)
         members = np.flatnonzero(inside)
         if not len(members):
@@ -72,7 +78,7 @@ def _above(surface: FramedMesh, faces: np.ndarray, point_m: np.ndarray, normal: 
     """Tell which faces a point lies above or below, seen along a normal: a large face's corners may all be far."""
     triangles = surface.mesh.triangles[faces] - point_m
     turns = np.stack([np.cross(triangles[:, i], triangles[:, (i + 1) % 3]) @ normal for i in range(3)], axis=1)
-    return (turns >= 0).all(1) | (turns <= 0).all(1)
+    return np.asarray((turns >= 0).all(1) | (turns <= 0).all(1))
 
 
 def _measured(surface: FramedMesh, faces: np.ndarray, normal: np.ndarray, center_m: np.ndarray) -> Patch:

@@ -10,6 +10,7 @@ from manitwin.geometry.frames.feature import Kind
 
 _KINDS: tuple[tuple[str, tuple[Kind, ...]], ...] = (
     (r"button|switch|trigger|\bkeys?\b|knob|dial|wheel|space bar|pump head|pushbutton|lever|bump", ("button", "surface")),
+    (r"flap|\blid\b|\bcap\b|stopper|\bupper\b", ("face", "surface")),
     (r"spout|nozzle|\bnose\b|tip\b|tips\b|\bpoint\b|tines?|prongs?|claw|wick|pole\b|plug|\bend\b|corner|needle|bit\b", ("tip",)),
     (r"finger|\bhole|holes\b|\bbore\b|\bcore\b|socket|keyhole|\beye\b|\bring\b|\bloops?\b|\bbow\b|inner side", ("hole",)),
     (r"opening|mouth|\brim\b|inside|interior|cavity|hollow|basin|pour|\blip\b|outlet", ("opening",)),
@@ -23,6 +24,15 @@ _KINDS: tuple[tuple[str, tuple[Kind, ...]], ...] = (
     (r"bowl|scoop|cup\b", ("opening", "surface")),
     (r"handle|grip|shaft|stem|barrel|shank|\brod\b|stick|temple|\barm\b|\bneck\b", ("axis", "hole", "surface")),
 )  # fmt: skip
+_ALSO: tuple[tuple[str, tuple[Kind, ...]], ...] = (
+    (r"mouth|\bjaws?\b", ("tip", "hole")),
+    (r"\blip\b", ("edge",)),
+    (r"blade|base\b|bristles", ("tip", "face")),
+    (r"\bbow\b", ("face",)),
+    (r"\barm\b|\bneck\b", ("button",)),
+    (r"spout|nozzle", ("opening", "hole")),
+)
+"""What a word may mean of some things besides: not looked for by it, but no contradiction."""
 _UNSAID: tuple[Kind, ...] = ("surface",)
 _DOWN = re.compile(r"base\b|bottom|underside|\bfoot\b|sole", re.IGNORECASE)
 _END_ON = re.compile(r"striking|strike|hit|pound", re.IGNORECASE)
@@ -48,3 +58,10 @@ def direction_for(label: str) -> np.ndarray | None:
 def is_end(label: str) -> bool:
     """Tell whether a face of that name is the end of something, as a striking face is that of a head."""
     return _END_ON.search(label) is not None
+
+
+def fits(label: str, kind: Kind) -> bool:
+    """Tell whether a kind of frame fits a label; to words that say no kind, any does."""
+    kinds = kinds_for(label)
+    also = {each for pattern, others in _ALSO if re.search(pattern, label.lower()) for each in others}
+    return kinds is _UNSAID or kind in kinds or kind in also

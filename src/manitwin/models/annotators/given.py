@@ -102,6 +102,7 @@ class GivenPoints:
             description=label,
             confidence=1.0,
             rationale=self._rationale(distance_m),
+            frame=None if point.frame is None else point.frame.model_copy(update={"source": self._given.source}),
         )
 
     def _grasp_point(self, number: int, point: GivenPoint, candidate: int, distance_m: float) -> GraspPoint:

@@ -9,6 +9,9 @@ import numpy as np
 from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.errors import TwinError
+from manitwin.geometry.frames.on_feature import ON_FEATURE_M, off_feature_m
+from manitwin.geometry.frames.words import fits
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import NO_PART
 
@@ -69,6 +72,45 @@ def face_parts_differ(measured: MeasuredAsset) -> Iterator[Complaint]:
             )
 
 
+def frames_off_feature(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of functional frames that do not lie at the feature that they are said to be of."""
+    if measured.record is None or measured.record.points is None or not len(measured.samples):
+        return
+    limit = max(ON_FEATURE_M, measured.spacing_m)
+    off = {
+        point.id: off_feature_m(
+            point.frame.kind,
+            np.array(point.frame.position_m),
+            rotation_from_quaternion_wxyz(np.array(point.frame.quaternion_wxyz)),
+            point.frame.size_m,
+            measured.samples,
+        )
+        for point in measured.record.points.functional
+        if point.frame is not None
+    }
+    far = {name: away for name, away in off.items() if away > limit}
+    if far:
+        said = ", ".join(f"{name} {1000 * away:.0f} mm" for name, away in far.items())
+        yield Complaint(
+            f"functional frames off the feature that they are of: {said}", values={"off_m": list(far.values())}
+        )
+
+
+def frame_kinds(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of frames of a kind that the label of their point cannot mean."""
+    if measured.record is None or measured.record.points is None:
+        return
+    odd = [
+        f"{point.id} {point.label!r} as {point.frame.kind}"
+        for point in measured.record.points.functional
+        if point.frame is not None and not fits(point.label, point.frame.kind)
+    ]
+    if odd:
+        yield Complaint(
+            f"frames of a kind that their label does not mean: {', '.join(odd)}", values={"count": len(odd)}
+        )
+
+
 RULES = (
     Rule(
         "TWN001",
@@ -95,5 +137,22 @@ RULES = (
         " not, every region of a grasp and every name of a part is wrong.",
         remedy="Build the twin again from its source.",
         check=face_parts_differ,
+    ),
+    Rule(
+        "TWN004",
+        "frame-off-feature",
+        "error",
+        why="A skill moves to the frame: pours over the lip, strikes with the face. 5 mm beside the surface, or of an opening or"
+        " hole beside the plane of its walls, it pours beside and strikes the air.",
+        remedy="Build the twin again; where a person has set the frame, set it to null or to its feature.",
+        check=frames_off_feature,
+    ),
+    Rule(
+        "TWN005",
+        "frame-kind-unfitting",
+        "warning",
+        why="The kind says what a skill may do with a frame: an opening at a point called 'blade' is poured into for nothing.",
+        remedy="Mend the label or the frame's kind.",
+        check=frame_kinds,
     ),
 )

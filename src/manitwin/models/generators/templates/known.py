@@ -7,6 +7,7 @@ import trimesh
 from manifold3d import Manifold
 
 from manitwin.geometry.mass_properties import solid_mass_properties
+from manitwin.models.generators.templates.known_frames import known_frame
 from manitwin.models.generators.templates.made import Made
 from manitwin.models.generators.templates.template import IN_THE_OPEN, KnownPoint
 from manitwin.twin.import_record import GivenPoint, ImportRecord
@@ -43,7 +44,13 @@ def known_of(made: Made, text: str) -> ImportRecord:
         material=material_words(made),
         captions=[],
         functional_points=[
-            GivenPoint(position_m=_on_surface(made, point).tolist(), normal=list(point.direction), label=point.label)
+            GivenPoint(
+                position_m=_on_surface(made, point).tolist(),
+                normal=list(point.direction),
+                label=point.label,
+                # a mere place has what geometry finds there: a handle its axis
+                frame=None if point.kind == "surface" else known_frame(made, point, center),
+            )
             for point in made.points[:MOST_POINTS]
         ],
         grasp_points=[],

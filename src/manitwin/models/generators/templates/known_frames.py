@@ -23,8 +23,9 @@ _HANDLES, _SPOUTS = ("handle", "grips"), ("spout",)
 def known_frame(made: Made, point: KnownPoint, center_of_mass_m: np.ndarray) -> FunctionalFrame:
     """Return the frame of a known point in the thing's object frame.
 
-    Position and Z are those that the template states, of a face the middle of it. X and the size follow from the faces of its parts: of an opening away
-    from the handle or towards the spout, of an edge along it, of a hole towards the centre of mass ``(3,)``.
+    Position and Z are those that the template states, of a face the middle of it. X and the size follow from the faces of
+    its parts: of an opening away from the handle or towards the spout, of an edge along it, of a hole towards the centre of
+    mass ``(3,)``.
     """
     position, z = np.array(point.position_m), np.array(point.direction) / np.linalg.norm(point.direction)
     x, size, free = _extent(made, point, position, z, center_of_mass_m)

@@ -1,0 +1,53 @@
+"""Give the chosen functional points their frames: from geometry, where an import record has none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+
+from manitwin.geometry.frames.feature import FeatureFrame, FramedMesh
+from manitwin.geometry.frames.find import find_frame
+from manitwin.geometry.frames.on_feature import ON_FEATURE_M, off_feature_m
+from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint
+
+GEOMETRY = "geometry"
+"""The source of a frame that was computed."""
+
+
+def with_frames(
+    points: Sequence[FunctionalPoint], solid: trimesh.Trimesh, center_of_mass_m: np.ndarray, seed: int
+) -> tuple[list[FunctionalPoint], list[str]]:
+    """Return the points with the frames of the features that they mean, and why those without one have none.
+
+    The point and its label choose the feature, geometry gives the frame. ``solid`` is the watertight mesh and
+    ``center_of_mass_m (3,)`` its centre of mass, both in the object frame. What a point brings already is kept.
+    """
+    surface = FramedMesh(solid, center_of_mass_m, seed)
+    framed, missing = [], []
+    for point in points:
+        if point.frame is None:
+            found = find_frame(surface, np.array(point.position_m), np.array(point.normal), point.label)
+            if isinstance(found, FeatureFrame):
+                off_m = off_feature_m(found.kind, found.position_m, found.rotation, found.size_m, surface.samples[0])
+                if off_m <= max(ON_FEATURE_M, surface.spacing_m):
+                    point = point.model_copy(update={"frame": _recorded(found)})
+                else:
+                    missing.append(f"{point.id}, {point.label!r}: its {found.kind} is off the surface")
+            else:
+                missing.append(f"{point.id}, {point.label!r}: {found.reason}")
+        framed.append(point)
+    return framed, missing
+
+
+def _recorded(frame: FeatureFrame) -> FunctionalFrame:
+    return FunctionalFrame(
+        position_m=frame.position_m.tolist(),
+        quaternion_wxyz=quaternion_wxyz(frame.rotation).tolist(),
+        kind=frame.kind,
+        size_m=frame.size_m,
+        free="roll" if frame.roll_free else "none",
+        source=GEOMETRY,
+    )

@@ -1,0 +1,119 @@
+"""Frames of bodies whose features are known in closed form."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from manitwin.geometry.frames.feature import FeatureFrame, FramedMesh, Unclear
+from manitwin.geometry.frames.find import find_frame
+from manitwin.geometry.frames.on_feature import ON_FEATURE_M, off_feature_m
+from manitwin.geometry.frames.words import fits, kinds_for
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+
+TURN = rotation_from_quaternion_wxyz(np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3]))
+
+
+def framed(mesh: trimesh.Trimesh) -> FramedMesh:
+    return FramedMesh(mesh, mesh.center_mass, 0)
+
+
+def turned(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    pose = np.eye(4)
+    pose[:3, :3] = TURN
+    return mesh.copy().apply_transform(pose)
+
+
+def found(mesh: trimesh.Trimesh, point: object, normal: object, label: str) -> FeatureFrame:
+    surface = framed(mesh)
+    frame = find_frame(surface, np.array(point, float), np.array(normal, float), label)
+    assert isinstance(frame, FeatureFrame), frame
+    assert np.allclose(frame.rotation.T @ frame.rotation, np.eye(3), atol=1e-9)
+    assert np.linalg.det(frame.rotation) == pytest.approx(1)
+    off = off_feature_m(frame.kind, frame.position_m, frame.rotation, frame.size_m, surface.samples[0])
+    assert off < ON_FEATURE_M
+    return frame
+
+
+def cup(handle: bool = True) -> trimesh.Trimesh:
+    outer = trimesh.creation.cylinder(0.04, 0.09, sections=96)
+    inner = trimesh.creation.cylinder(0.037, 0.09, sections=96).apply_translation([0, 0, 0.004])
+    if handle:
+        loop = trimesh.creation.torus(0.024, 0.006, major_sections=48, minor_sections=24)
+        loop.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0])).apply_translation(
+            [0.05, 0, 0]
+        )
+        outer = outer.union(loop)
+    return outer.difference(inner).apply_translation([0, 0, 0.045])
+
+
+def test_face_of_a_turned_box_is_its_middle() -> None:
+    box = turned(trimesh.creation.box((0.1, 0.06, 0.04)))
+    frame = found(box, TURN @ [0.03, 0.02, 0.02], TURN @ [0, 0, 1], "cover")
+    assert frame.kind == "face" and not frame.roll_free
+    assert np.allclose(frame.position_m, TURN @ [0, 0, 0.02], atol=1e-6)
+    assert np.allclose(frame.z, TURN @ [0, 0, 1], atol=1e-6)
+    assert abs(frame.x @ (TURN @ [1, 0, 0])) == pytest.approx(1)
+    assert frame.size_m == pytest.approx(np.sqrt(0.1 * 0.06 / np.pi))
+
+
+def test_opening_of_a_cup_pours_away_from_its_handle() -> None:
+    frame = found(cup(), [-0.0385, 0, 0.09], [0, 0, 1], "opening")
+    assert frame.kind == "opening" and not frame.roll_free
+    assert np.allclose(frame.position_m, [0, 0, 0.09], atol=0.002)
+    assert frame.z @ [0, 0, 1] > np.cos(np.radians(1)) and frame.x @ [-1, 0, 0] > np.cos(np.radians(5))
+    assert found(cup(handle=False), [-0.0385, 0, 0.09], [0, 0, 1], "rim").roll_free
+
+
+def test_loop_of_a_handle_is_a_hole() -> None:
+    frame = found(cup(), [0.08, 0, 0.045], [1, 0, 0], "handle hole")
+    assert frame.kind == "hole" and abs(frame.z @ [0, 1, 0]) > np.cos(np.radians(5))
+    assert abs(frame.position_m[1]) < 0.002
+
+
+@pytest.mark.parametrize("label", ["hole", "bore"])
+def test_bore_of_a_turned_ring(label: str) -> None:
+    ring = turned(trimesh.creation.annulus(0.01, 0.02, 0.03, sections=64))
+    frame = found(ring, TURN @ [0.01, 0, 0.004], TURN @ [-1, 0, 0], label)
+    assert abs(frame.z @ (TURN @ [0, 0, 1])) > np.cos(np.radians(1))
+    assert np.allclose(frame.position_m, 0, atol=0.001) and frame.size_m == pytest.approx(0.01, rel=0.02)
+
+
+def test_axis_and_tip_of_a_rod() -> None:
+    rod = turned(trimesh.creation.cylinder(0.008, 0.2, sections=48))
+    axis = found(rod, TURN @ [0.008, 0, 0.03], TURN @ [1, 0, 0], "shaft")
+    assert abs(axis.z @ (TURN @ [0, 0, 1])) > np.cos(np.radians(1)) and axis.size_m == pytest.approx(0.2, abs=0.012)
+    tip = found(rod, TURN @ [0.008, 0, 0.095], TURN @ [1, 0, 0], "tip")
+    assert np.allclose(tip.position_m, TURN @ [0, 0, 0.1], atol=0.002) and tip.z @ (TURN @ [0, 0, 1]) > 0.999
+
+
+def test_edge_of_a_wedge_is_its_sharp_side() -> None:
+    wedge = trimesh.convex.convex_hull(
+        [[x, y, z] for x in (-0.08, 0.08) for y, z in ((-0.02, 0), (0.02, 0.0015), (0.02, -0.0015))]
+    )
+    frame = found(wedge, [0.01, -0.01, 0.0004], [0, 0, 1], "blade")
+    assert frame.kind == "edge" and abs(frame.x @ [1, 0, 0]) > 0.999
+    assert frame.z @ [0, -1, 0] > 0.99 and frame.size_m == pytest.approx(0.16, abs=0.01)
+    assert abs(frame.position_m[1] + 0.02) < 0.002
+
+
+@pytest.mark.parametrize("label", ["opening", "hole", "blade", "tip", "button"])
+def test_ball_has_no_frame_but_a_reason(label: str) -> None:
+    ball = trimesh.creation.icosphere(4, 0.04)
+    for point in ([0, 0, 0.04], [0.04, 0, 0]):
+        frame = find_frame(framed(ball), np.array(point), np.array(point) / 0.04, label)
+        assert isinstance(frame, Unclear) and frame.reason if label != "button" else frame.kind == "surface"
+
+
+def test_frame_beside_its_feature_is_told() -> None:
+    surface = framed(cup())
+    points, turn = surface.samples[0], np.eye(3)
+    assert off_feature_m("opening", np.array([0, 0, 0.09]), turn, 0.037, points) < ON_FEATURE_M
+    assert off_feature_m("opening", np.array([0, 0, 0.1]), turn, 0.037, points) > ON_FEATURE_M
+    assert off_feature_m("opening", np.array([0.1, 0, 0.09]), turn, 0.037, points) == np.inf
+    assert off_feature_m("tip", np.array([0, 0, 0.05]), turn, 0.01, points) > 0.03
+
+
+def test_words_choose_the_kind() -> None:
+    assert kinds_for("Mouth")[0] == "opening" and kinds_for("cutting edge") == ("edge",)
+    assert kinds_for("pouring spout") == ("tip",) and kinds_for("base")[0] == "face"
+    assert fits("handle", "hole") and fits("thing", "edge") and not fits("blade", "opening")
