@@ -99,6 +99,8 @@ class GraspConfig(Section):
     """Proposals (paper, implementation details: 4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
 
     ``on_support_share`` of those that are tried leave room for the plane of each placement that the object is picked from.
+    At each grasp point ``least_per_point`` should hold: where they do not, up to ``tries_per_point`` more of those that a
+    denser sample finds there are tried.
     """
 
     max_proposals: int = Field(default=4000, ge=1)
@@ -110,6 +112,8 @@ class GraspConfig(Section):
     scarce_rounds: int = Field(default=24, ge=1)
     near_enough: int = Field(default=600, ge=1)
     on_support_share: float = Field(default=0.4, ge=0, le=1)
+    least_per_point: int = Field(default=10, ge=0)
+    tries_per_point: int = Field(default=40, ge=0)
 
 
 class VerifyConfig(Section):

@@ -16,6 +16,7 @@ from manitwin.errors import Rejected
 from manitwin.formats.installation import installed_version
 from manitwin.formats.packed_source import pack_photos, pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
+from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
 from manitwin.pipeline.quality import (
@@ -168,7 +169,7 @@ def _accepted_sections(draft: Draft[Item]) -> dict[str, Any]:
         "mesh": mesh,
         "physical": draft.field("physical"),
         "language": draft.field("language"),
-        "points": {"candidates": draft.field("candidates"), **points},
+        "points": {"candidates": draft.field("candidates"), **points, **draft.field(GRASP_POINTS)},
         "grasps": draft.field("grasps"),
         "placements": draft.field("placements"),
         "quality": draft.field("quality"),

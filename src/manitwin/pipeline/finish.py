@@ -14,6 +14,7 @@ from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.grasp_diversity import farthest_grasps
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import load_hulls, load_solid, object_name
 from manitwin.pipeline.quality import filled_in, quality_checks
@@ -30,10 +31,11 @@ class FinishStage:
     gripper: Gripper
 
     name: ClassVar[str] = "finish"
-    version: ClassVar[str] = "6"
+    version: ClassVar[str] = "7"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb", "solid.npz", "hulls.npz", "grasps.parquet", "photo.png?", "matte?", "naming?", "generation?", "geometry",
-        "gate", "physical", "size", "collision", "language", "points", "frames_missing", "grasps", "placements",
+        "gate", "physical", "size", "collision", "language", "points", "frames_missing", GRASP_POINTS, "grasps",
+        "placements",
     )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = ("card.png", "quality")
     needs: ClassVar[Resource] = "cpu"
@@ -48,7 +50,7 @@ class FinishStage:
             parts=read_glb(draft.path("visual.glb")),
             solid=load_solid(draft.path("solid.npz")),
             hulls=load_hulls(draft.path("hulls.npz")),
-            points=_card_points(draft.field("points")),
+            points=_card_points(draft.field("points") | draft.field(GRASP_POINTS)),
             grasps=self._card_grasps(draft.path("grasps.parquet")),
             text=card_text(draft),
             photo=photo,

@@ -7,7 +7,7 @@ and Filtering" (4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +33,13 @@ from manitwin.robots.grippers.parallel import ParallelGripper
 
 PROPOSALS = "proposals{}.npz"
 PROPOSED = "proposals{}"
+GRASP_POINTS = "grasp_points"
+"""The grasp points as the first gripper's trials leave them: ``{grasp, withdrawn}``."""
 UNFILTERED = ":unfiltered"
+QUOTA_MARGIN = 1.3
+"""How many more are tried at a point than should hold there."""
+Quota = tuple[np.ndarray, int]
+"""Which grasps are asked for ``(N,)`` bool, and of how many."""
 
 
 class GraspsStage:
@@ -43,15 +49,17 @@ class GraspsStage:
     rejects the object; another one is left with no proposals and the reason.
     """
 
-    version = "3"
-    reads: ClassVar[tuple[str, ...]] = ("solid.npz", "hulls.npz", "points", "physical", "placements", "geometry?")
+    version = "4"
+    reads: tuple[str, ...] = ("solid.npz", "hulls.npz", "points", "physical", "placements", "geometry?")
 
     def __init__(self, settings: GraspConfig, grasper: Grasper, gripper: Gripper, suffix: str = ""):
         """Take the settings, the grasper and the gripper."""
         self.name = f"grasps{suffix}"
         self.file, self.proposed = PROPOSALS.format(suffix), PROPOSED.format(suffix)
         self.writes: tuple[str, ...] = (self.file, self.proposed)
-        self.may_reject = not suffix
+        self.may_reject, self.answered = not suffix, bool(suffix)
+        if suffix:  # the first gripper's trials have the last word on where the object is held
+            self.reads = (*self.reads, f"{GRASP_POINTS}?")
         self.settings, self.grasper, self.gripper = settings, grasper, gripper
         self.backend = grasper.name
         self.needs: Resource = grasper.needs
@@ -60,7 +68,9 @@ class GraspsStage:
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Write ``proposals.npz``, return the field ``proposals``; raises Rejected where nothing fits the gripper."""
         settings, points = self.settings, draft.field("points")
-        request = self._request(draft)
+        if self.answered:
+            points = points | draft.fields.get(GRASP_POINTS, {})
+        request = grasp_request(draft, points, self.gripper, settings)
         screen = KINDS[self.gripper.kind].screen(request)
         kept = propose_in_rounds(request, self.grasper, screen, settings)
         kept = with_support_rounds(kept, request, self.grasper, screen, settings)
@@ -69,7 +79,7 @@ class GraspsStage:
             answer = screen.why_none(kept.counts)
             if self.may_reject:
                 raise answer
-            self._write(folder / self.file, request, kept, np.empty(0, int), points, [])
+            self._write(folder / self.file, kept, np.empty(0, int), points, [], draft.seed)
             return {self.proposed: {"none_because": {"reason": answer.reason, "detail": answer.detail}}}
         nearest_m = kept.distance_m.min(1)
         association = associate(
@@ -79,10 +89,10 @@ class GraspsStage:
             object_size_m=float(np.linalg.norm(request.solid.extents)),
         )
         near = association.index + len(given)
-        chosen = np.concatenate(
-            [np.arange(len(given)), _likely(kept, near, self._on_support(kept, near, request), settings)]
-        )
-        self._write(folder / self.file, request, kept, chosen, points, given)
+        at_points = _at_points(kept, near, len(request.grasp_points_m), settings)
+        quotas = [*self._on_support(kept, near, request), *at_points]
+        chosen = np.concatenate([np.arange(len(given)), _likely(kept, near, quotas, settings.simulated)])
+        self._write(folder / self.file, kept, chosen, points, given, draft.seed)
         octants = approach_octants(kept.proposals.gripper_to_object)
         return {
             self.proposed: {
@@ -100,68 +110,78 @@ class GraspsStage:
             }
         }
 
-    def _on_support(self, kept: Kept, near: np.ndarray, request: GraspRequest) -> list[np.ndarray]:
-        """Tell of each support which of the kept are near a point and leave room for it ``(N,)``."""
+    def _on_support(self, kept: Kept, near: np.ndarray, request: GraspRequest) -> list[Quota]:
+        """Ask of each support for its share of those near a point that leave room for it."""
         gripper = self.gripper
         if not isinstance(gripper, ParallelGripper):
             return []
         is_near = np.zeros(len(kept.proposals), bool)
         is_near[near] = True
         radius_m = float("inf")  # what is near enough was decided by the association
-        return [is_near & on_support(kept, gripper, support, radius_m) for support in request.supports]
-
-    def _request(self, draft: Draft) -> GraspRequest:
-        physical, points = draft.field("physical"), draft.field("points")
-        return GraspRequest(
-            solid=load_solid(draft.path("solid.npz")),
-            hulls=load_hulls(draft.path("hulls.npz")),
-            mass_kg=physical["mass_kg"]["value"],
-            center_of_mass_m=np.array(physical["center_of_mass_m"]),
-            object_friction=physical["friction_static"]["value"],
-            gripper=self.gripper,
-            focus_points_m=np.array([p["position_m"] for p in points["functional"] + points["grasp"]]),
-            max_proposals=self.settings.raw_per_round,
-            seed=draft.seed,
-            grasp_points_m=np.array([p["position_m"] for p in points["grasp"]]),
-            grasp_types=tuple(p["type"] for p in points["grasp"]),
-            supports=picked_from(draft.field("placements")),
-        )
+        count = round(self.settings.on_support_share * self.settings.simulated)
+        return [(is_near & on_support(kept, gripper, support, radius_m), count) for support in request.supports]
 
     def _write(
         self,
         path: Path,
-        request: GraspRequest,
         kept: Kept,
         chosen: np.ndarray,
         points: dict[str, Any],
         given: list[str],
+        seed: int,
     ) -> None:
         """Write the chosen grasps, then the unfiltered sample, with the ids of their nearest points.
 
         ``given`` are the proposers of the first of the chosen.
         """
         raw, count = kept.raw, min(self.settings.unfiltered, len(kept.raw))
-        drawn = np.sort(np.random.default_rng(request.seed).choice(len(raw), count, replace=False))
+        drawn = np.sort(np.random.default_rng(seed).choice(len(raw), count, replace=False))
         others = raw.take(drawn)
         both = GraspProposals.joined([kept.proposals.take(chosen), others])
-        distance_m = np.concatenate([kept.distance_m[chosen], distances_to_grasps(request.focus_points_m, others)])
-        functional = [point["id"] for point in points["functional"]]
-        grasp = [point["id"] for point in points["grasp"]]
         name = self.grasper.name
-        arrays = {
-            "gripper_to_object": both.gripper_to_object,
-            "width_m": both.width_m,
-            "depth_m": both.depth_m,
-            "score": both.score,
-            "functional_point_id": np.array(functional)[distance_m[:, : len(functional)].argmin(1)],
-            "grasp_point_id": np.array(grasp)[distance_m[:, len(functional) :].argmin(1)],
-            "distance_to_point_m": distance_m.min(1),
-            "proposer": np.array(
-                [*given, *[name] * (len(chosen) - len(given)), *[name + UNFILTERED] * len(others)], str
-            ),
-            **_hand_joints(both),
-        }
-        np.savez(path, allow_pickle=False, **arrays)
+        proposer = [*given, *[name] * (len(chosen) - len(given)), *[name + UNFILTERED] * len(others)]
+        np.savez(path, allow_pickle=False, **proposal_arrays(both, proposer, points))
+
+
+def grasp_request(draft: Draft, points: dict[str, Any], gripper: Gripper, settings: GraspConfig) -> GraspRequest:
+    """Read what a grasper is told of an object with these points."""
+    physical = draft.field("physical")
+    return GraspRequest(
+        solid=load_solid(draft.path("solid.npz")),
+        hulls=load_hulls(draft.path("hulls.npz")),
+        mass_kg=physical["mass_kg"]["value"],
+        center_of_mass_m=np.array(physical["center_of_mass_m"]),
+        object_friction=physical["friction_static"]["value"],
+        gripper=gripper,
+        focus_points_m=positions_of(points["functional"] + points["grasp"]),
+        max_proposals=settings.raw_per_round,
+        seed=draft.seed,
+        grasp_points_m=positions_of(points["grasp"]),
+        grasp_types=tuple(p["type"] for p in points["grasp"]),
+        supports=picked_from(draft.field("placements")),
+    )
+
+
+def positions_of(points: list[dict[str, Any]]) -> np.ndarray:
+    """Return the places ``(P, 3)`` of points."""
+    return np.array([point["position_m"] for point in points], float).reshape(-1, 3)
+
+
+def proposal_arrays(grasps: GraspProposals, proposer: list[str], points: dict[str, Any]) -> dict[str, np.ndarray]:
+    """Return the arrays of ``proposals.npz``: the grasps, who proposed them, and the ids of their nearest points."""
+    to_functional = distances_to_grasps(positions_of(points["functional"]), grasps)
+    to_grasp = distances_to_grasps(positions_of(points["grasp"]), grasps)
+    return {
+        "gripper_to_object": grasps.gripper_to_object,
+        "width_m": grasps.width_m,
+        "depth_m": grasps.depth_m,
+        "score": grasps.score,
+        "functional_point_id": np.array([p["id"] for p in points["functional"]])[to_functional.argmin(1)],
+        "grasp_point_id": np.array([p["id"] for p in points["grasp"]])[to_grasp.argmin(1)],
+        "distance_to_point_m": np.minimum(to_functional.min(1), to_grasp.min(1)),
+        "proposer": np.array(proposer, str),
+        **_hand_joints(grasps),
+    }
 
 
 def picked_from(placements: list[dict[str, Any]]) -> tuple[np.ndarray, ...]:
@@ -178,16 +198,35 @@ def picked_from(placements: list[dict[str, Any]]) -> tuple[np.ndarray, ...]:
     )
 
 
-def _likely(kept: Kept, near: np.ndarray, on_support: list[np.ndarray], settings: GraspConfig) -> np.ndarray:
-    """Choose among the kept at ``near``; of those in each of ``on_support`` (``(N,)`` bool) no less than their share."""
-    chosen = _select(kept, near, settings.simulated)
-    wanted = round(settings.on_support_share * settings.simulated)
-    short = [np.flatnonzero(free) for free in on_support if free[chosen].sum() < min(wanted, int(free.sum()))]
-    if not short:
+def _at_points(kept: Kept, near: np.ndarray, count: int, settings: GraspConfig) -> list[Quota]:
+    """Ask at each of the last ``count`` points, the grasp points, for what should hold there and some that may not.
+
+    Of those that are fit only: where what there is asks too much of the pads, trials of many would tell no more than a few.
+    """
+    nearest = kept.distance_m[:, -count:].argmin(1)
+    within = kept.distance_m[:, -count:].min(1) <= settings.association_radius_m
+    is_near = np.zeros(len(kept.proposals), bool)
+    is_near[near] = True
+    wanted = min(round(QUOTA_MARGIN * settings.least_per_point), settings.simulated // (2 * count))
+    return [(is_near & within & kept.merits.fit & (nearest == point), wanted) for point in range(count)]
+
+
+def _likely(kept: Kept, near: np.ndarray, quotas: list[Quota], count: int) -> np.ndarray:
+    """Choose ``count`` among the kept at ``near``; of those in each quota no fewer than it asks for, as far as there are.
+
+    What fills one quota counts for the next; where they ask for more than ``count`` in all, the first go first.
+    """
+    chosen = _select(kept, near, count)
+    if all(member[chosen].sum() >= min(wanted, int(member.sum())) for member, wanted in quotas):
         return chosen
-    sure = np.unique(np.concatenate([_select(kept, free, wanted) for free in short]))
+    sure = near[:0]
+    for member, wanted in quotas:
+        free = member.copy()
+        free[sure] = False
+        more = _select(kept, np.flatnonzero(free), min(wanted - int(member[sure].sum()), count - len(sure)))
+        sure = np.concatenate([sure, more])
     rest = np.setdiff1d(near, sure)
-    return np.sort(np.concatenate([sure, _select(kept, rest, settings.simulated - len(sure))]))
+    return np.sort(np.concatenate([sure, _select(kept, rest, count - len(sure))]))
 
 
 def _select(kept: Kept, among: np.ndarray, count: int) -> np.ndarray:

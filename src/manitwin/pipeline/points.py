@@ -10,6 +10,7 @@ import numpy as np
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
+from manitwin.models.annotators.point_rules import spare_grasp_points
 from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints
 from manitwin.pipeline.frames import with_frames
 from manitwin.pipeline.object_state import findings_of, pictures, read_subject
@@ -32,7 +33,7 @@ class PointsStage:
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "language", "candidates", "visible_candidates",
         "cameras", "geometry?", "naming?",
     )  # fmt: skip
-    writes: ClassVar[tuple[str, ...]] = ("points", "points_findings", "frames_missing")
+    writes: ClassVar[tuple[str, ...]] = ("points", "spare_grasp_points", "points_findings", "frames_missing")
 
     settings = NO_SETTINGS
 
@@ -68,9 +69,17 @@ class PointsStage:
                 "functional": [point.model_dump() for point in functional],
                 "grasp": [point.model_dump() for point in selected.grasp],
             },
+            "spare_grasp_points": [point.model_dump() for point in _spares(selected, request)],
             "points_findings": findings_of(selected),
             "frames_missing": missing,
         }
+
+
+def _spares(selected: SelectedPoints, request: PointsRequest) -> list[GraspPoint]:
+    """Return the next best grasp points, best first: the annotator's own, then by geometry as many as there are points."""
+    taken = [point.candidate for point in (*selected.grasp, *selected.spare)]
+    missing = max(0, GRASP[1] - len(selected.spare))
+    return [*selected.spare, *(spare_grasp_points(request, taken)[:missing] if missing else ())]
 
 
 def check_selection(selected: SelectedPoints, positions_m: np.ndarray) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any, cast
 
 from manitwin.engine.stage import Draft
+from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.twin.record_values import Check
 
 UNCOVERED_LIMIT_M = 0.002
@@ -249,9 +250,23 @@ def _collision_checks(draft: Draft) -> list[Check]:
     return checks
 
 
+def point_checks(draft: Draft) -> list[Check]:
+    """Return whether enough grasps hold at every grasp point, and what was said of those where they do not."""
+    points = draft.field(GRASP_POINTS)
+    said = [
+        f"{p['id']} ({p['scenario']}), confidence {p['confidence']:g}: {p['shortfall']}"
+        for p in points["grasp"]
+        if p["shortfall"]
+    ]
+    said += [f"{p['id']} ({p['scenario']}) was withdrawn: {p['shortfall']}" for p in points["withdrawn"]]
+    least = min(point["verified"] for point in points["grasp"])
+    return [Check(name="held_at_points", passed=not said, value=float(least), message="; ".join(said))]
+
+
 def _grasp_checks(draft: Draft) -> list[Check]:
     grasps = draft.field("grasps")
     return [
+        *point_checks(draft),
         Check(
             name="grasps_near_points",
             passed=not grasps["association_radius_widened"],

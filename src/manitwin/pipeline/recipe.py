@@ -35,6 +35,7 @@ from manitwin.pipeline.naming import NameStage
 from manitwin.pipeline.photo import PhotosStage, PhotoStage
 from manitwin.pipeline.physical import PhysicalStage
 from manitwin.pipeline.placement import PlacementStage
+from manitwin.pipeline.point_trials import PointTrialsStage
 from manitwin.pipeline.points import PointsStage
 from manitwin.pipeline.record_grasps import RecordGraspsStage
 from manitwin.pipeline.robustness import RobustnessStage
@@ -122,10 +123,13 @@ def _trials(gripper: Gripper, suffix: str, config: BuildConfig) -> list[Stage]:
     """Return the stages that propose and try the grasps of one gripper."""
     kind = KINDS[gripper.kind]
     simulator = create("simulator", kind.simulator(config), config)
+    grasper = create("grasper", kind.grasper(config), config)
     stages: list[Stage] = [
-        GraspsStage(config.grasps, create("grasper", kind.grasper(config), config), gripper, suffix),
+        GraspsStage(config.grasps, grasper, gripper, suffix),
         VerifyStage(config.verify, simulator, gripper, suffix),
     ]
+    if not suffix:
+        stages.append(PointTrialsStage(config.grasps, config.verify, grasper, simulator, gripper))
     second = kind.second_simulator(config)
     if config.second_opinion.enabled and second is not None:
         other = create("simulator", second, config)

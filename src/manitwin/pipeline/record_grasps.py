@@ -12,10 +12,11 @@ from manitwin.config import Resource, SecondOpinionConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.geometry.grasp_diversity import approach_octants
-from manitwin.pipeline.grasps import PROPOSALS, PROPOSED, UNFILTERED
+from manitwin.pipeline.grasps import GRASP_POINTS, PROPOSED, UNFILTERED
 from manitwin.pipeline.robustness import ROBUSTNESS, ROBUSTNESS_FILE, rank_values
 from manitwin.pipeline.second_opinion import AGREEMENT, FAILS, NOT_TRIED, SECOND_OPINION
-from manitwin.pipeline.verify import TRIAL, VERDICTS
+from manitwin.pipeline.tried import read_arrays, read_tried, tried_names
+from manitwin.pipeline.verify import TRIAL
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.grasp_summary import FailureTable, GraspSummary, OtherGripper
 from manitwin.twin.grasp_table import JITTERED, GripperRows, write_grasp_table
@@ -27,7 +28,7 @@ class RecordGraspsStage:
     """Write ``grasps.parquet`` and the field ``grasps`` for the twin's first gripper and all others."""
 
     name = "record_grasps"
-    version = "1"
+    version = "2"
     writes: tuple[str, ...] = (TABLE, "grasps")
     needs: Resource = "cpu"
     backend = "builtin"
@@ -37,17 +38,20 @@ class RecordGraspsStage:
         """Take whether both engines must agree, and the grippers with the suffixes of their artifacts, the first one first."""
         self.settings, self.grippers = settings, grippers
         self.model = ", ".join(f"{gripper.name} {gripper.sha256[:12]}" for gripper, _ in grippers)
-        kinds = [PROPOSALS, PROPOSED, VERDICTS, TRIAL]
+        kinds = [PROPOSED, TRIAL]
         optional = [SECOND_OPINION, AGREEMENT, ROBUSTNESS_FILE, ROBUSTNESS]
         self.reads: tuple[str, ...] = (
             "points",
+            f"{GRASP_POINTS}?",
+            *(name for _, suffix in grippers for name in tried_names(suffix)),
             *(name.format(suffix) for _, suffix in grippers for name in kinds),
             *(f"{name.format(suffix)}?" for _, suffix in grippers for name in optional),
         )
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Write the table and return the summary; raises Rejected where engines must agree and do so on no grasp."""
-        types = {point["id"]: point["type"] for point in draft.field("points")["grasp"]}
+        points = draft.fields.get(GRASP_POINTS) or draft.field("points")
+        types = {point["id"]: point["type"] for point in points["grasp"]}
         labels = {point["id"]: point["label"] for point in draft.field("points")["functional"]}
         parts: list[dict[str, list[Any]]] = []
         summaries: list[GraspSummary | None] = []
@@ -74,14 +78,14 @@ class RecordGraspsStage:
 
     def _rows(self, draft: Draft, gripper: Gripper, suffix: str) -> tuple[GripperRows, list[dict[str, list[Any]]]]:
         """Return the rows of the proposals, and the columns of the jittered controls where there are any."""
-        proposals, verdicts = _arrays(draft, PROPOSALS.format(suffix)), _arrays(draft, VERDICTS.format(suffix))
+        proposals, verdicts = read_tried(draft, suffix)
         count = len(proposals["score"])
         ids = [f"{gripper.name}-{number:04d}" for number in range(count)]
         holds: list[bool | None] = [None] * count
         outcome = verdicts["outcome"]
         controls = []
         if SECOND_OPINION.format(suffix) in draft.paths:
-            second = _arrays(draft, SECOND_OPINION.format(suffix))
+            second = read_arrays(draft, SECOND_OPINION.format(suffix))
             holds = [None if value == NOT_TRIED else bool(value) for value in second["holds"]]
             if self.settings.require_agreement:
                 refused = (outcome == "held") & (second["holds"] == FAILS)
@@ -90,7 +94,7 @@ class RecordGraspsStage:
         shares: list[float | None] = [None] * count
         trials: list[int | None] = [None] * count
         if ROBUSTNESS_FILE.format(suffix) in draft.paths:
-            again = _arrays(draft, ROBUSTNESS_FILE.format(suffix))
+            again = read_arrays(draft, ROBUSTNESS_FILE.format(suffix))
             shares = [float(h / n) if n else None for h, n in zip(again["held"], again["trials"], strict=True)]
             trials = [int(n) if n else None for n in again["trials"]]
         rows = GripperRows(
@@ -109,15 +113,10 @@ class RecordGraspsStage:
 
 def _none_agreed(draft: Draft, rows: GripperRows) -> Rejected:
     """Say what became in the second engine of all that held in the first."""
-    held = (_arrays(draft, VERDICTS.format(""))["outcome"] == "held") & ~_unfiltered(rows)
+    held = (read_tried(draft, "")[1]["outcome"] == "held") & ~_unfiltered(rows)
     counted = ", ".join(f"{n} {outcome}" for outcome, n in sorted(Counter(rows.outcome[held].tolist()).items()))
     engine, second = (draft.field(name.format(""))["engine"] for name in (TRIAL, AGREEMENT))
     return Rejected("none_held", f"of {held.sum()} grasps that held in {engine} none holds in {second}: {counted}")
-
-
-def _arrays(draft: Draft, name: str) -> dict[str, np.ndarray]:
-    with np.load(draft.path(name)) as arrays:
-        return dict(arrays)
 
 
 def _unfiltered(rows: GripperRows) -> np.ndarray:

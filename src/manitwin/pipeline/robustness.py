@@ -11,9 +11,10 @@ from manitwin.config import Resource, RobustnessConfig, VerifyConfig
 from manitwin.engine.stage import Draft
 from manitwin.physics.robustness import Robustness, SequentialTest, Spread, draw_perturbations, try_until_clear
 from manitwin.physics.trial import GraspTrial
-from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
+from manitwin.pipeline.grasps import UNFILTERED
 from manitwin.pipeline.object_state import joints_of, load_body
-from manitwin.pipeline.verify import VERDICTS, trial_settings
+from manitwin.pipeline.tried import read_tried, tried_names
+from manitwin.pipeline.verify import trial_settings
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.grasp_summary import RobustnessSummary
 
@@ -24,7 +25,7 @@ ROBUSTNESS = "robustness{}"
 class RobustnessStage:
     """Try each held grasp again and again; writes ``held (N,)`` and ``trials (N,)``, zero trials where it never held."""
 
-    version = "1"
+    version = "2"
     needs: Resource = "cpu"
 
     def __init__(
@@ -35,18 +36,18 @@ class RobustnessStage:
         self.backend = trial.name
         self.model: str | None = f"{gripper.name} {gripper.sha256[:12]}, {verify.model_dump_json()}"
         self.name = f"robustness{suffix}"
-        self.proposals, self.verdicts = PROPOSALS.format(suffix), VERDICTS.format(suffix)
+        self.suffix = suffix
         self.file, self.field = ROBUSTNESS_FILE.format(suffix), ROBUSTNESS.format(suffix)
-        self.reads: tuple[str, ...] = (self.proposals, self.verdicts, "solid.npz", "hulls.npz", "physical")
+        self.reads: tuple[str, ...] = (*tried_names(suffix), "solid.npz", "hulls.npz", "physical")
         self.writes: tuple[str, ...] = (self.file, self.field)
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Write how many trials each grasp survived and return the summary."""
-        with np.load(draft.path(self.proposals)) as proposals, np.load(draft.path(self.verdicts)) as verdicts:
-            poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
-            chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
-            good = np.flatnonzero((verdicts["outcome"] == "held") & chosen)
-            joints = joints_of(proposals, np.arange(len(poses)))
+        proposals, verdicts = read_tried(draft, self.suffix)
+        poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
+        chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
+        good = np.flatnonzero((verdicts["outcome"] == "held") & chosen)
+        joints = joints_of(proposals, np.arange(len(poses)))
         spread = self._spread(draft.field("physical"))
         draws = draw_perturbations(spread, self.settings.max_trials, draft.seed)
         body, settings = load_body(draft), trial_settings(self.verify, self.gripper)

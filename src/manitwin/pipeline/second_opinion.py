@@ -11,9 +11,10 @@ from manitwin.config import Resource, SecondOpinionConfig, VerifyConfig
 from manitwin.engine.stage import Draft
 from manitwin.physics.robustness import jittered
 from manitwin.physics.trial import GraspTrial, TrialResult
-from manitwin.pipeline.grasps import PROPOSALS, UNFILTERED
+from manitwin.pipeline.grasps import UNFILTERED
 from manitwin.pipeline.object_state import joints_of, load_body
-from manitwin.pipeline.verify import VERDICTS, trial_settings
+from manitwin.pipeline.tried import read_tried, tried_names
+from manitwin.pipeline.verify import trial_settings
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.grasp_summary import SecondOpinion as SecondOpinionRecord
 
@@ -30,7 +31,7 @@ class SecondOpinionStage:
     with both engines' verdicts.
     """
 
-    version = "1"
+    version = "2"
     needs: Resource = "cpu"
 
     def __init__(
@@ -49,18 +50,18 @@ class SecondOpinionStage:
             f"beside {first.name}, {gripper.name} {gripper.sha256[:12]}, {verify.model_dump_json()}"
         )
         self.name = f"second_opinion{suffix}"
-        self.proposals, self.verdicts = PROPOSALS.format(suffix), VERDICTS.format(suffix)
+        self.suffix = suffix
         self.file, self.field = SECOND_OPINION.format(suffix), AGREEMENT.format(suffix)
-        self.reads: tuple[str, ...] = (self.proposals, self.verdicts, "solid.npz", "hulls.npz", "physical")
+        self.reads: tuple[str, ...] = (*tried_names(suffix), "solid.npz", "hulls.npz", "physical")
         self.writes: tuple[str, ...] = (self.file, self.field)
 
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Write the second engine's verdicts and return how far the two agree."""
-        with np.load(draft.path(self.proposals)) as proposals, np.load(draft.path(self.verdicts)) as verdicts:
-            poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
-            chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
-            held = verdicts["outcome"] == "held"
-            joints = joints_of(proposals, np.arange(len(poses)))
+        proposals, verdicts = read_tried(draft, self.suffix)
+        poses, depth_m = proposals["gripper_to_object"], proposals["depth_m"]
+        chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
+        held = verdicts["outcome"] == "held"
+        joints = joints_of(proposals, np.arange(len(poses)))
         rng = np.random.default_rng([draft.seed, JITTER_STREAM])
         good, bad = np.flatnonzero(held & chosen), np.flatnonzero(~held & chosen)
         some_bad = np.sort(rng.permutation(bad)[: round(self.settings.share_of_failed * len(bad))])

@@ -55,7 +55,7 @@ class VerifyStage:
             tried = [results[i] for i in chosen]
             why = KINDS[self.gripper.kind].why_none_held
             raise Rejected("none_held", why(tried, poses[chosen], depth_m[chosen], body, settings))
-        save_results(folder / self.verdicts, results)
+        np.savez(folder / self.verdicts, allow_pickle=False, **result_arrays(results))
         return {self.trial_field: describe(self.trial, settings, body.friction_static).model_dump(mode="json")}
 
 
@@ -81,11 +81,10 @@ def describe(trial: GraspTrial, settings: TrialSettings, object_friction: float)
     )
 
 
-def save_results(path: Path, results: list[TrialResult]) -> None:
-    """Save outcome, displacement (m) and rotation (rad) of each trial as arrays."""
-    np.savez(
-        path,
-        outcome=np.array([result.outcome for result in results], dtype="U16"),
-        displacement_m=np.array([result.displacement_m for result in results], float),
-        rotation_rad=np.array([result.rotation_rad for result in results], float),
-    )
+def result_arrays(results: list[TrialResult]) -> dict[str, np.ndarray]:
+    """Return the arrays of ``verdicts.npz``: outcome, displacement (m) and rotation (rad) of each trial."""
+    return {
+        "outcome": np.array([result.outcome for result in results], dtype="U16"),
+        "displacement_m": np.array([result.displacement_m for result in results], float),
+        "rotation_rad": np.array([result.rotation_rad for result in results], float),
+    }

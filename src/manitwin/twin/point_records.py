@@ -87,7 +87,11 @@ class FunctionalPoint(Record):
 
 
 class GraspPoint(Record):
-    """A point that is good to hold the object by; ``label`` is the part as whoever chose it says, None where nobody did."""
+    """A point that is good to hold the object by; ``label`` is the part as whoever chose it says, None where nobody did.
+
+    ``verified`` counts the first gripper's grasps that held and have this point as their nearest, within the radius of
+    association; None: not counted. ``shortfall`` says why they are fewer than were asked for; empty where they are not.
+    """
 
     id: str
     candidate: int
@@ -98,11 +102,17 @@ class GraspPoint(Record):
     confidence: Unit
     rationale: str
     label: str | None = None
+    verified: int | None = Field(default=None, ge=0)
+    shortfall: str = ""
 
 
 class Points(Record):
-    """Candidate, functional and grasp points."""
+    """Candidate, functional and grasp points.
+
+    ``withdrawn`` are grasp points at which no grasp held, and in whose place another one is.
+    """
 
     candidates: Candidates
     functional: list[FunctionalPoint]
     grasp: list[GraspPoint]
+    withdrawn: list[GraspPoint] = Field(default_factory=list)

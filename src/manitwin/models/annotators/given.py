@@ -55,11 +55,12 @@ class GivenPoints:
     def selection(self, others: SelectedPoints | None) -> SelectedPoints:
         """Return the given points, filled up with others to as many as an object has at least."""
         functional, grasp, findings = self._functional, self._grasp, self.findings
+        spare = () if others is None else others.spare
         if others is not None:
             functional = _filled(functional, others.functional, LEAST["functional"], "f")
             grasp = _filled(grasp, others.grasp, LEAST["grasp"], "g")
             findings = findings + list(others.findings or ())
-        return SelectedPoints(tuple(functional), tuple(grasp), tuple(findings))
+        return SelectedPoints(tuple(functional), tuple(grasp), tuple(findings), spare)
 
     def _snapped(self, kind: str, points: list[GivenPoint]) -> list[tuple[GivenPoint, int, float]]:
         """Return each point with its candidate and the distance (m), no candidate twice."""

@@ -18,6 +18,7 @@ from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint
 
 MOST_FUNCTIONAL, MOST_GRASPS, LEAST = 4, 3, 2  # the paper: 2-4 functional and 2-3 grasp points
+MOST_SPARES = 3
 
 _WEAK = 0.2  # a place that no candidate reaches better than this is not there
 _LEVER_M = 0.08  # from the centre of mass: half as good; grasps held at 80 mm slip half of the time, measured in SAPIEN
@@ -63,7 +64,19 @@ class PointSelection:
 
     def select(self) -> SelectedPoints:
         """Return 2-4 functional and 2-3 grasp points, each at a candidate of its own within its kind."""
-        return SelectedPoints(self._functional(), self._grasps())
+        grasp = self._grasps()
+        return SelectedPoints(self._functional(), grasp, spare=self.spares([point.candidate for point in grasp]))
+
+    def spares(self, taken: list[int]) -> tuple[GraspPoint, ...]:
+        """Return the next best grasp points where these candidates are taken: places not yet asked for, then second choices."""
+        weights, taken = self._seen() * self._fit() * self._closeness(), list(taken)
+        found: list[GraspPoint] = []
+        for part in (*self.prior.grasp, *_generic_grasps()):
+            choice = self._best(part.feature, weights, taken, 0.15 * self.shape.size_m)
+            if choice is not None and len(found) < MOST_SPARES:
+                taken.append(choice.candidate)
+                found.append(self._grasp_point(len(taken) - 1, part, choice))
+        return tuple(found)
 
     def _seen(self) -> np.ndarray:
         seen = np.zeros(len(self.request.positions_m), dtype=bool)
@@ -106,9 +119,7 @@ class PointSelection:
         return tuple(found)
 
     def _grasps(self) -> tuple[GraspPoint, ...]:
-        generic = tuple(
-            GraspPart(type="parallel_jaw", scenario=f"pick up by {_PLACES[f]}", feature=f) for f in _GENERIC_GRASP
-        )
+        generic = _generic_grasps()
         weights = self._seen() * self._fit() * self._closeness()
         found: list[GraspPoint] = []
         taken: list[int] = []
@@ -225,6 +236,15 @@ _PLACES: dict[str, str] = {
     "grip": "grip",
     "housing": "barrel behind the working end",
 }
+
+
+def _generic_grasps() -> tuple[GraspPart, ...]:
+    return tuple(GraspPart(type="parallel_jaw", scenario=f"pick up by {_PLACES[f]}", feature=f) for f in _GENERIC_GRASP)
+
+
+def spare_grasp_points(request: PointsRequest, taken: list[int]) -> tuple[GraspPoint, ...]:
+    """Return grasp points by geometry alone, best first, at none of the candidates ``taken``."""
+    return PointSelection(request, None).spares(taken)
 
 
 def select_points(request: PointsRequest, prior: Prior | None) -> SelectedPoints:

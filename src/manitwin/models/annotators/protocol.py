@@ -87,11 +87,15 @@ class PointsRequest:
 
 @dataclass(frozen=True)
 class SelectedPoints:
-    """2-4 functional and 2-3 grasp points, each at a candidate; ``findings`` as those of ``PhysicalEstimates``."""
+    """2-4 functional and 2-3 grasp points, each at a candidate; ``findings`` as those of ``PhysicalEstimates``.
+
+    ``spare`` are the next best grasp points, best first: one of them takes the place of a point at which nothing holds.
+    """
 
     functional: tuple[FunctionalPoint, ...]
     grasp: tuple[GraspPoint, ...]
     findings: tuple[str, ...] | None = None
+    spare: tuple[GraspPoint, ...] = ()
 
 
 AnnotatorQuestion = Literal["quality", "physical", "captions", "points"]

@@ -21,7 +21,8 @@ class GraspRequest:
     ``solid`` is the watertight mesh, ``hulls`` the convex collision vertices (each ``(V, 3)``), both in the object frame in
     metres. ``focus_points_m`` ``(P, 3)`` are the selected points: proposals should be denser around them.
     ``grasp_points_m (G, 3)`` are those of them that are for grasping, ``grasp_types`` how each wants to be grasped.
-    ``supports`` are the placements ``object_to_plane (4, 4)`` that it will be picked from.
+    ``supports`` are the placements ``object_to_plane (4, 4)`` that it will be picked from. Where ``within_m`` is given, only
+    grasps of the surface within it of a focus point are of use.
     """
 
     solid: trimesh.Trimesh
@@ -36,6 +37,7 @@ class GraspRequest:
     grasp_points_m: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
     grasp_types: tuple[str, ...] = ()
     supports: tuple[np.ndarray, ...] = ()
+    within_m: float | None = None
 
 
 @dataclass(frozen=True)

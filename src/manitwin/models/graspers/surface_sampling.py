@@ -36,20 +36,26 @@ CUP_HALF_LEVER_M, CUP_LEVER_SLOPE_M = (
 def starting_points(request: GraspRequest, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Draw up to ``count`` surface points ``(N, 3)`` and their outward normals ``(N, 3)``."""
     points, normals, _ = sample_surface(request.solid, POOL, rng)
-    chosen = rng.choice(POOL, min(POOL, count), replace=False, p=_density(request, points))
+    density = _density(request, points)
+    reached = np.flatnonzero(density)
+    if not len(reached):
+        return points[:0], normals[:0]
+    chosen = rng.choice(reached, min(len(reached), count), replace=False, p=density[reached] / density[reached].sum())
     return points[chosen], normals[chosen]
 
 
 def _density(request: GraspRequest, points: np.ndarray) -> np.ndarray:
-    """Return the probability ``(N,)`` with which each surface point is drawn."""
-    weight = np.ones(len(points))
+    """Return how much more likely each surface point is drawn than others ``(N,)``; zero where it is out of reach."""
+    weight, reached = np.ones(len(points)), np.ones(len(points), bool)
     if len(request.focus_points_m):
         distance = cKDTree(request.focus_points_m).query(points)[0]
         weight += FOCUS_WEIGHT * np.exp(-0.5 * (distance / FOCUS_SPREAD_M) ** 2)
+        reached = distance <= (np.inf if request.within_m is None else request.within_m)
     spread_m = CENTER_SPREAD * float(np.linalg.norm(request.solid.extents))
     distance = np.linalg.norm(points - request.center_of_mass_m, axis=1)
     weight += CENTER_WEIGHT * np.exp(-0.5 * (distance / spread_m) ** 2)
-    return weight / weight.sum()
+    weight[~reached] = 0.0
+    return weight
 
 
 class AntipodalGrasper:

@@ -20,7 +20,7 @@ from manitwin.models.annotators.protocol import (
     Subject,
 )
 from manitwin.models.annotators.vlm.captions import CaptionsAnswer, captions_question, examine_captions, language_of
-from manitwin.models.annotators.vlm.grasp_vote import Ballot, ballots, elect
+from manitwin.models.annotators.vlm.grasp_vote import Ballot, ballots, elect, runners_up
 from manitwin.models.annotators.vlm.physical import PhysicalAnswer, physical_estimates, physical_question
 from manitwin.models.annotators.vlm.physical_checks import (
     PhysicalFinding,
@@ -165,7 +165,8 @@ class VlmAnnotator:
         votes = self.config.vlm.votes
         cast = [ballot for vote in range(votes) for ballot in self._ballots(request, checks, vote)]
         grasp, more = elect(cast, votes, checks)
-        return SelectedPoints(functional, grasp, findings + more)
+        spare = runners_up(cast, votes, checks, [point.candidate for point in grasp])
+        return SelectedPoints(functional, grasp, findings + more, spare)
 
     def questions(self, request: PointsRequest, material: str, extents_m: np.ndarray) -> list[Question]:
         """Return all that an object is asked about in a build, in order, ``select_points`` and its votes last; asks nothing."""

@@ -100,6 +100,12 @@ def elect(cast: list[Ballot], votes: int, checks: PlaceChecks) -> tuple[tuple[Gr
     return tuple(_grasp_point(number, place, checks) for number, place in enumerate(chosen)), tuple(findings)
 
 
+def runners_up(cast: list[Ballot], votes: int, checks: PlaceChecks, taken: list[int]) -> tuple[GraspPoint, ...]:
+    """Return the places that were chosen by fewer, at none of the candidates ``taken``, in the order of the vote."""
+    others = [place for place in _elected(cast, votes, checks) if place.candidate not in taken]
+    return tuple(_grasp_point(len(taken) + number, place, checks) for number, place in enumerate(others))
+
+
 def _elected(cast: list[Ballot], votes: int, checks: PlaceChecks) -> list[Elected]:
     """Return places in order; each ballot supports one of them."""
     left, found = list(cast), list[Elected]()

@@ -1,0 +1,127 @@
+"""Search at grasp points where too few grasps held: denser proposals there, tried best first, until enough hold or none will."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manitwin.config import GraspConfig
+from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest, Screen
+from manitwin.physics.grasp_selection import select_likely
+from manitwin.physics.trial import TrialResult
+from manitwin.pipeline.proposals import Kept, distances_to_grasps
+from manitwin.twin.point_records import GraspPoint
+
+FIRST_POINT_SEED = 100_000
+"""Seeds of the rounds at points begin here, apart from those of the rounds for the whole object and for supports."""
+POINT_ROUNDS = 3
+RAW_SHARE = 0.5
+"""Of the proposals of a round over the whole object: one at a point looks at a small part of it."""
+HOPELESS_TRIES, HOPELESS_SHARE = 8, 0.25
+"""After so many of which a smaller share than this has held, physics forbids the rest."""
+
+Try = Callable[[GraspProposals], list[TrialResult]]
+
+
+@dataclass
+class Tried:
+    """Grasps and how they ended, row by row."""
+
+    grasps: GraspProposals
+    outcome: list[str]
+
+    def add(self, grasps: GraspProposals, outcome: list[str]) -> None:
+        """Append rows."""
+        self.grasps, self.outcome = GraspProposals.joined([self.grasps, grasps]), self.outcome + outcome
+
+
+class PointSearch:
+    """One object, its grasp points, and all that was tried at them so far."""
+
+    def __init__(
+        self,
+        request: GraspRequest,
+        grasper: Grasper,
+        screen: Screen,
+        settings: GraspConfig,
+        tried: Tried,
+        attempt: Try,
+    ):
+        """Take what a grasper is asked, the filter, the settings, the grasps of the first pass, and how to try more."""
+        self.request, self.grasper, self.screen, self.settings = request, grasper, screen, settings
+        self.tried, self.attempt = tried, attempt
+        self.results: list[TrialResult] = []
+        self.passed: dict[int, Counter[str]] = {}
+        """How many proposals at a candidate passed each filter."""
+
+    def outcomes_at(self, point: GraspPoint, others: list[GraspPoint]) -> Counter[str]:
+        """Count the outcomes of what was tried within reach of a point and has it as the nearest of all grasp points."""
+        mine = self._belongs(self.tried.grasps, point, others)
+        return Counter(outcome for outcome, is_mine in zip(self.tried.outcome, mine, strict=True) if is_mine)
+
+    def short(self, point: GraspPoint, others: list[GraspPoint]) -> bool:
+        """Tell whether fewer hold at a point than were asked for."""
+        return self.outcomes_at(point, others)["held"] < self.settings.least_per_point
+
+    def search(self, point: GraspPoint, others: list[GraspPoint]) -> None:
+        """Propose at a point and try, until enough hold there, the tries are used up, or few of many have held."""
+        left = self._proposed_at(point, others)
+        free = self._belongs(left.proposals, point, others)  # their widths are those at the pads by now
+        budget = self.settings.tries_per_point
+        while budget > 0 and free.any() and self.short(point, others):
+            so_far = self.outcomes_at(point, others)
+            if so_far.total() >= HOPELESS_TRIES and so_far["held"] < HOPELESS_SHARE * so_far.total():
+                return
+            among = np.flatnonzero(free)
+            some = left.proposals.take(among)
+            missing = self.settings.least_per_point - so_far["held"]
+            count = min(budget, max(missing, HOPELESS_TRIES - so_far.total()) if so_far["held"] else HOPELESS_TRIES)
+            chosen = among[select_likely(some.gripper_to_object, some.depth_m, left.merits.take(among), count)]
+            results = self.attempt(left.proposals.take(chosen))
+            self.tried.add(left.proposals.take(chosen), [result.outcome for result in results])
+            self.results += results
+            free[chosen] = False
+            budget -= len(chosen)
+
+    def shortfall(self, point: GraspPoint, others: list[GraspPoint]) -> str:
+        """Say why fewer hold at a point than were asked for; empty where they do not."""
+        outcomes = self.outcomes_at(point, others)
+        if outcomes["held"] >= self.settings.least_per_point:
+            return ""
+        reach = f"within {1000 * self.settings.association_radius_m:.0f} mm"
+        counted = ", ".join(f"{count} {outcome}" for outcome, count in sorted(outcomes.items()) if outcome != "held")
+        said = f"{outcomes['held']} of {outcomes.total()} grasps tried {reach} held"
+        filters = ", ".join(f"{name} {count}" for name, count in self.passed[point.candidate].items())
+        return f"{said}{f' ({counted})' if counted else ''}; proposals there: {filters}"
+
+    def _proposed_at(self, point: GraspPoint, others: list[GraspPoint]) -> Kept:
+        """Return the proposals at a point that pass the screen, of one round and more where they are few."""
+        settings, passed, parts = self.settings, Counter[str](), list[Kept]()
+        rounds = POINT_ROUNDS if self.grasper.rounds is None else min(1, self.grasper.rounds)
+        enough = 2 * settings.tries_per_point
+        for number in range(rounds):
+            words = [self.request.seed, FIRST_POINT_SEED + POINT_ROUNDS * point.candidate + number]
+            request = replace(
+                self.request,
+                focus_points_m=np.array([point.position_m]),
+                within_m=settings.association_radius_m,
+                max_proposals=max(1, round(RAW_SHARE * settings.raw_per_round)),
+                seed=int(np.random.SeedSequence(words).generate_state(1)[0]),
+            )
+            raw = self.grasper.propose(request)
+            raw = raw.take(np.flatnonzero(self._belongs(raw, point, others)))
+            parts.append(Kept.screened(raw, self.screen, request.focus_points_m))
+            passed.update(parts[-1].counts)
+            if sum(len(part.proposals) for part in parts) >= enough:
+                break
+        self.passed[point.candidate] = passed
+        return Kept.joined(parts, parts[0].raw)
+
+    def _belongs(self, grasps: GraspProposals, point: GraspPoint, others: list[GraspPoint]) -> np.ndarray:
+        """Tell which grasps ``(N,)`` are within reach of a point and nearer to it than to the other points."""
+        places = np.array([p.position_m for p in (point, *(p for p in others if p.id != point.id))])
+        distance_m = distances_to_grasps(places, grasps)
+        return (distance_m[:, 0] <= self.settings.association_radius_m) & (distance_m.argmin(1) == 0)

@@ -1,0 +1,155 @@
+"""Let physics answer back: see that enough grasps hold at every grasp point, or say why not and put another in its place.
+
+The selection of grasps spreads over the object, so that a mug's handle may get three trials of a hundred. Where fewer hold at a
+point than were asked for, more are proposed at that very place and tried. A point at which still none holds is withdrawn, and
+the next best one at which some do takes its place; where there is none, it stays with a confidence that says so.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from manitwin.config import GraspConfig, Resource, VerifyConfig
+from manitwin.engine.stage import Draft
+from manitwin.models.graspers.protocol import Grasper, GraspProposals
+from manitwin.physics.trial import GraspTrial, TrialResult
+from manitwin.pipeline.grasps import GRASP_POINTS, PROPOSALS, UNFILTERED, grasp_request, proposal_arrays
+from manitwin.pipeline.gripper_kinds import KINDS
+from manitwin.pipeline.object_state import JOINTS, load_body
+from manitwin.pipeline.point_search import PointSearch, Tried
+from manitwin.pipeline.tried import POINT_PROPOSALS, POINT_VERDICTS, read_arrays
+from manitwin.pipeline.verify import VERDICTS, result_arrays, trial_settings
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.twin.point_records import GraspPoint
+
+DISPROVED = 0.1
+"""The confidence of a grasp point at which nothing holds."""
+
+
+class PointTrialsStage:
+    """Try more grasps where too few held, and write all rows again, with the ids of the points that are left.
+
+    Of the twin's first gripper only: others tell what of its points transfers to them.
+    """
+
+    name: ClassVar[str] = "point_trials"
+    version: ClassVar[str] = "1"
+    reads: ClassVar[tuple[str, ...]] = (
+        "solid.npz", "hulls.npz", "points", "spare_grasp_points", "physical", "placements",
+        PROPOSALS.format(""), VERDICTS.format(""),
+    )  # fmt: skip
+    writes: ClassVar[tuple[str, ...]] = (POINT_PROPOSALS, POINT_VERDICTS, GRASP_POINTS)
+
+    def __init__(
+        self, settings: GraspConfig, verify: VerifyConfig, grasper: Grasper, trial: GraspTrial, gripper: Gripper
+    ):
+        """Take the settings, the trial's, the grasper, the engine and the gripper."""
+        self.settings, self.verify = settings, verify
+        self.grasper, self.trial, self.gripper = grasper, trial, gripper
+        self.backend = trial.name
+        self.needs: Resource = grasper.needs
+        self.model: str | None = (
+            f"{grasper.model or grasper.name} for {gripper.name} {gripper.sha256[:12]}, {verify.model_dump_json()}"
+        )
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Write all rows and return the field ``grasp_points``: those that are left, and those withdrawn."""
+        first, verdicts = read_arrays(draft, PROPOSALS.format("")), read_arrays(draft, VERDICTS.format(""))
+        chosen = np.flatnonzero(~np.char.endswith(first["proposer"], UNFILTERED))
+        grasps, points = grasps_of(first), draft.field("points")
+        request = grasp_request(draft, points, self.gripper, self.settings)
+        body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
+
+        def attempt(some: GraspProposals) -> list[TrialResult]:
+            joints = {} if some.joints_rad is None else {"joints_rad": some.joints_rad}
+            return self.trial.run(body, self.gripper, some.gripper_to_object, settings, **joints)
+
+        tried = Tried(grasps.take(chosen), verdicts["outcome"][chosen].tolist())
+        screen = KINDS[self.gripper.kind].screen(request)
+        search = PointSearch(request, self.grasper, screen, self.settings, tried, attempt)
+        answered = answer(
+            search,
+            [GraspPoint(**point) for point in points["grasp"]],
+            [GraspPoint(**point) for point in draft.field("spare_grasp_points")],
+        )
+        self._write(folder, first, verdicts, search, points | answered)
+        return {GRASP_POINTS: answered}
+
+    def _write(
+        self,
+        folder: Path,
+        first: dict[str, np.ndarray],
+        verdicts: dict[str, np.ndarray],
+        search: PointSearch,
+        points: dict[str, Any],
+    ) -> None:
+        before, results = grasps_of(first), search.results
+        more = search.tried.grasps.take(np.arange(len(search.tried.grasps) - len(results), len(search.tried.grasps)))
+        proposer = [*first["proposer"].tolist(), *[self.grasper.name] * len(more)]
+        arrays = proposal_arrays(GraspProposals.joined([before, more]), proposer, points)
+        np.savez(folder / POINT_PROPOSALS, allow_pickle=False, **arrays)
+        joined = {name: np.concatenate([verdicts[name], new]) for name, new in result_arrays(results).items()}
+        np.savez(folder / POINT_VERDICTS, allow_pickle=False, **joined)
+
+
+def answer(search: PointSearch, points: list[GraspPoint], spares: list[GraspPoint]) -> dict[str, list[dict[str, Any]]]:
+    """Return the points with what holds at them, and the withdrawn, after searching wherever that is too little."""
+    searched: set[str] = set()
+    number = len(points)
+    withdrawn: list[GraspPoint] = []
+    spares = list(spares)
+    _search_where_short(search, points, searched)
+    for place, point in enumerate(list(points)):
+        if search.outcomes_at(point, points)["held"] or not search.short(point, points):
+            continue
+        others = [p for p in points if p.id != point.id]
+        spare = _next_best(search, f"g{number}", others, spares)
+        if spare is not None:
+            reason = search.shortfall(point, points)
+            confidence = min(DISPROVED, point.confidence)
+            withdrawn.append(point.model_copy(update={"confidence": confidence, "verified": 0, "shortfall": reason}))
+            points, number = [*points[:place], spare, *points[place + 1 :]], number + 1
+            searched.add(spare.id)
+    _search_where_short(search, points, searched)  # a new point may be the nearest of what was another one's
+    return {
+        "grasp": [_counted(search, point, points).model_dump() for point in points],
+        "withdrawn": [point.model_dump() for point in withdrawn],
+    }
+
+
+def _next_best(search: PointSearch, name: str, others: list[GraspPoint], spares: list[GraspPoint]) -> GraspPoint | None:
+    """Take from ``spares`` the first at which enough hold; where there is none, the one at which most do; None: no one."""
+    best, most = None, 0
+    spares.sort(key=lambda spare: search.short(spare, others))  # those at which enough hold already go first
+    while spares:
+        spare = spares.pop(0).model_copy(update={"id": name})
+        if search.short(spare, others):
+            search.search(spare, others)
+        held = search.outcomes_at(spare, others)["held"]
+        if not search.short(spare, others):
+            return spare
+        if held > most:
+            best, most = spare, held
+    return best
+
+
+def _search_where_short(search: PointSearch, points: list[GraspPoint], searched: set[str]) -> None:
+    for point in points:
+        if point.id not in searched and search.short(point, points):
+            searched.add(point.id)
+            search.search(point, points)
+
+
+def _counted(search: PointSearch, point: GraspPoint, points: list[GraspPoint]) -> GraspPoint:
+    held = search.outcomes_at(point, points)["held"]
+    update = {"verified": held, "shortfall": search.shortfall(point, points)}
+    return point.model_copy(update=update if held else update | {"confidence": min(DISPROVED, point.confidence)})
+
+
+def grasps_of(arrays: dict[str, np.ndarray]) -> GraspProposals:
+    """Return the grasps of ``proposals.npz``."""
+    joints = np.stack([arrays[name] for name in JOINTS], axis=1) if JOINTS[0] in arrays else None
+    return GraspProposals(arrays["gripper_to_object"], arrays["width_m"], arrays["depth_m"], arrays["score"], joints)

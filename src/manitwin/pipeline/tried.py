@@ -1,0 +1,31 @@
+"""The grasps of one gripper that were tried, with their verdicts: the chosen, the unfiltered, then more at grasp points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.engine.stage import Draft
+from manitwin.pipeline.grasps import PROPOSALS
+from manitwin.pipeline.verify import VERDICTS
+
+POINT_PROPOSALS, POINT_VERDICTS = "point_proposals.npz", "point_verdicts.npz"
+"""The first gripper's, all of them: the rows of ``proposals.npz`` and ``verdicts.npz``, and behind them those at points."""
+
+
+def tried_names(suffix: str) -> tuple[str, ...]:
+    """Return what a stage reads that asks for the grasps of the gripper with this suffix."""
+    more = () if suffix else (f"{POINT_PROPOSALS}?", f"{POINT_VERDICTS}?")
+    return (PROPOSALS.format(suffix), VERDICTS.format(suffix), *more)
+
+
+def read_tried(draft: Draft, suffix: str) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return the arrays of proposals and verdicts, row by row."""
+    if not suffix and POINT_PROPOSALS in draft.paths:
+        return read_arrays(draft, POINT_PROPOSALS), read_arrays(draft, POINT_VERDICTS)
+    return read_arrays(draft, PROPOSALS.format(suffix)), read_arrays(draft, VERDICTS.format(suffix))
+
+
+def read_arrays(draft: Draft, name: str) -> dict[str, np.ndarray]:
+    """Return the arrays of a file artifact."""
+    with np.load(draft.path(name)) as arrays:
+        return dict(arrays)
