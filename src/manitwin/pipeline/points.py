@@ -28,7 +28,7 @@ class PointsStage:
     """
 
     name: ClassVar[str] = "points"
-    version: ClassVar[str] = "5"
+    version: ClassVar[str] = "6"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "language", "candidates", "visible_candidates",
         "cameras", "geometry?", "naming?",
