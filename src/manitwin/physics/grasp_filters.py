@@ -27,7 +27,6 @@ CLEARANCE_M = 0.0005
 # What the simulation is likely to hold, measured on 1,799 trials of 18 objects: of grasps with levers under 50 mm 98 %
 # held, beyond 80 mm 47 %; of those on 2 cells 73 %, on 6 and more 92 %.
 GOOD_CELLS, GOOD_LEVER_M, GOOD_TORQUE_RATIO = 3, 0.05, 0.5
-FIRM_CELLS = 6  # where the torque is more than that: a small patch turns under it
 PAD_ARM_M = 0.007  # the arm of the friction torque that a pad can hold: about two thirds of its half width
 PEAK_SLIDE_ACCELERATION_M_S2 = 3.6  # of a quintic path of 0.1 m in 0.4 s: 5.77 d / t^2
 
@@ -135,13 +134,9 @@ def torque_ratio(lever_m: np.ndarray, *, mass_kg: float, force_n: float, frictio
 
 
 def pad_merits(contacts: PadContacts, torque_ratio: np.ndarray) -> Merits:
-    """Rate grasps: fit ones touch with three cells or more and need half of the friction torque at most; levers cost.
-
-    Of those that need more, the ones on a patch smaller than six cells are weak.
-    """
-    heavy = torque_ratio > GOOD_TORQUE_RATIO
-    weak = contacts.cells < np.where(heavy, FIRM_CELLS, GOOD_CELLS)
-    return Merits(~weak & ~heavy, weak, contacts.lever_m, GOOD_LEVER_M)
+    """Rate grasps: fit ones touch with three cells or more and need half of the friction torque at most; levers cost."""
+    weak = contacts.cells < GOOD_CELLS
+    return Merits(~weak & (torque_ratio <= GOOD_TORQUE_RATIO), weak, contacts.lever_m, GOOD_LEVER_M)
 
 
 def lowest_points_m(gripper: ParallelGripper, gripper_to_object: np.ndarray, object_to_plane: np.ndarray) -> np.ndarray:
