@@ -20,8 +20,8 @@ FIRST_POINT_SEED = 100_000
 POINT_ROUNDS = 3
 RAW_SHARE = 0.5
 """Of the proposals of a round over the whole object: one at a point looks at a small part of it."""
-HOPELESS_TRIES, HOPELESS_SHARE = 8, 0.25
-"""After so many of which a smaller share than this has held, physics forbids the rest."""
+HOPELESS_TRIES, HOPELESS_SHARE = 8, 0.5
+"""After so many of which a smaller share than this has held, it is no place to hold the object: the rest is not tried."""
 
 Try = Callable[[GraspProposals], list[TrialResult]]
 
