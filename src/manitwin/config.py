@@ -59,11 +59,28 @@ RETIRED_SECTIONS = ("caption", "points", "finish")
 """Sections that once were there without any setting in them: empty ones are read over."""
 
 
+Elevation = Annotated[float, Field(ge=-80, le=80)]
+
+
 class ViewsConfig(Section):
-    """The eight pictures of the object (paper, "Physical Property Estimation"); no size: the one the annotator reads best."""
+    """The eight pictures of the object (paper, "Physical Property Estimation"); no size: the one the annotator reads best.
+
+    ``elevations_deg`` are the heights that they are seen from, one by one around the object; ``fov_y_deg`` is the angle of a
+    picture's longer side, ``size_px`` squared about its pixels.
+    """
 
     size_px: int | None = Field(default=None, ge=64, le=4096)
     fov_y_deg: float = Field(default=30.0, gt=1, lt=120)
+    elevations_deg: tuple[Elevation, Elevation, Elevation, Elevation, Elevation, Elevation, Elevation, Elevation] = (
+        20.0,
+        50.0,
+        20.0,
+        -35.0,
+        20.0,
+        65.0,
+        20.0,
+        -35.0,
+    )
     webp_quality: int = Field(default=90, ge=1, le=100)
 
 

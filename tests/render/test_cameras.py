@@ -86,3 +86,24 @@ def test_camera_survives_json() -> None:
     again = Camera.from_json(json.loads(json.dumps(camera.to_json())))
     assert np.array_equal(again.camera_to_object, camera.camera_to_object)
     assert (again.fov_y_rad, again.width_px, again.height_px) == (0.7, 31, 17)
+
+
+@pytest.mark.parametrize("sides", [(0.2, 0.03, 0.015), (0.05, 0.05, 0.25), (0.1, 0.09, 0.08), (0.15, 0.1, 0.004)])
+def test_orbit_pictures_are_shaped_so_that_the_object_fills_them(sides: tuple[float, float, float]) -> None:
+    corners = trimesh.creation.box(sides).vertices
+    for camera in orbit_cameras(corners, fov_y_deg=30, size_px=768):
+        filled = np.ptp(project(corners, camera)[0], axis=0) / [camera.width_px, camera.height_px]
+        assert filled.min() >= 0.6 and filled.max() <= 0.89
+        assert camera.width_px * camera.height_px == pytest.approx(768**2, rel=0.02)
+
+
+def test_two_views_look_from_below_and_a_list_of_heights_is_taken() -> None:
+    corners = trimesh.creation.box([0.1, 0.1, 0.1]).vertices
+
+    def heights(**more: object) -> list[float]:
+        cameras = orbit_cameras(corners, fov_y_deg=30, size_px=64, **more)  # type: ignore[arg-type]
+        return [float(np.degrees(np.arcsin(camera.camera_to_object[2, 2]))) for camera in cameras]
+
+    assert sum(height < -20 for height in heights()) == 2
+    said = (0.0, 10.0, -50.0, 70.0, -20.0, 30.0, 45.0, 5.0)
+    assert heights(elevations_deg=said) == pytest.approx(said)

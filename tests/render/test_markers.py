@@ -56,3 +56,16 @@ def test_equal_input_gives_equal_pixels() -> None:
     pixels = np.random.default_rng(1).uniform(0, 512, (30, 2))
     labels = [str(i) for i in range(30)]
     assert np.array_equal(draw_markers(picture, pixels, labels), draw_markers(picture, pixels, labels))
+
+
+def test_no_line_runs_under_the_dot_of_another() -> None:
+    for seed, spread in ((0, 40), (1, 60), (2, 90)):
+        rng = np.random.default_rng(seed)
+        pixels = rng.normal([256, 256], spread, (26, 2))
+        apart = np.linalg.norm(pixels[:, None] - pixels[None], axis=2) + 1e9 * np.eye(len(pixels))
+        pixels = pixels[apart.min(1) > 14]  # dots that touch each other cannot be told apart anyway
+        centers = place_boxes(pixels, np.tile([22.0, 16.0], (len(pixels), 1)), SHAPE)
+        for index, (start, end) in enumerate(zip(pixels, centers, strict=True)):
+            share = np.clip((pixels - start) @ (end - start) / ((end - start) @ (end - start)), 0, 1)
+            away = np.linalg.norm(pixels - start - share[:, None] * (end - start), axis=1)
+            assert np.delete(away, index).min() > 5.0, "the radius of a dot is 4 to 5 pixels at this size"

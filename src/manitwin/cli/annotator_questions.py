@@ -18,10 +18,9 @@ from manitwin.models.registry import without_url
 from manitwin.models.vlm.openai_dialect import instructions_with_schema
 from manitwin.models.vlm.prices import TokenPrice, estimated_usage
 from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn
-from manitwin.pipeline.candidates import seen_tolerance_m
 from manitwin.pipeline.views import write_webp
 from manitwin.render.cameras import orbit_cameras
-from manitwin.render.raycast import merged, visible_points
+from manitwin.render.raycast import merged, seen_tolerance_m, visible_points
 from manitwin.render.renderer import shared_renderer
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
 from manitwin.twin.loaded_twin import Twin

@@ -16,14 +16,12 @@ from manitwin.errors import Rejected
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
-from manitwin.pipeline.object_state import load_solid
+from manitwin.pipeline.object_state import load_solid, pictures
 from manitwin.pipeline.views import write_webp
 from manitwin.render.cameras import Camera, project
+from manitwin.render.grounds import marker_color
 from manitwin.render.markers import draw_markers, font_px
-from manitwin.render.raycast import merged, silhouette, visible_points
-
-ON_SURFACE_M = 0.001  # a candidate is on the surface that is seen, to a millimetre (half of what a twin may be off)
-ON_SURFACE_SHARE = 0.01  # and of small objects to this share of the longest side
+from manitwin.render.raycast import merged, seen_tolerance_m, silhouette, visible_points
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class CandidatesStage:
     settings: CandidatesConfig
 
     name: ClassVar[str] = "candidates"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz", "visual.glb", "views/", "cameras", "physical")
     writes: ClassVar[tuple[str, ...]] = ("marked/", "candidates", "visible_candidates")
     needs: ClassVar[Resource] = "cpu"
@@ -60,14 +58,16 @@ class CandidatesStage:
             rng=np.random.default_rng(draft.seed),
         )
         (folder / "marked").mkdir(parents=True, exist_ok=True)
-        for index, (camera, seen) in enumerate(zip(cameras, visible, strict=True)):
-            view = np.asarray(Image.open(draft.path("views/") / f"rgb_{index:02d}.webp").convert("RGB"))
+        views = [np.asarray(Image.open(path).convert("RGB")) for path in pictures(draft.path("views/"), "rgb")]
+        dot = marker_color(views).rgb
+        for index, (view, camera, seen) in enumerate(zip(views, cameras, visible, strict=True)):
             marked = draw_markers(
                 view,
                 project(positions[seen], camera)[0],
                 [str(i) for i in seen],
                 occupied=silhouette(caster, camera),
-                font_px=font_px(camera.height_px),
+                dot=dot,
+                font_px=font_px(camera.width_px, camera.height_px),
             )
             write_webp(marked, folder / "marked" / f"marked_{index:02d}.webp", self.settings.webp_quality)
         return {
@@ -104,8 +104,3 @@ def choose_candidates(
     start = int(((points[shown] - points[shown].mean(0)) ** 2).sum(1).argmax())
     chosen = shown[farthest_point_sampling(points[shown], count, start)]
     return points[chosen], normals[chosen], [np.flatnonzero(row[chosen]) for row in seen]
-
-
-def seen_tolerance_m(extents_m: np.ndarray) -> float:
-    """Return how far (m) a candidate may be off the surface that is seen, for an object of extents ``(3,)``."""
-    return min(ON_SURFACE_M, ON_SURFACE_SHARE * float(extents_m.max()))

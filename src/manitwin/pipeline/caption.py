@@ -17,11 +17,12 @@ class CaptionStage:
     """Ask the annotator for words."""
 
     name: ClassVar[str] = "caption"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb",
         "solid.npz",
         "physical",
+        "size",
         "views/",
         "cameras",
         "geometry?",
@@ -42,7 +43,12 @@ class CaptionStage:
         """Return ``language``."""
         physical = draft.field("physical")
         subject = read_subject(
-            draft, solid="solid.npz", visual="visual.glb", metric=True, scale=physical["scale_applied"]
+            draft,
+            solid="solid.npz",
+            visual="visual.glb",
+            metric=True,
+            scale=physical["scale_applied"],
+            size_estimated=draft.field("size") is not None,
         )
         language = self._annotator.describe(subject, physical["material"], np.array(physical["extents_m"]))
         return {"language": language.model_dump()}

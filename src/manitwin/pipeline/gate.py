@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -13,7 +14,7 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.geometry.repair.components import separate_objects
 from manitwin.models.annotators.protocol import Annotator, QualityVerdict
-from manitwin.pipeline.object_state import load_solid, read_subject
+from manitwin.pipeline.object_state import cut_out_photos, load_solid, read_subject
 from manitwin.twin.record_values import Check
 
 
@@ -24,8 +25,10 @@ class GateStage:
     """
 
     name: ClassVar[str] = "gate"
-    version: ClassVar[str] = "1"
-    reads: ClassVar[tuple[str, ...]] = ("canonical.npz", "canonical.glb", "geometry", "views/", "cameras", "naming?")
+    version: ClassVar[str] = "2"
+    reads: ClassVar[tuple[str, ...]] = (
+        "canonical.npz", "canonical.glb", "geometry", "views/", "cameras", "naming?", "photo.png?", "photos/?",
+    )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = ("gate",)
 
     def __init__(self, settings: GateConfig, annotator: Annotator | None = None):
@@ -56,9 +59,8 @@ class GateStage:
     def _verdict(self, draft: Draft, metric: bool) -> QualityVerdict:
         if self.annotator is None:
             return QualityVerdict(None, None, "no annotator that sees")
-        return self.annotator.judge_quality(
-            read_subject(draft, solid="canonical.npz", visual="canonical.glb", metric=metric)
-        )
+        subject = read_subject(draft, solid="canonical.npz", visual="canonical.glb", metric=metric)
+        return self.annotator.judge_quality(replace(subject, photos=cut_out_photos(draft)))
 
 
 def check_watertight(watertight: bool, repairs: list[str]) -> Check:

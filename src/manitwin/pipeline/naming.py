@@ -14,12 +14,11 @@ from manitwin.models.classifiers.classifier import Named, classify
 from manitwin.models.classifiers.efficientnet_lite import NAME, WEIGHTS_SHA256
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name, pictures
-from manitwin.render.renderer import BACKDROP
+from manitwin.render.grounds import shown_object
 from manitwin.twin.record import Likely, Naming
 
 VIEWS_FROM_ABOVE = (0, 1, 2, 4, 5, 6)
-"""Of the eight views, those that a person has of a thing on a table."""
-_BACKDROP_TOLERANCE = 6  # what lossy pictures move a plain colour by
+"""Of the eight views, those that a person has of a thing on a table (``render.cameras.ORBIT_ELEVATIONS_DEG``)."""
 
 
 class NameStage:
@@ -52,8 +51,8 @@ class NameStage:
 
 
 def cut_view(picture: np.ndarray) -> np.ndarray:
-    """Return a view ``(H, W, 3) uint8`` of a mesh with the matte that its plain backdrop gives, ``(H, W, 4)``."""
-    away = np.abs(picture.astype(int) - np.array(BACKDROP)).max(axis=2) > _BACKDROP_TOLERANCE
+    """Return a view ``(H, W, 3) uint8`` of a mesh with the matte that its plain ground gives, ``(H, W, 4)``."""
+    away = shown_object(picture)
     alpha = away if away.any() else np.ones_like(away)
     return np.dstack([picture, np.where(alpha, 255, 0).astype(np.uint8)])
 

@@ -54,10 +54,13 @@ def joints_of(proposals: Mapping[str, np.ndarray], index: np.ndarray) -> dict[st
     return {"joints_rad": np.stack([proposals[name][index] for name in JOINTS], axis=1)}
 
 
-def read_subject(draft: Draft[Item], *, solid: str, visual: str, metric: bool, scale: float = 1.0) -> Subject:
+def read_subject(
+    draft: Draft[Item], *, solid: str, visual: str, metric: bool, scale: float = 1.0, size_estimated: bool = False
+) -> Subject:
     """Read the subject of a draft; ``solid`` and ``visual`` name the artifacts that hold the meshes.
 
-    ``scale`` is how much larger these are than the canonical mesh, which the views were taken of.
+    ``scale`` is how much larger these are than the canonical mesh, which the views were taken of; ``size_estimated`` says
+    that an estimate gave it.
     """
     given = read_given(draft)
     return Subject(
@@ -69,6 +72,7 @@ def read_subject(draft: Draft[Item], *, solid: str, visual: str, metric: bool, s
         cameras=tuple(Camera.from_json(value).scaled(scale) for value in draft.field("cameras")),
         seed=draft.seed,
         given=given if given is None or scale == 1.0 else given.scaled(scale),
+        size_estimated=size_estimated,
     )
 
 
@@ -103,6 +107,13 @@ def _known(draft: Draft[Item]) -> dict[str, Any] | None:
     else:
         known = draft.field("generation").get("known") if "generation" in draft.fields else None
     return cast(dict[str, Any] | None, known)
+
+
+def cut_out_photos(draft: Draft[Item]) -> tuple[Path, ...]:
+    """Return the cut-out photos that the mesh was made of; none where it was made of something else."""
+    if "photos/" in draft.paths:
+        return tuple(sorted(draft.path("photos/").glob("*.png")))
+    return (draft.path("photo.png"),) if "photo.png" in draft.paths else ()
 
 
 def pictures(folder: Path, kind: str) -> tuple[Path, ...]:

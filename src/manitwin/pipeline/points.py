@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -28,9 +29,9 @@ class PointsStage:
     """
 
     name: ClassVar[str] = "points"
-    version: ClassVar[str] = "6"
+    version: ClassVar[str] = "7"
     reads: ClassVar[tuple[str, ...]] = (
-        "solid.npz", "visual.glb", "views/", "marked/", "physical", "language", "candidates", "visible_candidates",
+        "solid.npz", "visual.glb", "views/", "marked/", "physical", "size", "language", "candidates", "visible_candidates",
         "cameras", "geometry?", "naming?",
     )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = ("points", "spare_grasp_points", "points_findings", "frames_missing")
@@ -48,10 +49,16 @@ class PointsStage:
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return ``points`` ``{functional, grasp}``; raises BadReply for too few, too many, or no candidates."""
         candidates, physical = draft.field("candidates"), draft.field("physical")
+        subject = read_subject(
+            draft,
+            solid="solid.npz",
+            visual="visual.glb",
+            metric=True,
+            scale=physical["scale_applied"],
+            size_estimated=draft.field("size") is not None,
+        )
         request = PointsRequest(
-            subject=read_subject(
-                draft, solid="solid.npz", visual="visual.glb", metric=True, scale=physical["scale_applied"]
-            ),
+            subject=replace(subject, known_as=draft.field("language")["category"]),
             positions_m=np.array(candidates["positions_m"]),
             normals=np.array(candidates["normals"]),
             marked_views=pictures(draft.path("marked/"), "marked"),

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
+import trimesh
 from PIL import Image, WebPImagePlugin
 
 from manitwin.config import Resource, ViewsConfig
 from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb
-from manitwin.render.cameras import orbit_cameras
-from manitwin.render.renderer import shared_renderer
+from manitwin.render.cameras import Camera, orbit_cameras
+from manitwin.render.grounds import ground_for
+from manitwin.render.renderer import BACKDROP, shared_renderer
 
 VIEWS = 8
 """Paper, "Physical Property Estimation"."""
@@ -26,7 +29,7 @@ class ViewsStage:
     """
 
     name: ClassVar[str] = "views"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb",)
     writes: ClassVar[tuple[str, ...]] = ("views/", "cameras")
     needs: ClassVar[Resource] = "cpu"
@@ -41,13 +44,24 @@ class ViewsStage:
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Draw the views; raises RendererMissing where nothing renders."""
         parts = read_glb(draft.path("canonical.glb"))
-        points = np.concatenate([part.vertices for part in parts])
-        cameras = orbit_cameras(points, fov_y_deg=self.settings.fov_y_deg, size_px=self._size_px)
-        frames = shared_renderer().render(parts, cameras)
+        cameras, pictures = draw_views(parts, self.settings, self._size_px)
         (folder / "views").mkdir(parents=True, exist_ok=True)
-        for index, frame in enumerate(frames):
-            write_webp(frame.rgb, folder / "views" / f"rgb_{index:02d}.webp", self.settings.webp_quality)
+        for index, picture in enumerate(pictures):
+            write_webp(picture, folder / "views" / f"rgb_{index:02d}.webp", self.settings.webp_quality)
         return {"cameras": [camera.to_json() for camera in cameras]}
+
+
+def draw_views(
+    parts: Sequence[trimesh.Trimesh], settings: ViewsConfig, size_px: int
+) -> tuple[list[Camera], list[np.ndarray]]:
+    """Return the eight cameras around meshes and their pictures ``(H, W, 3) uint8``, on a ground that shows the outline."""
+    points = np.concatenate([part.vertices for part in parts])
+    cameras = orbit_cameras(
+        points, fov_y_deg=settings.fov_y_deg, size_px=size_px, elevations_deg=settings.elevations_deg
+    )
+    frames = shared_renderer().render(parts, cameras)
+    ground = ground_for(frames)
+    return cameras, [frame.over(BACKDROP, ground) for frame in frames]
 
 
 def write_webp(picture: np.ndarray, path: Path, quality: int) -> None:

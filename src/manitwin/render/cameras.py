@@ -6,6 +6,7 @@ left pixel is (0.5, 0.5).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +15,12 @@ import numpy as np
 
 from manitwin.geometry.poses import inverse, transform_points
 
-# Eight views: every 45 degrees of azimuth. Four from the height of a person who looks at a thing on a table, three from
-# well above (into cavities) and one from below, all seen from another side than their neighbours.
-ORBIT_ELEVATIONS_DEG = (20.0, 50.0, 20.0, -35.0, 20.0, 50.0, 20.0, 65.0)
+# Eight views: every 45 degrees of azimuth. Four from the height of a person who looks at a thing on a table, two from
+# well above (into cavities) and two from below, on opposite sides: what is seen once only cannot be checked.
+ORBIT_ELEVATIONS_DEG = (20.0, 50.0, 20.0, -35.0, 20.0, 65.0, 20.0, -35.0)
 ORBIT_FIRST_AZIMUTH_DEG = -60.0
+ORBIT_ASPECTS = (1.0, 1.62, 2.62, 4.24)
+"""Long by short side of the pictures: steps so close that a thing fills 60 % of both sides, up to one of 1 : 6."""
 HERO_ELEVATION_DEG, HERO_FLAT_ELEVATION_DEG = 26.0, 50.0
 FLAT = 0.3  # height, in the longer side of the footprint, below which a thing lies rather than stands
 FILL = 0.88  # share of the picture's half width that the silhouette may reach
@@ -116,22 +119,48 @@ def framing_camera(
     return Camera(pose, float(np.deg2rad(fov_y_deg)), width_px, height_px)
 
 
-def orbit_cameras(points: np.ndarray, *, fov_y_deg: float, size_px: int) -> list[Camera]:
-    """Return eight cameras around ``points (N, 3)``: every 45 degrees, from the side, from above and from below.
+def orbit_cameras(
+    points: np.ndarray,
+    *,
+    fov_y_deg: float,
+    size_px: int,
+    elevations_deg: Sequence[float] = ORBIT_ELEVATIONS_DEG,
+    first_azimuth_deg: float = ORBIT_FIRST_AZIMUTH_DEG,
+) -> list[Camera]:
+    """Return a camera for each elevation around ``points (N, 3)``, at equal steps of azimuth.
 
-    Source: paper, "Physical Property Estimation" (8 multi-view renders); which elevations is our choice.
+    Source: paper, "Physical Property Estimation" (8 multi-view renders); which elevations is our choice. A picture is as
+    wide by its height as the object from there, to a step of ``ORBIT_ASPECTS``, and has about ``size_px`` squared pixels;
+    ``fov_y_deg`` is the angle of its longer side.
     """
     return [
-        framing_camera(
-            points,
-            azimuth_deg=ORBIT_FIRST_AZIMUTH_DEG + 45.0 * i,
-            elevation_deg=elevation,
-            fov_y_deg=fov_y_deg,
-            width_px=size_px,
-            height_px=size_px,
-        )
-        for i, elevation in enumerate(ORBIT_ELEVATIONS_DEG)
+        _fitted_camera(points, first_azimuth_deg + 360.0 / len(elevations_deg) * i, elevation, fov_y_deg, size_px)
+        for i, elevation in enumerate(elevations_deg)
     ]
+
+
+def _fitted_camera(
+    points: np.ndarray, azimuth_deg: float, elevation_deg: float, fov_deg: float, size_px: int
+) -> Camera:
+    def shaped(width_px: int, height_px: int) -> Camera:
+        tangent = np.tan(np.deg2rad(fov_deg) / 2) * height_px / max(width_px, height_px)
+        return framing_camera(
+            points,
+            azimuth_deg=azimuth_deg,
+            elevation_deg=elevation_deg,
+            fov_y_deg=float(np.rad2deg(2 * np.arctan(tangent))),
+            width_px=width_px,
+            height_px=height_px,
+        )
+
+    square = shaped(size_px, size_px)
+    width, height = np.ptp(project(points, square)[0], axis=0)
+    aspects = np.array(ORBIT_ASPECTS)
+    aspect = float(aspects[np.abs(np.log(aspects) - abs(np.log(width / height))).argmin()])
+    if aspect == 1.0:
+        return square
+    long_px, short_px = (4 * round(size_px * factor / 4) for factor in (aspect**0.5, aspect**-0.5))
+    return shaped(long_px, short_px) if width > height else shaped(short_px, long_px)
 
 
 def hero_camera(points: np.ndarray, *, fov_y_deg: float, width_px: int, height_px: int) -> Camera:

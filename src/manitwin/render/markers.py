@@ -17,7 +17,8 @@ INK = (18, 22, 30)
 PAPER = (255, 255, 255)
 X_AXIS, Z_AXIS = (214, 48, 49), (30, 80, 220)
 DIRECTIONS = 16
-RINGS = (1.0, 1.35, 1.8, 2.4, 3.2, 4.2)  # how far a number may move from its dot, in heights of the number's box
+RINGS = (1.0, 1.35, 1.8, 2.4, 3.2, 4.2, 5.5, 7.0)  # how far a number may move off its dot, in heights of its box
+DOT_SHARE = 0.36  # of a box's height: the radius of a dot with its edge, and a pixel
 _SUBPIXEL = 4  # bits: OpenCV draws at sixteenths of a pixel
 
 
@@ -28,15 +29,16 @@ def draw_markers(
     *,
     occupied: np.ndarray | None = None,
     colors: Sequence[tuple[int, int, int]] | None = None,
+    dot: tuple[int, int, int] = DOT,
     font_px: int = 13,
 ) -> np.ndarray:
     """Draw a dot at each of ``pixels (N, 2)`` and its label in a box beside it.
 
     Returns the picture ``(H, W, 3) uint8``. Boxes keep clear of dots and of each other as far as there is room, with a
     line to their dot; where there is a choice they leave ``occupied (H, W) bool``, the object, uncovered. ``colors``
-    are those of dots and boxes (None: red dots, dark boxes). Equal input gives equal pixels.
+    are those of dots and boxes (None: dots of colour ``dot``, dark boxes). Equal input gives equal pixels.
     """
-    dots, fills = colors or [DOT] * len(labels), colors or [INK] * len(labels)
+    dots, fills = colors or [dot] * len(labels), colors or [INK] * len(labels)
     sizes = np.array([_box_size(label, font_px) for label in labels], dtype=float).reshape(-1, 2)
     centers = place_boxes(pixels, sizes, picture.shape[:2], occupied)
     canvas = picture.copy()
@@ -44,8 +46,8 @@ def draw_markers(
         for pixel, center in zip(pixels, centers, strict=True):
             cv2.line(canvas, _fixed(pixel), _fixed(center), color, width, cv2.LINE_AA, _SUBPIXEL)
     radius = font_px * 0.32
-    for pixel, dot in zip(pixels, dots, strict=True):
-        for color, size in ((PAPER, radius + 1.5), (dot, radius)):
+    for pixel, fill in zip(pixels, dots, strict=True):
+        for color, size in ((PAPER, radius + 1.5), (fill, radius)):
             cv2.circle(canvas, _fixed(pixel), round(size * 2**_SUBPIXEL), color, -1, cv2.LINE_AA, _SUBPIXEL)
     image = Image.fromarray(canvas)
     draw = ImageDraw.Draw(image)
@@ -75,9 +77,9 @@ def _whole(pixel: np.ndarray) -> tuple[int, int]:
     return int(column), int(row)
 
 
-def font_px(height_px: int) -> int:
-    """Return the size of the numbers: 13 px on a picture 512 px high, read well by people and models."""
-    return max(9, round(height_px * 13 / 512))
+def font_px(width_px: int, height_px: int) -> int:
+    """Return the size of the numbers: 13 px on a picture of 512 x 512, read well by people and models."""
+    return max(9, round((width_px * height_px) ** 0.5 * 13 / 512))
 
 
 def place_boxes(
@@ -86,7 +88,7 @@ def place_boxes(
     """Return centres ``(N, 2)`` for boxes of ``sizes (N, 2)`` near their points, overlapping as little as may be.
 
     Greedy, the most crowded point first: the cheapest of 16 directions on rings around the point, by overlap with boxes
-    that are already there, dots covered, distance, and object covered.
+    that are already there, dots covered, lines under dots and boxes of others, distance, and object covered.
     """
     count = len(pixels)
     if not count:
@@ -110,6 +112,9 @@ def place_boxes(
         cost += 8 * _overlap(options, half, centers[placed], sizes[placed] / 2).sum(1)
         cost += 4 * _overlap(options, half, pixels, np.full((count, 2), gap * 0.3)).sum(1)
         cost += 1.0 * _crossings(pixels[index], options, pixels[placed], centers[placed])
+        others = np.delete(pixels, index, axis=0)
+        cost += 6 * (_from_lines(pixels[index], options, others) < gap * DOT_SHARE).sum(1)
+        cost += 2 * (_from_lines(pixels[index], options, centers[placed]) < gap / 2).sum(1)
         centers[index], placed[index] = options[int(cost.argmin())], True
     return centers
 
@@ -129,6 +134,14 @@ def _crossings(start: np.ndarray, ends: np.ndarray, starts: np.ndarray, stops: n
 
     e, p, q = ends[:, None], starts[None], stops[None]
     return ((side(start, e, p) * side(start, e, q) < 0) & (side(p, q, start) * side(p, q, e) < 0)).sum(1)
+
+
+def _from_lines(start: np.ndarray, ends: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the distances ``(O, M)`` of points from the lines from ``start`` to each of ``ends (O, 2)``."""
+    along = ends - start
+    share = (points[None] - start) @ along[:, :, None]
+    share = np.clip(share[..., 0] / np.maximum((along**2).sum(1), 1e-9)[:, None], 0, 1)
+    return np.linalg.norm(points[None] - start - share[..., None] * along[:, None], axis=2)
 
 
 def _covered_share(occupied: np.ndarray, size: np.ndarray) -> np.ndarray:

@@ -9,6 +9,8 @@ import trimesh
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.render.cameras import Camera, pixel_rays
 
+ON_SURFACE_M = 0.001  # a candidate is on the surface that is seen, to a millimetre (half of what a twin may be off)
+ON_SURFACE_SHARE = 0.01  # and of small objects to this share of the longest side
 FACING_COSINE = 0.05  # a surface seen at less than 3 degrees is a line
 
 
@@ -52,6 +54,11 @@ def visible_points(
     inside = (np.abs(seen[:, :2]) < -seen[:, 2:] * tangent).all(1)
     hit, _ = caster.first_hits(np.broadcast_to(camera.position, points.shape), toward)
     return facing & inside & (np.abs(hit - distance) <= tolerance_m)
+
+
+def seen_tolerance_m(extents_m: np.ndarray) -> float:
+    """Return how far (m) a candidate may be off the surface that is seen, for an object of extents ``(3,)``."""
+    return min(ON_SURFACE_M, ON_SURFACE_SHARE * float(extents_m.max()))
 
 
 def merged(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:

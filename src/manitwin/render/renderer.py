@@ -26,6 +26,7 @@ from manitwin.render.surfaces import RenderSurface, render_surface, triangle_mes
 
 BACKDROP = (233, 235, 238)  # light enough to be no colour, dark enough that white things stand out
 SUPERSAMPLE = 2  # SAPIEN's edges are not antialiased; twice the size each way removes the steps that are seen
+MOST_CAMERAS = 8  # picture sizes that are kept ready: each holds its pictures' memory
 SHADERS = Path(__file__).parent / "shaders"
 DARKENING_RADIUS = 0.035  # of the picture's height: how far a nearer surface throws its soft shade
 DARKENING_STRENGTH = 2.6
@@ -111,6 +112,8 @@ class Renderer:
             entity.add_component(component)
             self._scene.add_entity(entity)
             self._cameras[width, height] = component, entity
+            if len(self._cameras) > MOST_CAMERAS:
+                self._scene.remove_entity(self._cameras.pop(next(iter(self._cameras)))[1])
         return self._cameras[width, height]
 
     def _shoot(
@@ -148,6 +151,11 @@ class Frame:
     rgb: np.ndarray
     coverage: np.ndarray
     depth: np.ndarray
+
+    def over(self, old: tuple[int, int, int], new: tuple[int, int, int]) -> np.ndarray:
+        """Return ``rgb`` over another background than the one that it was drawn over."""
+        moved = (1 - self.coverage)[..., None] * (np.array(new, np.float32) - np.array(old, np.float32))
+        return np.rint(np.clip(self.rgb + moved, 0, 255)).astype(np.uint8)
 
 
 def reduced_frame(

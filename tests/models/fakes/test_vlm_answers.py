@@ -48,7 +48,10 @@ def test_proportions_are_seen_in_outlines(mesh: trimesh.Trimesh, sides: tuple[fl
 def test_points_are_chosen_by_what_the_list_says() -> None:
     schema: dict[str, Any] = {"properties": {"points": {"items": {"properties": {"id": {"enum": ["4", "7", "9"]}}}}}}
     first = rehearsal_answer(
-        "grasp_points", schema, "The user calls it: mug. Choose: 4: 50 mm, 90 mm; 7: 10 mm, 40 mm; 9: 20 mm, 0 mm.", []
+        "grasp_points",
+        schema,
+        "The user calls it: mug. Choose: 4: 50 mm, 90 mm, 8 mm; 7: 10 mm, 40 mm, unknown; 9: 20 mm, 0 mm, 70 mm.",
+        [],
     )
     assert [point["id"] for point in first["points"]] == ["7", "9"]
     other = rehearsal_answer(

@@ -63,7 +63,9 @@ def subject(mesh: trimesh.Trimesh, folder: Path, name: str | None, *, metric: bo
         picture = np.where((face >= 0)[..., None], 90, 230).astype(np.uint8).repeat(3, axis=2)
         views.append(folder / f"rgb_{number:02d}.webp")
         Image.fromarray(picture).save(views[-1], lossless=True)
-    return Subject(name, mesh, (visual(mesh),), metric, tuple(views), tuple(cameras), 0)
+    return Subject(
+        name, mesh, (visual(mesh, baseColorFactor=[120, 120, 120, 255]),), metric, tuple(views), tuple(cameras), 0
+    )
 
 
 def points_request(mesh: trimesh.Trimesh, folder: Path, name: str | None, count: int = 42) -> PointsRequest:

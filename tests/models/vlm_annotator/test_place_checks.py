@@ -80,3 +80,33 @@ def test_thick_cylinder_is_too_wide_for_two_fingers_only() -> None:
         and of.of_grasp("three_finger", 0) is None
     )
     assert checks(cylinder(0.03, 0.3), [[0.03, 0, 0.15]], [[1, 0, 0]]).of_grasp("parallel_jaw", 0) is None
+
+
+def test_bottom_rim_is_that_of_the_bottom_not_of_the_opening(of_mug: PlaceChecks) -> None:
+    for label in ("bottom rim", "base rim", "lower rim"):
+        assert of_mug.of_label(label, list(PLACES).index("underside")) is None
+    assert of_mug.of_label("bottom rim", list(PLACES).index("rim")) is not None
+
+
+def test_ends_of_a_lying_can_are_its_bottom_and_top() -> None:
+    can = cylinder(0.033, 0.12)
+    can.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
+    can.apply_translation([0, 0, -can.bounds[0, 2]])
+    low, high = can.bounds[:, 0]
+    at = {
+        "upper edge of an end": [low, 0, 0.065],
+        "other end": [high, 0, 0.001],
+        "side on top": [(low + high) / 2, 0, 0.066],
+    }
+    of = checks(can, list(at.values()), [[-1, 0, 0], [1, 0, 0], [0, 0, 1]])
+    assert of.of_label("bottom rim", 0) is None and of.of_label("top", 1) is None and of.of_label("base", 0) is None
+    assert of.of_label("bottom", 2) is not None, "the middle of its side is no end"
+
+
+def test_pinch_is_for_what_is_thin_and_widths_are_said() -> None:
+    box = trimesh.creation.box([0.2, 0.15, 0.06])
+    of = checks(box, [[0.1, 0, 0]], [[1, 0, 0]])
+    assert "parallel_jaw" in (of.of_grasp("pinch", 0) or "") and of.of_grasp("parallel_jaw", 0) is None
+    assert of.width_phrase(0) == "60 mm"
+    thin = checks(trimesh.creation.box([0.2, 0.15, 0.008]), [[0.1, 0, 0]], [[1, 0, 0]])
+    assert thin.of_grasp("pinch", 0) is None and thin.width_phrase(0) == "8 mm"

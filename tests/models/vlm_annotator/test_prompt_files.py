@@ -24,7 +24,7 @@ def test_each_prompt_uses_all_that_it_is_given() -> None:
 
 
 def test_pictures_stand_between_the_text() -> None:
-    values = {"count": "8", "name": "It is called {count}."}
+    values = {"count": "8", "name": "It is called {count}.", "made_of": ""}
     instructions, parts = load_prompts(None)["quality"].filled(values, ["View 1:", Picture(b"x")])
     assert parts[1:3] == ("View 1:", Picture(b"x")) and len(parts) == 4 and instructions.startswith("You inspect")
     assert "It is called {count}." in str(parts[0]), "what is put in is not filled again"

@@ -13,7 +13,9 @@ from handmade import cup
 from manitwin.errors import BadReply, Rejected
 from manitwin.models.annotators.priors import load_materials
 from manitwin.models.annotators.protocol import PhysicalEstimates
-from manitwin.models.annotators.vlm.physical import Matter
+from manitwin.models.annotators.vlm.physical import Matter, physical_question
+from manitwin.models.annotators.vlm.prompt_files import load_prompts
+from manitwin.models.annotators.vlm.question_parts import size_phrase
 
 
 def interval(low: float, typical: float, high: float) -> dict[str, float]:
@@ -162,14 +164,24 @@ def test_malformed_answer_is_repaired_once_and_never_used(tmp_path: Path, change
         estimated(tmp_path, changed(GOOD, **changes))
 
 
-def test_neither_proportions_nor_size_of_the_mesh_are_told(tmp_path: Path) -> None:
+def test_proportions_are_not_told_nor_a_size_that_nobody_declared(tmp_path: Path) -> None:
     texts = []
     for mesh in (cup(), cup(radius_m=0.03, height_m=0.4)):
-        chat, _ = estimated(tmp_path, GOOD, mesh=mesh)
-        question = chat.asked[0][0]
+        question = physical_question(subject(mesh, tmp_path, "cup", metric=False), load_prompts(None)["physical"])
         texts.append([question.instructions, *(part for part in question.parts if isinstance(part, str))])
-    assert texts[0] == texts[1] and any("The user calls it: cup." in part for part in texts[0])
+    assert texts[0] == texts[1] and any("The user calls it: cup. Nobody has said" in part for part in texts[0])
+
+
+def test_declared_size_is_told_for_the_mass_belongs_to_it(tmp_path: Path) -> None:
+    question = physical_question(subject(cup(), tmp_path, "cup"), load_prompts(None)["physical"])
+    said = next(part for part in question.parts if isinstance(part, str))
+    assert f"declares how large it is: {size_phrase(cup().extents)}" in said and "Nobody has said" not in said
+
+
+def test_material_that_no_picture_tells_may_be_said_to_be_unknown(tmp_path: Path) -> None:
+    answer = changed(GOOD, materials=[{"part": "all", "material": "unknown"}])
+    assert estimated(tmp_path, answer)[1].mass_kg is not None
 
 
 def test_materials_are_those_of_the_table() -> None:
-    assert {*Matter.__args__} - {"other"} == {*load_materials()} - {"unknown"}  # type: ignore[attr-defined]
+    assert {*Matter.__args__} - {"other", "unknown"} == {*load_materials()} - {"unknown"}  # type: ignore[attr-defined]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import threading
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -16,8 +17,15 @@ from handmade import mug
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import PointsRequest
 from manitwin.models.annotators.vlm.place_checks import PlaceChecks
-from manitwin.models.annotators.vlm.points import Numbering, functional_numbering, grasp_numbering
-from manitwin.models.annotators.vlm.question_parts import marked_views
+from manitwin.models.annotators.vlm.points import (
+    functional_numbering,
+    grasp_numbering,
+    grasp_numbers,
+    grasp_question,
+)
+from manitwin.models.annotators.vlm.prompt_files import load_prompts
+from manitwin.models.annotators.vlm.view_pictures import marked_views
+from manitwin.models.annotators.vlm.vote_views import own_views
 from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.render.cameras import project
 from manitwin.render.markers import DOT
@@ -54,7 +62,7 @@ def by_place(request: PointsRequest, *places: tuple[str, int, str, float]) -> Ca
     """Answer a grasp question with candidates, by whatever number they have in it."""
 
     def answer(question: Question) -> dict[str, Any]:
-        numbers = grasp_numbering(request, question.vote).numbers
+        numbers = grasp_numbers(request, question.vote)
         return grasps(*((label, str(numbers[i]), kind, confidence) for label, i, kind, confidence in places))
 
     return answer
@@ -96,8 +104,8 @@ def test_model_that_says_the_lowest_numbers_gets_no_majority(request_of_mug: Poi
         return grasps(*(("body", number, "power", 0.9) for number in ids_of(question)[:2]))
 
     selected = annotator(ScriptedChat(good_functional(request_of_mug), lowest)).select_points(request_of_mug)
-    assert len(selected.grasp) == 2 and all(point.confidence < 0.5 for point in selected.grasp)
-    assert selected.findings is not None and sum("no majority" in finding for finding in selected.findings) == 2
+    assert len(selected.grasp) == 2 and all(point.confidence < 0.7 for point in selected.grasp)
+    assert selected.findings is not None and any("no majority" in finding for finding in selected.findings)
 
 
 def test_enum_holds_only_what_some_view_shows(request_of_mug: PointsRequest) -> None:
@@ -110,11 +118,15 @@ def test_enum_holds_only_what_some_view_shows(request_of_mug: PointsRequest) -> 
     )
     annotator(chat).select_points(request)
     seen = {i for view in request.visible for i in view}
-    for number, (question, _) in enumerate(chat.asked):
-        numbers = (functional_numbering(request) if number == 0 else grasp_numbering(request, number - 1)).numbers
-        assert set(ids_of(question)) == {str(numbers[i]) for i in seen}
+    for question, _ in chat.asked:
+        of_grasps = question.name == "grasp_points"
+        numbering = grasp_numbering(request, question.vote, 3) if of_grasps else functional_numbering(request)
+        numbers = numbering.numbers
+        if question.vote == 0:
+            assert numbering.views.seen == seen
+        assert set(ids_of(question)) == {str(numbers[i]) for i in numbering.views.seen}
         listed = next(part for part in reversed(question.parts) if isinstance(part, str))
-        assert not any(f" {numbers[i]}: " in listed for i in hidden)
+        assert not any(f" {numbers[i]}: " in listed for i in hidden - numbering.views.seen)
     unseen = str(functional_numbering(request).numbers[3])
     with pytest.raises(BadReply, match="points"):
         annotator(ScriptedChat(functional(("rim", unseen), ("base", ids_of(chat.asked[0][0])[0])))).select_points(
@@ -123,8 +135,10 @@ def test_enum_holds_only_what_some_view_shows(request_of_mug: PointsRequest) -> 
 
 
 def test_numbers_are_drawn_at_their_candidates_and_clean_views_stay_clean(request_of_mug: PointsRequest) -> None:
-    request, numbering = request_of_mug, Numbering(request_of_mug, 1, 0)
-    parts = marked_views(request, numbering.numbers)
+    request, numbering = request_of_mug, grasp_numbering(request_of_mug, 0, 3)
+    views = numbering.views
+    parts, color = marked_views(request, numbering.numbers, views.pictures, views.cameras, views.visible)
+    assert color == "red"
     pictures = [np.asarray(Image.open(io.BytesIO(part.png))) for part in parts if isinstance(part, Picture)]
     captions = [part for part in parts if isinstance(part, str)]
     assert len(pictures) == 16 and captions[0] == "View 1 of 8, azimuth 300, elevation 20, clean:"
@@ -143,17 +157,19 @@ def test_drawn_number_is_that_of_the_query(request_of_mug: PointsRequest) -> Non
 
     def box(number: int) -> bytes:
         numbers = np.full(len(one.positions_m), number)
-        return [part.png for part in marked_views(one, numbers) if isinstance(part, Picture)][1]
+        views = own_views(one)
+        parts, _ = marked_views(one, numbers, views.pictures, views.cameras, views.visible)
+        return [part.png for part in parts if isinstance(part, Picture)][1]
 
     assert box(11) == box(11) and box(11) != box(12)
 
 
 def test_neighbours_support_each_other(request_of_mug: PointsRequest) -> None:
     request = request_of_mug
-    spacing_m = PlaceChecks(request).spacing_m
-    near = nearest(request, (0, 0.04, 0.05), 3)
-    near = [i for i in near if np.linalg.norm(request.positions_m[i] - request.positions_m[near[0]]) <= spacing_m][:2]
-    assert len(near) == 2, "the mug's wall has candidates within one spacing of each other"
+    near = nearest(request, (0, 0.04, 0.05), 2)
+    positions, normals = request.positions_m.copy(), request.normals.copy()
+    positions[near[1]], normals[near[1]] = positions[near[0]] + [0, 0, 0.019], normals[near[0]]  # less than 2 cm away
+    request = replace(request, positions_m=positions, normals=normals)
     far = nearest(request, (0.075, 0, 0.05))[0]
 
     def answer(question: Question) -> dict[str, Any]:
@@ -235,3 +251,62 @@ def test_number_written_as_a_number_is_the_same_id(request_of_mug: PointsRequest
         point["id"] = int(point["id"])
     votes = by_place(request_of_mug, ("body", 1, "power", 0.9), ("body", 2, "power", 0.8))
     assert len(annotator(ScriptedChat(answer, votes)).select_points(request_of_mug).functional) == 2
+
+
+def test_each_vote_has_other_views_order_numbers_and_words(request_of_mug: PointsRequest) -> None:
+    votes = by_place(request_of_mug, ("body", 1, "power", 0.9), ("body", 2, "power", 0.8))
+    chat = ScriptedChat(good_functional(request_of_mug), votes)
+    annotator(chat).select_points(request_of_mug)
+    grasp = sorted((question for question, _ in chat.asked[1:]), key=lambda question: question.vote)
+    captions = [[p for p in q.parts if isinstance(p, str) and p.endswith("clean:")] for q in grasp]
+    azimuths = [[int(caption.split("azimuth ")[1].split(",")[0]) for caption in one] for one in captions]
+    assert not set(azimuths[1]) & set(azimuths[0]) and not set(azimuths[2]) & {*azimuths[0], *azimuths[1]}
+    assert all(sorted(one) != one and len(one) == 8 for one in azimuths[1:])
+    pngs = [{p.png for p in q.parts if isinstance(p, Picture)} for q in grasp]
+    assert not pngs[0] & pngs[1] and not pngs[1] & pngs[2]
+    words = [" ".join(p for p in q.parts if isinstance(p, str) and not p.startswith("View")) for q in grasp]
+    assert len({text.split(".")[-2] for text in words}) == 3 and len({q.instructions for q in grasp}) == 1
+
+
+def test_votes_are_asked_at_the_same_time(request_of_mug: PointsRequest) -> None:
+    votes = by_place(request_of_mug, ("body", 1, "power", 0.9), ("body", 2, "power", 0.8))
+    together = threading.Barrier(3, timeout=30)  # one after the other, the first would wait for ever
+
+    def answer(question: Question) -> dict[str, Any]:
+        together.wait()
+        return votes(question)
+
+    selected = annotator(ScriptedChat(good_functional(request_of_mug), answer)).select_points(request_of_mug)
+    assert [point.candidate for point in selected.grasp] == [1, 2]
+
+
+def test_mirrored_places_support_each_other(request_of_mug: PointsRequest) -> None:
+    request = request_of_mug
+    left, far = nearest(request, (0, 0.04, 0.05))[0], nearest(request, (0.075, 0, 0.05))[0]
+    right = nearest(request, (0, -0.04, 0.05))[0]
+    positions, normals = request.positions_m.copy(), request.normals.copy()
+    positions[right], normals[right] = positions[left] * [1, -1, 1], normals[left] * [1, -1, 1]
+    request = replace(request, positions_m=positions, normals=normals)
+
+    def answer(question: Question) -> dict[str, Any]:
+        side = right if question.vote == 1 else left
+        return by_place(request, ("body", side, "power", 0.9), ("handle", far, "parallel_jaw", 0.8))(question)
+
+    selected = annotator(ScriptedChat(good_functional(request), answer)).select_points(request)
+    assert [(p.candidate, p.confidence) for p in selected.grasp] == [
+        (left, 0.9),
+        (far, 0.8),
+    ] and selected.findings == ()
+
+
+def test_widths_are_listed_and_what_is_known_is_said(request_of_mug: PointsRequest) -> None:
+    subject = replace(request_of_mug.subject, name=None, known_as="coffee mug", size_estimated=True)
+    checks = PlaceChecks(replace(request_of_mug, subject=subject))
+    numbering = grasp_numbering(checks.request, 0, 3)
+    question = grasp_question(checks, numbering, load_prompts(None)["grasp_points"], 0)
+    said = [part for part in question.parts if isinstance(part, str)]
+    handle = nearest(request_of_mug, (0.075, 0, 0.05))[0]
+    width = checks.width_phrase(handle)
+    assert f"; {numbering.numbers[handle]}: " in said[-1] and f" mm, {width}" in said[-1] and width.endswith(" mm")
+    assert "it was recognised as: coffee mug." in said[0]
+    assert "estimated from pictures, not measured" in said[0] and "measured size is" not in said[0]

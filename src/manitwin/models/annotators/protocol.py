@@ -24,7 +24,8 @@ class Subject:
     ``solid`` is the repaired watertight mesh and ``parts`` are the textured visual meshes, both in the object frame (Z-up),
     metres as far as known: ``metric`` says whether the scale is declared or only guessed. ``views`` are eight pictures, and
     ``cameras`` those that took them, in the same frame and unit as the meshes. ``given`` is what an imported asset says of
-    itself, in the same frame; None for every other input.
+    itself, in the same frame; None for every other input. ``known_as`` is what an earlier answer took it for, ``photos`` are the
+    photos that it was made of, cut out (RGBA), and ``size_estimated`` says that the metres are those of an estimate.
     """
 
     name: str | None
@@ -35,6 +36,9 @@ class Subject:
     cameras: tuple[Camera, ...]
     seed: int
     given: ImportRecord | None = None
+    known_as: str | None = None
+    photos: tuple[Path, ...] = ()
+    size_estimated: bool = False
 
 
 @dataclass(frozen=True)

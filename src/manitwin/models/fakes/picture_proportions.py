@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 
 HALF_VIEW = 0.88 * float(np.tan(np.deg2rad(15.0)))
-"""Tangent of half the angle that a centred thing fills: pictures of 30 degrees, filled to 88 %."""
+"""Tangent of half the angle that a centred thing fills along the longer side: pictures of 30 degrees, filled to 88 %."""
 
 WIDTHS = np.geomspace(0.05, 1.0, 14)
 HEIGHTS = np.geomspace(0.05, 20.0, 26)
@@ -29,15 +29,17 @@ def measure_proportions(pngs: list[bytes], views: list[tuple[float, float]]) -> 
     The box, upright cylinder or ellipsoid is taken whose outlines are as wide by their height as those seen, from a grid of
     widths, heights and turns. Without pictures: a cube.
     """
-    aspects, directions = [], []
+    aspects, directions, frames = [], [], []
     for png, view in zip(pngs, views, strict=False):
-        rows, columns = np.nonzero(foreground(np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))))
+        picture = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+        rows, columns = np.nonzero(foreground(picture))
         if len(rows):
             aspects.append((np.ptp(columns) + 1) / (np.ptp(rows) + 1))
             directions.append(view)
+            frames.append(HALF_VIEW * np.array(picture.shape[1::-1]) / max(picture.shape[:2]))
     if not aspects:
         return 1.0, 1.0, 1.0
-    best = min((_fit(solid, np.array(aspects), directions) for solid in _solids()), key=lambda fit: fit[0])
+    best = min((_fit(solid, np.array(aspects), directions, frames) for solid in _solids()), key=lambda fit: fit[0])
     sides = sorted(best[1], reverse=True)
     return 1.0, sides[1] / sides[0], sides[2] / sides[0]
 
@@ -53,7 +55,9 @@ def _solids() -> list[np.ndarray]:
     return [box, cylinder, np.concatenate(ball)]
 
 
-def _fit(solid: np.ndarray, aspects: np.ndarray, views: list[tuple[float, float]]) -> tuple[float, tuple[float, ...]]:
+def _fit(
+    solid: np.ndarray, aspects: np.ndarray, views: list[tuple[float, float]], frames: list[np.ndarray]
+) -> tuple[float, tuple[float, ...]]:
     width, height, yaw = (a.reshape(-1) for a in np.meshgrid(WIDTHS, HEIGHTS, YAWS, indexing="ij"))
     sides = np.stack([np.ones_like(width), width, height], 1)
     points = solid[None] * sides[:, None]
@@ -62,21 +66,24 @@ def _fit(solid: np.ndarray, aspects: np.ndarray, views: list[tuple[float, float]
         [cos * points[..., 0] - sin * points[..., 1], sin * points[..., 0] + cos * points[..., 1], points[..., 2]], -1
     )
     error = np.zeros(len(sides))
-    for aspect, (azimuth, elevation) in zip(aspects, views, strict=True):
-        error += np.log(_outline_aspect(turned, azimuth, elevation) / aspect) ** 2
+    for aspect, (azimuth, elevation), frame in zip(aspects, views, frames, strict=True):
+        error += np.log(_outline_aspect(turned, azimuth, elevation, frame) / aspect) ** 2
     best = int(error.argmin())
     return float(error[best]), tuple(float(side) for side in sides[best])
 
 
-def _outline_aspect(points: np.ndarray, azimuth_deg: float, elevation_deg: float) -> np.ndarray:
-    """Return width by height of the outlines of ``(K, N, 3)`` points, seen centred and filling the picture."""
+def _outline_aspect(points: np.ndarray, azimuth_deg: float, elevation_deg: float, frame: np.ndarray) -> np.ndarray:
+    """Return width by height of the outlines of ``(K, N, 3)`` points, seen centred and filling a picture.
+
+    ``frame (2,)`` are the tangents of half the angles that are filled, across and up.
+    """
     azimuth, elevation = np.deg2rad(azimuth_deg), np.deg2rad(elevation_deg)
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
     backward = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
     seen = points @ np.stack([right, np.cross(backward, right), backward], 1)
     plane, toward = seen[..., :2], seen[..., 2:]
-    upper, lower = (plane + toward * HALF_VIEW).max(1), (plane - toward * HALF_VIEW).min(1)
-    distance = ((upper - lower) / (2 * HALF_VIEW)).max(1)[:, None, None]
+    upper, lower = (plane + toward * frame).max(1), (plane - toward * frame).min(1)
+    distance = ((upper - lower) / (2 * frame)).max(1)[:, None, None]
     projected = (plane - ((upper + lower) / 2)[:, None]) / (distance - toward)
     extent = np.ptp(projected, axis=1)
     return extent[:, 0] / extent[:, 1]

@@ -19,11 +19,11 @@ from manitwin.models.fakes.picture_proportions import foreground, measure_propor
 ASKED_AGAIN = "It contradicts what is known"
 """What the annotator says where an answer is asked for once more."""
 
-_NAME = re.compile(r"The user calls it: (.+?)\.(?:\s|$)")
+_NAME = re.compile(r"(?:The user calls it|it was recognised as): (.+?)\.(?:\s|$)")
 _VIEW = re.compile(r"azimuth (-?\d+), elevation (-?\d+)")
-_SIZE = re.compile(r"measured size is ([\d. x]+ cm)")
+_SIZE = re.compile(r"(?:measured size is|not measured: about) ([\d. x]+ cm)")
 _MATERIAL = re.compile(r"material was estimated as (.+?)\.(?:\s|$)")
-_LISTED = re.compile(r"\b(\d+): (\d+) mm(?:, (\d+) mm)?(?=[;.])")
+_LISTED = re.compile(r"\b(\d+): (\d+) mm(?:, (\d+) mm, (?:\d+ mm|unknown))?(?=[;.])")
 _BOX = re.compile(r"smallest box has 1 : ([\d.]+) : ([\d.]+)")
 _DENSITY = re.compile(r"is ([\d.e+-]+) kg/m3, but a thing of .* has ([\d.e+-]+) to ([\d.e+-]+) kg/m3")
 _ASKED_FOR = re.compile(r"somebody asks for (['\"])(.+?)\1\.(?:\s|$)")
@@ -37,7 +37,7 @@ def rehearsal_answer(schema_name: str, schema: dict[str, Any], text: str, pngs: 
     found = _NAME.search(text)
     prior = lookup(found.group(1)) if found else None
     if schema_name == "quality":
-        return _quality(prior or unknown_prior())
+        return _quality(prior or unknown_prior(), beside_photo="like_photo" in schema["properties"])
     if schema_name == "physical":
         matters = schema["properties"]["materials"]["items"]["properties"]["material"]["enum"]
         answer = _physical(prior or unknown_prior(), found is not None, text, pngs, matters)
@@ -57,7 +57,7 @@ def rehearsal_answer(schema_name: str, schema: dict[str, Any], text: str, pngs: 
     return answer
 
 
-def _quality(prior: Prior) -> dict[str, Any]:
+def _quality(prior: Prior, *, beside_photo: bool) -> dict[str, Any]:
     clean = {"evidence": "nothing seen", "severity": "none"}
     return {
         "shown": f"One {prior.category}.",
@@ -68,6 +68,7 @@ def _quality(prior: Prior) -> dict[str, Any]:
         "geometric_implausibility": clean,
         "quality_evidence": "no artifact in any view",
         "visual_quality": "yes",
+        **({"photo_evidence": "nothing is missing", "like_photo": "yes"} if beside_photo else {}),
     }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -41,13 +42,20 @@ from manitwin.models.annotators.vlm.points import (
     grasp_question,
 )
 from manitwin.models.annotators.vlm.prompt_files import Prompt, load_prompts
-from manitwin.models.annotators.vlm.quality import QualityAnswer, examine_quality, quality_question, quality_verdict
+from manitwin.models.annotators.vlm.quality import (
+    QualityBesidePhotoAnswer,
+    examine_quality,
+    quality_answer,
+    quality_question,
+    quality_verdict,
+)
 from manitwin.models.annotators.vlm.template_reader import TemplateReader
 from manitwin.models.vlm.chat_from_spec import anthropic_from_spec, openai_from_spec, replay_from_spec
 from manitwin.models.vlm.prices import expected_usd
 from manitwin.models.vlm.protocol import ChatModel, Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.models.vlm.structured import Forgetful, ask, probe
+from manitwin.models.vlm.together import asked_together
 from manitwin.twin.record import Language
 
 PROMPTS: dict[AnnotatorQuestion, tuple[str, ...]] = {
@@ -118,9 +126,9 @@ class VlmAnnotator:
         return TemplateReader(self.chat, self.config.vlm, self.prompts)
 
     def judge_quality(self, subject: Subject) -> QualityVerdict:
-        """Judge the two criteria; what is unsure when asked twice is a no."""
-        question = quality_question(subject, self.prompts["quality"])
-        return quality_verdict(ask(self.chat, question, QualityAnswer, examine_quality).value)
+        """Judge the criteria, beside the photos if there are any; what is unsure when asked twice is a no."""
+        question = quality_question(subject, self.prompts["quality"], self.picture_px)
+        return quality_verdict(ask(self.chat, question, quality_answer(subject), examine_quality).value)
 
     def estimate_physical(self, subject: Subject) -> PhysicalEstimates:
         """Estimate size, mass and contact; raises Rejected for what is impossible when asked twice."""
@@ -152,7 +160,10 @@ class VlmAnnotator:
             raise
 
     def select_points(self, request: PointsRequest) -> SelectedPoints:
-        """Choose functional points in one query, and grasp points by a vote over several with other numbers."""
+        """Choose functional points in one query, and grasp points by a vote over several at once.
+
+        Each of these has other views, in another order, other numbers and another wording.
+        """
         checks = PlaceChecks(request)
         numbering = functional_numbering(request)
         answered = ask(
@@ -163,35 +174,42 @@ class VlmAnnotator:
         )
         functional, findings = functional_points(answered.value, numbering, checks)
         votes = self.config.vlm.votes
-        cast = [ballot for vote in range(votes) for ballot in self._ballots(request, checks, vote)]
+        queries = asked_together([self._query(checks, vote, votes) for vote in range(votes)])
+        cast = [ballot for query in queries for ballot in query]
         grasp, more = elect(cast, votes, checks)
         spare = runners_up(cast, votes, checks, [point.candidate for point in grasp])
         return SelectedPoints(functional, grasp, findings + more, spare)
 
     def questions(self, request: PointsRequest, material: str, extents_m: np.ndarray) -> list[Question]:
         """Return all that an object is asked about in a build, in order, ``select_points`` and its votes last; asks nothing."""
-        subject, prompts = request.subject, self.prompts
+        subject, prompts, checks, votes = request.subject, self.prompts, PlaceChecks(request), self.config.vlm.votes
         grasps = [
-            grasp_question(request, grasp_numbering(request, vote), prompts["grasp_points"], vote)
-            for vote in range(self.config.vlm.votes)
+            grasp_question(checks, grasp_numbering(request, vote, votes), prompts["grasp_points"], vote)
+            for vote in range(votes)
         ]
         return [
-            quality_question(subject, prompts["quality"]),
+            quality_question(subject, prompts["quality"], self.picture_px),
             physical_question(subject, prompts["physical"]),
             captions_question(subject, material, extents_m, prompts["captions"]),
             functional_question(request, functional_numbering(request), prompts["functional_points"]),
             *grasps,
         ]
 
-    def _ballots(self, request: PointsRequest, checks: PlaceChecks, vote: int) -> list[Ballot]:
-        numbering = grasp_numbering(request, vote)
-        answered = ask(
-            self.chat,
-            grasp_question(request, numbering, self.prompts["grasp_points"], vote),
-            grasp_answer(numbering.ids),
-            lambda answer: examine_points(answer, numbering, checks),
-        )
-        return ballots(answered.value, numbering, checks, vote)
+    def _query(self, checks: PlaceChecks, vote: int, votes: int) -> Callable[[], list[Ballot]]:
+        """Return what asks one of the grasp queries; its pictures are drawn here, in the thread that may."""
+        numbering = grasp_numbering(checks.request, vote, votes)
+        question = grasp_question(checks, numbering, self.prompts["grasp_points"], vote)
+
+        def ballots_of_query() -> list[Ballot]:
+            answered = ask(
+                self.chat,
+                question,
+                grasp_answer(numbering.ids),
+                lambda answer: examine_points(answer, numbering, checks),
+            )
+            return ballots(answered.value, numbering, checks, vote)
+
+        return ballots_of_query
 
     def _forget(self, question: Question) -> None:
         # A kept answer that cannot be used would be of no use again.
@@ -204,7 +222,7 @@ class VlmAnnotator:
         digests: dict[AnnotatorQuestion, str] = {}
         for question, names in PROMPTS.items():
             votes = self.config.vlm.votes if question == "points" else 1
-            asked = [(self.prompts[n].instructions, self.prompts[n].question, strict_schema(_FORMS[n])) for n in names]
+            asked = [(self.prompts[n].text, strict_schema(_FORMS[n])) for n in names]
             text = json.dumps([asked, settings, votes], sort_keys=True)
             digests[question] = hashlib.sha256(text.encode()).hexdigest()[:8]
         return digests
@@ -220,7 +238,7 @@ class VlmAnnotator:
 
 
 _FORMS: dict[str, type[BaseModel]] = {
-    "quality": QualityAnswer,
+    "quality": QualityBesidePhotoAnswer,
     "physical": PhysicalAnswer,
     "captions": CaptionsAnswer,
     "functional_points": functional_answer(["1"]),

@@ -12,7 +12,8 @@ from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.vlm.physical import SameAsNamed
 from manitwin.models.annotators.vlm.prompt_files import Prompt
-from manitwin.models.annotators.vlm.question_parts import clean_views, name_line, size_phrase
+from manitwin.models.annotators.vlm.question_parts import name_line, size_line, size_phrase
+from manitwin.models.annotators.vlm.view_pictures import clean_views
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.twin.record import Language
@@ -61,8 +62,8 @@ def captions_question(subject: Subject, material: str, extents_m: np.ndarray, pr
     """Ask for words; what is measured is told."""
     values = {
         "count": str(len(subject.views)),
-        "name": name_line(subject.name),
-        "size": size_phrase(extents_m),
+        "name": name_line(subject.name, subject.known_as),
+        "size": size_line(subject, extents_m),
         "material": material,
     }
     instructions, parts = prompt.filled(values, clean_views(subject))

@@ -76,9 +76,10 @@ def ballots(answer: PointsAnswer, numbering: Numbering, checks: PlaceChecks, vot
 def elect(cast: list[Ballot], votes: int, checks: PlaceChecks) -> tuple[tuple[GraspPoint, ...], tuple[str, ...]]:
     """Return 2 to 3 grasp points by support, then confidence, and what speaks against them.
 
-    A query supports a place where it chose its candidate, or one within a candidate's spacing of it (self-consistency: Wang et
-    al. 2022, arXiv 2203.11171, with places in the part of answers). Points without a majority are taken only where there
-    would be fewer than two. Findings: no majority, a tie at the cut, a contradiction with geometry.
+    A query supports a place where it chose its candidate, or one within 2 cm of it, where places that a symmetry of the solid
+    moves onto each other are one (self-consistency: Wang et al. 2022, arXiv 2203.11171, with places in the part of answers).
+    Points without a majority are taken only where there would be fewer than two. Findings: no majority, a tie at the cut, a
+    contradiction with geometry.
     """
     elected = _elected(cast, votes, checks)
     majority = [place for place in elected if 2 * place.support > votes]
@@ -119,15 +120,19 @@ def _elected(cast: list[Ballot], votes: int, checks: PlaceChecks) -> list[Electe
 
 def _supporters(candidate: int, cast: list[Ballot], votes: int, checks: PlaceChecks) -> Elected:
     nearest: dict[int, Ballot] = {}
-    for ballot in sorted(cast, key=lambda b: (_apart_m(b.candidate, candidate, checks), b.candidate)):
-        if _apart_m(ballot.candidate, candidate, checks) <= checks.spacing_m:
+    # the very candidate before its mirror image: each is at distance 0
+    nearest_first = sorted(
+        cast, key=lambda b: (_apart_m(b.candidate, candidate, checks), b.candidate != candidate, b.candidate)
+    )
+    for ballot in nearest_first:
+        if _apart_m(ballot.candidate, candidate, checks) <= checks.same_place_m:
             nearest.setdefault(ballot.vote, ballot)
     return Elected(candidate, tuple(nearest[vote] for vote in sorted(nearest)), votes)
 
 
 def _apart_m(first: int, second: int, checks: PlaceChecks) -> float:
     positions = checks.request.positions_m
-    return float(np.linalg.norm(positions[first] - positions[second]))
+    return 0.0 if first == second else checks.symmetries.apart_m(positions[first], positions[second])
 
 
 def _leading(place: Elected) -> Ballot:

@@ -9,16 +9,17 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.vlm.prompt_files import Prompt
-from manitwin.models.annotators.vlm.question_parts import clean_views, name_line
+from manitwin.models.annotators.vlm.question_parts import extents_of, name_line, size_phrase
+from manitwin.models.annotators.vlm.view_pictures import clean_views
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.twin.record_values import Estimate
 
 Matter = Literal[
     "plastic", "ceramic", "glass", "steel", "aluminium", "wood", "cardboard", "paper", "rubber", "foam", "textile",
-    "leather", "food skin", "wax", "stone", "other",
+    "leather", "food skin", "wax", "stone", "other", "unknown",
 ]  # fmt: skip
-"""The materials of ``data/priors/materials.toml``, and anything else."""
+"""The materials of ``data/priors/materials.toml``, any other one, and one that the pictures do not tell."""
 
 Structure = Literal["solid", "open_container", "hollow_closed", "full_closed"]
 SameAsNamed = Literal["yes", "no", "unsure", "no name given"]
@@ -98,11 +99,21 @@ class PhysicalAnswer(BaseModel):
 def physical_question(subject: Subject, prompt: Prompt) -> Question:
     """Ask for size, mass and contact properties over all views.
 
-    Neither the mesh's proportions nor its declared size are told: both are what the answer is checked against.
+    A declared size is told, for the mass has to belong to it; proportions are not: the answer is checked against them.
     """
-    values = {"count": str(len(subject.views)), "name": name_line(subject.name)}
+    values = {"count": str(len(subject.views)), "name": name_line(subject.name), "size": _size_said(subject)}
     instructions, parts = prompt.filled(values, clean_views(subject))
     return Question("physical", instructions, parts, strict_schema(PhysicalAnswer))
+
+
+def _size_said(subject: Subject) -> str:
+    if not subject.metric:
+        return "Nobody has said how large it is."
+    extents = extents_of(subject.parts)
+    return (
+        f"Its file declares how large it is: {size_phrase(extents)}, so that its longest extent is"
+        f" {100 * float(extents.max()):.1f} cm or, across corners, a little more."
+    )
 
 
 def physical_estimates(

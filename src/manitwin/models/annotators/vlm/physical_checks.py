@@ -118,7 +118,9 @@ def _density(answer: PhysicalAnswer, mesh: MeasuredMesh, settings: PhysicalConfi
 
 def _usual_density(answer: PhysicalAnswer, mesh: MeasuredMesh) -> tuple[float, float]:
     """Return the mass (kg) that things of these materials and structure have, per m3 of the mesh."""
-    named = [load_materials()["unknown" if p.material == "other" else p.material] for p in answer.materials]
+    named = [
+        load_materials()["unknown" if p.material in ("other", "unknown") else p.material] for p in answer.materials
+    ]
     lightest = min(material.density_kg_m3.low for material in named)
     heaviest = max(material.density_kg_m3.high for material in named)
     wall = answer.wall_thickness_m

@@ -10,18 +10,25 @@ import numpy as np
 
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, measure_shape
 from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.symmetry import Symmetries, find_symmetries
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import PointsRequest
 
 FINGERS_BETWEEN_M = 0.02  # how far below the surface fingers may reach from above (Franka hand: finger pads of 18 mm)
 LEAST_PLAY_M = 0.002  # of the opening: fingers must get around the object
+SAME_PLACE_M, SAME_PLACE_SHARE = 0.02, 0.25  # a fingertip's width: grasps as near to each other are one
 UPPER, LOWER = 0.6, 0.4  # shares of the height: what is above is no base, what is below no top
+LYING_COSINE = 0.5  # a long axis nearer to level than to upright
+ROUND, END_SHARE = 1.25, 0.2  # second by third side of what rolls; shares of its length that are its ends
+PINCH_M = 0.010  # two fingertips hold what is thinner, two flat fingers what is not (and is within the opening)
+_PINCH_SLACK = 2.0  # widths are those at a point: what is off by less is no contradiction
 _DIRECTIONS = 12  # in which a gripper that comes from outside may close
 
 _RIM = re.compile(r"\b(rim|mouth|lip|brim|opening edge|open top|opening)\b")
 _BASE = re.compile(
     r"^(?:the |flat |outer |under)*(base|bottom|underside|foot|sole)(?: surface| face| rim| edge| center| side)?$"
 )
+_LOW_RIM = re.compile(r"\b(base|bottom|lower|underside|foot)\b")
 _TOP = re.compile(r"^(?:the |flat )*(top|lid|upper side)(?: surface| face| edge| center| side)?$")
 _HANDLE = re.compile(r"\b(handle|grip handle)\b")
 _NOT_ITS_HANDLE = re.compile(r"\b(attachment|joint|base of|root|junction|opposite|connection)\b")
@@ -36,7 +43,8 @@ class PlaceChecks:
     @cached_property
     def shape(self) -> Shape:
         """The measurements that the rules use too."""
-        subject, prior = self.request.subject, lookup(self.request.subject.name)
+        subject = self.request.subject
+        prior = lookup(subject.name or subject.known_as)
         return measure_shape(
             subject.solid,
             self.request.center_of_mass_m,
@@ -44,6 +52,17 @@ class PlaceChecks:
             None if prior is None else prior.stands,
             np.random.default_rng(subject.seed),
         )
+
+    @cached_property
+    def symmetries(self) -> Symmetries:
+        """The motions that move the solid onto itself."""
+        subject = self.request.subject
+        return find_symmetries(subject.solid, np.random.default_rng(subject.seed))
+
+    @cached_property
+    def same_place_m(self) -> float:
+        """How far apart (m) two candidates may be that are one place: 2 cm, and of small things a quarter of their length."""
+        return min(SAME_PLACE_M, SAME_PLACE_SHARE * float(self.request.subject.solid.extents.max()))
 
     @cached_property
     def spacing_m(self) -> float:
@@ -64,13 +83,14 @@ class PlaceChecks:
         position = self.request.positions_m[candidate]
         height = self._share_of_height(position)
         opening = self.shape.opening
-        if _RIM.search(words) and opening is not None and opening.axis[2] > 0.9:
+        if _RIM.search(words) and not _LOW_RIM.search(words) and opening is not None and opening.axis[2] > 0.9:
             away_m = self._from_rim_m(position)
             if away_m > 1.5 * self.spacing_m:
                 return f"it is {1000 * away_m:.0f} mm from the rim of the opening"
-        if _BASE.search(words) and height > UPPER:
+        at_end = self._at_end_of_lying(position)
+        if _BASE.search(words) and height > UPPER and not at_end:
             return f"it is at {100 * height:.0f} % of the height, not at the bottom"
-        if _TOP.search(words) and height < LOWER:
+        if _TOP.search(words) and height < LOWER and not at_end:
             return f"it is at {100 * height:.0f} % of the height, not at the top"
         if _HANDLE.search(words) and not _NOT_ITS_HANDLE.search(words):
             away_m = self._from_side_handle_m(position)
@@ -84,9 +104,16 @@ class PlaceChecks:
             return None
         width_m, opening_m = self.width_m(candidate), self.request.max_opening_m
         if width_m <= opening_m - LEAST_PLAY_M:
+            if kind == "pinch" and width_m > _PINCH_SLACK * PINCH_M:
+                return f"the object is {1000 * width_m:.0f} mm wide there, which is no pinch but a parallel_jaw grasp"
             return None
         wide, opening = f"{1000 * width_m:.0f} mm", f"{1000 * opening_m:.0f} mm"
         return f"the object is at least {wide} wide there, but the fingers of a {kind} grasp open to {opening}"
+
+    def width_phrase(self, candidate: int) -> str:
+        """Return the width at a candidate as '23 mm', 'unknown' where no matter is behind it."""
+        width_m = self.width_m(candidate)
+        return f"{1000 * width_m:.0f} mm" if width_m > 0 else "unknown"
 
     def width_m(self, candidate: int) -> float:
         """Return the least width (m) that fingers would have to span at a candidate.
@@ -107,6 +134,13 @@ class PlaceChecks:
     def _share_of_height(self, position: np.ndarray) -> float:
         low, high = self.shape.bounds_m[:, 2]
         return float((position[2] - low) / max(high - low, 1e-9))
+
+    def _at_end_of_lying(self, position: np.ndarray) -> bool:
+        """Tell whether a place is at an end of a thing that lies and rolls: its bottom or top as it stands."""
+        axis, sides = self.shape.axis, np.sort(self.shape.obb_extents_m)
+        lies = abs(float(axis.direction[2])) < LYING_COSINE and sides[1] < ROUND * sides[0]
+        along = float(axis.along(position[None])[0])
+        return lies and not END_SHARE < along < 1 - END_SHARE
 
     def _from_rim_m(self, position: np.ndarray) -> float:
         opening = self.shape.opening

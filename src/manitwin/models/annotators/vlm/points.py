@@ -10,16 +10,17 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model, model_validator
 
 from manitwin.models.annotators.protocol import PointsRequest
-from manitwin.models.annotators.vlm.place_checks import PlaceChecks
+from manitwin.models.annotators.vlm.place_checks import PINCH_M, PlaceChecks
 from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import (
     extents_of,
     length_phrase,
-    marked_views,
     name_line,
-    size_phrase,
+    size_line,
 )
-from manitwin.models.vlm.protocol import Question
+from manitwin.models.annotators.vlm.view_pictures import marked_views
+from manitwin.models.annotators.vlm.vote_views import QueryViews, own_views, views_of_vote
+from manitwin.models.vlm.protocol import Picture, Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.twin.point_records import FunctionalPoint, GraspType
 
@@ -95,12 +96,11 @@ def _answer(name: str, choice: type[BaseModel], ids: Sequence[str], limits: tupl
 
 
 class Numbering:
-    """The numbers that stand for candidates in one query: ``numbers (N,)``, in an order of its own."""
+    """The numbers that stand for candidates in one query, ``numbers (N,)``, in an order of its own, and its views."""
 
-    def __init__(self, request: PointsRequest, stream: int, vote: int):
-        rng = np.random.default_rng([request.subject.seed, stream, vote])
-        self.numbers = rng.permutation(len(request.positions_m)) + 1
-        seen = sorted({i for view in request.visible for i in view}, key=lambda i: int(self.numbers[i]))
+    def __init__(self, request: PointsRequest, stream: int, vote: int, views: QueryViews):
+        self.numbers, self.views = _numbers(request, stream, vote), views
+        seen = sorted(views.seen, key=lambda i: int(self.numbers[i]))
         self.candidates = {str(self.numbers[i]): i for i in seen}
 
     @property
@@ -117,43 +117,66 @@ class Numbering:
         return _NUMBER_SAID.sub(said, text)
 
 
+def _numbers(request: PointsRequest, stream: int, vote: int) -> np.ndarray:
+    rng = np.random.default_rng([request.subject.seed, stream, vote])
+    return rng.permutation(len(request.positions_m)) + 1
+
+
+def grasp_numbers(request: PointsRequest, vote: int) -> np.ndarray:
+    """Return the number of each candidate ``(N,)`` in one of the grasp queries."""
+    return _numbers(request, _GRASP_STREAM, vote)
+
+
 def functional_numbering(request: PointsRequest) -> Numbering:
     """Return the numbers of the functional query."""
-    return Numbering(request, _FUNCTIONAL_STREAM, 0)
+    return Numbering(request, _FUNCTIONAL_STREAM, 0, own_views(request))
 
 
-def grasp_numbering(request: PointsRequest, vote: int) -> Numbering:
-    """Return the numbers of one of the grasp queries."""
-    return Numbering(request, _GRASP_STREAM, vote)
+def grasp_numbering(request: PointsRequest, vote: int, votes: int) -> Numbering:
+    """Return the numbers and views of one of the grasp queries; ``vote`` counts them from 0."""
+    return Numbering(request, _GRASP_STREAM, vote, views_of_vote(request, vote, votes))
 
 
 def functional_question(request: PointsRequest, numbering: Numbering, prompt: Prompt) -> Question:
     """Ask for functional points."""
     above_m = request.positions_m[:, 2]
     ids = "; ".join(f"{number}: {length_phrase(above_m[i])}" for number, i in numbering.candidates.items())
-    values = _values(request) | {"ids": ids}
-    instructions, parts = prompt.filled(values, marked_views(request, numbering.numbers))
+    pictures, color = _pictures(request, numbering)
+    values = _values(request) | {"ids": ids, "marker": color}
+    instructions, parts = prompt.filled(values, pictures)
     return Question("functional_points", instructions, parts, strict_schema(functional_answer(numbering.ids)))
 
 
-def grasp_question(request: PointsRequest, numbering: Numbering, prompt: Prompt, vote: int) -> Question:
-    """Ask for grasp points; ``vote`` counts the queries from 0."""
+def grasp_question(checks: PlaceChecks, numbering: Numbering, prompt: Prompt, vote: int) -> Question:
+    """Ask for grasp points, each vote in words of its own; ``vote`` counts the queries from 0."""
+    request = checks.request
     away_m = np.linalg.norm(request.positions_m - request.center_of_mass_m, axis=1)
     above_m = request.positions_m[:, 2]
     ids = "; ".join(
-        f"{number}: {length_phrase(away_m[i])}, {length_phrase(above_m[i])}"
+        f"{number}: {length_phrase(away_m[i])}, {length_phrase(above_m[i])}, {checks.width_phrase(i)}"
         for number, i in numbering.candidates.items()
     )
-    values = _values(request) | {"ids": ids, "opening": length_phrase(request.max_opening_m)}
-    instructions, parts = prompt.filled(values, marked_views(request, numbering.numbers))
+    pictures, color = _pictures(request, numbering)
+    values = _values(request) | {
+        "ids": ids,
+        "marker": color,
+        "opening": length_phrase(request.max_opening_m),
+        "pinch": length_phrase(PINCH_M),
+    }
+    instructions, parts = prompt.filled(values, pictures, wording=vote)
     return Question("grasp_points", instructions, parts, strict_schema(grasp_answer(numbering.ids)), vote)
+
+
+def _pictures(request: PointsRequest, numbering: Numbering) -> tuple[list[str | Picture], str]:
+    views = numbering.views
+    return marked_views(request, numbering.numbers, views.pictures, views.cameras, views.visible)
 
 
 def _values(request: PointsRequest) -> dict[str, str]:
     return {
         "count": str(len(request.subject.views)),
-        "name": name_line(request.subject.name),
-        "size": size_phrase(extents_of(request.subject.parts)),
+        "name": name_line(request.subject.name, request.subject.known_as),
+        "size": size_line(request.subject, extents_of(request.subject.parts)),
     }
 
 

@@ -13,11 +13,11 @@ from manitwin.formats.bounded_file import read_text
 from manitwin.models.vlm.protocol import Picture
 
 PLACEHOLDERS: dict[str, frozenset[str]] = {
-    "quality": frozenset({"count", "name", "pictures"}),
-    "physical": frozenset({"count", "name", "pictures"}),
+    "quality": frozenset({"count", "name", "made_of", "pictures"}),
+    "physical": frozenset({"count", "name", "size", "pictures"}),
     "captions": frozenset({"count", "name", "size", "material", "pictures"}),
-    "functional_points": frozenset({"count", "name", "size", "ids", "pictures"}),
-    "grasp_points": frozenset({"count", "name", "size", "opening", "ids", "pictures"}),
+    "functional_points": frozenset({"count", "name", "size", "marker", "ids", "pictures"}),
+    "grasp_points": frozenset({"count", "name", "size", "opening", "pinch", "marker", "ids", "pictures"}),
     "template": frozenset({"given", "name", "categories", "pictures"}),
     "template_measures": frozenset({"given", "name", "category", "about", "measures", "parts", "colors", "pictures"}),
     "template_likeness": frozenset(
@@ -27,6 +27,7 @@ PLACEHOLDERS: dict[str, frozenset[str]] = {
 """The prompts that there are, and what is put in for ``{placeholder}`` in each."""
 
 PICTURES = "{pictures}"
+OTHERWISE = "\n# The same question in other words\n"
 _MAX_BYTES = 1 << 20
 
 _PLACEHOLDER = re.compile(r"\{([a-z_]+)\}")
@@ -35,18 +36,28 @@ _FORM = re.compile(r"version: (\S+)\n+# Instructions\n(.*)\n# Question\n(.*)", r
 
 @dataclass(frozen=True)
 class Prompt:
-    """A prompt as it was read: standing instructions, and the question with places for what differs by object."""
+    """A prompt as it was read: standing instructions, and the question with places for what differs by object.
+
+    ``otherwise`` is the same question in other words, for what is asked several times.
+    """
 
     name: str
     version: str
     instructions: str
     question: str
+    otherwise: tuple[str, ...] = ()
+
+    @property
+    def text(self) -> list[str]:
+        """All that it says."""
+        return [self.instructions, self.question, *self.otherwise]
 
     def filled(
-        self, values: Mapping[str, str], pictures: Iterable[str | Picture]
+        self, values: Mapping[str, str], pictures: Iterable[str | Picture], wording: int = 0
     ) -> tuple[str, tuple[str | Picture, ...]]:
-        """Return the instructions, and the question's parts with the pictures in their place."""
-        before, after = self.question.split(PICTURES)
+        """Return the instructions, and the question's parts with the pictures in their place, in one of its wordings."""
+        wordings = (self.question, *self.otherwise)
+        before, after = wordings[wording % len(wordings)].split(PICTURES)
         parts = (_filled(before, values).rstrip(), *pictures, _filled(after, values).lstrip())
         return _filled(self.instructions, values), parts
 
@@ -76,10 +87,11 @@ def _parse(name: str, text: str) -> Prompt:
     found = _FORM.fullmatch(text.replace("\r\n", "\n"))
     if found is None:
         raise ConfigError(f"prompt {name}.md: it is a line 'version: 1', then '# Instructions', then '# Question'")
-    version, instructions, question = found.group(1), found.group(2).strip(), found.group(3).strip()
-    for word in _PLACEHOLDER.findall(instructions + question):
+    version, instructions = found.group(1), found.group(2).strip()
+    question, *otherwise = (wording.strip() for wording in found.group(3).split(OTHERWISE))
+    for word in _PLACEHOLDER.findall("\n".join([instructions, question, *otherwise])):
         if word not in PLACEHOLDERS[name]:
             raise ConfigError(f"prompt {name}.md: {choose_from('placeholder', word, PLACEHOLDERS[name])}")
-    if question.count(PICTURES) != 1 or PICTURES in instructions:
+    if any(wording.count(PICTURES) != 1 for wording in (question, *otherwise)) or PICTURES in instructions:
         raise ConfigError(f"prompt {name}.md: its question has {PICTURES} exactly once, and its instructions have none")
-    return Prompt(name, version, instructions, question)
+    return Prompt(name, version, instructions, question, tuple(otherwise))

@@ -1,4 +1,4 @@
-"""The quality question: the paper's two criteria, each with evidence; what is not clearly passed is failed."""
+"""The quality question: the paper's two criteria, each with evidence, beside the photo; what is not clearly passed is failed."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from manitwin.models.annotators.protocol import QualityVerdict, Subject
 from manitwin.models.annotators.vlm.prompt_files import Prompt
-from manitwin.models.annotators.vlm.question_parts import clean_views, name_line
+from manitwin.models.annotators.vlm.question_parts import name_line
+from manitwin.models.annotators.vlm.view_pictures import clean_views, photos_beside
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 
@@ -53,11 +54,32 @@ class QualityAnswer(BaseModel):
         return [name for name, artifact in self.artifacts.items() if artifact.severity == severity]
 
 
-def quality_question(subject: Subject, prompt: Prompt) -> Question:
-    """Ask for the two criteria over all views."""
-    values = {"count": str(len(subject.views)), "name": name_line(subject.name)}
-    instructions, parts = prompt.filled(values, clean_views(subject))
-    return Question("quality", instructions, parts, strict_schema(QualityAnswer))
+class QualityBesidePhotoAnswer(QualityAnswer):
+    """The answer where the photos that the model was made of are shown beside it."""
+
+    photo_evidence: str = Field(
+        description="which parts the photo shows and the model lacks, or has cut off or flattened"
+    )
+    like_photo: Decision = Field(description="the model is the whole thing that the photo shows")
+
+
+def quality_answer(subject: Subject) -> type[QualityAnswer]:
+    """Return the model of the answer: with a photo, likeness to it is asked too."""
+    return QualityBesidePhotoAnswer if subject.photos else QualityAnswer
+
+
+def quality_question(subject: Subject, prompt: Prompt, picture_px: int) -> Question:
+    """Ask for the criteria over all views, beside the photos that the model was made of."""
+    made_of = ""
+    if subject.photos:
+        made_of = (
+            "It was made of the photo that comes first: sides that the photo does not show are guessed. Judge like_photo too:"
+            " whether the model is the whole thing that the photo shows, no half or slice of it."
+        )
+    values = {"count": str(len(subject.views)), "name": name_line(subject.name, subject.known_as), "made_of": made_of}
+    pictures = [*photos_beside(subject, picture_px), *clean_views(subject)]
+    instructions, parts = prompt.filled(values, pictures)
+    return Question("quality", instructions, parts, strict_schema(quality_answer(subject)))
 
 
 def examine_quality(answer: QualityAnswer) -> list[str]:
@@ -74,6 +96,8 @@ def examine_quality(answer: QualityAnswer) -> list[str]:
         findings.append(f"{', '.join(severe)} is severe, but visual_quality is yes: one of the two is wrong")
     if not severe and answer.visual_quality == "no":
         findings.append("visual_quality is no, but no artifact is severe: name the severe one, or answer yes")
+    if isinstance(answer, QualityBesidePhotoAnswer) and answer.like_photo == "unsure":
+        findings.append("like_photo is unsure: compare every view with the photo again and answer yes or no")
     return findings
 
 
@@ -81,6 +105,9 @@ def quality_verdict(answer: QualityAnswer) -> QualityVerdict:
     """Turn the last answer into the verdict; doubt that is left, and a yes against the evidence, is a no."""
     doubtful = answer.of_severity("severe") + answer.of_severity("unsure")
     single, sound = answer.single_object == "yes", answer.visual_quality == "yes" and not doubtful
+    if isinstance(answer, QualityBesidePhotoAnswer) and answer.like_photo != "yes":
+        said = _said(answer.like_photo) + answer.photo_evidence
+        return QualityVerdict(single, False, f"not the whole thing that its photo shows: {said}")
     if single and sound:
         return QualityVerdict(True, True, answer.shown)
     reasons = []

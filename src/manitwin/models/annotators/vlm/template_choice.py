@@ -10,7 +10,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from manitwin.models.annotators.vlm.prompt_files import Prompt
-from manitwin.models.annotators.vlm.question_parts import cut_out_picture, name_line
+from manitwin.models.annotators.vlm.question_parts import name_line
+from manitwin.models.annotators.vlm.view_pictures import cut_out_picture
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.fit import kinds_of, template_for
 from manitwin.models.vlm.protocol import Picture, Question

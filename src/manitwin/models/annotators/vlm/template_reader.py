@@ -90,7 +90,7 @@ class TemplateReader:
     def model(self) -> str:
         """'MODEL, prompt template v1 and ... 0123abcd': model, prompts, and a digest of all that is asked with."""
         settings = self.settings.model_dump(mode="json", include={"picture_px", "max_tokens", "temperature"})
-        asked = [[prompt.instructions, prompt.question] for prompt in self._prompts.values()]
+        asked = [prompt.text for prompt in self._prompts.values()]
         text = json.dumps([asked, _forms(), settings], sort_keys=True)
         versions = " and ".join(f"{name} v{prompt.version}" for name, prompt in self._prompts.items())
         return f"{self.chat.model}, prompt {versions} {hashlib.sha256(text.encode()).hexdigest()[:8]}"

@@ -1,0 +1,105 @@
+"""The views as a model is shown them: PNG, each with a caption; clean, or with numbered markers; photos that are cut out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from manitwin.formats.image_file import png_of
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.models.annotators.protocol import PointsRequest, Subject
+from manitwin.models.vlm.protocol import Picture
+from manitwin.render.cameras import Camera, project
+from manitwin.render.grounds import ground_of_pixels, marker_color
+from manitwin.render.markers import draw_markers, font_px
+from manitwin.render.raycast import merged, silhouette
+
+_FILLED = 0.9  # of a picture's side by the object cut out of a photo
+
+
+def read_picture(path: Path) -> np.ndarray:
+    """Read a picture as ``(H, W, 3) uint8``."""
+    with Image.open(path) as image:
+        return np.asarray(image.convert("RGB"))
+
+
+def view_caption(number: int, count: int, camera: Camera) -> str:
+    """Return 'View 3 of 8, azimuth 30, elevation 20' in whole degrees: from where the camera looks."""
+    x, y, z = camera.camera_to_object[:3, 2]
+    azimuth = round(float(np.degrees(np.arctan2(y, x)))) % 360
+    return f"View {number} of {count}, azimuth {azimuth}, elevation {round(float(np.degrees(np.arcsin(z))))}"
+
+
+def clean_views(subject: Subject) -> list[str | Picture]:
+    """Return each view's caption and picture."""
+    parts: list[str | Picture] = []
+    for number, (path, camera) in enumerate(zip(subject.views, subject.cameras, strict=True), 1):
+        parts += [f"{view_caption(number, len(subject.views), camera)}:", Picture(png_of(read_picture(path)))]
+    return parts
+
+
+def photos_beside(subject: Subject, side_px: int) -> list[str | Picture]:
+    """Return the photos that the model was made of, cut out, each with a caption."""
+    parts: list[str | Picture] = []
+    for number, path in enumerate(subject.photos, 1):
+        which = "The photo" if len(subject.photos) == 1 else f"Photo {number} of {len(subject.photos)}"
+        with Image.open(path) as image:
+            parts += [f"{which} that it was made of:", cut_out_picture(np.asarray(image.convert("RGBA")), side_px)]
+    return parts
+
+
+def cut_out_picture(rgba: np.ndarray, side_px: int) -> Picture:
+    """Return the object of ``rgba (H, W, 4) uint8``, whose alpha is its mask, on the views' plain ground, ``side_px`` wide."""
+    inside = rgba[..., 3] > 127
+    rows, columns = np.nonzero(inside)
+    top, left = int(rows.min()), int(columns.min())
+    height, width = int(rows.max()) + 1 - top, int(columns.max()) + 1 - left
+    side = round(max(height, width) / _FILLED)
+    seen = rgba[top : top + height, left : left + width].astype(np.float32)
+    alpha = seen[..., 3:] / 255
+    ground = np.empty((side, side, 3), np.float32)
+    ground[...] = ground_of_pixels(rgba[inside][:, :3])
+    y, x = (side - height) // 2, (side - width) // 2
+    ground[y : y + height, x : x + width] *= 1 - alpha
+    ground[y : y + height, x : x + width] += alpha * seen[..., :3]
+    whole = Image.fromarray(np.rint(ground).astype(np.uint8))
+    resampling = Image.Resampling.BOX if side > side_px else Image.Resampling.BILINEAR
+    return Picture(png_of(np.asarray(whole.resize((side_px, side_px), resampling))))
+
+
+def marked_views(
+    request: PointsRequest,
+    numbers: np.ndarray,
+    pictures: Sequence[np.ndarray],
+    cameras: Sequence[Camera],
+    visible: Sequence[tuple[int, ...]],
+) -> tuple[list[str | Picture], str]:
+    """Return each view clean and with the candidates that it shows, and the word for the markers' colour.
+
+    Candidate ``i`` is marked by the number ``numbers[i]``. Source: set-of-mark prompting (Yang et al. 2023, arXiv
+    2310.11441): marks by number, kept off what they mark; only what a view shows is marked in it.
+    """
+    caster = RayCaster(merged(list(request.subject.parts)))
+    color = marker_color(pictures)
+    parts: list[str | Picture] = []
+    for number, (clean, camera, seen) in enumerate(zip(pictures, cameras, visible, strict=True), 1):
+        caption = view_caption(number, len(cameras), camera)
+        parts += [f"{caption}, clean:", Picture(png_of(clean))]
+        if not seen:
+            parts.append(f"{caption}: no marker can be seen from here.")
+            continue
+        # By number, not by candidate: where boxes compete for room, no place is favoured in all queries.
+        ids = sorted(seen, key=lambda i: int(numbers[i]))
+        marked = draw_markers(
+            clean,
+            project(request.positions_m[ids], camera)[0],
+            [str(numbers[i]) for i in ids],
+            occupied=silhouette(caster, camera),
+            dot=color.rgb,
+            font_px=font_px(camera.width_px, camera.height_px),
+        )
+        parts += [f"{caption}, with markers:", Picture(png_of(marked))]
+    return parts, color.name

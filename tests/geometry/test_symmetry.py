@@ -1,0 +1,41 @@
+"""Symmetries of solids of known form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from handmade import cylinder, mug
+from manitwin.geometry.symmetry import Symmetries, find_symmetries
+
+
+def of(mesh: trimesh.Trimesh) -> Symmetries:
+    return find_symmetries(mesh, np.random.default_rng(0))
+
+
+def test_cylinder_is_a_body_of_revolution_wherever_it_stands() -> None:
+    mesh = cylinder(0.03, 0.12)
+    mesh.apply_translation([0.2, -0.1, 0.0])
+    found = of(mesh)
+    assert found.axis is not None and abs(found.axis[2]) == pytest.approx(1, abs=1e-6)
+    first, across = np.array([0.23, -0.1, 0.04]), np.array([0.2, -0.07, 0.04])
+    assert found.apart_m(first, across) == pytest.approx(0, abs=1e-4)
+    assert found.apart_m(first, across + np.array([0, 0, 0.03])) == pytest.approx(
+        0.01, abs=1e-3
+    )  # upside down: 0.05 for 0.07
+    assert found.apart_m(first, np.array([0.2, -0.1, 0.0])) > 0.03
+
+
+def test_box_has_its_mirrors_and_half_turns_and_no_axis() -> None:
+    found = of(trimesh.creation.box([0.2, 0.12, 0.05]))
+    assert found.axis is None and len(found.motions) == 2**3
+    assert found.apart_m(np.array([0.1, 0.02, 0.01]), np.array([-0.1, -0.02, -0.01])) == pytest.approx(0, abs=1e-3)
+    assert found.apart_m(np.array([0.1, 0, 0]), np.array([0, 0.06, 0])) > 0.05
+
+
+def test_mug_has_the_mirror_through_its_handle_only() -> None:
+    found = of(mug())
+    assert found.axis is None and len(found.motions) == 2
+    assert found.apart_m(np.array([0, 0.04, 0.05]), np.array([0, -0.04, 0.05])) == pytest.approx(0, abs=2e-3)
+    assert found.apart_m(np.array([0.075, 0, 0.05]), np.array([-0.04, 0, 0.05])) > 0.05
