@@ -16,6 +16,8 @@ from manitwin.api import build
 from manitwin.cli.annotator_questions import AskedQuestions, questions_about, write_questions
 from manitwin.config import BuildConfig, ServicesConfig
 from manitwin.errors import TwinError, UsageError
+from manitwin.formats.isolated import Limits
+from manitwin.models.annotators.vlm.prompt_files import load_prompts
 from manitwin.models.fakes.openai_chat import FakeOpenAi
 from manitwin.models.fakes.server import FakeServer
 from manitwin.models.vlm.protocol import Picture
@@ -45,13 +47,25 @@ def asked_at_first(bodies: list[dict[str, Any]]) -> list[dict[str, Any]]:
     return [body for body in bodies if len(body["messages"]) == 2]
 
 
+def in_order(bodies: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The requests with the votes, which are sent at the same time, in the order of their wordings."""
+    wordings = [load_prompts(None)["grasp_points"].question, *load_prompts(None)["grasp_points"].otherwise]
+    ends = [wording.strip().splitlines()[-1] for wording in wordings]
+
+    def place(body: dict[str, Any]) -> int:
+        last = str(body["messages"][1]["content"][-1].get("text", "")).splitlines()[-1]
+        return ends.index(last) if last in ends else -1
+
+    return sorted(bodies, key=place)
+
+
 def test_text_and_schema_are_exactly_what_was_asked(
     asked_and_built: tuple[list[dict[str, Any]], AskedQuestions, Path],
 ) -> None:
     bodies, questions, _ = asked_and_built
     sent = asked_at_first(bodies)
-    assert len(sent) == len(questions.questions) == 7
-    for body, one in zip(sent, questions.questions, strict=True):
+    assert len(sent) == 7 and len(questions.questions) == 10
+    for body, one in zip(in_order(sent), questions.questions, strict=False):
         system, user = body["messages"]
         assert system["content"] == one.system
         texts = [part["text"] for part in user["content"] if part["type"] == "text"]
@@ -63,14 +77,14 @@ def test_pictures_agree_with_those_that_were_asked_with(
     asked_and_built: tuple[list[dict[str, Any]], AskedQuestions, Path],
 ) -> None:
     bodies, questions, _ = asked_and_built
-    for body, one in zip(asked_at_first(bodies), questions.questions, strict=True):
+    for body, one in zip(in_order(asked_at_first(bodies)), questions.questions, strict=False):
         urls = [part["image_url"]["url"] for part in body["messages"][1]["content"] if part["type"] == "image_url"]
         sent = [base64.b64decode(url.partition(",")[2]) for url in urls]
         made = [part.png for part in one.question.parts if isinstance(part, Picture)]
         assert len(sent) == len(made)
         for a, b in zip(sent, made, strict=True):
             first, second = (np.asarray(Image.open(io.BytesIO(png)), dtype=int) for png in (a, b))
-            assert first.shape == second.shape == (768, 768, 3)
+            assert first.shape == second.shape and first.size == pytest.approx(3 * 768**2, rel=0.02)
             assert np.abs(first - second).mean() < 0.2, "of 255: the same picture but for the coding of its texture"
 
 
@@ -80,14 +94,19 @@ def test_folders_hold_text_with_picture_names_and_a_bill(
     _, questions, folder = asked_and_built
     write_questions(questions, tmp_path / "asked")
     names = sorted(path.name for path in (tmp_path / "asked").iterdir())
-    assert names == ["1_quality", "2_physical", "3_captions", "4_functional_points", "5_grasp_points_1", "6_grasp_points_2",
-                     "7_grasp_points_3", "README.md"]  # fmt: skip
+    grasps = ["5_grasp_points_1", "6_grasp_points_2", "7_grasp_points_3"]
+    asked = ["1_quality", "2_physical", "3_captions", "4_functional_points", *grasps]
+    assert names == ["10_template_likeness", *asked, "8_template", "9_template_measures", "README.md"]
     for one in questions.questions:
         made = tmp_path / "asked" / one.folder
         lines = (made / "question.txt").read_text().splitlines()
         pictures = [line.strip("[]") for line in lines if line.startswith("[picture_")]
         assert pictures == sorted(path.name for path in made.glob("*.png"))
         assert json.loads((made / "schema.json").read_text()) == one.question.schema
+    template = json.loads((tmp_path / "asked" / "8_template" / "schema.json").read_text())
+    assert "mug" in template["properties"]["category"]["enum"]
+    likeness = (tmp_path / "asked" / "10_template_likeness" / "question.txt").read_text()
+    assert "built from the template: mug" in likeness and "The photo:" in likeness
     readme = (tmp_path / "asked" / "README.md").read_text()
     assert "7_grasp_points_3" in readme and "usd_per_million_tokens" in readme
     priced = BuildConfig(services=ServicesConfig(usd_per_million_tokens=(1.0, 10.0)))
@@ -100,3 +119,19 @@ def test_folders_hold_text_with_picture_names_and_a_bill(
 def test_folder_that_is_no_twin_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TwinError):
         questions_about(tmp_path, BuildConfig(), "openai:MODEL")
+
+
+def test_twin_is_read_in_a_process_with_limits_of_its_own(
+    asked_and_built: tuple[list[dict[str, Any]], AskedQuestions, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """This process would fail if it read one."""
+
+    def refused(*_: object, **__: object) -> None:
+        raise AssertionError("read in the main process")
+
+    monkeypatch.setattr("manitwin.cli.annotator_questions.Twin", refused)
+    monkeypatch.setattr("manitwin.cli.annotator_questions.read_questions", refused)
+    assert len(questions_about(asked_and_built[2], BuildConfig(), "openai:MODEL").questions) == 10
+    monkeypatch.setattr("manitwin.cli.annotator_questions.LIMITS", Limits(seconds=0.05))
+    with pytest.raises(TwinError, match=r"within 0\.05 s"):
+        questions_about(asked_and_built[2], BuildConfig(), "openai:MODEL")

@@ -45,6 +45,7 @@ def draft(tmp_path: Path) -> Draft:
         "cameras": [],
     }
     paths = {key: tmp_path / key for key in ("visual.glb", "solid.npz", "views/", "marked/")}
+    fields |= {"size": None, "language": {"category": "red mug"}}
     return Draft("id", Item(file=None, name="red mug"), 0, fields, paths)
 
 

@@ -1,4 +1,7 @@
-"""The questions about a finished twin, as a vision-language model was or would be asked them."""
+"""The questions about a finished twin, as a vision-language model was or would be asked them.
+
+What the twin's folder holds is read in a process where limits of time and memory hold: anybody may have made it.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +11,28 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
+from manitwin.cli.template_questions import template_questions
 from manitwin.config import BuildConfig
-from manitwin.errors import UsageError
+from manitwin.errors import TwinError, UsageError
+from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.models.annotators.protocol import AnnotatorQuestion, PointsRequest, Subject
+from manitwin.models.annotators.protocol import PointsRequest, Subject
 from manitwin.models.annotators.vlm.annotator import ANSWER_TOKENS, PROMPTS, VlmAnnotator
+from manitwin.models.annotators.vlm.template_reader import ANSWER_TOKENS as TEMPLATE_ANSWER_TOKENS
 from manitwin.models.registry import without_url
 from manitwin.models.vlm.openai_dialect import instructions_with_schema
 from manitwin.models.vlm.prices import TokenPrice, estimated_usage
 from manitwin.models.vlm.protocol import Picture, Question, Reply, Turn
-from manitwin.pipeline.views import write_webp
-from manitwin.render.cameras import orbit_cameras
+from manitwin.pipeline.photo import PhotoStage
+from manitwin.pipeline.views import draw_views, write_webp
 from manitwin.render.raycast import merged, seen_tolerance_m, visible_points
-from manitwin.render.renderer import shared_renderer
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
 from manitwin.twin.loaded_twin import Twin
+
+LIMITS = Limits(seconds=120.0, memory_bytes=8 << 30)
+"""Of reading a twin and drawing its pictures: 5 s and 1 GB for a photo twin; the renderer maps 4 GiB of address space."""
 
 
 class SilentModel:
@@ -41,69 +50,85 @@ class SilentModel:
 
 @dataclass(frozen=True)
 class AskedQuestion:
-    """One question, the folder that it is written to, the prompt that it comes from, and the system's turn as it is sent.
+    """One question, the folder that it is written to, what decides its answer, and the system's turn as it is sent.
 
     OpenAI's protocol says the schema there too, for servers that pass over ``response_format``.
     """
 
     folder: str
-    topic: AnnotatorQuestion
-    prompt: str
+    model: str
+    answer_tokens: int
     question: Question
     system: str
 
 
 @dataclass(frozen=True)
 class AskedQuestions:
-    """All questions about one twin, by the annotator that would ask them."""
+    """All questions about one twin, by the model that would be asked; ``remark`` is what the reader has to know of them."""
 
     twin_id: str
-    annotator: VlmAnnotator
+    model: str
     price: TokenPrice | None
     questions: tuple[AskedQuestion, ...]
+    remark: str = ""
 
 
 def questions_about(twin_folder: Path, config: BuildConfig, spec: str) -> AskedQuestions:
     """Return what the model of ``spec`` would be asked about a finished twin, in order; nothing is sent.
 
-    Raises TwinError for a folder that is no twin or a rejected one, RendererMissing where nothing renders.
+    The last three are those that a photo or a text is asked about before there is a mesh. Raises TwinError for a folder that is
+    no twin, a rejected one, or one that takes too long or too much memory, RendererMissing where nothing renders.
     """
-    twin = Twin(twin_folder)
     name, _, argument = without_url(spec).partition(":")
     model = argument or name
     per_million = config.services.usd_per_million_tokens
     price = None if per_million is None else TokenPrice(*per_million)
+    try:
+        twin_id, asked, remark = run_isolated(
+            f"{__name__}:read_questions", twin_folder, config, model, price, limits=LIMITS
+        )
+    except (ProcessCrashed, MemoryError):
+        limits = f"{LIMITS.seconds:g} s or {LIMITS.memory_bytes >> 30} GiB of memory"
+        raise TwinError(f"{twin_folder}: the twin cannot be read within {limits}; build it again") from None
     annotator = VlmAnnotator(SilentModel(model, price), config)
-    with tempfile.TemporaryDirectory() as folder:
-        request = _request(twin, config, Path(folder))
-        physical = twin.physical
-        asked = annotator.questions(request, physical.material, np.array(physical.extents_m))
-    topics: dict[str, AnnotatorQuestion] = {prompt: topic for topic, names in PROMPTS.items() for prompt in names}
+    topics = {prompt: topic for topic, names in PROMPTS.items() for prompt in names}
     questions = tuple(
         AskedQuestion(
             folder=f"{number}_{q.name}{f'_{q.vote + 1}' if q.name == 'grasp_points' else ''}",
-            topic=topics[q.name],
-            prompt=q.name,
+            model=annotator.model_for(topics[q.name]) if q.name in topics else annotator.template_reader.model,
+            answer_tokens=ANSWER_TOKENS[q.name] if q.name in topics else TEMPLATE_ANSWER_TOKENS[q.name],
             question=q,
             system=q.instructions if name == "anthropic" else instructions_with_schema(q),
         )
         for number, q in enumerate(asked, 1)
     )
-    return AskedQuestions(twin.record.twin_id, annotator, price, questions)
+    return AskedQuestions(twin_id, model, price, questions, remark)
+
+
+def read_questions(
+    twin_folder: Path, config: BuildConfig, model: str, price: TokenPrice | None
+) -> tuple[str, list[Question], str]:
+    """Return a twin's id, the questions about it and a remark on them; to be called in a process with limits."""
+    twin = Twin(twin_folder)
+    annotator = VlmAnnotator(SilentModel(model, price), config)
+    with tempfile.TemporaryDirectory() as folder:
+        request = _request(twin, config, Path(folder))
+        physical = twin.physical
+        asked = annotator.questions(request, physical.material, np.array(physical.extents_m))
+        more, remark = template_questions(twin, request.subject, config.vlm, annotator.prompts)
+    return twin.record.twin_id, [*asked, *more], remark
 
 
 def _request(twin: Twin, config: BuildConfig, folder: Path) -> PointsRequest:
     """Return what the stages ask with, from what a finished twin still has; views are drawn anew into ``folder``."""
     physical, record = twin.physical, twin.record
-    assert record.points is not None and record.grasps is not None
+    assert record.points is not None and record.grasps is not None and record.language is not None
     parts = twin.visual
-    points = np.concatenate([part.vertices for part in parts])
-    size_px = config.views.size_px or config.vlm.picture_px
-    cameras = orbit_cameras(points, fov_y_deg=config.views.fov_y_deg, size_px=size_px)
+    cameras, pictures = draw_views(parts, config.views, config.views.size_px or config.vlm.picture_px)
     views = []
-    for index, frame in enumerate(shared_renderer().render(parts, cameras)):
+    for index, picture in enumerate(pictures):
         views.append(folder / f"rgb_{index:02d}.webp")
-        write_webp(frame.rgb, views[-1], config.views.webp_quality)
+        write_webp(picture, views[-1], config.views.webp_quality)
     surface = merged(parts)
     positions, normals = np.array(record.points.candidates.positions_m), np.array(record.points.candidates.normals)
     caster, tolerance_m = RayCaster(surface), seen_tolerance_m(surface.extents)
@@ -116,6 +141,9 @@ def _request(twin: Twin, config: BuildConfig, folder: Path) -> PointsRequest:
         views=tuple(views),
         cameras=tuple(cameras),
         seed=record.provenance.seed,
+        known_as=record.language.category,
+        photos=_photos(twin, config, folder),
+        size_estimated=physical.scale_applied != 1.0,
     )
     return PointsRequest(
         subject=subject,
@@ -126,6 +154,15 @@ def _request(twin: Twin, config: BuildConfig, folder: Path) -> PointsRequest:
         center_of_mass_m=np.array(physical.center_of_mass_m),
         max_opening_m=_gripper(record.grasps.gripper, config).opening_m,
     )
+
+
+def _photos(twin: Twin, config: BuildConfig, folder: Path) -> tuple[Path, ...]:
+    """Return the photo that a twin was made of, cut out again; none where it was made of several, or of something else."""
+    if twin.record.source.kind != "image":
+        return ()
+    rgba, _ = PhotoStage(config.matting).cut_out(twin.folder / twin.record.source.file)
+    Image.fromarray(rgba).save(folder / "photo.png", compress_level=1)
+    return (folder / "photo.png",)
 
 
 def _gripper(name: str, config: BuildConfig) -> Gripper:
@@ -173,13 +210,15 @@ def _write_question(asked: AskedQuestion, folder: Path) -> None:
 
 
 def _readme(asked: AskedQuestions) -> str:
-    annotator, price = asked.annotator, asked.price
+    price = asked.price
     lines = [
-        f"# What {annotator.chat.model} is asked about twin {asked.twin_id}",
+        f"# What {asked.model} is asked about twin {asked.twin_id}",
         "",
         "Each folder is one question: `instructions.txt` (the system's turn), `question.txt` (the user's turn, with pictures"
         " where their names stand), `schema.json` (the form of the answer). What contradicts geometry or priors is asked for"
         " once more with what is wrong, which costs about as much again.",
+        "",
+        asked.remark,
         "",
         "| question | asked with | pictures | tokens read | tokens written | USD |",
         "|---|---|---|---|---|---|",
@@ -187,15 +226,14 @@ def _readme(asked: AskedQuestions) -> str:
     total, read_all, written_all = 0.0, 0, 0
     for one in asked.questions:
         read = estimated_usage(one.question, "").input_tokens
-        written = ANSWER_TOKENS[one.prompt]
+        written = one.answer_tokens
         usd = (
             0.0
             if price is None
             else (read * price.read_usd_per_million + written * price.written_usd_per_million) / 1e6
         )
         pictures = sum(isinstance(part, Picture) for part in one.question.parts)
-        model = annotator.model_for(one.topic)
-        lines.append(f"| {one.folder} | {model} | {pictures} | {read} | {written} | {_usd(usd, price)} |")
+        lines.append(f"| {one.folder} | {one.model} | {pictures} | {read} | {written} | {_usd(usd, price)} |")
         total, read_all, written_all = total + usd, read_all + read, written_all + written
     lines.append(f"| all | | | {read_all} | {written_all} | {_usd(total, price)} |")
     if price is None:

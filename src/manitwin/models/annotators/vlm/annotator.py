@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -187,10 +188,12 @@ class VlmAnnotator:
             grasp_question(checks, grasp_numbering(request, vote, votes), prompts["grasp_points"], vote)
             for vote in range(votes)
         ]
+        # what it is and how large is known from the physical question on
+        unknown = replace(subject, known_as=None, metric=not subject.size_estimated)
         return [
-            quality_question(subject, prompts["quality"], self.picture_px),
-            physical_question(subject, prompts["physical"]),
-            captions_question(subject, material, extents_m, prompts["captions"]),
+            quality_question(unknown, prompts["quality"], self.picture_px),
+            physical_question(unknown, prompts["physical"]),
+            captions_question(replace(subject, known_as=None), material, extents_m, prompts["captions"]),
             functional_question(request, functional_numbering(request), prompts["functional_points"]),
             *grasps,
         ]

@@ -45,7 +45,7 @@ _USUAL = "mug"  # a template of usual size, for the estimate
 _PICTURES = {"template": 1, "template_measures": 1, "template_likeness": 1 + MODEL_VIEWS}
 # about what form and placeholders of a mug have
 _FORM_CHARACTERS = {"template": 5600, "template_measures": 2500, "template_likeness": 3200}
-_ANSWER_TOKENS = {
+ANSWER_TOKENS = {
     "template": 80,
     "template_measures": 200,
     "template_likeness": 250,
@@ -107,7 +107,7 @@ class TemplateReader:
                 characters=len(prompt.instructions) + len(prompt.question) + _FORM_CHARACTERS[name],
                 pictures=_PICTURES[name],
                 picture_px=self.settings.picture_px,
-                answer_tokens=_ANSWER_TOKENS[name],
+                answer_tokens=ANSWER_TOKENS[name],
             )
             for name, prompt in self._prompts.items()
         )

@@ -18,7 +18,8 @@ from manitwin.models.generators.templates.filled import Filled
 from manitwin.models.generators.templates.text import Wish
 from manitwin.models.vlm.protocol import Picture
 from manitwin.render.cameras import framing_camera
-from manitwin.render.renderer import shared_renderer
+from manitwin.render.grounds import ground_for
+from manitwin.render.renderer import BACKDROP, shared_renderer
 
 T = TypeVar("T")
 FOV_Y_DEG = 30.0
@@ -106,6 +107,7 @@ def pictures_of(
         for azimuth, elevation in sides
     ]
     frames = shared_renderer().render(list(parts), cameras)
+    ground = ground_for(frames)
     shown: list[str | Picture] = []
     for number, frame in enumerate(frames):
         where = (
@@ -113,5 +115,5 @@ def pictures_of(
             if number == 0
             else f"turned by {number * 360 // MODEL_VIEWS} degrees"
         )
-        shown += [f"The model, {where}:", Picture(png_of(frame.rgb))]
+        shown += [f"The model, {where}:", Picture(png_of(frame.over(BACKDROP, ground)))]
     return shown
