@@ -22,6 +22,9 @@ class Role(IntEnum):
     FURNITURE = 6
 
 
+ROBOT_NAME = "robot"
+
+
 @dataclass(frozen=True)
 class Touches:
     """The force (N) of each finger on the target, and whether something else carries it."""
@@ -68,6 +71,17 @@ class ContactReader:
                 impulses[second] -= _impulse(contact)
         plus_n, minus_n = (float(np.linalg.norm(impulse)) / self._system.timestep for impulse in impulses)
         return Touches((plus_n, minus_n), on_support)
+
+    def pressing(self, contacts: Iterable[physx.PhysxContact]) -> set[frozenset[str]]:
+        """Return the pairs of names of what presses on each other; every part of the robot goes by ``ROBOT_NAME``."""
+        pairs = set()
+        for contact in contacts:
+            if any(point.impulse.any() for point in contact.points):
+                pairs.add(frozenset(self._public_name(body) for body in contact.bodies))
+        return {pair for pair in pairs if len(pair) == 2}
+
+    def _public_name(self, body: physx.PhysxBaseComponent) -> str:
+        return ROBOT_NAME if self._roles[body] < Role.TARGET else self._names[body]
 
     def unplanned(self, contacts: Iterable[physx.PhysxContact], *, in_hand: bool) -> set[tuple[str, str]]:
         """Return the names of what touches with more than the allowed force and should not, the robot's part first.

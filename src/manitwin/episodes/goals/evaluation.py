@@ -1,0 +1,81 @@
+"""The one evaluator of goals: for the planner's checks, for recorded episodes, and for any policy in the environment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from manitwin.episodes.goals import functional, spatial
+from manitwin.episodes.goals.goal import SIGNATURES, Goal, Literal
+from manitwin.episodes.goals.spatial import Judgement
+from manitwin.episodes.goals.world_state import WorldState
+
+JUDGES: Mapping[str, Callable[[WorldState, Literal], Judgement]] = {
+    "on": spatial.on,
+    "in": spatial.inside,
+    **dict.fromkeys(spatial.SIDES, spatial.beside),
+    "near": spatial.near,
+    "upright": spatial.upright,
+    "lifted": spatial.lifted,
+    "touching": spatial.touching,
+    "undisturbed": spatial.undisturbed,
+    "pushed_to": spatial.pushed_to,
+    "hung": functional.hung,
+    "poured": functional.poured,
+    "pressed": functional.pressed,
+    "struck": functional.struck,
+}
+assert JUDGES.keys() == SIGNATURES.keys(), "every predicate has a judge"
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A goal on a state: the judgement of each literal, of those that come true and of those that stay."""
+
+    goal: Goal
+    literals: tuple[Judgement, ...]
+    stays: tuple[Judgement, ...]
+
+    @property
+    def reached(self) -> bool:
+        """True where every literal holds."""
+        return all(each.holds for each in (*self.literals, *self.stays))
+
+    @property
+    def failure(self) -> str | None:
+        """The first literal that does not hold, and why: ``in(object_00, object_01): on_the_rim``."""
+        for literal, judgement in zip(
+            (*self.goal.literals, *self.goal.stays), (*self.literals, *self.stays), strict=True
+        ):
+            if not judgement.holds:
+                return f"{literal}: {judgement.failure}"
+        return None
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Return every literal with its judgement as plain values."""
+        return [
+            {
+                "literal": str(literal),
+                "holds": judged.holds,
+                "failure": judged.failure,
+                "measured": dict(judged.measured),
+            }
+            for literal, judged in zip(
+                (*self.goal.literals, *self.goal.stays), (*self.literals, *self.stays), strict=True
+            )
+        ]
+
+
+def judge(state: WorldState, literal: Literal) -> Judgement:
+    """Judge one literal; raises UsageError for objects, places or fixtures that the state does not have."""
+    return JUDGES[literal.predicate](state, literal)
+
+
+def evaluate(state: WorldState, goal: Goal) -> Evaluation:
+    """Judge every literal of a goal on a state; raises UsageError for objects that the state does not have."""
+    return Evaluation(
+        goal,
+        tuple(judge(state, each) for each in goal.literals),
+        tuple(judge(state, each) for each in goal.stays),
+    )

@@ -1,0 +1,110 @@
+"""What was done with an object: poured, pressed, struck, hung; measured on granules, contacts and holes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.episodes.goals.goal import Literal
+from manitwin.episodes.goals.spatial import Judgement, judged
+from manitwin.episodes.goals.world_state import ROBOT, Event, Granules, ObjectState, WorldState
+from manitwin.geometry.poses import inverse, transform_points
+
+MOST_SPILT = 0.05
+PRESS_RADIUS_M, PRESS_RAD = 0.012, np.radians(30)
+STRIKE_RAD = np.radians(15)
+HANG_SLACK_M = 0.006
+
+
+def granules_in(vessel: ObjectState, granules: Granules) -> np.ndarray:
+    """Return for each granule whether it lies in a vessel's cavity: the cylinder of its rim, down to its deepest point."""
+    opening = vessel.opening
+    if opening is None:
+        return np.zeros(len(granules.positions_m), bool)
+    from_rim_m = transform_points(inverse(vessel.object_to_world), granules.positions_m) - opening.center_m
+    along_m = from_rim_m @ opening.axis
+    out_m = np.linalg.norm(from_rim_m - along_m[:, None] * opening.axis, axis=1)
+    radius_m = granules.radius_m
+    return np.asarray(
+        (along_m < radius_m) & (along_m > -opening.depth_m - radius_m) & (out_m < opening.rim_radius_m + 0.3 * radius_m)
+    )
+
+
+def poured(state: WorldState, literal: Literal) -> Judgement:
+    """Judge that the value's share of what an object held is in another one, and 5 % at most in neither."""
+    assert literal.value is not None and literal.second is not None
+    source, vessel = state.of(literal.subject), state.of(literal.second)
+    held = state.granules_at_start.get(literal.subject, 0)
+    if state.granules is None or not held:
+        return Judgement(False, "nothing_to_pour", {"granules": 0.0})
+    in_vessel, in_source = granules_in(vessel, state.granules), granules_in(source, state.granules)
+    there_before = state.granules_at_start.get(literal.second, 0)
+    share = (int(in_vessel.sum()) - there_before) / held
+    spilt = int((~in_vessel & ~in_source).sum()) / held
+    left = int((in_source & ~in_vessel).sum()) / held
+    return judged(
+        {"spilt": spilt <= MOST_SPILT, "left_in": share >= literal.value},
+        {"share": share, "spilt": spilt, "left": left, "granules": held},
+    )
+
+
+def pressed(state: WorldState, literal: Literal) -> Judgement:
+    """Judge that a point was pressed with the value's force, within 12 mm of it and 30 degrees of its inward normal."""
+    assert literal.value is not None
+    found = _events(state, "pressed", literal)
+    if not found:
+        return Judgement(False, "not_touched", {})
+    best = max(found, key=lambda event: event.values["force_n"])
+    return judged(
+        {
+            "off": best.values["off_m"] <= PRESS_RADIUS_M,
+            "askew": best.values["angle_rad"] <= PRESS_RAD,
+            "weak": best.values["force_n"] >= literal.value,
+        },
+        best.values,
+    )
+
+
+def struck(state: WorldState, literal: Literal) -> Judgement:
+    """Judge the first touch of an object's face with another: inside the face, within 15 degrees, as fast as the value."""
+    assert literal.value is not None
+    found = _events(state, "struck", literal)
+    if not found:
+        return Judgement(False, "missed", {})
+    first = found[0]
+    return judged(
+        {
+            "wrong_face": first.values["off_m"] <= first.values["face_radius_m"],
+            "askew": first.values["angle_rad"] <= STRIKE_RAD,
+            "slow": first.values["speed_m_s"] >= literal.value,
+        },
+        first.values,
+    )
+
+
+def hung(state: WorldState, literal: Literal) -> Judgement:
+    """Judge that an object hangs by its hole on a peg: the peg passes through the hole, and nothing else bears it."""
+    assert literal.second is not None
+    thing, peg = state.of(literal.subject), state.peg(literal.second)
+    if thing.hole is None:
+        return Judgement(False, "no_hole", {})
+    center = transform_points(thing.object_to_world, thing.hole.center_m[None])[0] - peg.foot_m
+    along_m = float(center @ peg.direction)
+    off_m = float(np.linalg.norm(center - along_m * peg.direction))
+    return judged(
+        {
+            "beside_it": 0 < along_m < peg.length_m and off_m <= thing.hole.radius_m + HANG_SLACK_M,
+            "not_touching": state.touch(literal.subject, literal.second),
+            "on_furniture": not state.neighbours(literal.subject) & state.furniture,
+            "not_released": not state.touch(literal.subject, ROBOT),
+            "moving": thing.at_rest,
+        },
+        {"along_m": along_m, "off_m": off_m},
+    )
+
+
+def _events(state: WorldState, kind: str, literal: Literal) -> list[Event]:
+    return [
+        event
+        for event in state.events
+        if event.kind == kind and event.subject == literal.subject and event.second == literal.second
+    ]

@@ -1,0 +1,139 @@
+"""The goal language: a goal is a conjunction of literals that come true, and of literals that stay true."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from manitwin.errors import UsageError, choose_from
+
+
+@dataclass(frozen=True)
+class Signature:
+    """How a predicate is written: what its second argument is, and the unit and default of its value; None: it has none.
+
+    ``second`` is ``object`` (another object of the scene), ``fixture`` (a peg, a plate) or ``place`` (a marked position).
+    ``by_event``: it is true of something that happened, and stays true afterwards.
+    """
+
+    second: str | None = None
+    unit: str | None = None
+    default: float | None = None
+    by_event: bool = False
+
+
+SIGNATURES: Mapping[str, Signature] = {
+    "on": Signature("object"),
+    "in": Signature("object"),
+    "left_of": Signature("object"),
+    "right_of": Signature("object"),
+    "behind": Signature("object"),
+    "in_front_of": Signature("object"),
+    "near": Signature("object", "m", 0.10),
+    "upright": Signature(),
+    "lifted": Signature(None, "m", 0.05),
+    "touching": Signature("object"),
+    "undisturbed": Signature(),
+    "pushed_to": Signature("place", "m", 0.02),
+    "hung": Signature("fixture"),
+    "poured": Signature("object", "share", 0.9, by_event=False),
+    "pressed": Signature(None, "N", 5.0, by_event=True),
+    "struck": Signature("object", "m/s", 0.15, by_event=True),
+}
+"""Every predicate of the language; ``docs/skills.md`` says what each measures."""
+
+
+@dataclass(frozen=True)
+class Literal:
+    """One predicate of an object: ``in(object_00, object_01)``, ``near(object_00, object_02, 0.1)``."""
+
+    predicate: str
+    subject: str
+    second: str | None = None
+    value: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raise UsageError for an unknown predicate, or arguments that it does not take; fill in its default value."""
+        signature = SIGNATURES.get(self.predicate)
+        if signature is None:
+            raise UsageError(choose_from("predicate", self.predicate, SIGNATURES))
+        if (self.second is None) != (signature.second is None):
+            wants = f"needs a second argument, a {signature.second}" if signature.second else "takes one argument"
+            raise UsageError(f"{self.predicate} {wants}: {self.subject}, {self.second}")
+        if self.second is not None and self.second == self.subject:
+            raise UsageError(f"{self.predicate}({self.subject}, {self.second}): needs two different things")
+        if signature.unit is None and self.value is not None:
+            raise UsageError(f"{self.predicate} takes no value, not {self.value:g}")
+        if signature.unit is not None and self.value is None:
+            object.__setattr__(self, "value", signature.default)
+        if self.value is not None and not 0 <= self.value < 1e6:
+            raise UsageError(f"{self.predicate}: a value of {self.value:g} {signature.unit}; give one from 0")
+
+    def __str__(self) -> str:
+        arguments = [self.subject, *([self.second] if self.second else [])]
+        if self.value is not None:
+            arguments.append(f"{self.value:g}")
+        return f"{self.predicate}({', '.join(arguments)})"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return its fields, without those that are not given."""
+        said = {
+            "predicate": self.predicate,
+            "subject": self.subject,
+            "second": self.second,
+            "value": self.value,
+        }
+        return {name: value for name, value in said.items() if value is not None}
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is to come true, all of it, and what must not cease to be true on the way."""
+
+    literals: tuple[Literal, ...]
+    stays: tuple[Literal, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Raise UsageError for a goal that asks for nothing, or twice for the same."""
+        if not self.literals:
+            raise UsageError("a goal without a literal; give one or more")
+        everything = self.literals + self.stays
+        if len(set(everything)) != len(everything):
+            raise UsageError(f"a goal that says a thing twice: {self}")
+
+    def __str__(self) -> str:
+        stays = f", with {' and '.join(map(str, self.stays))} throughout" if self.stays else ""
+        return " and ".join(map(str, self.literals)) + stays
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the goal as plain values."""
+        return {
+            "literals": [each.to_json() for each in self.literals],
+            "stays": [each.to_json() for each in self.stays],
+        }
+
+    @classmethod
+    def from_json(cls, said: Mapping[str, Any]) -> Goal:
+        """Read what ``to_json`` wrote; raises UsageError for anything else."""
+        try:
+            unknown = sorted(set(said) - {"literals", "stays"})
+            if unknown:
+                raise UsageError(f"a goal with unknown fields: {', '.join(unknown)}; valid: literals, stays")
+            return cls(tuple(map(_literal, said["literals"])), tuple(map(_literal, said.get("stays", ()))))
+        except (TypeError, KeyError, AttributeError) as error:
+            raise UsageError(f"no goal ({error!r}); give {{literals: [{{predicate, subject, ...}}]}}") from error
+
+
+def _literal(said: Mapping[str, Any]) -> Literal:
+    fields: dict[str, Any] = {name: said.get(name) for name in ("predicate", "subject", "second", "value")}
+    unknown = sorted(set(said) - set(fields))
+    if unknown:
+        raise UsageError(f"a literal with unknown fields: {', '.join(unknown)}; valid: {', '.join(fields)}")
+    for name in ("predicate", "subject", "second"):
+        if not isinstance(fields[name], str) and not (name == "second" and fields[name] is None):
+            raise UsageError(f"a literal whose {name} is {fields[name]!r}, not a text")
+    value = fields["value"]
+    if value is not None and (isinstance(value, bool) or not isinstance(value, int | float)):
+        raise UsageError(f"a literal whose value is {value!r}, not a number")
+    return Literal(fields["predicate"], fields["subject"], fields["second"], None if value is None else float(value))

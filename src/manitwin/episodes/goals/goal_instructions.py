@@ -1,0 +1,102 @@
+"""Instructions of a goal as a person would give them: templates by predicate, filled with names that tell objects apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from manitwin.episodes.goals.goal import Literal
+from manitwin.episodes.naming import Name, names_of
+from manitwin.errors import UsageError
+from manitwin.twin.record import Language
+
+TEMPLATES: Mapping[str, tuple[str, ...]] = {
+    "on": (
+        "put {a} on {b}", "place {a} on top of {b}", "set {a} down on {b}", "{a} should stand on {b}: put {it} there",
+        "pick up {a} and put {it} on {b}", "take {a} and stand {it} on {b}", "please stack {a} on {b}",
+    ),
+    "in": (
+        "put {a} in {b}", "place {a} into {b}", "drop {a} into {b}", "pick up {a} and put {it} into {b}",
+        "{a} should be in {b}: put {it} there", "please put {a} inside {b}", "take {a} and let {it} go in {b}",
+    ),
+    "left_of": (
+        "put {a} to the left of {b}", "place {a} on the left side of {b}", "set {a} down left of {b}",
+        "move {a} so that {it} is to the left of {b}", "{a} should be left of {b}: move {it} there",
+        "pick up {a} and put {it} beside {b}, on the left",
+    ),
+    "right_of": (
+        "put {a} to the right of {b}", "place {a} on the right side of {b}", "set {a} down right of {b}",
+        "move {a} so that {it} is to the right of {b}", "{a} should be right of {b}: move {it} there",
+        "pick up {a} and put {it} beside {b}, on the right",
+    ),
+    "behind": (
+        "put {a} behind {b}", "place {a} at the back of {b}", "set {a} down behind {b}, as you see it",
+        "move {a} so that {it} is behind {b}", "{a} should be behind {b}: move {it} there",
+        "pick up {a} and put {it} farther away from you than {b}, just behind {it_b}",
+    ),
+    "in_front_of": (
+        "put {a} in front of {b}", "place {a} before {b}", "set {a} down in front of {b}, as you see it",
+        "move {a} so that {it} is in front of {b}", "{a} should be in front of {b}: move {it} there",
+        "pick up {a} and put {it} between you and {b}, close to {it_b}",
+    ),
+    "near": (
+        "put {a} near {b}", "place {a} next to {b}", "set {a} down close to {b}", "bring {a} to {b}",
+        "{a} should be next to {b}: move {it} there", "pick up {a} and put {it} beside {b}",
+    ),
+    "upright": (
+        "stand {a} up", "put {a} upright", "{a} has fallen over: stand {it} up", "set {a} back on {its} base",
+        "pick up {a} and put {it} down upright", "please stand {a} upright again",
+    ),
+}  # fmt: skip
+"""The templates of each predicate; the last one of each is held out for tests of policies (``held_out``)."""
+
+
+def goal_instructions(
+    literal: Literal,
+    words: Mapping[str, Language],
+    *,
+    seed: int,
+    count: int = 6,
+    held_out: bool = False,
+) -> tuple[str, ...]:
+    """Return up to ``count`` different instructions in English for one literal.
+
+    ``words`` are those of all objects in the scene by name: a name that fits two of them is used only where none tells
+    them apart. ``held_out``: only the template that the others never use. The same arguments give the same words. Raises
+    UsageError for a predicate that has no templates.
+    """
+    if literal.predicate not in TEMPLATES:
+        raise UsageError(f"no instructions for {literal.predicate!r}; there are some for {', '.join(TEMPLATES)}")
+    templates = TEMPLATES[literal.predicate]
+    templates = templates[-1:] if held_out else templates[:-1]
+    subjects = _names(literal.subject, words)
+    seconds = [None] if literal.second is None else _names(literal.second, words)
+    rng = np.random.default_rng(seed)
+    pairs = list(product(subjects, seconds))
+    templates = tuple(templates[i] for i in rng.permutation(len(templates)))
+    pairs = [pairs[i] for i in rng.permutation(len(pairs))]
+    said: dict[str, None] = {}
+    for round_number in range(len(pairs)):
+        for place, template in enumerate(templates):
+            subject, second = pairs[(place + round_number) % len(pairs)]
+            said[_filled(template, subject, second)] = None
+            if len(said) == count:
+                return tuple(said)
+    return tuple(said)
+
+
+def _names(name: str, words: Mapping[str, Language]) -> list[Name]:
+    others: Sequence[Language] = [language for other, language in words.items() if other != name]
+    return names_of(words[name], others)
+
+
+def _filled(template: str, subject: Name, second: Name | None) -> str:
+    return template.format(
+        a=f"the {subject.words}",
+        b="" if second is None else f"the {second.words}",
+        it="them" if subject.plural else "it",
+        its="their" if subject.plural else "its",
+        it_b="them" if second is not None and second.plural else "it",
+    )
