@@ -15,7 +15,8 @@ from manitwin.dataset.index.tables import TABLES
 from manitwin.engine.drive import EXECUTORS
 from manitwin.episodes import collect
 from manitwin.episodes.cameras import named_cameras
-from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
+from manitwin.episodes.settings import PicturesConfig
+from manitwin.episodes.skills.registry import skill_names
 from manitwin.errors import UsageError
 from manitwin.models.fakes.catalog import REHEARSALS
 from manitwin.models.registry import backends
@@ -38,7 +39,7 @@ def literal(section: type, name: str) -> set[str]:
         (choices.EXECUTORS, set(EXECUTORS)),
         (choices.GRIPPERS, set(shipped_grippers())),
         (choices.ROBOTS, set(shipped_robots())),
-        (choices.SKILLS, literal(TrajectoriesConfig, "skill")),
+        (choices.SKILLS, set(skill_names())),
         (choices.SURFACES, literal(LayoutSettings, "surface")),
         (choices.CLUTTER, literal(LayoutSettings, "clutter")),
         (choices.CODECS, literal(PicturesConfig, "codec")),

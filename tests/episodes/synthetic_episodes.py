@@ -71,7 +71,7 @@ def recording(seed: int, steps: int, arm: int = 7, things: int = 3) -> Recording
 def attempt(number: int, *, outcome: str = "kept", robot_name: str = "panda", **changes: Any) -> Attempt:
     category = CATEGORIES[number % len(CATEGORIES)]
     executed, ended = (
-        outcome not in ("no_plan", "no_room", "unsettled"),
+        outcome not in ("no_plan", "no_room", "unsettled", "reached_already"),
         outcome in ("kept", "unplanned_contact", "disturbed"),
     )
     made = Attempt(

@@ -73,7 +73,8 @@ def test_counts_are_those_of_the_attempts(report: EpisodeReport) -> None:
     assert {row["outcome"]: row["attempts"] for row in outcomes} == {name: counted[name] for name in OUTCOMES}
     steps = {row["step"]: row["attempts"] for row in report.results["funnel"].rows}
     assert steps["attempted"] == len(given)
-    assert steps["set up and standing"] == len(given) - counted["unsettled"] - counted["no_room"]
+    never = sum(counted[name] for name in ("unsettled", "reached_already", "no_room"))
+    assert steps["set up and standing"] == len(given) - never
     assert steps["planned and executed"] == sum(a.planned for a in given)
     assert steps["succeeded"] == sum(a.succeeded for a in given)
     assert steps["kept"] == counted["kept"]
@@ -87,6 +88,7 @@ def test_success_by_object_category_grasp_and_robot(report: EpisodeReport) -> No
         ("by_category", "category"),
         ("by_grasp_type", "grasp_type"),
         ("by_robot", "robot"),
+        ("by_skill", "skill"),
     ):
         rows = report.results[name].rows
         assert len(rows) == len({row[key] for row in rows}) or name == "by_robot"

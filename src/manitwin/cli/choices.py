@@ -97,7 +97,12 @@ GENERATORS = Choices("generator", _backends("generator"), spec=True)
 GRASPERS = Choices("grasper", _backends("grasper"), spec=True)
 GRIPPERS = Choices("gripper", _shipped("robots/grippers/definitions"), or_file=".toml")
 ROBOTS = Choices("robot", _shipped("robots/definitions"), or_file=".toml")
-SKILLS = Choices("skill", _of("pick_place"))
+SKILLS = Choices(
+    "skill",
+    _of(
+        "pick_place", "place_on", "place_in", "stack", "left_of", "right_of", "behind", "in_front_of", "near", "upright"
+    ),
+)
 SURFACES = Choices("surface", _of("table", "shelf", "tray"))
 CLUTTER = Choices("clutter", _of("sparse", "medium", "dense"))
 CAMERAS = Choices("camera", _of("front", "side", "top", "wrist"), listed=True)

@@ -16,14 +16,15 @@ from manitwin.formats.parquet_file import open_parquet
 from manitwin.twin.store import file_beside
 
 OUTCOMES = (
-    "kept", "unplanned_contact", "disturbed", "misplaced", "toppled", "dropped", "not_lifted", "replan_failed", "unsettled",
-    "no_plan", "no_room",
+    "kept", "unplanned_contact", "disturbed", "misplaced", "toppled", "goal_missed", "dropped", "not_lifted", "replan_failed",
+    "unsettled", "reached_already", "no_plan", "no_room",
 )  # fmt: skip
 """``kept`` succeeded and touched nothing by accident; ``unplanned_contact`` and ``disturbed`` (another object moved by more than
 1 cm or 5 degrees) succeeded otherwise; from ``misplaced`` to ``replan_failed`` the execution failed; ``unsettled`` is a start
-that did not stand, ``no_room`` one that could not be set up; ``no_plan`` was never executed."""
+that did not stand, ``reached_already`` one of which the goal was true, ``no_room`` one that could not be set up; ``no_plan`` was
+never executed. ``goal_missed``: the skill's goal is not true at the end; ``failure`` says what of it."""
 
-EXECUTION_FAILURES = ("misplaced", "toppled", "dropped", "not_lifted", "replan_failed")
+EXECUTION_FAILURES = ("misplaced", "toppled", "goal_missed", "dropped", "not_lifted", "replan_failed")
 
 ATTEMPTS = "attempts.parquet"
 _TEXT, _REAL, _COUNT, _FLAG = pa.string(), pa.float64(), pa.int32(), pa.bool_()
@@ -50,6 +51,9 @@ SCHEMA = pa.schema(
         ("slip_m", _REAL),
         ("length_s", _REAL),
         ("instructions", pa.list_(_TEXT)),
+        ("goal", _TEXT),
+        ("failure", _TEXT),
+        ("measured", _TEXT),
     ]
 )
 """The columns of a batch: the fields of Attempt."""
@@ -64,7 +68,8 @@ _ROW_GROUP = 1 << 16
 class Attempt:
     """One row; errors are of the released object at rest against the goal that was asked for. None: never got there.
 
-    ``plan_failures`` is JSON: how many candidate grasps failed of what.
+    ``plan_failures`` is JSON: how many candidate grasps failed of what. ``goal`` is the skill's goal in words (pick_place: None),
+    ``failure`` the first literal of it that is not true, ``measured`` JSON: every literal with what was measured.
     """
 
     episode_id: str
@@ -87,11 +92,14 @@ class Attempt:
     slip_m: float | None
     length_s: float | None
     instructions: tuple[str, ...]
+    goal: str | None = None
+    failure: str | None = None
+    measured: str | None = None
 
     @property
     def planned(self) -> bool:
         """True where a plan was found, so that it was executed."""
-        return self.outcome not in ("no_plan", "no_room", "unsettled")
+        return self.outcome not in ("no_plan", "no_room", "unsettled", "reached_already")
 
     @property
     def succeeded(self) -> bool:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
 
 from manitwin.episodes.execution import FRAME_S, Execution
+from manitwin.episodes.goals.evaluation import Evaluation, evaluate
+from manitwin.episodes.goals.world_state import ObjectState, WorldState
 from manitwin.episodes.outcome import (
     PlacementErrors,
     is_at_rest,
@@ -21,7 +24,9 @@ from manitwin.episodes.outcome import (
 from manitwin.episodes.planning.problem import Grasp, Motion, PickPlacePlan, PickPlaceProblem, PlanFailure, PlanReport
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.settings import EpisodeSettings
+from manitwin.episodes.skills.skill import SkillGoal
 from manitwin.geometry.poses import inverse, transform_points
+from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 from manitwin.robots.robot import Robot
@@ -61,6 +66,7 @@ class EpisodeFacts:
     slip_m: float | None = None
     length_s: float | None = None
     unplanned: tuple[tuple[str, str], ...] = ()
+    evaluation: Evaluation | None = None
     replans: Counter[str] = field(default_factory=Counter)
 
 
@@ -79,13 +85,19 @@ class _Ended(Exception):
 
 
 def run_episode(
-    problem: PickPlaceProblem, planner: Planner, robot: Robot, settings: EpisodeSettings
+    problem: PickPlaceProblem,
+    planner: Planner,
+    robot: Robot,
+    settings: EpisodeSettings,
+    skill_goal: SkillGoal | None = None,
 ) -> tuple[EpisodeFacts, Recording | None]:
     """Run one episode and return what became of it, and its recording where it was executed.
 
-    The objects settle first, and the plan is made from where they came to rest. The same arguments give the same bytes.
+    The objects settle first, and the plan is made from where they came to rest. Without a ``skill_goal`` the target's pose is
+    judged against that of the problem; with one the first of its poses that can be planned is taken, and its goal is judged.
+    The same arguments give the same bytes.
     """
-    return _Episode(problem, planner, robot, settings).run()
+    return _Episode(problem, planner, robot, settings, skill_goal).run()
 
 
 def world_of(problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings, closing_force_n: float) -> RobotWorld:
@@ -106,8 +118,16 @@ def world_of(problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings,
 
 
 class _Episode:
-    def __init__(self, problem: PickPlaceProblem, planner: Planner, robot: Robot, settings: EpisodeSettings):
+    def __init__(
+        self,
+        problem: PickPlaceProblem,
+        planner: Planner,
+        robot: Robot,
+        settings: EpisodeSettings,
+        skill_goal: SkillGoal | None,
+    ):
         self.problem, self.planner, self.robot, self.settings = problem, planner, robot, settings
+        self.skill_goal = skill_goal
         self.goal_object_to_world = problem.goal_object_to_world
         self.facts = EpisodeFacts()
 
@@ -116,6 +136,8 @@ class _Episode:
         with world_of(self.problem, self.robot, self.settings, closing.force_n) as world:
             if not self._settle(world):
                 self.facts.outcome = "unsettled"
+            elif self._is_reached_already(world):
+                self.facts.outcome = "reached_already"
             elif plan := self._plan(world):
                 execution = Execution(world, self.robot, closing, self.planner.tip_pose)
                 try:
@@ -144,17 +166,51 @@ class _Episode:
         self.problem = replace(
             self.problem,
             target=rested[world.target],
-            goal_object_to_world=_raised(self.goal_object_to_world, settings.release_height_m),
             obstacles=tuple(placed for number, placed in enumerate(rested) if number != world.target),
         )
         self.rested = rested
         return True
 
+    def _is_reached_already(self, world: RobotWorld) -> bool:
+        """Tell whether a goal is true of the start."""
+        if self.skill_goal is None:
+            return False
+        touching = frozenset(world.contacts.pressing(world.contacts.read()))
+        return evaluate(
+            self._state([each.object_to_world for each in self.rested], touching), self.skill_goal.goal
+        ).reached
+
     def _plan(self, world: RobotWorld) -> PickPlacePlan | None:
-        report = self.planner.plan(self.problem)
-        self.facts.grasps_tried, self.facts.plan_failures = report.tried, report.failures
-        self.facts.grasp = report.plan.grasp if report.plan else None
-        return report.plan
+        """Plan for the first goal pose that can be reached; the settled problem becomes that of this pose."""
+        facts, height_m = self.facts, self.settings.release_height_m
+        poses = (self.goal_object_to_world,) if self.skill_goal is None else self.skill_goal.poses
+        for pose in poses:
+            problem = replace(self.problem, goal_object_to_world=_raised(pose, height_m))
+            report = self.planner.plan(problem)
+            facts.grasps_tried += report.tried
+            facts.plan_failures += report.failures
+            if report.plan is not None:
+                self.problem, self.goal_object_to_world = problem, pose
+                facts.grasp = report.plan.grasp
+                return report.plan
+        return None
+
+    def _state(
+        self,
+        object_to_world: Sequence[np.ndarray],
+        touching: frozenset[frozenset[str]],
+        at_rest: Sequence[bool] | None = None,
+    ) -> WorldState:
+        """Return what a goal is judged on, from the objects' poses ``(4, 4)`` in the order of the world."""
+        assert self.skill_goal is not None
+        rests = at_rest if at_rest is not None else [True] * len(self.rested)
+        objects = {
+            start.name: ObjectState(
+                start.body, pose, start.object_to_world, still, self.skill_goal.openings.get(start.name)
+            )
+            for start, pose, still in zip(self.rested, object_to_world, rests, strict=True)
+        }
+        return WorldState(objects, touching, frozenset(box.name for box in self.problem.static_boxes))
 
     def _closing(self) -> TrialSettings:
         gripper, settings = self.robot.gripper, self.settings
@@ -229,15 +285,23 @@ class _Episode:
         self.facts.slip_m = moved_m(planned, measured, self.problem.target.body.center_of_mass_m)
 
     def _judge(self, world: RobotWorld, execution: Execution) -> None:
-        settings, body = self.settings, self.problem.target.body
+        settings, target = self.settings, self.problem.target
         last = execution.rest(round(settings.max_rest_s / settings.timestep_s))
-        errors = placement_errors(execution.target_to_world(), self.goal_object_to_world, body.center_of_mass_m)
-        released = max(execution.touches.finger_forces_n) == 0
+        errors = placement_errors(execution.target_to_world(), self.goal_object_to_world, target.body.center_of_mass_m)
         self.facts.errors = errors
-        at_rest = is_at_rest(last, body.center_of_mass_m, settings)
-        failure = placement_outcome(errors, at_rest=at_rest, released=released, settings=settings)
+        at_rest = [
+            is_at_rest([row[number] for row in last], placed.body.center_of_mass_m, settings)
+            for number, placed in enumerate(world.placed)
+        ]
+        if self.skill_goal is None:
+            released = max(execution.touches.finger_forces_n) == 0
+            failure = placement_outcome(errors, at_rest=at_rest[world.target], released=released, settings=settings)
+        else:
+            state = self._state(last[-1], execution.pressing, at_rest)
+            self.facts.evaluation = evaluate(state, self.skill_goal.goal)
+            failure = None if self.facts.evaluation.reached else "goal_missed"
         if failure is None and any(
-            is_disturbed(placed.object_to_world, world.object_to_world(number), placed.body.center_of_mass_m, settings)
+            self._is_disturbed(placed, last[-1][number])
             for number, placed in enumerate(self.rested)
             if number != world.target
         ):
@@ -245,6 +309,13 @@ class _Episode:
         if failure in (None, "disturbed") and execution.unplanned:
             failure = "unplanned_contact"
         self.facts.outcome = failure or "kept"
+
+    def _is_disturbed(self, placed: PlacedObject, after: np.ndarray) -> bool:
+        """Tell whether an object that was to stay moved; a partner that something is put on or into may move a little more."""
+        settings, center = self.settings, placed.body.center_of_mass_m
+        if self.skill_goal is not None and placed.name == self.skill_goal.partner:
+            return moved_m(placed.object_to_world, after, center) > settings.max_partner_moved_m
+        return is_disturbed(placed.object_to_world, after, center, settings)
 
 
 def _raised(pose: np.ndarray, height_m: float) -> np.ndarray:

@@ -23,6 +23,7 @@ from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.settings import TrajectoriesConfig
+from manitwin.episodes.skills.registry import load_skill
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.robots.load import load_robot
@@ -160,11 +161,12 @@ def make_episodes(
 
     ``twins`` names where the twins of scenes are now, None: where they were as the layouts were made.
     ``count`` is how many there are at the end; where there are as many already, none is made.
-    Raises UsageError for a place without twins or scenes, an unknown robot, an ``out`` that has episodes of
+    Raises UsageError for a place without twins or scenes, an unknown robot or skill, an ``out`` that has episodes of
     scenes where twins are given or the other way, or made with other settings, or where another run is at work there.
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
+    load_skill(config.skill)
     robot, source, root = load_robot(config.robot), EpisodesSource.of(place, twins), DatasetRoot(out)
     _check_out(root, source)
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -16,20 +15,21 @@ from manitwin.engine.stage import Draft, tell_part
 from manitwin.episodes.attempts import ATTEMPTS, Attempt, write_attempts
 from manitwin.episodes.batch import Batch
 from manitwin.episodes.episode import EpisodeFacts, run_episode
+from manitwin.episodes.goals.goal_instructions import goal_instructions
 from manitwin.episodes.hdf5_file import write_episodes
 from manitwin.episodes.instructions import episode_instructions
-from manitwin.episodes.pick_place_tasks import PickPlaceTask, Placeable, PlacingArea, free_goal, sample_task
+from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
+from manitwin.episodes.setting import Setting, scene_setting, table_setting
 from manitwin.episodes.settings import TrajectoriesConfig
+from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode, recorded_robot
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
-from manitwin.scenes.layouts.surroundings import make_furniture, make_lights
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
-from manitwin.scenes.scene import Furniture, Light
 from manitwin.scenes.scene_files import scene_name
 from manitwin.twin.loaded_twin import Twin, TwinSource
 
@@ -37,22 +37,11 @@ EPISODES = "episodes.h5"
 KEPT_TWINS = 256
 
 
-@dataclass(frozen=True)
-class _Setting:
-    """An episode before it is planned: the task on its furniture, and the scene that it is of, if any."""
-
-    task: PickPlaceTask
-    furniture: Furniture
-    ambient: tuple[float, float, float]
-    lights: tuple[Light, ...]
-    scene_id: str | None = None
-
-
 class EpisodesStage:
     """Make the episodes of a batch. Each draws from a generator of its own, by the run's seed and its number in the whole."""
 
     name = "episodes"
-    version = "1"
+    version = "2"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (EPISODES, ATTEMPTS, "batch")
     needs: Resource = "cpu"
@@ -86,12 +75,8 @@ class EpisodesStage:
     def _pool(self) -> Pool:
         return pool_of(self.dataset)
 
-    @cached_property
-    def _pool_twins(self) -> dict[str, PoolTwin]:
-        return {twin.twin_id: twin for twin in self._pool.twins}
-
     def _read_placeable(self, twin_id: str) -> Placeable:
-        return Placeable.of(self._pool, self._pool_twins[twin_id])
+        return Placeable.of(self._pool, self._pool.twin(twin_id))
 
     def _read_twin(self, twin_id: str) -> Twin:
         return self._source.twin(twin_id)
@@ -129,46 +114,34 @@ class EpisodesStage:
             if isinstance(stored, StoredEpisode):
                 yield stored
 
-    def _setting(self, batch: Batch, rng: np.random.Generator) -> _Setting | None:
-        workspace = self._robot.workspace
+    def _setting(self, batch: Batch, rng: np.random.Generator) -> Setting | None:
+        workspace, skill = self._robot.workspace, load_skill(self.settings.skill)
         if batch.twin_id is not None:
-            pool = self._pool.twins
-
-            def other() -> Placeable:
-                while True:
-                    twin = pool[int(rng.integers(len(pool)))]
-                    if twin.twin_id != batch.twin_id or len(pool) == 1:
-                        return self._placeable(twin.twin_id)
-
-            furniture, (ambient, lights) = make_furniture("table", rng), make_lights(rng)
-            room = PlacingArea(workspace, furniture.supports[0])
-            task = sample_task(self._placeable(batch.twin_id), other, self.settings.others, room, rng)
-            return None if task is None else _Setting(task, furniture, ambient, lights)
+            target = self._pool.twin(batch.twin_id)
+            return table_setting(skill, target, self._pool, self._placeable_of, self.settings.others, workspace, rng)
         assert batch.scene_id is not None and self.scenes is not None
         scene = Scene.read(Path(self.scenes) / scene_name(batch.scene_id), self.dataset)
-        objects, record = tuple(scene.placed_objects()), scene.record
-        supporting = {each.supported_by for each in record.objects}
-        able = [
-            number
-            for number, each in enumerate(record.objects)
-            if each.name not in supporting
-            and workspace.min_radius_m <= np.hypot(*each.position_m[:2]) <= workspace.max_radius_m
-            and self._twin(each.twin_id).record.grasps is not None
-        ]
-        supports = {support.name: support for support in record.furniture.supports}
-        for target in rng.permutation(able):
-            room = PlacingArea(workspace, supports[record.objects[int(target)].surface])
-            goal = free_goal(objects, int(target), room, rng)
-            if goal is not None:
-                task = PickPlaceTask(objects, int(target), goal)
-                return _Setting(task, record.furniture, record.ambient, record.lights, batch.scene_id)
-        return None
+        return scene_setting(skill, scene, self._pool, self._is_graspable, workspace, rng)
 
-    def _attempt(self, batch: Batch, number: int, seed: int, setting: _Setting | None) -> Attempt | StoredEpisode:
+    def _placeable_of(self, twin: PoolTwin) -> Placeable:
+        return self._placeable(twin.twin_id)
+
+    def _is_graspable(self, twin_id: str) -> bool:
+        return self._twin(twin_id).record.grasps is not None
+
+    def _attempt(self, batch: Batch, number: int, seed: int, setting: Setting | None) -> Attempt | StoredEpisode:
         episode_id = f"{batch.batch_id}-{number:08d}"
         if setting is None:
             return _attempt(
-                episode_id, self._robot, batch.twin_id or "", "", batch.scene_id, seed, 0, EpisodeFacts("no_room")
+                episode_id,
+                self._robot,
+                self.settings.skill,
+                batch.twin_id or "",
+                "",
+                batch.scene_id,
+                seed,
+                0,
+                EpisodeFacts("no_room"),
             )
         task = setting.task
         target = task.objects[task.target]
@@ -183,16 +156,10 @@ class EpisodesStage:
             static_boxes=tuple(furniture_boxes(setting.furniture)),
             seed=seed,
         )
-        facts, recording = run_episode(problem, self._planner, self._robot, self.settings.episode)
-        spoken = episode_instructions(
-            twin.record.language,
-            target.object_to_world[:3, 3],
-            task.goal_object_to_world[:3, 3],
-            seed=seed,
-            others=[self._language(o.twin_id) for o in problem.obstacles],
-        )
+        facts, recording = run_episode(problem, self._planner, self._robot, self.settings.episode, setting.skill_goal)
+        spoken = self._instructions(setting, seed)
         attempt = _attempt(
-            episode_id, self._robot, target.twin_id, twin.record.language.category, setting.scene_id, seed,
+            episode_id, self._robot, self.settings.skill, target.twin_id, twin.record.language.category, setting.scene_id, seed,
             len(problem.obstacles), facts, grasps.get(facts.grasp.grasp_id) if facts.grasp else None, spoken,
         )  # fmt: skip
         if attempt.outcome != "kept" or recording is None:
@@ -207,6 +174,20 @@ class EpisodesStage:
         }
         return StoredEpisode(attempt, recording, recorded_robot(self._robot), objects, said)
 
+    def _instructions(self, setting: Setting, seed: int) -> tuple[str, ...]:
+        task = setting.task
+        target = task.objects[task.target]
+        if setting.skill_goal is not None:
+            words = {each.name: self._language(each.twin_id) for each in task.objects}
+            return goal_instructions(setting.skill_goal.goal.literals[0], words, seed=seed)
+        return episode_instructions(
+            self._language(target.twin_id),
+            target.object_to_world[:3, 3],
+            task.goal_object_to_world[:3, 3],
+            seed=seed,
+            others=[self._language(each.twin_id) for place, each in enumerate(task.objects) if place != task.target],
+        )
+
     def _language(self, twin_id: str) -> Any:
         return self._twin(twin_id).record.language
 
@@ -214,6 +195,7 @@ class EpisodesStage:
 def _attempt(
     episode_id: str,
     robot: Robot,
+    skill: str,
     twin_id: str,
     category: str,
     scene_id: str | None,
@@ -223,11 +205,11 @@ def _attempt(
     grasp: TargetGrasp | None = None,
     instructions: tuple[str, ...] = (),
 ) -> Attempt:
-    errors = facts.errors
+    errors, judged = facts.errors, facts.evaluation
     return Attempt(
         episode_id=episode_id,
         robot=robot.name,
-        skill="pick_place",
+        skill=skill,
         twin_id=twin_id,
         category=category,
         scene_id=scene_id,
@@ -245,4 +227,7 @@ def _attempt(
         slip_m=facts.slip_m,
         length_s=facts.length_s,
         instructions=instructions,
+        goal=str(judged.goal) if judged else None,
+        failure=judged.failure if judged else None,
+        measured=json.dumps(judged.to_json()) if judged else None,
     )

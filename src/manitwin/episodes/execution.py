@@ -48,6 +48,7 @@ class Execution:
         self._presses = False
         self.steps = 0
         self.unplanned: set[tuple[str, str]] = set()
+        self.pressing: frozenset[frozenset[str]] = frozenset()
         self._unplanned_since_row = False
         self.touches = world.contacts.touches(world.contacts.read())
         self._recorder = Recorder(world, self.touches)
@@ -107,19 +108,25 @@ class Execution:
         """Return the hand where the joints are told to be, in the object's frame: what the arm sags by counts as in the hand."""
         return inverse(self.target_to_world()) @ self._tip_pose(self.commanded_rad)
 
-    def rest(self, max_steps: int) -> list[np.ndarray]:
-        """Stay until nothing has moved for a quarter of a second; returns the target's poses ``(4, 4)`` at the last rows."""
-        watch, poses = (
-            self._world.rest_watch(STILL_ROWS),
-            deque([self.target_to_world()], maxlen=REST_ROWS),
-        )
+    def rest(self, max_steps: int) -> list[list[np.ndarray]]:
+        """Stay until nothing has moved for a quarter of a second; returns the poses ``(4, 4)`` of all objects at the last rows.
+
+        ``pressing`` then has the pairs of names of what pressed on each other at any of them.
+        """
+        watch, poses = self._world.rest_watch(STILL_ROWS), deque([self._poses()], maxlen=REST_ROWS)
+        pressing = deque([self._world.contacts.pressing(self._world.contacts.read())], maxlen=STILL_ROWS)
         for _ in range(max_steps // self._steps_per_row):
             self.wait(Phase.REST, self._steps_per_row - self.steps % self._steps_per_row)
-            poses.append(self.target_to_world())
+            poses.append(self._poses())
+            pressing.append(self._world.contacts.pressing(self._world.contacts.read()))
             watch.look()
             if watch.all_rest:
                 break
+        self.pressing = frozenset().union(*pressing)
         return list(poses)
+
+    def _poses(self) -> list[np.ndarray]:
+        return [self._world.object_to_world(number) for number in range(len(self._world.placed))]
 
     def _steps(self, time_s: float) -> int:
         return round(time_s / self._closing.timestep_s)

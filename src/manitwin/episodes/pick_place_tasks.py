@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +12,7 @@ from manitwin.geometry.boxes import footprint, separation_m
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody
 from manitwin.robots.robot import Workspace
-from manitwin.scenes.layouts.pool import Pool, PoolTwin
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 from manitwin.scenes.scene import SupportRegion
 
 MIN_MOVE_M = 0.15
@@ -47,6 +47,11 @@ class Placeable:
     def at(self, plane_to_world: np.ndarray) -> np.ndarray:
         """Return the object's pose where the placement's frame is at a pose."""
         return plane_to_world @ self.object_to_plane
+
+    @classmethod
+    def in_pose(cls, pool: Pool, twin: PoolTwin, pose: StandingPose) -> Placeable:
+        """Take a settled placement."""
+        return cls(twin.twin_id, pool.body(twin.twin_id).body, pose.object_to_plane)
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,13 @@ class PlacingArea:
                 return pose
         return None
 
+    def reaches(self, position_m: np.ndarray, corners: np.ndarray) -> bool:
+        """Tell whether a place ``(2,)`` is in the workspace, and a footprint ``(K, 2)`` there wholly on the surface."""
+        workspace, radius_m = self.workspace, float(np.linalg.norm(position_m))
+        angle_rad = abs(float(np.arctan2(position_m[1], position_m[0])))
+        in_reach = workspace.min_radius_m <= radius_m <= workspace.max_radius_m
+        return in_reach and angle_rad <= workspace.half_angle_rad and self._holds(corners)
+
     def _holds(self, corners: np.ndarray) -> bool:
         inside = np.abs(corners - self.support.center_m) <= self.support.half_extents_m
         # nothing may stand in the arm's foot, whatever its centre's distance
@@ -109,24 +121,75 @@ def sample_task(
     return None
 
 
+def sample_objects(
+    taking_part: Sequence[Placeable],
+    others: Callable[[], Placeable],
+    count: int,
+    area: PlacingArea,
+    rng: np.random.Generator,
+) -> tuple[PlacedObject, ...] | None:
+    """Draw places in reach for those that take part, and ``count`` drawn ``others`` around; None: there is no room."""
+    for _ in range(OTHERS_TRIED):
+        taken, placed = list[np.ndarray](), list[PlacedObject]()
+        for number, each in enumerate(taking_part):
+            pose = area.draw(each.footprint, taken, rng)
+            if pose is None:
+                break
+            taken.append(_at(each.footprint, pose))
+            placed.append(PlacedObject(f"object_{number:02d}", each.twin_id, each.body, each.at(pose)))
+        if len(placed) < len(taking_part):
+            continue
+        around = _others(others, count, taken, area.wider(), rng, first=len(placed))
+        if around is not None:
+            return (*placed, *around)
+    return None
+
+
 def free_goal(
     objects: Sequence[PlacedObject], target: int, area: PlacingArea, rng: np.random.Generator
 ) -> np.ndarray | None:
     """Draw a free pose for ``objects[target]`` on its surface, turned about Z alone; None: no area."""
     moved = objects[target]
-    hulls = np.concatenate(moved.body.hulls)
+    object_to_plane, corners = on_its_surface(moved, area.support.height_m)
+    taken = [
+        footprint_at(other.body, other.object_to_world) for number, other in enumerate(objects) if number != target
+    ]
+    pose = _elsewhere(corners, moved.object_to_world[:2, 3], taken, area, rng)
+    return None if pose is None else pose @ object_to_plane
+
+
+def on_its_surface(moved: PlacedObject, height_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return an object's pose ``(4, 4)`` turned as it is, above the origin of a level plane at a height, and its footprint."""
     here = moved.object_to_world
     center = transform(translation=np.array([here[0, 3], here[1, 3], 0.0]))
     object_to_plane = inverse(center) @ here
-    object_to_plane[2, 3] += area.support.height_m - float(transform_points(here, hulls)[:, 2].min())
-    corners = footprint(transform_points(object_to_plane, hulls))
-    taken = [
-        footprint(transform_points(other.object_to_world, np.concatenate(other.body.hulls)))
-        for number, other in enumerate(objects)
-        if number != target
-    ]
-    pose = _elsewhere(corners, here[:2, 3], taken, area, rng)
-    return None if pose is None else pose @ object_to_plane
+    lowest_m = float(transform_points(here, np.concatenate(moved.body.hulls))[:, 2].min())
+    object_to_plane[2, 3] += height_m - lowest_m
+    return object_to_plane, footprint_at(moved.body, object_to_plane)
+
+
+def footprint_at(body: RigidBody, object_to_world: np.ndarray) -> np.ndarray:
+    """Return the corners ``(K, 2)`` of what a body covers of the ground at a pose."""
+    return footprint(transform_points(object_to_world, np.concatenate(body.hulls)))
+
+
+def free_poses(
+    body: RigidBody,
+    object_to_plane: np.ndarray,
+    taken: Sequence[np.ndarray],
+    area: PlacingArea,
+    rng: np.random.Generator,
+    *,
+    count: int,
+) -> Iterator[np.ndarray]:
+    """Yield up to ``count`` free poses of a body in a placement ``(4, 4)``, clear of the footprints that are ``taken``."""
+    corners = footprint_at(body, object_to_plane)
+    for _ in range(count):
+        pose = area.draw(corners, taken, rng)
+        if pose is None:
+            return
+        pose[2, 3] += area.support.height_m
+        yield pose @ object_to_plane
 
 
 def _elsewhere(
@@ -145,6 +208,7 @@ def _others(
     kept_free: list[np.ndarray],
     area: PlacingArea,
     rng: np.random.Generator,
+    first: int = 1,
 ) -> list[PlacedObject] | None:
     taken, placed = list(kept_free), []
     for number in range(count):
@@ -153,7 +217,7 @@ def _others(
         if pose is None:
             return None
         taken.append(_at(other.footprint, pose))
-        placed.append(PlacedObject(f"object_{number + 1:02d}", other.twin_id, other.body, other.at(pose)))
+        placed.append(PlacedObject(f"object_{number + first:02d}", other.twin_id, other.body, other.at(pose)))
     return placed
 
 

@@ -19,7 +19,7 @@ class EpisodeSettings(Section):
     ``release_height_m`` is how far above its goal an object is let go. What moved less than ``max_placed_m`` and tilted less
     than ``max_tilt_deg`` from its goal stands where it should, if it moves by no more than ``max_rest_*`` in half a second;
     ``max_start_*`` is what a start may move until it rests,
-    ``max_disturbed_*`` what may happen to the other objects.
+    ``max_disturbed_*`` what may happen to the other objects, ``max_partner_moved_m`` to the one that a goal is about.
     """
 
     timestep_s: float = Field(default=1 / 120, gt=0)
@@ -39,6 +39,7 @@ class EpisodeSettings(Section):
     max_start_deg: float = Field(default=5.0, gt=0, lt=180)
     max_disturbed_m: float = Field(default=0.01, gt=0)
     max_disturbed_deg: float = Field(default=5.0, gt=0, lt=180)
+    max_partner_moved_m: float = Field(default=0.02, gt=0)
     max_contact_force_n: float = Field(default=0.5, ge=0)
 
 
@@ -52,7 +53,7 @@ class TrajectoriesConfig(Section):
 
     seed: Seed = 0
     robot: str = "panda"
-    skill: Literal["pick_place"] = "pick_place"
+    skill: str = "pick_place"
     others: int = Field(default=0, ge=0, le=20)
     batch: int = Field(default=10, ge=1)
     retire_failed_share: float = Field(default=1 / 3, ge=0, lt=1)

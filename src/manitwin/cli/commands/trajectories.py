@@ -34,7 +34,9 @@ def trajectories(
     robot: Annotated[
         str | None, choices.ROBOTS.option(help="A robot by name, or a TOML file that describes one.")
     ] = None,
-    skill: Annotated[str | None, choices.SKILLS.option(help="What to do: pick_place.")] = None,
+    skill: Annotated[
+        str | None, choices.SKILLS.option(help="What to do: pick_place, place_in, stack, left_of ... (docs/skills.md).")
+    ] = None,
     twins: options.Twins = None,
     others: Annotated[
         int | None, typer.Option(help="So many other objects around, where twins are given.", min=0, max=20)

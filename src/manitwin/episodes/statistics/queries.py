@@ -18,7 +18,9 @@ MEANINGS = {
     "dropped": "lost on the way",
     "not_lifted": "left behind on the table",
     "replan_failed": "no way to put it down from how it lay in the hand",
+    "goal_missed": "it is not where, or not done, what the skill's goal asks for",
     "unsettled": "the start did not stand still",
+    "reached_already": "the skill's goal was true before anything moved",
     "no_plan": "no grasp could be planned",
     "no_room": "the scene could not be set up",
 }
@@ -72,7 +74,8 @@ def _by(
 FUNNEL = Query(
     "funnel",
     "How far attempts came.",
-    f"""WITH counted AS (SELECT {_COUNTS}, count(*) FILTER (outcome NOT IN ('unsettled', 'no_room')) AS started FROM attempts)
+    f"""WITH counted AS (SELECT {_COUNTS},
+  count(*) FILTER (outcome NOT IN ('unsettled', 'reached_already', 'no_room')) AS started FROM attempts)
 SELECT step, attempts, attempts / nullif(first, 0) AS of_all, attempts / nullif(before, 0) AS of_before,
   wilson_low(attempts, before) AS low, wilson_high(attempts, before) AS high
 FROM (SELECT unnest(['attempted', 'set up and standing', 'planned and executed', 'succeeded', 'kept']) AS step,
@@ -121,6 +124,7 @@ FROM failed GROUP BY reason ORDER BY grasps DESC, reason""",
     "Several candidates of one attempt may fail before one can be planned.",
 )
 
+BY_SKILL = _by("by_skill", "Success by skill.", "skill", labels("skill"), "attempted DESC, skill")
 BY_CATEGORY = _by(
     *("by_category", "Success by category.", f"{_CATEGORY} AS category, count(DISTINCT twin_id) AS objects"),
     (*labels("category"), *counts("objects")),
@@ -287,6 +291,6 @@ ORDER BY position""",
 
 QUERIES: tuple[Query, ...] = (
     *(FUNNEL, OUTCOMES_COUNTED, PLAN_FAILURES, BESIDE_THE_PAPER),
-    *(BY_ROBOT, BY_CATEGORY, BY_OBJECT, NEVER_KEPT, BY_GRASP_TYPE, BY_OTHERS),
+    *(BY_SKILL, BY_ROBOT, BY_CATEGORY, BY_OBJECT, NEVER_KEPT, BY_GRASP_TYPE, BY_OTHERS),
     *(LENGTHS, LENGTH_HISTOGRAM, PLACEMENT, PLACEMENT_HISTOGRAM, JOINTS, GRASPS, FAILED_GRASPS),
 )

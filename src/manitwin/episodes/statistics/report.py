@@ -37,7 +37,17 @@ VIEWS = (
 EPISODE_FILES = "batches/*/*/episodes.h5"
 _MERGED = "maniskill/trajectory.h5"
 _PRINTED = (
-    *("funnel", "outcomes", "plan_failures", "by_robot", "by_category", "never_kept", "by_grasp_type", "by_others"),
+    *(
+        "funnel",
+        "outcomes",
+        "plan_failures",
+        "by_skill",
+        "by_robot",
+        "by_category",
+        "never_kept",
+        "by_grasp_type",
+        "by_others",
+    ),
     *("placement", "joints", "grasps", "beside_the_paper"),
 )
 
@@ -133,7 +143,16 @@ class EpisodeReport:
             section("attempts", "Attempts", "funnel", "figure:outcomes", "outcomes", "plan_failures"),
             section("paper", "Beside the paper", "beside_the_paper"),
             section(
-                *("success", "Success", "by_robot", "figure:categories", "by_category", "by_grasp_type", "by_others"),
+                *(
+                    "success",
+                    "Success",
+                    "by_skill",
+                    "by_robot",
+                    "figure:categories",
+                    "by_category",
+                    "by_grasp_type",
+                    "by_others",
+                ),
                 "by_object",
             ),
             section("never", "Objects without a kept episode", "never_kept", empty="Every object has one."),

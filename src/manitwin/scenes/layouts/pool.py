@@ -92,6 +92,18 @@ class Pool:
         if not self.twins:
             raise UsageError("no accepted twin that stays where it is set down; build some first")
 
+    def twin(self, twin_id: str) -> PoolTwin:
+        """Return a twin by its id; raises UsageError where there is none."""
+        if twin_id not in self._by_id:
+            raise UsageError(
+                f"no twin {twin_id!r} that stays where it is set down; build it again, or name its data set"
+            )
+        return self._by_id[twin_id]
+
+    @cached_property
+    def _by_id(self) -> dict[str, PoolTwin]:
+        return {twin.twin_id: twin for twin in self.twins}
+
     def body(self, twin_id: str) -> PoolBody:
         """Return a twin's body and convex parts."""
         found = self._bodies.pop(twin_id, None)

@@ -54,10 +54,10 @@ def level_poses(twin: PoolTwin, body: PoolBody) -> list[StandingPose]:
     """Return the placements of a twin with a top that something can stand on; a vessel has only a rim."""
     if twin.vessel:
         return []
-    return [pose for pose in twin.poses if _is_broad(_level_end(body.parts.at(pose.object_to_plane), top=True))]
+    return [pose for pose in twin.poses if _is_broad(level_end(body.parts.at(pose.object_to_plane), top=True))]
 
 
-def _is_broad(level: _Level | None) -> bool:
+def _is_broad(level: Level | None) -> bool:
     return level is not None and level.depth_inside(level.middle_m) >= BROAD_M
 
 
@@ -103,9 +103,9 @@ def put_onto(
     they have in common.
     """
     pose = draw_pose(twin.poses, rng)
-    top = _level_end(base, top=True)
+    top = level_end(base, top=True)
     turned = body.parts.at(on_plane(pose, np.zeros(2), 0.0, rng.uniform(-np.pi, np.pi)))
-    foot = _level_end(turned, top=False)
+    foot = level_end(turned, top=False)
     center = transform_points(turned.pose, body.body.center_of_mass_m[None])[0, :2]
     if top is None or foot is None or foot.depth_inside(center) < STANDS_M:
         return None
@@ -142,7 +142,7 @@ def lower(body: PoolBody, raised: np.ndarray, obstacles: Sequence[PlacedParts], 
 
 
 @dataclass(frozen=True)
-class _Level:
+class Level:
     """The level end of a body seen from above: the middle of a convex polygon, and its sides' ``normals . x + offsets <= 0``."""
 
     middle_m: np.ndarray
@@ -154,15 +154,15 @@ class _Level:
         return -float((self.normals @ point + self.offsets_m).max())
 
 
-def _level_end(parts: PlacedParts, *, top: bool) -> _Level | None:
-    """Return a body's upper or lower end where that is level, and ``STANDS_M`` wide about its middle."""
+def level_end(parts: PlacedParts, *, top: bool, within_m: float = LEVEL_M) -> Level | None:
+    """Return a body's upper or lower end where that is level (to ``within_m``), and ``STANDS_M`` wide about its middle."""
     heights = parts.whole[:, 2] * (1 if top else -1)
-    points = parts.whole[heights > heights.max() - LEVEL_M][:, :2]
+    points = parts.whole[heights > heights.max() - within_m][:, :2]
     if len(points) < 3 or np.linalg.matrix_rank(points - points.mean(0), tol=STANDS_M) < 2:
         return None
     polygon = ConvexHull(points)
     middle = points[polygon.vertices].mean(0)
-    level = _Level(middle, polygon.equations[:, :2], polygon.equations[:, 2])
+    level = Level(middle, polygon.equations[:, :2], polygon.equations[:, 2])
     return level if level.depth_inside(middle) >= 2 * STANDS_M else None
 
 

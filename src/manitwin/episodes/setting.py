@@ -1,0 +1,141 @@
+"""What an episode begins with: objects on furniture, which of them is moved, and the goal; drawn on a table or in a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.episodes.pick_place_tasks import (
+    PickPlaceTask,
+    Placeable,
+    PlacingArea,
+    free_goal,
+    sample_objects,
+    sample_task,
+)
+from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, set_goal
+from manitwin.robots.robot import Workspace
+from manitwin.scenes.layouts.pool import Pool, PoolTwin
+from manitwin.scenes.layouts.surroundings import make_furniture, make_lights
+from manitwin.scenes.loaded_scene import Scene, furniture_boxes
+from manitwin.scenes.scene import Furniture, Light
+
+PARTNERS_TRIED, STARTS_TRIED = 40, 6
+
+
+@dataclass(frozen=True)
+class Setting:
+    """An episode before it is planned: the task on its furniture, the scene that it is of, and a goal in words, if any."""
+
+    task: PickPlaceTask
+    furniture: Furniture
+    ambient: tuple[float, float, float]
+    lights: tuple[Light, ...]
+    scene_id: str | None = None
+    skill_goal: SkillGoal | None = None
+
+
+def table_setting(
+    skill: Skill | None,
+    target: PoolTwin,
+    pool: Pool,
+    placeable: Callable[[PoolTwin], Placeable],
+    others: int,
+    workspace: Workspace,
+    rng: np.random.Generator,
+) -> Setting | None:
+    """Draw a table with a target, the partner that the skill wants, and so many others; None: there is no room, or no partner."""
+
+    def other() -> Placeable:
+        while True:
+            twin = pool.twins[int(rng.integers(len(pool.twins)))]
+            if twin.twin_id != target.twin_id or len(pool.twins) == 1:
+                return placeable(twin)
+
+    furniture, (ambient, lights) = make_furniture("table", rng), make_lights(rng)
+    area = PlacingArea(workspace, furniture.supports[0])
+    if skill is None:
+        task = sample_task(placeable(target), other, others, area, rng)
+        return None if task is None else Setting(task, furniture, ambient, lights)
+    for _ in range(STARTS_TRIED):
+        taking_part = _taking_part(skill, target, pool, placeable, rng)
+        objects = None if taking_part is None else sample_objects(taking_part, other, others, area, rng)
+        if objects is None:
+            return None
+        around = Surroundings(objects, pool, area, tuple(furniture_boxes(furniture)))
+        found = set_goal(skill, around, 0, 1 if skill.has_partner else None, rng)
+        if found is not None:
+            return Setting(PickPlaceTask(objects, 0, found.poses[0]), furniture, ambient, lights, None, found)
+    return None
+
+
+def scene_setting(
+    skill: Skill | None,
+    scene: Scene,
+    pool: Pool,
+    graspable: Callable[[str], bool],
+    workspace: Workspace,
+    rng: np.random.Generator,
+) -> Setting | None:
+    """Choose a target in reach and a goal in a scene, and the partner that the skill wants; None: there is none."""
+    objects, record = tuple(scene.placed_objects()), scene.record
+    supporting = {each.supported_by for each in record.objects}
+    able = [
+        number
+        for number, each in enumerate(record.objects)
+        if each.name not in supporting and _in_reach(each.position_m, workspace) and graspable(each.twin_id)
+    ]
+    supports = {support.name: support for support in record.furniture.supports}
+    boxes = tuple(furniture_boxes(record.furniture))
+    for target in map(int, rng.permutation(able)):
+        area = PlacingArea(workspace, supports[record.objects[target].surface])
+        if skill is None:
+            goal = free_goal(objects, target, area, rng)
+            if goal is not None:
+                task = PickPlaceTask(objects, target, goal)
+                return Setting(task, record.furniture, record.ambient, record.lights, scene.record.scene_id)
+            continue
+        around = Surroundings(objects, pool, area, boxes)
+        for partner in _partners(skill, around, target, rng):
+            found = set_goal(skill, around, target, partner, rng)
+            if found is not None:
+                task = PickPlaceTask(objects, target, found.poses[0])
+                return Setting(task, record.furniture, record.ambient, record.lights, scene.record.scene_id, found)
+    return None
+
+
+def _taking_part(
+    skill: Skill,
+    target: PoolTwin,
+    pool: Pool,
+    placeable: Callable[[PoolTwin], Placeable],
+    rng: np.random.Generator,
+) -> list[Placeable] | None:
+    if not skill.has_partner and not skill.suits(pool, target, None):
+        return None
+    begins = skill.begins_in(target)
+    first = Placeable.in_pose(pool, target, begins[int(rng.integers(len(begins)))])
+    if not skill.has_partner:
+        return [first]
+    for number in rng.permutation(len(pool.twins))[:PARTNERS_TRIED]:
+        partner = pool.twins[int(number)]
+        if partner.twin_id != target.twin_id and skill.suits(pool, target, partner):
+            return [first, placeable(partner)]
+    return None
+
+
+def _partners(skill: Skill, around: Surroundings, target: int, rng: np.random.Generator) -> Sequence[int | None]:
+    twins = [around.twin(number) for number in range(len(around.objects))]
+    if not skill.has_partner:
+        return [None] if skill.suits(around.pool, twins[target], None) else []
+    return [
+        int(number)
+        for number in rng.permutation(len(twins))
+        if number != target and skill.suits(around.pool, twins[target], twins[int(number)])
+    ]
+
+
+def _in_reach(position_m: Sequence[float], workspace: Workspace) -> bool:
+    return workspace.min_radius_m <= float(np.hypot(position_m[0], position_m[1])) <= workspace.max_radius_m

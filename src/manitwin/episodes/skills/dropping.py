@@ -1,0 +1,45 @@
+"""Dropping tests: whether a goal is true of where an object comes to rest that is let go on or in another one, in physics."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from manitwin.episodes.goals.evaluation import evaluate
+from manitwin.episodes.goals.goal import Goal
+from manitwin.episodes.goals.world_state import ObjectState, WorldState
+from manitwin.episodes.skills.skill import Surroundings
+from manitwin.geometry.poses import transform
+from manitwin.geometry.rigid_body import StaticBox
+from manitwin.physics.sapien.settle import settle_scene
+
+SETTLES_S = 2.0
+GIVE_UP_M = 0.3  # what has moved so far from where it was let go has fallen beside
+FLOOR = StaticBox("floor", np.array([1.0, 1.0, 0.25]), transform(translation=np.array([0.0, 0, -0.25])))
+
+
+def rest_after_drop(
+    around: Surroundings, target: int, partner: int, goal: Goal, let_go_at: np.ndarray
+) -> np.ndarray | None:
+    """Return where the target comes to rest ``(4, 4)`` that is let go at a pose; None where the goal is not true there.
+
+    The two are alone on a level floor under the partner.
+    """
+    moved, base = around.objects[target], around.objects[partner]
+    height_m = float(around.parts(partner).bounds[0][2])
+    down, up = (transform(translation=np.array([0.0, 0, sign * height_m])) for sign in (-1, 1))
+    released = [
+        replace(moved, object_to_world=down @ let_go_at),
+        replace(base, object_to_world=down @ base.object_to_world),
+    ]
+    settled = settle_scene(released, [FLOOR], seconds=SETTLES_S, give_up_m=[GIVE_UP_M, GIVE_UP_M])
+    states = {
+        each.name: ObjectState(each.body, end, each.object_to_world, bool(at_rest), around.body(number).opening)
+        for each, end, at_rest, number in zip(
+            released, settled.object_to_world, settled.at_rest, (target, partner), strict=True
+        )
+    }
+    touching = frozenset(frozenset(pair) for pair in settled.touching)
+    state = WorldState(states, touching, frozenset({FLOOR.name}))
+    return up @ settled.object_to_world[0] if evaluate(state, goal).reached else None

@@ -1,0 +1,125 @@
+"""``place_in``: let an object go in a vessel, on end a little below the rim, or lying where it comes to rest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import zip_longest
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manitwin.episodes.goals.goal import Goal, Literal
+from manitwin.episodes.skills.dropping import rest_after_drop
+from manitwin.episodes.skills.skill import Skill, Surroundings, tries
+from manitwin.geometry.boxes import smallest_enclosing_circle
+from manitwin.geometry.hull_distance import PlacedParts
+from manitwin.geometry.poses import rotation_between, transform
+from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.scenes.layouts.pool import Pool, PoolTwin
+from manitwin.scenes.layouts.stacking import RIM_SLACK, Mouth, mouth_of, open_poses, put_into
+
+LEAST_DEPTH_M = 0.025  # of a vessel: what is put on a plate lies on it, and rolls off
+LET_GO_M = 0.04  # the lower end is so deep below the rim: a hand that goes deeper meets the rim
+LEAST_ROOM_M = 0.004  # all around a thing on end
+FREE_FALL_M = 0.002  # above where a lying thing would come to rest
+LYING_TRIED, ON_END_TRIED = 6, 12
+PERTURBED, OFF_M, OFF_RAD = 3, 0.005, np.radians(3)
+
+
+class PlaceIn(Skill):
+    """Put the target into its partner, a vessel that opens upward."""
+
+    name, has_partner, most_poses = "place_in", True, 6
+
+    def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
+        """Accept a vessel that is deeper than a plate, with a rim wider than the target's two smaller sides."""
+        if partner is None or not partner.vessel or not open_poses(partner, pool.body(partner.twin_id)):
+            return False
+        opening = pool.body(partner.twin_id).opening
+        if opening is None or opening.depth_m < LEAST_DEPTH_M:
+            return False
+        return _radius_on_end(pool.body(target.twin_id).parts.whole) < opening.rim_radius_m
+
+    def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
+        """Return: the target is in the vessel."""
+        assert partner is not None
+        return Goal((Literal("in", target.name, partner.name),))
+
+    def poses(
+        self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
+    ) -> Iterator[np.ndarray]:
+        """Yield poses on end with the lower end below the rim, and poses just above where the target would lie.
+
+        Those from which it comes to rest in the vessel when it is let go there in physics, also when that is a little beside:
+        a banana that balances on the rim of a bowl is no goal.
+        """
+        assert partner is not None
+        mouth = mouth_of(around.body(partner), around.objects[partner].object_to_world)
+        if mouth is None:
+            return
+        vessel = around.parts(partner)
+        on_end = tries(lambda: _on_end(around.body(target).parts.whole, mouth, rng), ON_END_TRIED)
+        lying = tries(lambda: _lying(around, target, vessel, mouth, rng), LYING_TRIED)
+        long = _extents(around.body(target).parts.whole)[2] > mouth.depth_m
+        goal = self.goal(around.objects[target], around.objects[partner])
+        for pose in _by_turns(on_end, lying) if long else _by_turns(lying, on_end):
+            if all(rest_after_drop(around, target, partner, goal, each) is not None for each in _nearby(pose, rng)):
+                yield pose
+
+
+def _on_end(points: np.ndarray, mouth: Mouth, rng: np.random.Generator) -> np.ndarray | None:
+    longest = _axes(points)[:, 2] * rng.choice([-1.0, 1.0])
+    yaw = rng.uniform(-np.pi, np.pi)
+    about_z = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1.0]])
+    rotation = about_z @ rotation_between(longest, np.array([0.0, 0, 1]))
+    turned = points @ rotation.T
+    middle, radius_m = smallest_enclosing_circle(turned[:, :2])
+    spare_m = RIM_SLACK * mouth.radius_m - radius_m - LEAST_ROOM_M
+    if spare_m < 0:
+        return None
+    depth_m = min(LET_GO_M, 0.8 * mouth.depth_m)
+    height_m = mouth.center_m[2] - depth_m - turned[:, 2].min()
+    around, out_m = rng.uniform(-np.pi, np.pi), 0.5 * spare_m * np.sqrt(rng.random())
+    at = mouth.center_m[:2] - middle + out_m * np.array([np.cos(around), np.sin(around)])
+    return transform(rotation, np.array([*at, height_m]))
+
+
+def _lying(
+    around: Surroundings, target: int, vessel: PlacedParts, mouth: Mouth, rng: np.random.Generator
+) -> np.ndarray | None:
+    twin = around.twin(target)
+    put = put_into(twin, around.body(target), around.area.support.name, mouth, [vessel], rng)
+    if put is None:
+        return None
+    pose = put.object_to_world.copy()
+    pose[2, 3] += FREE_FALL_M
+    return pose
+
+
+def _by_turns(first: Iterator[np.ndarray], second: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
+    """Yield from two iterators in turn: the hand may meet the rim for all poses of one kind."""
+    for pair in zip_longest(first, second):
+        yield from (pose for pose in pair if pose is not None)
+
+
+def _nearby(pose: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
+    """Yield a pose, and some that differ from it as a placement does from its plan."""
+    yield pose
+    for _ in range(PERTURBED):
+        turn = Rotation.from_rotvec(rng.normal(0, OFF_RAD, 3)).as_matrix() @ pose[:3, :3]
+        yield transform(turn, pose[:3, 3] + np.array([*rng.normal(0, OFF_M, 2), 0.0]))
+
+
+def _axes(points: np.ndarray) -> np.ndarray:
+    """Return the principal axes ``(3, 3)``, the longest last."""
+    return np.asarray(np.linalg.eigh(np.cov(points.T))[1])
+
+
+def _extents(points: np.ndarray) -> np.ndarray:
+    return np.sort(np.ptp(points @ _axes(points), axis=0))
+
+
+def _radius_on_end(points: np.ndarray) -> float:
+    """Return the radius of the circle that a thing on end passes through."""
+    flat = points @ _axes(points)[:, :2]
+    return float(smallest_enclosing_circle(flat)[1]) + LEAST_ROOM_M

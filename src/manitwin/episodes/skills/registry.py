@@ -1,0 +1,33 @@
+"""The skills by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from manitwin.episodes.skills.beside import SIDE_SKILLS
+from manitwin.episodes.skills.place_in import PlaceIn
+from manitwin.episodes.skills.place_on import PLACE_ON, STACK
+from manitwin.episodes.skills.skill import Skill
+from manitwin.episodes.skills.upright import Upright
+from manitwin.errors import UsageError, choose_from
+
+PICK_PLACE = "pick_place"
+"""Moves an object to a pose drawn at random: its goal is that pose, not one in words."""
+
+_SKILLS: tuple[Skill, ...] = (PLACE_ON, PlaceIn(), STACK, *SIDE_SKILLS, Upright())
+
+SKILLS: Mapping[str, Skill] = {skill.name: skill for skill in _SKILLS}
+
+
+def skill_names() -> tuple[str, ...]:
+    """Return the names of all skills, pick-and-place first."""
+    return (PICK_PLACE, *SKILLS)
+
+
+def load_skill(name: str) -> Skill | None:
+    """Return a skill, None for pick-and-place; raises UsageError that lists the valid names for an unknown one."""
+    if name == PICK_PLACE:
+        return None
+    if name not in SKILLS:
+        raise UsageError(choose_from("skill", name, skill_names()))
+    return SKILLS[name]

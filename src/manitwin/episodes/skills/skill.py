@@ -1,0 +1,126 @@
+"""What a skill is: it tells who can take part, and sets a goal in words with the poses that may reach it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+
+from manitwin.episodes.goals.evaluation import evaluate
+from manitwin.episodes.goals.goal import Goal
+from manitwin.episodes.goals.world_state import ObjectState, WorldState
+from manitwin.episodes.pick_place_tasks import PlacingArea
+from manitwin.geometry.cavity import Opening
+from manitwin.geometry.hull_distance import ConvexParts, PlacedParts
+from manitwin.geometry.rigid_body import PlacedObject, StaticBox
+from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin, StandingPose
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """Objects at rest on furniture, and the part of the target's surface that the robot reaches."""
+
+    objects: tuple[PlacedObject, ...]
+    pool: Pool
+    area: PlacingArea
+    boxes: tuple[StaticBox, ...] = ()
+
+    def body(self, number: int) -> PoolBody:
+        """Return an object's body with its opening."""
+        return self.pool.body(self.objects[number].twin_id)
+
+    def twin(self, number: int) -> PoolTwin:
+        """Return an object's twin with its placements."""
+        return self.pool.twin(self.objects[number].twin_id)
+
+    def parts(self, number: int) -> PlacedParts:
+        """Return an object's convex parts where it stands."""
+        return self.body(number).parts.at(self.objects[number].object_to_world)
+
+    def obstacles(self, *, without: Sequence[int]) -> list[PlacedParts]:
+        """Return the convex parts of furniture and of all objects but some."""
+        boxes = [ConvexParts.of_box(box).at(np.eye(4)) for box in self.boxes]
+        return boxes + [self.parts(number) for number in range(len(self.objects)) if number not in without]
+
+
+@dataclass(frozen=True)
+class SkillGoal:
+    """A goal, the poses ``object_to_world (4, 4)`` of the target that should reach it, best first, and who takes part.
+
+    ``partner`` is the object that the goal is about beside the target. ``openings`` are those of the objects, by name.
+    """
+
+    goal: Goal
+    poses: tuple[np.ndarray, ...]
+    partner: str | None
+    openings: Mapping[str, Opening]
+
+
+class Skill(ABC):
+    """A skill: ``name`` is that on the command line, ``has_partner`` tells whether a second object takes part.
+
+    ``most_poses``: so many goal poses are planned for, one after the other, before a goal counts as impossible to plan.
+    """
+
+    name: str
+    has_partner: bool
+    most_poses: int = 12
+
+    @abstractmethod
+    def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
+        """Tell whether these two can take part, by what is known of them: sizes, openings, placements."""
+
+    @abstractmethod
+    def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
+        """Return the goal in the goal language."""
+
+    @abstractmethod
+    def poses(
+        self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
+    ) -> Iterator[np.ndarray]:
+        """Yield poses ``(4, 4)`` of the target that reach the goal when it is let go there; none: there is no room."""
+
+    def begins_in(self, target: PoolTwin) -> Sequence[StandingPose]:
+        """Return the placements that the target may begin in: its likeliest one, upright where it has such."""
+        return [max(target.poses, key=lambda pose: (pose.upright, pose.probability))]
+
+
+def set_goal(
+    skill: Skill, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
+) -> SkillGoal | None:
+    """Return a skill's goal in some surroundings with the first poses that it finds.
+
+    None where it finds none, and where the goal is true of the beginning.
+    """
+    second = None if partner is None else around.objects[partner]
+    goal = skill.goal(around.objects[target], second)
+    if evaluate(_state_at_rest(around.objects), goal).reached:
+        return None
+    poses = tuple(islice(skill.poses(around, target, partner, rng), skill.most_poses))
+    if not poses:
+        return None
+    openings: dict[str, Opening] = {}
+    for number in (target, *([] if partner is None else [partner])):
+        opening = around.body(number).opening
+        if opening is not None:
+            openings[around.objects[number].name] = opening
+    return SkillGoal(goal, poses, None if second is None else second.name, openings)
+
+
+def _state_at_rest(objects: Sequence[PlacedObject]) -> WorldState:
+    """Return the state before anything happens, as far as poses tell: nothing touches, nothing opens."""
+    return WorldState(
+        {each.name: ObjectState(each.body, each.object_to_world, each.object_to_world, True) for each in objects},
+        frozenset(),
+    )
+
+
+def tries(draw: Callable[[], np.ndarray | None], count: int) -> Iterator[np.ndarray]:
+    """Yield what ``count`` draws give, without those that give nothing."""
+    for _ in range(count):
+        drawn = draw()
+        if drawn is not None:
+            yield drawn

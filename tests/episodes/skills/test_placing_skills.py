@@ -1,0 +1,101 @@
+"""Skills that set an object down: they reach their goals in physics, and what is put 15 cm beside does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from placing_skills import AREA, GRASPS, LYING, POOL, around, attempt, goal_of, placed, pool_with_lying_can
+
+from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.skills.registry import PICK_PLACE, SKILLS, load_skill, skill_names
+from manitwin.errors import UsageError
+from manitwin.geometry.poses import transform_points
+from rigid_boxes import above
+
+DICE = (GRASPS["dice"],)
+CASES = {
+    "place_in": ("mixing bowl", "beside_it"),
+    "place_on": ("box", "not_touching"),
+    "left_of": ("box", "another_side"),
+    "near": ("box", "too_far"),
+}
+
+
+@pytest.mark.parametrize("skill", CASES)
+def test_a_goal_is_reached_and_15_cm_beside_it_is_not(skill: str) -> None:
+    surroundings = around(placed(0, "dice", 0.45, -0.2), placed(1, CASES[skill][0], 0.5, 0.1))
+    goal = goal_of(skill, surroundings)
+    assert goal is not None
+    facts = attempt(surroundings, goal, DICE)
+    assert facts.outcome == "kept", (facts, facts.evaluation)
+    missed = attempt(surroundings, goal, DICE, off_m=(0.0, -0.3, 0.0) if skill == "left_of" else (0.0, 0.2, 0.01))
+    assert missed.outcome in ("goal_missed", "no_plan")
+    assert missed.outcome == "goal_missed"
+    assert missed.evaluation is not None and not missed.evaluation.reached
+
+
+def test_a_can_that_lies_is_stood_up() -> None:
+    pool = pool_with_lying_can()
+    can = placed(0, "can", 0.5, 0.1, LYING, 0.035)
+    surroundings = around(can, pool=pool)
+    goal = goal_of("upright", surroundings)
+    assert goal is not None
+    # from the side that is up while the can lies, closing across its axis
+    grasp = above([0, 0.0, 0.065], LYING)
+    turned = grasp @ np.diag([-1.0, -1, 1, 1])
+    facts = attempt(surroundings, goal, (Grasp("g0", grasp, 0.07), Grasp("g1", turned, 0.07)))
+    assert facts.outcome == "kept", (facts, facts.evaluation)
+
+
+@pytest.mark.parametrize("skill", ["left_of", "right_of", "behind", "in_front_of", "near"])
+def test_what_is_true_already_is_no_goal(skill: str) -> None:
+    way = {"left_of": (0, 1), "right_of": (0, -1), "behind": (1, 0), "in_front_of": (-1, 0), "near": (0, 1)}[skill]
+    beside = placed(0, "dice", 0.5 + 0.13 * way[0], 0.1 * way[1])
+    assert goal_of(skill, around(beside, placed(1, "box", 0.5, 0.0))) is None
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_sides_are_free_and_in_reach(seed: int) -> None:
+    surroundings = around(
+        placed(0, "dice", 0.45, -0.3),
+        placed(1, "box", 0.5, 0.0),
+        placed(2, "can", 0.5, 0.14),
+        placed(3, "tea box", 0.62, 0.0),
+    )
+    for skill in ("left_of", "behind", "near"):
+        goal = goal_of(skill, surroundings, seed)
+        if goal is None:
+            continue
+        for pose in goal.poses:
+            corners = transform_points(pose, np.concatenate(surroundings.objects[0].body.hulls))
+            assert corners[:, 2].min() == pytest.approx(0.0, abs=1e-9)
+            for other in surroundings.objects[1:]:
+                there = transform_points(other.object_to_world, np.concatenate(other.body.hulls))
+                assert np.linalg.norm(corners[:, None, :2] - there[None, :, :2], axis=2).min() > 0.02
+            assert AREA.reaches(pose[:2, 3], corners[:, :2])
+
+
+def test_only_what_fits_goes_into_a_vessel() -> None:
+    bowl, box, dice, board = (
+        next(t for t in POOL.twins if t.category == c) for c in ("mixing bowl", "box", "dice", "board")
+    )
+    assert SKILLS["place_in"].suits(POOL, dice, bowl)
+    assert not SKILLS["place_in"].suits(POOL, board, bowl)
+    assert not SKILLS["place_in"].suits(POOL, dice, box)
+    assert not SKILLS["stack"].suits(POOL, dice, box)
+    assert SKILLS["place_on"].suits(POOL, dice, board)
+    assert not SKILLS["place_on"].suits(POOL, dice, bowl)  # a vessel has only a rim
+
+
+def test_the_same_seed_gives_the_same_poses() -> None:
+    surroundings = around(placed(0, "dice", 0.45, -0.2), placed(1, "mixing bowl", 0.5, 0.1))
+    first, second = (goal_of("place_in", surroundings, 5) for _ in range(2))
+    assert first is not None and second is not None
+    assert np.array_equal(first.poses, second.poses)
+
+
+def test_unknown_skills_are_refused_with_the_valid_ones() -> None:
+    assert load_skill(PICK_PLACE) is None
+    assert set(skill_names()) == {PICK_PLACE, *SKILLS}
+    with pytest.raises(UsageError, match="place_in"):
+        load_skill("place_inn")
