@@ -87,7 +87,7 @@ class ViewsConfig(Section):
 class CandidatesConfig(Section):
     """The candidate points and the pictures that show them (paper, "Candidate Point Sampling")."""
 
-    samples: int = Field(default=20_000, ge=1000)
+    samples: int = Field(default=8_000, ge=1000)
     count: int = Field(default=42, ge=4, le=99)
     webp_quality: int = Field(default=90, ge=1, le=100)
 

@@ -169,11 +169,22 @@ def _accepted_sections(draft: Draft[Item]) -> dict[str, Any]:
         "mesh": mesh,
         "physical": draft.field("physical"),
         "language": draft.field("language"),
-        "points": {"candidates": draft.field("candidates"), **points, **draft.field(GRASP_POINTS)},
+        "points": {"candidates": _candidates(draft), **points, **draft.field(GRASP_POINTS)},
         "grasps": draft.field("grasps"),
         "placements": draft.field("placements"),
         "quality": draft.field("quality"),
     }
+
+
+def _candidates(draft: Draft[Item]) -> dict[str, Any]:
+    """Return the candidates, of which those that a closer look has moved are where their functional points are."""
+    candidates, refined = draft.field("candidates"), draft.field("refined_candidates")
+    positions, normals = list(candidates["positions_m"]), list(candidates["normals"])
+    moved = {row["candidate"] for row in refined}
+    for point in draft.field("points")["functional"]:
+        if point["candidate"] in moved:
+            positions[point["candidate"]], normals[point["candidate"]] = point["position_m"], point["normal"]
+    return {"positions_m": positions, "normals": normals, "refined": refined}
 
 
 def name_hint(record: TwinRecord) -> str | None:

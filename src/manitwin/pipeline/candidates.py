@@ -14,8 +14,9 @@ from manitwin.config import CandidatesConfig, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.formats.glb import read_glb
+from manitwin.geometry.candidate_sampling import sample_candidates
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
+from manitwin.geometry.sampling import sample_surface
 from manitwin.pipeline.object_state import load_solid, pictures
 from manitwin.pipeline.views import write_webp
 from manitwin.render.cameras import Camera, project
@@ -26,7 +27,7 @@ from manitwin.render.raycast import merged, seen_tolerance_m, silhouette, visibl
 
 @dataclass(frozen=True)
 class CandidatesStage:
-    """Sample the surface, keep 42 far-apart points and mark them on the views (paper, "Candidate Point Sampling").
+    """Sample the surface, keep 42 points where functions may be and mark them on the views (paper, "Candidate Point Sampling").
 
     Only what some view shows is sampled: nobody can choose a point that no picture shows. Fields: ``candidates``
     ``{positions_m, normals}`` in the object frame; ``visible_candidates``, for each view the ids (rows of
@@ -36,7 +37,7 @@ class CandidatesStage:
     settings: CandidatesConfig
 
     name: ClassVar[str] = "candidates"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz", "visual.glb", "views/", "cameras", "physical")
     writes: ClassVar[tuple[str, ...]] = ("marked/", "candidates", "visible_candidates")
     needs: ClassVar[Resource] = "cpu"
@@ -87,8 +88,8 @@ def choose_candidates(
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Return positions ``(count, 3)`` m, outward normals ``(count, 3)``, and for each camera the ids that it sees.
 
-    The first point is the one farthest from the middle of all that is seen; each next one the farthest from those
-    before (paper, eq. 1). Raises Rejected where fewer than ``count`` samples are seen.
+    They are far from each other (paper, eq. 1), denser where the surface bends, and a fifth at most on the underside
+    (``sample_candidates``). Raises Rejected where fewer than ``count`` samples are seen.
     """
     points, normals, _ = sample_surface(solid, samples, rng)
     tolerance_m = seen_tolerance_m(solid.extents)
@@ -101,6 +102,5 @@ def choose_candidates(
             " close the holes of the mesh",
             stage="gate",
         )
-    start = int(((points[shown] - points[shown].mean(0)) ** 2).sum(1).argmax())
-    chosen = shown[farthest_point_sampling(points[shown], count, start)]
+    chosen = shown[sample_candidates(points[shown], normals[shown], count)]
     return points[chosen], normals[chosen], [np.flatnonzero(row[chosen]) for row in seen]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import trimesh
 
 from manitwin.geometry.frames.feature import FeatureFrame, FramedMesh
 from manitwin.geometry.frames.find import find_frame
@@ -17,15 +16,12 @@ GEOMETRY = "geometry"
 """The source of a frame that was computed."""
 
 
-def with_frames(
-    points: Sequence[FunctionalPoint], solid: trimesh.Trimesh, center_of_mass_m: np.ndarray, seed: int
-) -> tuple[list[FunctionalPoint], list[str]]:
+def with_frames(points: Sequence[FunctionalPoint], surface: FramedMesh) -> tuple[list[FunctionalPoint], list[str]]:
     """Return the points with the frames of the features that they mean, and why those without one have none.
 
-    The point and its label choose the feature, geometry gives the frame. ``solid`` is the watertight mesh and
-    ``center_of_mass_m (3,)`` its centre of mass, both in the object frame. What a point brings already is kept.
+    The point and its label choose the feature, geometry gives the frame. ``surface`` is the watertight mesh in
+    the object frame. What a point brings already is kept.
     """
-    surface = FramedMesh(solid, center_of_mass_m, seed)
     framed, missing = [], []
     for point in points:
         if point.frame is None:

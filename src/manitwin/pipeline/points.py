@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,10 +12,14 @@ import numpy as np
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
+from manitwin.geometry.distance import closest_points_on_triangles
+from manitwin.geometry.frames.feature import FramedMesh
 from manitwin.models.annotators.point_rules import spare_grasp_points
-from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints
+from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints, Subject
 from manitwin.pipeline.frames import with_frames
 from manitwin.pipeline.object_state import findings_of, pictures, read_subject
+from manitwin.pipeline.refinement import refined_points
+from manitwin.render.raycast import merged, seen_tolerance_m
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint
 
@@ -25,16 +30,19 @@ FUNCTIONAL, GRASP = (2, 4), (2, 3)
 class PointsStage:
     """Ask the annotator for points, see that each is one of the candidates, and give the functional ones their frames.
 
-    ``frames_missing`` says of each functional point without a frame why it has none.
+    ``frames_missing`` says of each functional point without a frame why it has none, ``refined_candidates`` where the views
+    have marked those that have moved to their features since.
     """
 
     name: ClassVar[str] = "points"
-    version: ClassVar[str] = "7"
+    version: ClassVar[str] = "8"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "size", "language", "candidates", "visible_candidates",
         "cameras", "geometry?", "naming?",
     )  # fmt: skip
-    writes: ClassVar[tuple[str, ...]] = ("points", "spare_grasp_points", "points_findings", "frames_missing")
+    writes: ClassVar[tuple[str, ...]] = (
+        "points", "spare_grasp_points", "points_findings", "frames_missing", "refined_candidates",
+    )  # fmt: skip
 
     settings = NO_SETTINGS
 
@@ -68,17 +76,21 @@ class PointsStage:
         )
         selected = self._annotator.select_points(request)
         check_selection(selected, request.positions_m)
-        functional, missing = with_frames(
-            selected.functional, request.subject.solid, request.center_of_mass_m, request.subject.seed
+        surface = FramedMesh(request.subject.solid, request.center_of_mass_m, draft.seed)
+        spares = _spares(selected, request)
+        framed, missing = with_frames(selected.functional, surface)
+        functional, refined = refined_points(
+            framed, surface, {point.candidate for point in (*selected.grasp, *spares)}, _on(request.subject)
         )
         return {
             "points": {
                 "functional": [point.model_dump() for point in functional],
                 "grasp": [point.model_dump() for point in selected.grasp],
             },
-            "spare_grasp_points": [point.model_dump() for point in _spares(selected, request)],
+            "spare_grasp_points": [point.model_dump() for point in spares],
             "points_findings": findings_of(selected),
             "frames_missing": missing,
+            "refined_candidates": [row.model_dump() for row in refined],
         }
 
 
@@ -87,6 +99,17 @@ def _spares(selected: SelectedPoints, request: PointsRequest) -> list[GraspPoint
     taken = [point.candidate for point in (*selected.grasp, *selected.spare)]
     missing = max(0, GRASP[1] - len(selected.spare))
     return [*selected.spare, *(spare_grasp_points(request, taken)[:missing] if missing else ())]
+
+
+def _on(subject: Subject) -> Callable[[np.ndarray], bool]:
+    """Return what tells of a place ``(3,)`` whether it is on the surface that is seen, as candidates are."""
+    limit_m, corners = seen_tolerance_m(subject.solid.extents), merged(list(subject.parts)).triangles
+
+    def is_seen(place_m: np.ndarray) -> bool:
+        nearest, _ = closest_points_on_triangles(np.repeat(place_m[None], len(corners), 0), corners)
+        return bool(np.linalg.norm(nearest - place_m, axis=1).min() <= limit_m)
+
+    return is_seen
 
 
 def check_selection(selected: SelectedPoints, positions_m: np.ndarray) -> None:

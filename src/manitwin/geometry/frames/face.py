@@ -12,6 +12,7 @@ _ANGLE_RAD = np.radians(20.0)  # of the patch's normal: a scanned mallet's face,
 _SLAB_SHARE, _LEAST_SLAB_M = 0.012, 0.0008  # of the longest side: half of a patch's thickness
 _SEARCH_SHARE = 0.12  # of the longest side: a candidate for a face may lie on the side next to it, at its border
 _WIDE_SHARE = 0.35  # of the longest side, where the word says which side the face is on
+_RECESS = 0.12  # of the extent in the direction of the word: what lies deeper is an inside, no base or top
 _ROUGH_SHARE = 0.12  # RMS distance from the plane by the patch's radius: a ball's cap is rounder
 _LEAST_RADIUS_SHARE = 0.012  # of the longest side: a smaller flat is a facet of something round
 _OBLONG = 1.15  # longer by shorter side from which a face's roll is not free
@@ -36,6 +37,8 @@ def face_frame(
     """
     share = _SEARCH_SHARE if towards is None else _WIDE_SHARE
     found = [p for p in _patches(surface, point_m, normal, towards, share) if _is_face(surface, p)]
+    if towards is not None:
+        found = [patch for patch in found if _recess_share(surface, patch, towards) < _RECESS]
     if end_on:
         found = [patch for patch in found if _depth(surface, patch) > _END_ON]
     if not found:
@@ -137,6 +140,12 @@ def _rough(patch: Patch) -> float:
 def _is_button(surface: FramedMesh, patch: Patch) -> bool:
     small = _LEAST_RADIUS_SHARE / 3 * surface.size_m < _radius(patch) < _BUTTON_SHARE * surface.size_m
     return small and _rough(patch) < _ROUGH_SHARE and _stands_out(surface, patch)
+
+
+def _recess_share(surface: FramedMesh, patch: Patch, towards: np.ndarray) -> float:
+    """Return how far a patch lies behind the outermost place in a direction, as a share of the extent in it."""
+    along = surface.mesh.vertices @ towards
+    return float((along.max() - patch.center_m @ towards) / max(np.ptp(along), 1e-9))
 
 
 def _depth(surface: FramedMesh, patch: Patch) -> float:

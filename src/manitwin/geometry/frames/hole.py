@@ -15,6 +15,7 @@ _SLOT = 0.9  # of the largest circle's radius: as much room as the middle of a s
 _LEAST_RADIUS_M = 0.0008
 _SEARCH_SHARE, _SEEDS = 0.2, 60  # of the longest side around the point, and how many samples there are asked
 _LEVEL = 0.01  # by which a place must be narrower for each metre along the axis: a bore is equally narrow everywhere
+_ON_WALL = 0.3  # of the radius: a point that near to a hole's wall means that hole
 _FAN_RAD = np.radians(12)
 _FAR = 0.6  # of the longest side: walls beyond are not a hole's
 
@@ -36,6 +37,8 @@ def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> 
         score = abs(beside - radius) / radius
         if beside < 4.0 * radius + 0.02 * surface.size_m and (best is None or score < best[0]):
             best = (score, center, axis, radius)
+            if score < _ON_WALL:
+                break
     if best is None:
         return Unclear("no wall around the point closes to a hole")
     return _framed(surface, *best[1:])

@@ -35,6 +35,11 @@ _ALSO: tuple[tuple[str, tuple[Kind, ...]], ...] = (
 """What a word may mean of some things besides: not looked for by it, but no contradiction."""
 _UNSAID: tuple[Kind, ...] = ("surface",)
 _DOWN = re.compile(r"base\b|bottom|underside|\bfoot\b|sole", re.IGNORECASE)
+_WHOLE = re.compile(
+    r"bristles|jaws?\b|wires|\bend\b|base\b|bottom|underside|\bfoot\b|sole|front|back\b|\btop\b|upper|surface|flap|\blid\b|\bcap\b",
+    re.IGNORECASE,
+)
+_INSIDE = re.compile(r"inside|interior|cavity|hollow|basin|bowl|scoop|cooking", re.IGNORECASE)
 _END_ON = re.compile(r"striking|strike|hit|pound", re.IGNORECASE)
 _UPWARD = re.compile(r"\btop\b|upper", re.IGNORECASE)
 
@@ -65,3 +70,10 @@ def fits(label: str, kind: Kind) -> bool:
     kinds = kinds_for(label)
     also = {each for pattern, others in _ALSO if re.search(pattern, label.lower()) for each in others}
     return kinds is _UNSAID or kind in kinds or kind in also
+
+
+def means_place(label: str, kind: Kind) -> bool:
+    """Tell whether a label means the feature that its frame is of, and not something larger that the feature belongs to."""
+    if kind in ("surface", "axis") or _INSIDE.search(label):
+        return False
+    return kinds_for(label)[0] == kind and _WHOLE.search(label) is None
