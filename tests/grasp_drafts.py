@@ -36,6 +36,7 @@ def box_draft(folder: Path, extents_m: list[float], points: list[list[float]], m
     box.apply_translation([0, 0, extents_m[2] / 2])
     np.savez(folder / "solid.npz", vertices=box.vertices, faces=box.faces)
     np.savez(folder / "hulls.npz", hull_00=box.vertices)
+    np.savez(folder / "parts.npz", solid=np.full(len(box.faces), 255, np.uint8))
     x, y, z = np.square(extents_m)
     physical = {
         "mass_kg": estimate(mass_kg, 0.7 * mass_kg, 1.4 * mass_kg),
@@ -58,8 +59,10 @@ def box_draft(folder: Path, extents_m: list[float], points: list[list[float]], m
         "upright": True,
         "settled": True,
     }
-    draft.fields.update(physical=physical, points={"functional": functional, "grasp": grasp}, placements=[standing])
-    draft.paths.update({name: folder / name for name in ("solid.npz", "hulls.npz")})
+    draft.fields.update(
+        physical=physical, points={"functional": functional, "grasp": grasp}, placements=[standing], parts=[]
+    )
+    draft.paths.update({name: folder / name for name in ("solid.npz", "hulls.npz", "parts.npz")})
     return draft
 
 
@@ -75,7 +78,7 @@ def proposed_draft(
 ) -> Draft:
     """A box draft with made-up proposals and verdicts: the last ``unfiltered`` ones are the unfiltered sample.
 
-    Proposal i is at x = i mm, belongs to grasp point g(i mod 2), and functional point f0.
+    Proposal i is at x = i mm and touches the box, as far as it does, beside grasp point g(i mod 2).
     """
     draft = draft or box_draft(folder, [0.04, 0.04, 0.25], [[0, 0, 0.25], [0.02, 0, 0.1], [0.02, 0, 0.2]])
     count = len(outcomes)
@@ -86,11 +89,8 @@ def proposed_draft(
             -1, 4, 4
         ),
         width_m=np.full(count, 0.04),
-        depth_m=np.full(count, PANDA.tip_depth_m),
+        depth_m=PANDA.tip_depth_m + 0.1 * (np.arange(count) % 2),
         score=np.linspace(1, 0.5, count),
-        functional_point_id=np.array(["f0"] * count, str),
-        grasp_point_id=np.array([f"g{i % 2}" for i in range(count)], str),
-        distance_to_point_m=np.full(count, 0.01),
         proposer=np.array(names, str),
     )
     np.savez(
@@ -104,6 +104,7 @@ def proposed_draft(
     draft.fields[f"proposals{suffix}"] = {
         "proposed": 100,
         "proposed_by_filter": {"raw": 200, "after_pad": 150, "after_collision": 100},
+        "point_radius_m": 0.03,
         "association_radius_m": 0.03,
         "association_radius_widened": False,
         "share_beyond_3cm": 0.0,

@@ -14,11 +14,13 @@ from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import Rejected
 from manitwin.formats.installation import installed_version
+from manitwin.formats.npy_file import labels_to_npy
 from manitwin.formats.packed_source import pack_photos, pack_source
 from manitwin.geometry.hulls.reduction import hull_to_obj
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import object_name
+from manitwin.pipeline.parts import PARTS_FILE
 from manitwin.pipeline.quality import (
     UNKNOWN,
     filled_checks,
@@ -28,6 +30,7 @@ from manitwin.pipeline.quality import (
     size_checks,
     unsaid_size_words,
 )
+from manitwin.twin.part_records import FACE_PARTS
 from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
 from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
 from manitwin.twin.wholeness import note_sizes
@@ -146,6 +149,9 @@ def _rejection(rejected: Rejected, stage: str | None, draft: Draft[Item]) -> Rej
 def _write_accepted(draft: Draft[Item], folder: Path) -> None:
     for name in ("visual.glb", "grasps.parquet", "card.png"):
         shutil.copyfile(draft.path(name), folder / name)
+    if draft.field("parts"):
+        with np.load(draft.path(PARTS_FILE)) as arrays:
+            (folder / FACE_PARTS).write_bytes(labels_to_npy(arrays["visual"]))
     (folder / "views").mkdir()
     for artifact in ("views/", "marked/"):
         for picture in sorted(draft.path(artifact).iterdir()):
@@ -170,6 +176,7 @@ def _accepted_sections(draft: Draft[Item]) -> dict[str, Any]:
         "physical": draft.field("physical"),
         "language": draft.field("language"),
         "points": {"candidates": _candidates(draft), **points, **draft.field(GRASP_POINTS)},
+        "parts": draft.field("parts"),
         "grasps": draft.field("grasps"),
         "placements": draft.field("placements"),
         "quality": draft.field("quality"),

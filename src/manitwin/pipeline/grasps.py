@@ -22,7 +22,6 @@ from manitwin.pipeline.object_state import JOINTS, load_hulls, load_solid, read_
 from manitwin.pipeline.proposals import (
     Kept,
     associate,
-    distances_to_grasps,
     on_support,
     propose_in_rounds,
     with_given,
@@ -49,7 +48,7 @@ class GraspsStage:
     rejects the object; another one is left with no proposals and the reason.
     """
 
-    version = "4"
+    version = "5"
     reads: tuple[str, ...] = ("solid.npz", "hulls.npz", "points", "physical", "placements", "geometry?")
 
     def __init__(self, settings: GraspConfig, grasper: Grasper, gripper: Gripper, suffix: str = ""):
@@ -79,8 +78,13 @@ class GraspsStage:
             answer = screen.why_none(kept.counts)
             if self.may_reject:
                 raise answer
-            self._write(folder / self.file, kept, np.empty(0, int), points, [], draft.seed)
-            return {self.proposed: {"none_because": {"reason": answer.reason, "detail": answer.detail}}}
+            self._write(folder / self.file, kept, np.empty(0, int), [], draft.seed)
+            return {
+                self.proposed: {
+                    "none_because": {"reason": answer.reason, "detail": answer.detail},
+                    "point_radius_m": settings.association_radius_m,
+                }
+            }
         nearest_m = kept.distance_m.min(1)
         association = associate(
             nearest_m[len(given) :],
@@ -92,7 +96,7 @@ class GraspsStage:
         at_points = _at_points(kept, near, len(request.grasp_points_m), settings)
         quotas = [*self._on_support(kept, near, request), *at_points]
         chosen = np.concatenate([np.arange(len(given)), _likely(kept, near, quotas, settings.simulated)])
-        self._write(folder / self.file, kept, chosen, points, given, draft.seed)
+        self._write(folder / self.file, kept, chosen, given, draft.seed)
         octants = approach_octants(kept.proposals.gripper_to_object)
         return {
             self.proposed: {
@@ -102,6 +106,7 @@ class GraspsStage:
                     "after_association": len(near) + len(given),
                     "after_diversity": len(chosen),
                 },
+                "point_radius_m": settings.association_radius_m,
                 "association_radius_m": association.radius_m,
                 "association_radius_widened": association.widened,
                 "share_beyond_3cm": float((nearest_m[chosen] > settings.association_radius_m).mean()),
@@ -126,11 +131,10 @@ class GraspsStage:
         path: Path,
         kept: Kept,
         chosen: np.ndarray,
-        points: dict[str, Any],
         given: list[str],
         seed: int,
     ) -> None:
-        """Write the chosen grasps, then the unfiltered sample, with the ids of their nearest points.
+        """Write the chosen grasps, then the unfiltered sample.
 
         ``given`` are the proposers of the first of the chosen.
         """
@@ -140,7 +144,7 @@ class GraspsStage:
         both = GraspProposals.joined([kept.proposals.take(chosen), others])
         name = self.grasper.name
         proposer = [*given, *[name] * (len(chosen) - len(given)), *[name + UNFILTERED] * len(others)]
-        np.savez(path, allow_pickle=False, **proposal_arrays(both, proposer, points))
+        np.savez(path, allow_pickle=False, **proposal_arrays(both, proposer))
 
 
 def grasp_request(draft: Draft, points: dict[str, Any], gripper: Gripper, settings: GraspConfig) -> GraspRequest:
@@ -167,18 +171,13 @@ def positions_of(points: list[dict[str, Any]]) -> np.ndarray:
     return np.array([point["position_m"] for point in points], float).reshape(-1, 3)
 
 
-def proposal_arrays(grasps: GraspProposals, proposer: list[str], points: dict[str, Any]) -> dict[str, np.ndarray]:
-    """Return the arrays of ``proposals.npz``: the grasps, who proposed them, and the ids of their nearest points."""
-    to_functional = distances_to_grasps(positions_of(points["functional"]), grasps)
-    to_grasp = distances_to_grasps(positions_of(points["grasp"]), grasps)
+def proposal_arrays(grasps: GraspProposals, proposer: list[str]) -> dict[str, np.ndarray]:
+    """Return the arrays of ``proposals.npz``: the grasps, and who proposed them."""
     return {
         "gripper_to_object": grasps.gripper_to_object,
         "width_m": grasps.width_m,
         "depth_m": grasps.depth_m,
         "score": grasps.score,
-        "functional_point_id": np.array([p["id"] for p in points["functional"]])[to_functional.argmin(1)],
-        "grasp_point_id": np.array([p["id"] for p in points["grasp"]])[to_grasp.argmin(1)],
-        "distance_to_point_m": np.minimum(to_functional.min(1), to_grasp.min(1)),
         "proposer": np.array(proposer, str),
         **_hand_joints(grasps),
     }

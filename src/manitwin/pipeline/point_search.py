@@ -12,7 +12,8 @@ from manitwin.config import GraspConfig
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest, Screen
 from manitwin.physics.grasp_selection import select_likely
 from manitwin.physics.trial import TrialResult
-from manitwin.pipeline.proposals import Kept, distances_to_grasps
+from manitwin.pipeline.grasp_regions import PartedSolid
+from manitwin.pipeline.proposals import Kept
 from manitwin.twin.point_records import GraspPoint
 
 FIRST_POINT_SEED = 100_000
@@ -47,10 +48,12 @@ class PointSearch:
         grasper: Grasper,
         screen: Screen,
         settings: GraspConfig,
+        held: PartedSolid,
         tried: Tried,
         attempt: Try,
     ):
-        """Take what a grasper is asked, the filter, the settings, the grasps of the first pass, and how to try more."""
+        """Take what a grasper is asked, the filter, the settings, the parts, what the first pass tried, and how to try more."""
+        self.held = held
         self.request, self.grasper, self.screen, self.settings = request, grasper, screen, settings
         self.tried, self.attempt = tried, attempt
         self.results: list[TrialResult] = []
@@ -58,7 +61,7 @@ class PointSearch:
         """How many proposals at a candidate passed each filter."""
 
     def outcomes_at(self, point: GraspPoint, others: list[GraspPoint]) -> Counter[str]:
-        """Count the outcomes of what was tried within reach of a point and has it as the nearest of all grasp points."""
+        """Count the outcomes of what was tried at a point: fingertips touch its part there, no other point more nearly."""
         mine = self._belongs(self.tried.grasps, point, others)
         return Counter(outcome for outcome, is_mine in zip(self.tried.outcome, mine, strict=True) if is_mine)
 
@@ -121,7 +124,7 @@ class PointSearch:
         return Kept.joined(parts, parts[0].raw)
 
     def _belongs(self, grasps: GraspProposals, point: GraspPoint, others: list[GraspPoint]) -> np.ndarray:
-        """Tell which grasps ``(N,)`` are within reach of a point and nearer to it than to the other points."""
+        """Tell which grasps ``(N,)`` serve a point, by what their fingertips touch, and none of the other points more nearly."""
         places = np.array([p.position_m for p in (point, *(p for p in others if p.id != point.id))])
-        distance_m = distances_to_grasps(places, grasps)
-        return (distance_m[:, 0] <= self.settings.association_radius_m) & (distance_m.argmin(1) == 0)
+        contacts = self.held.contacts(grasps.gripper_to_object, grasps.depth_m, grasps.width_m)
+        return self.held.served(contacts, places) == 0

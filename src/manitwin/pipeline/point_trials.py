@@ -16,6 +16,7 @@ from manitwin.config import GraspConfig, Resource, VerifyConfig
 from manitwin.engine.stage import Draft
 from manitwin.models.graspers.protocol import Grasper, GraspProposals
 from manitwin.physics.trial import GraspTrial, TrialResult
+from manitwin.pipeline.grasp_regions import READS, PartedSolid
 from manitwin.pipeline.grasps import GRASP_POINTS, PROPOSALS, UNFILTERED, grasp_request, proposal_arrays
 from manitwin.pipeline.gripper_kinds import KINDS
 from manitwin.pipeline.object_state import JOINTS, load_body
@@ -36,9 +37,9 @@ class PointTrialsStage:
     """
 
     name: ClassVar[str] = "point_trials"
-    version: ClassVar[str] = "1"
+    version: ClassVar[str] = "2"
     reads: ClassVar[tuple[str, ...]] = (
-        "solid.npz", "hulls.npz", "points", "spare_grasp_points", "physical", "placements",
+        *READS, "hulls.npz", "points", "spare_grasp_points", "physical", "placements",
         PROPOSALS.format(""), VERDICTS.format(""),
     )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = (POINT_PROPOSALS, POINT_VERDICTS, GRASP_POINTS)
@@ -69,13 +70,14 @@ class PointTrialsStage:
 
         tried = Tried(grasps.take(chosen), verdicts["outcome"][chosen].tolist())
         screen = KINDS[self.gripper.kind].screen(request)
-        search = PointSearch(request, self.grasper, screen, self.settings, tried, attempt)
+        held = PartedSolid.read(draft, self.gripper, self.settings.association_radius_m)
+        search = PointSearch(request, self.grasper, screen, self.settings, held, tried, attempt)
         answered = answer(
             search,
             [GraspPoint(**point) for point in points["grasp"]],
             [GraspPoint(**point) for point in draft.field("spare_grasp_points")],
         )
-        self._write(folder, first, verdicts, search, points | answered)
+        self._write(folder, first, verdicts, search)
         return {GRASP_POINTS: answered}
 
     def _write(
@@ -84,12 +86,11 @@ class PointTrialsStage:
         first: dict[str, np.ndarray],
         verdicts: dict[str, np.ndarray],
         search: PointSearch,
-        points: dict[str, Any],
     ) -> None:
         before, results = grasps_of(first), search.results
         more = search.tried.grasps.take(np.arange(len(search.tried.grasps) - len(results), len(search.tried.grasps)))
         proposer = [*first["proposer"].tolist(), *[self.grasper.name] * len(more)]
-        arrays = proposal_arrays(GraspProposals.joined([before, more]), proposer, points)
+        arrays = proposal_arrays(GraspProposals.joined([before, more]), proposer)
         np.savez(folder / POINT_PROPOSALS, allow_pickle=False, **arrays)
         joined = {name: np.concatenate([verdicts[name], new]) for name, new in result_arrays(results).items()}
         np.savez(folder / POINT_VERDICTS, allow_pickle=False, **joined)

@@ -32,6 +32,7 @@ from manitwin.pipeline.input_kind import KINDS_OF_INPUT, Kind, claimed_kind, kin
 from manitwin.pipeline.item import Item, require_readable_size, twin_id
 from manitwin.pipeline.mesh import MeshStage
 from manitwin.pipeline.naming import NameStage
+from manitwin.pipeline.parts import PartsStage
 from manitwin.pipeline.photo import PhotosStage, PhotoStage
 from manitwin.pipeline.physical import PhysicalStage
 from manitwin.pipeline.placement import PlacementStage
@@ -104,6 +105,7 @@ def stages_for(kind: Kind, config: BuildConfig) -> list[Stage]:
         CaptionStage(annotator),
         CandidatesStage(config.candidates),
         PointsStage(annotator, first),
+        PartsStage(),
         *(stage for gripper, suffix in grippers for stage in _trials(gripper, suffix, config)),
         RecordGraspsStage(config.second_opinion, grippers),
         FinishStage(first),

@@ -12,6 +12,7 @@ from manitwin.config import Resource, SecondOpinionConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.geometry.grasp_diversity import approach_octants
+from manitwin.pipeline.grasp_regions import NOBODY, READS, PartedSolid, region_columns
 from manitwin.pipeline.grasps import GRASP_POINTS, PROPOSED, UNFILTERED
 from manitwin.pipeline.robustness import ROBUSTNESS, ROBUSTNESS_FILE, rank_values
 from manitwin.pipeline.second_opinion import AGREEMENT, FAILS, NOT_TRIED, SECOND_OPINION
@@ -19,16 +20,18 @@ from manitwin.pipeline.tried import read_arrays, read_tried, tried_names
 from manitwin.pipeline.verify import TRIAL
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.grasp_summary import FailureTable, GraspSummary, OtherGripper
-from manitwin.twin.grasp_table import JITTERED, GripperRows, write_grasp_table
+from manitwin.twin.grasp_table import JITTERED, PART, POINTED, GripperRows, write_grasp_table
 
 TABLE = "grasps.parquet"
+NO_PART, NO_POINT = "no part", "no point"
+"""What counts of outcomes call the grasps that hold no part that is told, and those at no grasp point."""
 
 
 class RecordGraspsStage:
     """Write ``grasps.parquet`` and the field ``grasps`` for the twin's first gripper and all others."""
 
     name = "record_grasps"
-    version = "2"
+    version = "3"
     writes: tuple[str, ...] = (TABLE, "grasps")
     needs: Resource = "cpu"
     backend = "builtin"
@@ -42,6 +45,7 @@ class RecordGraspsStage:
         optional = [SECOND_OPINION, AGREEMENT, ROBUSTNESS_FILE, ROBUSTNESS]
         self.reads: tuple[str, ...] = (
             "points",
+            *READS,
             f"{GRASP_POINTS}?",
             *(name for _, suffix in grippers for name in tried_names(suffix)),
             *(name.format(suffix) for _, suffix in grippers for name in kinds),
@@ -52,18 +56,19 @@ class RecordGraspsStage:
         """Write the table and return the summary; raises Rejected where engines must agree and do so on no grasp."""
         points = draft.fields.get(GRASP_POINTS) or draft.field("points")
         types = {point["id"]: point["type"] for point in points["grasp"]}
-        labels = {point["id"]: point["label"] for point in draft.field("points")["functional"]}
+        types[NOBODY] = NO_POINT
+        names = {NOBODY: NO_PART} | {part["id"]: part["name"] for part in draft.field("parts")}
         parts: list[dict[str, list[Any]]] = []
         summaries: list[GraspSummary | None] = []
         held_points: list[set[str]] = []
         for gripper, suffix in self.grippers:
             rows, controls = self._rows(draft, gripper, suffix)
             parts += [rows.columns(_best_first(rows)), *controls]
-            summaries.append(_summary(draft, gripper, suffix, rows, types, labels))
+            summaries.append(_summary(draft, gripper, suffix, rows, types, names))
             chosen = (rows.outcome == "held") & ~_unfiltered(rows)
             if self.settings.require_agreement and not suffix and not chosen.any():
                 raise _none_agreed(draft, rows)
-            held_points.append(set(rows.proposals["grasp_point_id"][chosen].tolist()))
+            held_points.append(set(rows.proposals["grasp_point_id"][chosen].tolist()) - {NOBODY})
         write_grasp_table(folder / TABLE, parts)
         others = {
             gripper.name: _other(draft, suffix, summary, held_points[0], points)
@@ -79,6 +84,9 @@ class RecordGraspsStage:
     def _rows(self, draft: Draft, gripper: Gripper, suffix: str) -> tuple[GripperRows, list[dict[str, list[Any]]]]:
         """Return the rows of the proposals, and the columns of the jittered controls where there are any."""
         proposals, verdicts = read_tried(draft, suffix)
+        held = PartedSolid.read(draft, gripper, draft.field(PROPOSED.format(suffix))["point_radius_m"])
+        points = draft.field("points") | (draft.fields.get(GRASP_POINTS) or {})
+        proposals |= region_columns(proposals, held, points["functional"], points["grasp"])
         count = len(proposals["score"])
         ids = [f"{gripper.name}-{number:04d}" for number in range(count)]
         holds: list[bool | None] = [None] * count
@@ -138,6 +146,8 @@ def _controls(
     moved = {name: values[of] for name, values in proposals.items()}
     moved["gripper_to_object"] = second["jittered_gripper_to_object"]
     moved["proposer"] = np.char.add(moved["proposer"], JITTERED)
+    for name in POINTED:  # where it was moved to holds something else
+        moved[name] = np.full(len(of), NOBODY)
     rows = GripperRows(
         gripper.name,
         moved,
@@ -153,7 +163,7 @@ def _controls(
 
 
 def _summary(
-    draft: Draft, gripper: Gripper, suffix: str, rows: GripperRows, types: dict[str, str], labels: dict[str, str]
+    draft: Draft, gripper: Gripper, suffix: str, rows: GripperRows, types: dict[str, str], names: dict[str, str]
 ) -> GraspSummary | None:
     proposed = draft.field(PROPOSED.format(suffix))
     if "none_because" in proposed:
@@ -180,7 +190,7 @@ def _summary(
         trial=draft.field(TRIAL.format(suffix)),
         failure_table=FailureTable(
             by_grasp_type=_outcomes_by(rows, "grasp_point_id", types, ~unfiltered),
-            by_region=_outcomes_by(rows, "functional_point_id", labels, ~unfiltered),
+            by_region=_outcomes_by(rows, PART, names, ~unfiltered),
         ),
         second_opinion=draft.fields.get(AGREEMENT.format(suffix)),
         robustness=draft.fields.get(ROBUSTNESS.format(suffix)),
@@ -188,7 +198,7 @@ def _summary(
 
 
 def _outcomes_by(rows: GripperRows, column: str, names: dict[str, str], which: np.ndarray) -> dict[str, dict[str, int]]:
-    """Count outcomes of the rows ``which`` by the name of their nearest point."""
+    """Count outcomes of the rows ``which`` by the name of what they hold."""
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for point, outcome in zip(rows.proposals[column][which].tolist(), rows.outcome[which].tolist(), strict=True):
         counts[names[point]][outcome] += 1

@@ -16,7 +16,7 @@ STAGE_ORDER = (
         "caption",
         "candidates",
     ),
-    *("points", "grasps", "verify", "point_trials", "second_opinion", "robustness", "record_grasps", "finish"),
+    *("points", "parts", "grasps", "verify", "point_trials", "second_opinion", "robustness", "record_grasps", "finish"),
 )
 """The order of ``recipe.stages_for``; twin.json keeps its stages by name."""
 

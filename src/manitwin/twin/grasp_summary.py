@@ -67,7 +67,7 @@ class RobustnessSummary(Record):
 
 
 class FailureTable(Record):
-    """Outcomes counted by what was grasped: by the type of the nearest grasp point and by the nearest functional point."""
+    """Outcomes by the type of the grasp point that is served (``no point``: none) and by the part that is held (``no part``)."""
 
     by_grasp_type: dict[str, dict[str, int]]
     by_region: dict[str, dict[str, int]]

@@ -46,10 +46,9 @@ SCHEMA = pa.schema(
     ]
 )
 _OF_VERSION_1 = [name for name in SCHEMA.names if name != PART]
-FROM_PROPOSALS = (
-    *("width_m", "depth_m", "score", "proposer"),
-    *("grasp_point_id", "functional_point_id", "distance_to_point_m"),
-)
+FROM_PROPOSALS = ("width_m", "depth_m", "score", "proposer", "distance_to_point_m")
+POINTED = ("grasp_point_id", "functional_point_id", PART)
+"""What a grasp holds, '' in arrays where it holds none: null in the table."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ class GripperRows:
             "position_m": poses[:, :3, 3].tolist(),
             "quaternion_wxyz": quaternion_wxyz(poses[:, :3, :3]).tolist(),
             **{name: self.proposals[name][order].tolist() for name in FROM_PROPOSALS},
-            PART: [None] * len(order),
+            **{name: [each or None for each in self.proposals[name][order].tolist()] for name in POINTED},
             "outcome": self.outcome[order].tolist(),
             "verified": (self.outcome[order] == "held").tolist(),
             "displacement_m": self.displacement_m[order].tolist(),

@@ -50,6 +50,13 @@ class GivenGrasps(Record):
     held: list[bool]
 
 
+class GivenParts(Record):
+    """The part of each face of the mesh that it is given with, in the order of its file: an index into ``names``."""
+
+    names: list[str]
+    of_face: list[int]
+
+
 class ImportRecord(Record):
     """An imported asset in the object frame: Z up, origin at the bottom centre of its visual meshes, metres.
 
@@ -78,6 +85,7 @@ class ImportRecord(Record):
     rests: list[Matrix4]
     missing: list[str]
     remarks: list[str]
+    parts: GivenParts | None = None
 
     @property
     def source(self) -> str:

@@ -89,7 +89,7 @@ class FunctionalPoint(Record):
 class GraspPoint(Record):
     """A point that is good to hold the object by; ``label`` is the part as whoever chose it says, None where nobody did.
 
-    ``verified`` counts the first gripper's grasps that held and have this point as their nearest, within the radius of
+    ``verified`` counts the first gripper's grasps that held and touch this point's part within the radius of
     association; None: not counted. ``shortfall`` says why they are fewer than were asked for; empty where they are not.
     """
 

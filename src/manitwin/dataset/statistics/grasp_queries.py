@@ -99,7 +99,7 @@ FROM failed ORDER BY filtered DESC, unfiltered_sample DESC, outcome""",
 
 BY_GRASP_TYPE = Query(
     "by_grasp_type",
-    "Grasps by the type of the nearest grasp point.",
+    "Grasps by the type of the grasp point that they serve.",
     """SELECT type, count(*) AS simulated, count(*) FILTER (verified) AS verified,
   count(*) FILTER (verified) / count(*) AS rate,
   (SELECT count(*) FROM points q WHERE q.role = 'grasp' AND q.type = p.type) AS points

@@ -18,6 +18,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from manitwin.errors import ManiTwinError, choose_from
 from manitwin.formats.toml_file import parse_toml
 from manitwin.geometry.parts.features import Feature
+from manitwin.geometry.parts.part_rules import PartRule
 from manitwin.geometry.parts.shape import HeadEnd
 from manitwin.twin.point_records import GraspType
 from manitwin.twin.record_values import Estimate, Finite, Record
@@ -87,7 +88,7 @@ class Material(Record):
 
 
 class Form(Record):
-    """The shape, rest and parts that a family of categories shares."""
+    """The shape, rest and parts that a family of categories shares; ``parts`` is the rule that tells them apart on a surface."""
 
     shape: str
     stands: bool | None = None
@@ -95,6 +96,7 @@ class Form(Record):
     mass_distribution: Distribution
     wall_thickness_m: float | None = None
     head_end: HeadEnd = "wide"
+    parts: PartRule | None = None
     functional: tuple[FunctionalPart, ...] = Field(min_length=2, max_length=4)
     grasp: tuple[GraspPart, ...] = Field(min_length=2, max_length=3)
 
@@ -166,6 +168,8 @@ def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, 
         "friction_static": contact.friction_static, "friction_dynamic": contact.friction_dynamic,
         "restitution": contact.restitution, **forms[form_name], **row,
     }  # fmt: skip
+    if "functional" in row and "parts" not in row:
+        merged["parts"] = None  # places of its own: the form's rule is of others
     for key in ("functional", "grasp"):
         merged[key] = _worded(merged[key], category)
     return Prior.model_validate({**merged, "category": category, "domain": domain, "surface": surface})

@@ -80,7 +80,7 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
 def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
     """Return a fitted template with the photo on it."""
     surface = texture_of([fitted], [rgba])
-    known = known_of_fitted(fitted, name or fitted.category)
+    known = known_of_fitted(fitted, name or fitted.category, surface)
     return Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)
 
 

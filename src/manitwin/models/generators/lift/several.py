@@ -132,7 +132,7 @@ def _from_fit(found: SeveralFitted, views: Sequence[PhotoView], name: str | None
         for fit_, turn, told, taken in zip(found.fits, found.turns_deg, found.told, shown, strict=True)
     ]
     notes = notes_of(worst) | {"source": f"template fitted to {len(views)} photos", "views": photos}
-    known = known_of_fitted(found.fits[0], name or worst.category)
+    known = known_of_fitted(found.fits[0], name or worst.category, surface)
     return MadeOfViews(visual_part(surface), notes, surface.unseen_share, known)
 
 

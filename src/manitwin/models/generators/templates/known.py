@@ -8,7 +8,7 @@ from manifold3d import Manifold
 
 from manitwin.geometry.mass_properties import solid_mass_properties
 from manitwin.models.generators.templates.known_frames import known_frame
-from manitwin.models.generators.templates.made import Made
+from manitwin.models.generators.templates.made import Made, face_parts
 from manitwin.models.generators.templates.template import IN_THE_OPEN, KnownPoint
 from manitwin.twin.import_record import GivenPoint, ImportRecord
 
@@ -58,6 +58,7 @@ def known_of(made: Made, text: str) -> ImportRecord:
         rests=[],
         missing=["friction", "restitution", "grasps"],
         remarks=[],
+        parts=face_parts(made),
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,11 +14,13 @@ from trimesh.visual.material import PBRMaterial
 from manitwin.errors import UsageError
 from manitwin.formats.meshes.textures import srgb_to_linear
 from manitwin.formats.meshes.triangles import with_creased_normals
+from manitwin.geometry.seams import has_three_places
 from manitwin.geometry.solids.parts import PartedMesh
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.templates.looks import Look, look_of
 from manitwin.models.generators.templates.template import KnownPoint, Model, Template
 from manitwin.models.generators.templates.text import Wanted, Wish
+from manitwin.twin.import_record import GivenParts
 
 LEAST_WALL_M = 0.0008
 SIZE_MARGIN = 2.0
@@ -87,14 +89,9 @@ def dressed(
 
 def visual_parts(made: Made) -> list[trimesh.Trimesh]:
     """Return a mesh a look with its PBR material, in the object frame; parts of one look are one mesh."""
-    by_look: dict[Look, list[str]] = {}
-    for part in made.mesh.names:
-        by_look.setdefault(made.looks[part], []).append(part)
     parts = []
-    for look, names in by_look.items():
-        faces = made.mesh.faces[np.isin(made.mesh.part, [made.mesh.names.index(name) for name in names])]
-        if not len(faces):
-            continue
+    for look, names, index in _by_look(made):
+        faces = made.mesh.faces[index]
         used, compact = np.unique(faces, return_inverse=True)
         linear = srgb_to_linear(np.array(look.rgb))
         material = PBRMaterial(
@@ -112,6 +109,30 @@ def visual_parts(made: Made) -> list[trimesh.Trimesh]:
         )
         parts.append(with_creased_normals(mesh))
     return parts
+
+
+def face_parts(made: Made) -> GivenParts:
+    """Return the part of each face of ``visual_parts``, in the order in which their file is read again."""
+    order = np.concatenate([index for _, _, index in _by_look(made)])
+    return given_parts(made.mesh.names, made.mesh.part[order], made.mesh.vertices, made.mesh.faces[order])
+
+
+def given_parts(names: Sequence[str], part: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> GivenParts:
+    """Return the parts ``(F,)`` of faces ``(F, 3)`` without those that a file in single precision makes lines of."""
+    kept = has_three_places(np.asarray(vertices, np.float32), faces)
+    return GivenParts(names=list(names), of_face=part[kept].tolist())
+
+
+def _by_look(made: Made) -> list[tuple[Look, list[str], np.ndarray]]:
+    """Return each look with the parts that wear it and the numbers of their faces."""
+    by_look: dict[Look, list[str]] = {}
+    for part in made.mesh.names:
+        by_look.setdefault(made.looks[part], []).append(part)
+    numbered = [
+        (look, names, np.flatnonzero(np.isin(made.mesh.part, [made.mesh.names.index(name) for name in names])))
+        for look, names in by_look.items()
+    ]
+    return [each for each in numbered if len(each[2])]
 
 
 def _looks(template: Template, wanted: Wanted, rng: np.random.Generator) -> dict[str, Look]:

@@ -14,6 +14,7 @@ from manitwin.models.generators.photo_material import photo_material
 from manitwin.models.generators.templates.fitting.fit import Fitted
 from manitwin.models.generators.templates.fitting.texturing import Shot, Textured, textured
 from manitwin.models.generators.templates.known import known_of
+from manitwin.models.generators.templates.made import given_parts
 from manitwin.twin.import_record import FITTED, ImportRecord
 
 
@@ -34,8 +35,8 @@ def visual_part(surface: Textured) -> trimesh.Trimesh:
     return with_creased_normals(mesh)
 
 
-def known_of_fitted(fitted: Fitted, name: str) -> ImportRecord:
-    """Return what is known of a fitted thing: its category and functional points.
+def known_of_fitted(fitted: Fitted, name: str, surface: Textured) -> ImportRecord:
+    """Return what is known of a fitted thing with its texture: its category, parts and functional points.
 
     Its mass is not: a photo tells neither size nor matter.
     """
@@ -47,6 +48,7 @@ def known_of_fitted(fitted: Fitted, name: str) -> ImportRecord:
             "center_of_mass_m": None,
             "inertia_kg_m2": None,
             "material": None,
+            "parts": given_parts(fitted.made.mesh.names, surface.part, surface.vertices, surface.faces),
             "missing": ["mass", "material", *known.missing],
         }
     )

@@ -47,13 +47,14 @@ class Shot:
 class Textured:
     """A refined solid ``vertices (V, 3)`` m, ``faces (F, 3)``, ``uv (F, 3, 2)`` (v upward) into ``texture (H, W, 3) uint8``.
 
-    ``seen (F,)`` is where a photo shows it."""
+    ``seen (F,)`` is where a photo shows it, ``part (F,)`` which part each face is of."""
 
     vertices: np.ndarray
     faces: np.ndarray
     uv: np.ndarray
     texture: np.ndarray
     seen: np.ndarray
+    part: np.ndarray
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return vertices ``(N, 3)``, faces ``(F, 3)`` and uv ``(N, 2)`` with a vertex for each place in the texture."""
@@ -93,7 +94,7 @@ def textured(mesh: PartedMesh, shots: Sequence[Shot], colours: Mapping[str, tupl
     tones = _unseen_colours(points + center / half, fine, seen, shown, colours)
     cells, cell_uv = _charts(points, fine, ~seen, tones)
     texture, uv = _laid_out(_side_by_side(pictures), places, cells, cell_uv)
-    return Textured(fine.vertices, fine.faces, uv, texture, seen)
+    return Textured(fine.vertices, fine.faces, uv, texture, seen, fine.part)
 
 
 def _side_by_side(pictures: Sequence[np.ndarray]) -> np.ndarray:

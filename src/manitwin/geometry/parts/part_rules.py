@@ -1,0 +1,264 @@
+"""Rules of membership: which of an object's surface is handle, head, cap, stem or grip, by its form.
+
+Each rule takes the measured shape and points of the surface ``(N, 3)`` and gives the index of each point's part in ``PARTS`` of
+its own, with how surely the border was found in [0, 1]; None where the form shows no such border: nothing is guessed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from manitwin.geometry.parts.protrusions import Protrusion
+from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape
+
+PartRule = Literal["handled", "spouted", "capped", "stemmed", "ended", "pistol"]
+
+
+@dataclass(frozen=True)
+class Membership:
+    """The part of each point ``(N,)``, an index into ``roles``, and how sure the border is.
+
+    Nearer to a border than ``band_share`` of the longest side hollows tell the parts, and not the rule.
+    """
+
+    roles: tuple[str, ...]
+    index: np.ndarray
+    confidence: float
+    band_share: float = 0.1
+
+
+def membership(rule: PartRule, shape: Shape, points_m: np.ndarray) -> Membership | None:
+    """Return the parts of surface points ``(N, 3)`` by a rule; None where the shape does not show them."""
+    return _RULES[rule](shape, points_m)
+
+
+_SURE_REACH = 3.0  # times the least reach of a handle: sticks out beyond doubt
+
+
+def _handles(shape: Shape) -> list[Protrusion]:
+    least_m = LEAST_HANDLE_REACH * float(shape.body.radius_m.max())
+    first = shape.side_handle
+    return (
+        [] if first is None else [first, *(p for p in shape.body.protrusions if p is not first and p.reach_m > least_m)]
+    )
+
+
+def _handled(shape: Shape, points_m: np.ndarray) -> Membership | None:
+    """Body and handle: all that sticks out far enough is handle."""
+    found = _handles(shape)
+    if not found:
+        return None
+    mine = np.logical_or.reduce([shape.body.belongs(points_m, each) for each in found])
+    return Membership(("body", "handle"), mine.astype(int), _reach_confidence(shape, found[0]))
+
+
+def _spouted(shape: Shape, points_m: np.ndarray) -> Membership | None:
+    """Body, handle and spout: of what sticks out, the one opposite the handle is the spout."""
+    found = _handles(shape)
+    if not found:
+        return None
+    index = shape.body.belongs(points_m, found[0]).astype(int)
+    opposite = [p for p in found[1:] if np.cos(p.azimuth_rad - found[0].azimuth_rad) < 0]
+    if opposite:
+        index[shape.body.belongs(points_m, opposite[0])] = 2
+    return Membership(("body", "handle", "spout"), index, _reach_confidence(shape, found[0]))
+
+
+def _reach_confidence(shape: Shape, handle: Protrusion) -> float:
+    least_m = LEAST_HANDLE_REACH * float(shape.body.radius_m.max())
+    return float(np.clip(0.5 + 0.4 * (handle.reach_m / least_m - 1) / (_SURE_REACH - 1), 0.5, 0.9))
+
+
+_LEVELS = 72
+_SECTORS = 12
+_STEP_LEVELS = 2  # a step is as sharp as that
+_LEAST_STEP = 0.045  # of the largest radius, beyond what the slopes on both sides would give
+_CAP_ABOVE, _CAP_BELOW = 0.35, 0.95  # of the height: where a cap may begin
+_STEP_BAND = 0.03  # of the longest side: a step is known more exactly than other borders
+_CAP_RADIUS = 0.3  # of the largest radius: what is thinner is a wick or a pole, no cap
+_PUT_ON = (
+    0.8  # of the largest radius: what widens over a neck to no more than that is a cap, and the neck below it is not
+)
+_NECK = 0.35  # of the largest radius: a neck is wider, the stem of a pump is not
+_NEXT_STEP, _SURE_STEP = (
+    0.5,
+    0.12,
+)  # of the sharpest step, or of the radius: the lowest such step is where the cap begins
+
+
+def _outline(shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+    """Return heights ``(K,)`` as shares and radii ``(K,)`` m of the outline about the body's axis, the mean over directions."""
+    low, high = shape.bounds_m[:, 2]
+    share = (shape.surface_m[:, 2] - low) / max(high - low, 1e-9)
+    radius = np.hypot(*(shape.surface_m[:, :2] - shape.body.axis_xy_m).T)
+    level = np.clip((share * _LEVELS).astype(int), 0, _LEVELS - 1)
+    sector = ((shape.body.azimuth(shape.surface_m) + np.pi) / (2 * np.pi) * _SECTORS).astype(int) % _SECTORS
+    outermost = np.full((_LEVELS, _SECTORS), np.nan)
+    np.fmax.at(outermost, (level, sector), radius)
+    seen = np.isfinite(outermost).sum(1) >= _SECTORS / 2
+    found = np.full(_LEVELS, np.nan)
+    found[seen] = np.nanmean(outermost[seen], axis=1)
+    heights = (np.arange(_LEVELS) + 0.5) / _LEVELS
+    known = np.isfinite(found)
+    return heights, np.interp(heights, heights[known], found[known])
+
+
+def _steps(radius: np.ndarray) -> np.ndarray:
+    """Return the step of the outline at each level (upwards, m), less what the slopes below and above would give."""
+    steps = np.zeros(len(radius))
+    d = _STEP_LEVELS
+    for k in range(2 * d, len(radius) - 2 * d):
+        rise = radius[k + d - 1] - radius[k - d]
+        below, above = radius[k - d] - radius[k - 2 * d], radius[k + 2 * d - 1] - radius[k + d - 1]
+        below, above = np.sign(rise) * below, np.sign(rise) * above
+        slope = max(
+            above, below if above > 0 else 0.0, 0.0
+        )  # a slope that goes on above is a shoulder: a cap's side is upright
+        steps[k] = np.sign(rise) * max(abs(rise) - slope * (2 * d - 1) / d, 0.0)
+    return steps
+
+
+def _capped(shape: Shape, points_m: np.ndarray) -> Membership | None:
+    """Body and cap: the outline steps where the cap begins, outward over a neck, or inward from a shoulder."""
+    heights, radius = _outline(shape)
+    steps = _steps(radius) / max(float(radius.max()), 1e-9)
+    steps[(heights < _CAP_ABOVE) | (heights > _CAP_BELOW)] = 0.0
+    weight = np.where(steps > 0, 1.5 * steps, -steps)  # what widens upward is put on
+    above = np.array([float(radius[k : k + 2 * _STEP_LEVELS].max()) for k in range(_LEVELS)])
+    weight[above < _CAP_RADIUS * radius.max()] = 0.0
+    enough = np.flatnonzero(weight >= np.clip(_NEXT_STEP * weight.max(), _LEAST_STEP, _SURE_STEP))
+    if not len(enough):
+        return None
+    neck = np.array([float(radius[max(k - 2 * _STEP_LEVELS, 0) : k].min()) for k in enough]) > _NECK * radius.max()
+    put_on = enough[(steps[enough] > 0) & (above[enough] < _PUT_ON * radius.max()) & neck]
+    first = int((put_on if len(put_on) else enough)[0])
+    best = first + int(weight[first : first + 2 * _STEP_LEVELS].argmax())
+    border = best / _LEVELS
+    low, high = shape.bounds_m[:, 2]
+    share = (points_m[:, 2] - low) / max(high - low, 1e-9)
+    confidence = float(np.clip(0.5 + 2.0 * (weight[best] - _LEAST_STEP), 0.5, 0.9))
+    return Membership(("body", "cap"), (share > border).astype(int), confidence, _STEP_BAND)
+
+
+_STEM_SHARE = 0.45  # of the radius of foot and bowl: a stem is at most as wide
+
+
+def _stemmed(shape: Shape, points_m: np.ndarray) -> Membership | None:
+    """Bowl, stem and foot: the stem is the narrow stretch between two wide ones."""
+    heights, radius = _outline(shape)
+    middle = (heights > 0.08) & (heights < 0.85)
+    narrow = int(np.where(middle, radius, np.inf).argmin())
+    foot, bowl = float(radius[:narrow].max(initial=0.0)), float(radius[narrow:].max())
+    if radius[narrow] > _STEM_SHARE * min(foot, bowl):
+        return None
+    lower = radius[: narrow + 1] > np.sqrt(radius[narrow] * foot)
+    upper = radius[narrow:] > np.sqrt(radius[narrow] * bowl)
+    first = (int(np.flatnonzero(lower).max()) + 1) / _LEVELS if lower.any() else 0.0
+    last = (narrow + int(np.flatnonzero(upper).min())) / _LEVELS
+    low, high = shape.bounds_m[:, 2]
+    share = (points_m[:, 2] - low) / max(high - low, 1e-9)
+    return Membership(("bowl", "stem", "foot"), np.where(share > last, 0, np.where(share < first, 2, 1)), 0.8)
+
+
+_SLICES = 48
+_LEAST_EXPLAINED = 0.35  # of the outline's variance by stretches of one width and thickness each
+_NECK_GAIN = 0.2  # what a third stretch must explain besides
+_NECK_NARROW = 0.8  # of the handle's width and thickness (geometric mean): a neck is at most that
+_LEAST_CONTRAST = 1.2  # of width and thickness on both sides of a border
+_LEAST_STRETCH = 3  # slices
+_ENDS = (0.05, 0.85)  # of the length: where a head may end
+
+
+def _ended(shape: Shape, points_m: np.ndarray) -> Membership | None:
+    """Head and handle, with a narrower neck between them where there is one: stretches of the long axis.
+
+    The borders are where width and thickness change most: one or two change points by least squares over the outline.
+    """
+    if not shape.has_ends:
+        return None
+    outline = _section_outline(shape)
+    along = shape.axis.along(points_m)
+    one, (split,) = _best_splits(outline, 1)
+    two, (neck, grip) = _best_splits(outline, 2)
+    middle, handle = outline[neck:grip].mean(), outline[grip:].mean()
+    if two - one >= _NECK_GAIN and two >= _LEAST_EXPLAINED and middle <= handle + np.log(_NECK_NARROW):
+        index = np.searchsorted(np.array([neck, grip]) / _SLICES, along, side="right")
+        return Membership(("head", "neck", "handle"), index, _explained_confidence(two))
+    apart = float(np.linalg.norm(outline[:split].mean(0) - outline[split:].mean(0)))
+    if one < _LEAST_EXPLAINED or apart < np.log(_LEAST_CONTRAST):
+        return None
+    return Membership(("head", "handle"), (along >= split / _SLICES).astype(int), _explained_confidence(one))
+
+
+def _explained_confidence(explained: float) -> float:
+    return float(np.clip(0.3 + 0.7 * explained, 0.5, 0.9))
+
+
+def _best_splits(outline: np.ndarray, count: int) -> tuple[float, tuple[int, ...]]:
+    """Return how much of the outline's variance stretches of one width each explain, and where the best ones begin.
+
+    The outline ``(K, 2)`` is cut at ``count`` places (one or two), each stretch being at least three slices long.
+    """
+    sums = np.vstack([np.zeros(outline.shape[1]), np.cumsum(outline, axis=0)])
+
+    def between(a: np.ndarray | int, b: np.ndarray | int) -> np.ndarray:
+        """Return what the mean of the stretch from ``a`` to ``b`` keeps of its sum of squares."""
+        return np.asarray(((sums[b] - sums[a]) ** 2).sum(-1) / np.maximum(np.asarray(b) - a, 1))
+
+    whole = float((outline**2).sum()) - float(between(0, _SLICES))
+    low, high = max(round(_ENDS[0] * _SLICES), 1), round(_ENDS[1] * _SLICES)
+    first = np.arange(low, high + 1)
+    if count == 1:
+        kept = between(0, first) + between(first, _SLICES)
+        best = int(kept.argmax())
+        return _share(kept[best] - between(0, _SLICES), whole), (int(first[best]),)
+    a, b = np.meshgrid(first, first, indexing="ij")
+    kept = np.where(b - a >= _LEAST_STRETCH, between(0, a) + between(a, b) + between(b, _SLICES), -np.inf)
+    i, j = np.unravel_index(int(kept.argmax()), kept.shape)
+    return _share(kept[i, j] - between(0, _SLICES), whole), (int(first[i]), int(first[j]))
+
+
+def _share(explained: float, whole: float) -> float:
+    return float(explained) / max(whole, 1e-12)
+
+
+def _section_outline(shape: Shape) -> np.ndarray:
+    """Return log width and log thickness of slices of the long axis, ``(48, 2)``."""
+    along = shape.axis.along(shape.surface_m)
+    across = (shape.surface_m - shape.axis.origin_m) @ shape.axis.across.T
+    level = np.clip((along * _SLICES).astype(int), 0, _SLICES - 1)
+    least_m = 1e-3 * shape.size_m
+    rows = [
+        np.log(np.maximum(np.ptp(np.quantile(across[level == k], (0.03, 0.97), axis=0), axis=0), least_m))
+        if (level == k).sum() > 3
+        else np.full(2, np.nan)
+        for k in range(_SLICES)
+    ]
+    outline = np.array(rows)
+    places = np.arange(_SLICES)
+    for column in outline.T:
+        known = np.isfinite(column)
+        column[~known] = np.interp(places[~known], places[known], column[known])
+    return outline
+
+
+def _pistol(shape: Shape, points_m: np.ndarray) -> Membership | None:
+    """Housing and grip: what lies below the barrel is grip."""
+    if shape.pistol is None:
+        return None
+    _, down = shape.pistol.places(points_m)
+    return Membership(("housing", "grip"), (down > 1.0).astype(int), 0.75)
+
+
+_RULES: dict[PartRule, Callable[[Shape, np.ndarray], Membership | None]] = {
+    "handled": _handled,
+    "spouted": _spouted,
+    "capped": _capped,
+    "stemmed": _stemmed,
+    "ended": _ended,
+    "pistol": _pistol,
+}

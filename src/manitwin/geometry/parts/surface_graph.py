@@ -1,0 +1,116 @@
+"""A surface as a graph of its faces, and regions that grow over it and stop at hollows.
+
+Large faces are cut up first, so that a border can run anywhere; each piece knows the face that it is of.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+import trimesh
+from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.sparse.csgraph import dijkstra
+
+from manitwin.geometry.parts.cut_up import cut_up
+
+EDGE_SHARE = 1 / 40  # of the longest side: longer edges are cut
+_SMOOTH_SHARE = 0.012  # of the longest side: creases and hollows are looked for at this scale, noise is not
+_MOST_ROUNDS = 60  # of averaging: a dense scan needs more of them
+_CONCAVE_SHARE = 0.35  # of the longest side for each radian of a hollow that is crossed
+_LEAST_TURN_RAD = 0.03  # less is noise that averaging left
+
+
+class SurfaceGraph:
+    """The faces of a closed mesh as a graph; ``size_m`` is its longest side."""
+
+    def __init__(self, mesh: trimesh.Trimesh):
+        self.size_m = float(mesh.extents.max())
+        places, corner = np.unique(np.asarray(mesh.vertices), axis=0, return_inverse=True)  # a seam is no border
+        vertices, faces, of_face = cut_up(places, corner.reshape(-1)[mesh.faces], EDGE_SHARE * self.size_m)
+        self._mesh = trimesh.Trimesh(vertices, faces, process=False)
+        self._of_face, self._face_count = of_face, len(mesh.faces)
+
+    @property
+    def centers_m(self) -> np.ndarray:
+        """The middles ``(P, 3)`` of the pieces."""
+        return np.asarray(self._mesh.triangles_center)
+
+    @property
+    def areas_m2(self) -> np.ndarray:
+        """The areas ``(P,)`` of the pieces."""
+        return np.asarray(self._mesh.area_faces)
+
+    def grown(self, labels: np.ndarray, band_share: float) -> np.ndarray:
+        """Return labels ``(P,)`` believed away from their borders; nearer than the band the regions grow to meet at hollows.
+
+        ``band_share`` is of the longest side. A region that is thinner than the band everywhere keeps its middle.
+        """
+        a, b = self._pairs.T
+        differ = labels[a] != labels[b]
+        border = np.unique(np.concatenate([a[differ], b[differ]]))
+        if not len(border):
+            return labels
+        away_m = dijkstra(self._plain, indices=border, min_only=True)
+        names = np.unique(labels)
+        reach = []
+        for name in names:
+            mine = labels == name
+            width = min(band_share * self.size_m, 0.5 * float(away_m[mine & np.isfinite(away_m)].max(initial=0.0)))
+            seeds = np.flatnonzero(mine & (away_m >= width))
+            reach.append(dijkstra(self._averse, indices=seeds, min_only=True))
+        distance = np.stack(reach)
+        found = names[distance.argmin(0)]
+        return np.where(np.isfinite(distance.min(0)), found, labels)
+
+    def of_faces(self, labels: np.ndarray) -> np.ndarray:
+        """Return the label of each face of the mesh ``(F,)``: that of most of its area."""
+        names, place = np.unique(labels, return_inverse=True)
+        share = np.zeros((self._face_count, len(names)))
+        np.add.at(share, (self._of_face, place), self.areas_m2 + 1e-15)
+        return np.asarray(names[share.argmax(1)])
+
+    @cached_property
+    def _pairs(self) -> np.ndarray:
+        return np.asarray(self._mesh.face_adjacency)
+
+    @cached_property
+    def _steps_m(self) -> np.ndarray:
+        a, b = self._pairs.T
+        return np.asarray(np.linalg.norm(self.centers_m[a] - self.centers_m[b], axis=1)) + 1e-9
+
+    @cached_property
+    def _plain(self) -> csr_matrix:
+        return self._graph(self._steps_m)
+
+    @cached_property
+    def _averse(self) -> csr_matrix:
+        """The graph in which crossing a hollow costs as much as a way across a good part of the object."""
+        a, b = self._pairs.T
+        normals = self._smooth_normals
+        turn = np.arccos(np.clip(np.einsum("ij,ij->i", normals[a], normals[b]), -1, 1))
+        toward = self.centers_m[b] - self.centers_m[a]
+        hollow = np.einsum("ij,ij->i", normals[b] - normals[a], toward) < 0
+        turn = np.where(hollow, np.maximum(turn - _LEAST_TURN_RAD, 0.0), 0.0)
+        return self._graph(self._steps_m + _CONCAVE_SHARE * self.size_m * turn)
+
+    @cached_property
+    def _smooth_normals(self) -> np.ndarray:
+        """Normals ``(P, 3)`` averaged over neighbours, by area, until noise of a scan is gone."""
+        typical_m = float(np.median(self._steps_m))
+        rounds = int(np.clip(round((_SMOOTH_SHARE * self.size_m / typical_m) ** 2), 1, _MOST_ROUNDS))
+        a, b = self._pairs.T
+        count = len(self.centers_m)
+        ones = np.ones(len(a))
+        near = coo_matrix((ones, (a, b)), shape=(count, count)).tocsr()
+        weighted = (near + near.T + diags(np.ones(count))) @ diags(self.areas_m2 + 1e-15)
+        normals = np.array(self._mesh.face_normals)
+        for _ in range(rounds):
+            normals = weighted @ normals
+            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+        return normals
+
+    def _graph(self, cost: np.ndarray) -> csr_matrix:
+        a, b = self._pairs.T
+        count = len(self.centers_m)
+        return coo_matrix((np.r_[cost, cost], (np.r_[a, b], np.r_[b, a])), shape=(count, count)).tocsr()

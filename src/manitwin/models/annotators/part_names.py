@@ -1,0 +1,48 @@
+"""What the parts of a surface are called: by whoever chose points on them, else by the prior of their thing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from manitwin.geometry.parts.features import Feature
+from manitwin.models.annotators.priors import Prior
+
+_FEATURES: dict[str, tuple[Feature, ...]] = {
+    "handle": ("handle",),
+    "head": ("head", "edge", "tip"),
+    "body": ("side", "center"),
+    "cap": ("top",),
+    "spout": ("spout",),
+    "stem": ("neck",),
+    "foot": ("base",),
+    "grip": ("grip",),
+    "housing": ("housing",),
+}
+"""By role, the features whose label in a prior is the name of the whole part, the best first."""
+_WORDS: dict[str, frozenset[str]] = {
+    "handle": frozenset(["handle", "handles", "grip", "grips", "shaft", "loops", "rings"]),
+    "head": frozenset(["head", "blade", "blades", "shaft", "bowl", "tines", "jaws", "bristles", "beater", "wires"]),
+    "body": frozenset(["body", "barrel", "wall", "side", "bottle"]),
+    "cap": frozenset(["cap", "lid", "nozzle", "pump", "sprayer", "stopper", "top"]),
+    "spout": frozenset({"spout"}),
+    "stem": frozenset({"stem"}),
+    "neck": frozenset(["neck", "shaft", "shank", "stem"]),
+    "foot": frozenset(["foot", "base"]),
+    "bowl": frozenset(["bowl", "cup"]),
+    "grip": frozenset(["grip", "handle"]),
+    "housing": frozenset(["housing", "body", "barrel"]),
+}
+"""By role, the words of which a label has one where it names the whole part and no place on it."""
+
+
+def part_name(role: str, prior: Prior, labels_there: Iterable[str]) -> str:
+    """Return what a part of a role is called; ``labels_there`` are those of the points that lie on it, in their order.
+
+    The prior's label stands where a point on the part has it, or no label there names the whole part.
+    """
+    by_feature = {part.feature: part.label for part in reversed(prior.functional)}
+    usual = next((by_feature[feature] for feature in _FEATURES.get(role, ()) if feature in by_feature), role)
+    said = [" ".join(label.lower().split()) for label in labels_there]
+    if usual in said:
+        return usual
+    return next((label for label in said if _WORDS[role] & set(label.split())), usual)

@@ -1,0 +1,156 @@
+"""What a grasp holds: the part that its fingertips touch, and the points whose places they touch.
+
+Source: paper, "Spatial Filtering and Semantic Association" (3 cm); that a grasp belongs to what it touches, and not to the
+nearest point, is this project's: a knob 11 cm from a handle would carry the handle's scenario.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from manitwin.engine.stage import Draft
+from manitwin.geometry.distance import closest_faces, closest_points_on_triangles
+from manitwin.geometry.grasp_diversity import fingertips
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.pipeline.object_state import load_solid
+from manitwin.pipeline.parts import PARTS_FILE
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.twin.part_records import NO_PART
+
+READS = ("solid.npz", PARTS_FILE, "parts")
+"""What a stage reads that asks what grasps hold."""
+PAD_HALF_M = 0.006
+"""Rays start from a grid of three by three over so much of each fingertip, and its middle: most pads are 16 to 22 mm wide."""
+REACH_M = 0.008
+"""How far from the place that ``width_m`` says a contact may be: real ones lie up to 6 mm off (95 % of them, measured)."""
+NOBODY = ""
+"""The id of no part and of no point: null in the table."""
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """Where the two fingertips of each of N grasps touch: ``positions_m (N, 2, 3)``, ``touches (N, 2)``, ``part (N, 2)``.
+
+    ``share (N, 2)`` is how much of the fingertip touches that part; 255 is no part.
+    """
+
+    positions_m: np.ndarray
+    touches: np.ndarray
+    part: np.ndarray
+    share: np.ndarray
+
+
+@dataclass(frozen=True)
+class PartedSolid:
+    """A closed solid whose faces are of parts ``labels (F,) uint8`` called ``part_ids``: none are told where these are empty.
+
+    ``by_rays``: fingertips close on a line; those of other hands are taken to touch what is nearest to them.
+    """
+
+    solid: trimesh.Trimesh
+    surface: RayCaster
+    labels: np.ndarray
+    part_ids: tuple[str, ...]
+    radius_m: float
+    by_rays: bool = True
+
+    @classmethod
+    def read(cls, draft: Draft, gripper: Gripper, radius_m: float) -> PartedSolid:
+        """Read what a gripper holds; a point is served within the radius of association."""
+        solid = load_solid(draft.path("solid.npz"))
+        with np.load(draft.path(PARTS_FILE)) as arrays:
+            labels = arrays["solid"]
+        ids = tuple(part["id"] for part in draft.field("parts"))
+        return cls(solid, RayCaster(solid), labels, ids, radius_m, isinstance(gripper, ParallelGripper))
+
+    def contacts(self, gripper_to_object: np.ndarray, depth_m: np.ndarray, width_m: np.ndarray) -> Contacts:
+        """Return where grasps ``(N, 4, 4)`` touch; with rays nothing that is farther than their reach from where it should be."""
+        middle = fingertips(gripper_to_object, depth_m)
+        half = (width_m / 2)[:, None] * gripper_to_object[:, :3, 0]
+        find = self._by_rays if self.by_rays else self._nearest
+        sides = [find(middle + sign * half, gripper_to_object, sign) for sign in (1.0, -1.0)]
+        return Contacts(*(np.stack(values, axis=1) for values in zip(*sides, strict=True)))
+
+    def regions(self, contacts: Contacts) -> np.ndarray:
+        """Return the id of the part ``(N,)`` that more of the fingertips touches, at a tie of the first one; '' for none."""
+        share = np.where(contacts.part == NO_PART, 0.0, contacts.share)
+        rows, most = np.arange(len(share)), share.argmax(1)
+        index = np.where(share[rows, most] > 0, contacts.part[rows, most], NO_PART)
+        names = np.array([*self.part_ids, *[NOBODY] * (NO_PART + 1 - len(self.part_ids))])
+        return np.asarray(names[index])
+
+    def served(self, contacts: Contacts, places_m: np.ndarray) -> np.ndarray:
+        """Return which of places ``(P, 3)`` each grasp serves ``(N,)``, -1: none.
+
+        A fingertip touches the place's own part within the radius; of several places the nearest counts. Where no parts are told
+        the radius alone decides.
+        """
+        if not len(places_m) or not len(contacts.part):
+            return np.full(len(contacts.part), -1)
+        away_m = np.linalg.norm(contacts.positions_m[:, :, None] - places_m, axis=3)
+        reached = contacts.touches[:, :, None] & (away_m <= self.radius_m)
+        if self.part_ids:
+            of_place = self.labels[closest_faces(places_m, self.solid)[0]]
+            reached &= (contacts.part[:, :, None] == of_place) & (of_place != NO_PART)
+        nearest_m = np.where(reached, away_m, np.inf).min(1)
+        return np.where(np.isfinite(nearest_m.min(1)), nearest_m.argmin(1), -1)
+
+    def _by_rays(
+        self, place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Send rays along the closing axis from around each contact's place into the object."""
+        closing, across, approach = (gripper_to_object[:, :3, k] for k in range(3))
+        steps = np.linspace(-PAD_HALF_M, PAD_HALF_M, 3)
+        offsets = np.stack([u * across + v * approach for u in steps for v in steps], axis=1)
+        inward = np.repeat(-sign * closing, offsets.shape[1], axis=0)
+        starts = (place_m[:, None] + sign * REACH_M * closing[:, None] + offsets).reshape(-1, 3)
+        distance, face = self.surface.first_hits(starts, inward)
+        met = face >= 0
+        face = np.maximum(face, 0)
+        met &= (distance <= 2 * REACH_M) & (np.einsum("ij,ij->i", self.surface.face_normals[face], inward) < 0)
+        hits = (starts + np.where(met, distance, 0.0)[:, None] * inward).reshape(*offsets.shape)
+        met, part = met.reshape(offsets.shape[:2]), self.labels[face].reshape(offsets.shape[:2])
+        names = np.unique(self.labels)
+        on = met[:, :, None] & (part[:, :, None] == names)
+        best = on.sum(1).argmax(1)
+        mine = np.take_along_axis(on, best[:, None, None], 2)[:, :, 0]
+        count = mine.sum(1)
+        center = (hits * mine[:, :, None]).sum(1) / np.maximum(count, 1)[:, None]
+        positions = np.where((count > 0)[:, None], center, place_m)
+        return positions, count > 0, np.where(count > 0, names[best], NO_PART), count / offsets.shape[1]
+
+    def _nearest(
+        self, place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        if not len(place_m):
+            return place_m, np.zeros(0, bool), np.zeros(0, np.uint8), np.zeros(0)
+        face, _ = closest_faces(place_m, self.solid)
+        positions, _ = closest_points_on_triangles(place_m, np.asarray(self.solid.triangles)[face])
+        return positions, np.ones(len(face), bool), self.labels[face], np.ones(len(face))
+
+
+def region_columns(
+    grasps: dict[str, np.ndarray],
+    held: PartedSolid,
+    functional: Sequence[dict[str, Any]],
+    grasp: Sequence[dict[str, Any]],
+) -> dict[str, np.ndarray]:
+    """Return the table's columns of what grasps (arrays of ``proposals.npz``) hold: ids, '' for none.
+
+    ``distance_to_point_m`` is that of the nearest contact from the nearest of all points.
+    """
+    contacts = held.contacts(grasps["gripper_to_object"], grasps["depth_m"], grasps["width_m"])
+    everywhere = np.array([point["position_m"] for point in (*functional, *grasp)], float).reshape(-1, 3)
+    away_m = np.linalg.norm(contacts.positions_m[:, :, None] - everywhere, axis=3)
+    columns = {"part_id": held.regions(contacts), "distance_to_point_m": away_m.min((1, 2))}
+    for name, points in (("functional_point_id", functional), ("grasp_point_id", grasp)):
+        ids = np.array([*(point["id"] for point in points), NOBODY])
+        places = np.array([point["position_m"] for point in points], float).reshape(-1, 3)
+        columns[name] = ids[held.served(contacts, places)]
+    return columns

@@ -1,0 +1,136 @@
+"""Tell the parts of the surface: those that a template was built of, else what its form shows, else none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import trimesh
+
+from manitwin.config import NO_SETTINGS, Resource
+from manitwin.engine.stage import Draft
+from manitwin.formats.glb import read_glb
+from manitwin.geometry.distance import closest_faces
+from manitwin.geometry.parts.segmentation import carried_over, segmented
+from manitwin.geometry.parts.shape import measure_shape
+from manitwin.models.annotators.part_names import part_name
+from manitwin.models.annotators.priors import Prior, lookup
+from manitwin.pipeline.object_state import load_solid, object_name, read_given
+from manitwin.twin.part_records import NO_PART, Part
+
+PARTS_FILE = "parts.npz"
+"""``visual (F,)`` and ``solid (S,)`` uint8: the part of each face of visual.glb and of solid.npz, 255 where it is of none."""
+
+
+@dataclass(frozen=True)
+class _Told:
+    """The parts of both meshes by place in ``names``, who says so, and how surely."""
+
+    names: tuple[str, ...]
+    visual: np.ndarray
+    solid: np.ndarray
+    source: str
+    confidence: float
+
+
+class PartsStage:
+    """Give each face of ``visual.glb`` its part, or none where geometry does not tell it."""
+
+    name: ClassVar[str] = "parts"
+    version: ClassVar[str] = "1"
+    reads: ClassVar[tuple[str, ...]] = (
+        "solid.npz", "visual.glb", "points", "physical", "language", "geometry", "naming?",
+    )  # fmt: skip
+    writes: ClassVar[tuple[str, ...]] = (PARTS_FILE, "parts")
+    needs: ClassVar[Resource] = "cpu"
+    backend = "builtin"
+    model: str | None = None
+
+    settings = NO_SETTINGS
+
+    def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
+        """Write ``parts.npz`` and return the table ``parts``, empty where no parts are told."""
+        solid, meshes = load_solid(draft.path("solid.npz")), read_glb(draft.path("visual.glb"))
+        visual = trimesh.Trimesh(
+            *trimesh.util.append_faces([m.vertices for m in meshes], [m.faces for m in meshes]), process=False
+        )
+        told = _given(draft, solid, visual) or _by_form(draft, solid, visual) or _nothing(solid, visual)
+        np.savez(folder / PARTS_FILE, visual=told.visual, solid=told.solid)
+        return {"parts": [part.model_dump() for part in table_of(told.names, told.visual, visual, told)]}
+
+
+def _nothing(solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told:
+    none = [np.full(len(mesh.faces), NO_PART, np.uint8) for mesh in (visual, solid)]
+    return _Told((), none[0], none[1], "geometry", 0.0)
+
+
+def _given(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told | None:
+    """Return the parts that the thing was built of; None where nobody gives any, or repair has changed the faces."""
+    given = read_given(draft)
+    if given is None or given.parts is None or len(given.parts.of_face) != len(visual.faces):
+        return None
+    of_face = np.array(given.parts.of_face, dtype=np.int64)
+    used = np.unique(of_face)
+    labels = np.searchsorted(used, of_face).astype(np.uint8)
+    names = tuple(given.parts.names[i] for i in used)
+    return _Told(names, labels, carried_over(labels, visual, solid), given.source, 1.0)
+
+
+def _by_form(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _Told | None:
+    """Return the parts that the rule of its form tells; None where it has no rule, or the surface does not show them."""
+    prior = _prior(draft)
+    if prior is None or prior.parts is None:
+        return None
+    center_m = np.array(draft.field("physical")["center_of_mass_m"])
+    shape = measure_shape(solid, center_m, prior.head_end, prior.stands, np.random.default_rng(draft.seed))
+    found = segmented(solid, shape, prior.parts)
+    if found is None:
+        return None
+    of_visual = carried_over(found.role, solid, visual)
+    shown = np.unique(of_visual)
+    points = draft.field("points")
+    said = [*points["functional"], *(point for point in points["grasp"] if point["label"])]
+    on = parts_at(np.array([point["position_m"] for point in said]), solid, found.role)
+    names = tuple(
+        part_name(found.roles[role], prior, [p["label"] for p, at in zip(said, on, strict=True) if at == role])
+        for role in shown
+    )
+    places = np.full(len(found.roles), NO_PART, np.uint8)
+    places[shown] = np.arange(len(shown))
+    return _Told(names, places[of_visual], places[found.role], f"geometry:{prior.parts}", found.confidence)
+
+
+def _prior(draft: Draft) -> Prior | None:
+    """Return what is usual of such things, by the object's name, else by the category that it was given."""
+    return lookup(object_name(draft)) or lookup(draft.field("language")["category"])
+
+
+def parts_at(points_m: np.ndarray, mesh: trimesh.Trimesh, labels: np.ndarray) -> np.ndarray:
+    """Return the label of the face of a mesh that each point ``(N, 3)`` lies on."""
+    if not len(points_m):
+        return np.zeros(0, labels.dtype)
+    return np.asarray(labels[closest_faces(points_m, mesh)[0]])
+
+
+def table_of(names: tuple[str, ...], labels: np.ndarray, visual: trimesh.Trimesh, told: _Told) -> list[Part]:
+    """Return the table of parts: how much of the visual surface each is, and where."""
+    areas = np.asarray(visual.area_faces)
+    rows = []
+    for place, name in enumerate(names):
+        mine = labels == place
+        weights = areas[mine] if areas[mine].sum() > 0 else np.ones(int(mine.sum()))
+        center = np.average(np.asarray(visual.triangles_center)[mine], axis=0, weights=weights)
+        rows.append(
+            Part(
+                id=f"p{place}",
+                name=name,
+                source=told.source,
+                confidence=round(told.confidence, 3),
+                faces=int(mine.sum()),
+                area_share=float(areas[mine].sum() / areas.sum()),
+                centroid_m=center.tolist(),
+            )
+        )
+    return rows

@@ -1,0 +1,146 @@
+"""Parts of small solids whose parts are known by construction."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from trimesh.creation import annulus, box, cylinder, revolve
+
+from manitwin.geometry.parts.part_rules import PartRule
+from manitwin.geometry.parts.segmentation import Segmentation, carried_over, segmented
+from manitwin.geometry.parts.shape import HeadEnd, measure_shape
+
+
+def turned(*profile: tuple[float, float]) -> trimesh.Trimesh:
+    return revolve(np.array(profile), sections=36)
+
+
+def along_x(radius_m: float, length_m: float, at_m: float) -> trimesh.Trimesh:
+    bar = cylinder(radius_m, length_m, sections=24)
+    bar.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
+    bar.apply_translation([at_m, 0, 0])
+    return bar
+
+
+def at(mesh: trimesh.Trimesh, *offset_m: float) -> trimesh.Trimesh:
+    mesh.apply_translation(offset_m)
+    return mesh
+
+
+def hammer() -> trimesh.Trimesh:
+    return trimesh.boolean.union([along_x(0.012, 0.26, 0.0), box((0.03, 0.11, 0.03), at_(-0.13))])
+
+
+def at_(x_m: float) -> np.ndarray:
+    return trimesh.transformations.translation_matrix([x_m, 0, 0])
+
+
+def mug() -> trimesh.Trimesh:
+    cup = turned((0, 0), (0.04, 0), (0.04, 0.09), (0.036, 0.09), (0.036, 0.006), (0, 0.006))
+    ring = annulus(0.018, 0.028, 0.012)
+    ring.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
+    ring = at(ring, 0.048, 0, 0.045)
+    return trimesh.boolean.union([cup, trimesh.boolean.difference([ring, at(cylinder(0.038, 0.2), 0, 0, 0.05)])])
+
+
+def bottle() -> trimesh.Trimesh:
+    return turned(
+        *((0, 0), (0.035, 0), (0.035, 0.13), (0.013, 0.165), (0.013, 0.18)),
+        *((0.017, 0.18), (0.017, 0.205), (0, 0.205)),
+    )
+
+
+def told(
+    mesh: trimesh.Trimesh, rule: PartRule, stands: bool, head_end: HeadEnd = "wide", noise_m: float = 0.0
+) -> Segmentation | None:
+    if noise_m:
+        mesh = mesh.subdivide_to_size(0.004)
+        mesh = trimesh.Trimesh(mesh.vertices, mesh.faces)
+        mesh.vertices += np.random.default_rng(0).normal(0, noise_m, mesh.vertices.shape)
+    shape = measure_shape(mesh, mesh.center_mass, head_end, stands, np.random.default_rng(0))
+    found = segmented(mesh, shape, rule)
+    if found is not None:
+        assert found.role.shape == (len(mesh.faces),) and 0.5 <= found.confidence <= 0.9
+    return found
+
+
+def areas(mesh: trimesh.Trimesh, found: Segmentation) -> dict[str, float]:
+    share = np.bincount(found.role, mesh.area_faces, len(found.roles)) / mesh.area
+    return dict(zip(found.roles, share.tolist(), strict=True))
+
+
+@pytest.mark.parametrize("rough", [False, True])
+def test_head_and_handle_of_a_hammer_meet_where_they_were_joined(rough: bool) -> None:
+    mesh = hammer()
+    found = told(mesh, "ended", stands=False)
+    assert found is not None and found.roles == ("head", "handle")
+    inside = np.abs(mesh.triangles_center[:, 0] + 0.13) <= 0.0151
+    truth = np.where(inside & (np.hypot(*mesh.triangles_center[:, 1:].T) > 0.0121), 0, 1)
+    wrong = mesh.area_faces[(found.role != truth) & (np.abs(mesh.triangles_center[:, 0] + 0.13) > 0.02)].sum()
+    assert wrong < 0.02 * mesh.area
+    if rough:
+        noisy = told(mesh, "ended", stands=False, noise_m=0.0002)
+        assert noisy is not None and noisy.roles == found.roles
+
+
+def test_handle_of_a_mug_reaches_down_to_its_wall() -> None:
+    mesh = mug()
+    found = told(mesh, "handled", stands=True)
+    assert found is not None and found.roles == ("body", "handle")
+    away_m = np.hypot(*mesh.triangles_center[:, :2].T)
+    assert (away_m[found.role == 1] > 0.0395).all()
+    missed = mesh.area_faces[(away_m > 0.0405) & (found.role == 0)].sum()
+    assert missed < 0.05 * mesh.area_faces[away_m > 0.0405].sum()
+
+
+def test_cap_of_a_bottle_begins_above_its_neck() -> None:
+    mesh = bottle()
+    found = told(mesh, "capped", stands=True)
+    assert found is not None and found.roles == ("body", "cap")
+    heights = mesh.triangles_center[:, 2]
+    assert (found.role[heights > 0.181] == 1).all() and (found.role[heights < 0.175] == 0).all()
+
+
+def test_stem_is_between_bowl_and_foot() -> None:
+    glass = turned(
+        (0, 0), (0.035, 0), (0.035, 0.004), (0.004, 0.008), (0.004, 0.1), (0.035, 0.13), (0.035, 0.18), (0, 0.18)
+    )
+    found = told(glass, "stemmed", stands=True)
+    assert found is not None
+    share = areas(glass, found)
+    assert 0.05 < share["stem"] < 0.12 and share["bowl"] > 0.5 and share["foot"] > 0.15
+
+
+def test_neck_is_what_is_thinner_than_head_and_handle() -> None:
+    spoon = trimesh.boolean.union(
+        [along_x(0.018, 0.05, -0.075), along_x(0.003, 0.08, -0.02), along_x(0.008, 0.1, 0.05)]
+    )
+    found = told(spoon, "ended", stands=False)
+    assert found is not None and found.roles == ("head", "neck", "handle")
+    x = spoon.triangles_center[found.role == 1, 0]
+    assert x.min() > -0.055 and x.max() < 0.005
+
+
+@pytest.mark.parametrize(
+    ("mesh", "rule", "stands"),
+    [
+        (box((0.2, 0.02, 0.02)), "ended", False),
+        (at(cylinder(0.03, 0.12), 0, 0, 0.06), "capped", True),
+        (at(cylinder(0.03, 0.12), 0, 0, 0.06), "handled", True),
+        (at(cylinder(0.03, 0.12), 0, 0, 0.06), "spouted", True),
+        (at(cylinder(0.03, 0.12), 0, 0, 0.06), "stemmed", True),
+        (box((0.1, 0.1, 0.1)), "pistol", False),
+    ],
+)
+def test_what_a_form_does_not_show_is_not_guessed(mesh: trimesh.Trimesh, rule: PartRule, stands: bool) -> None:
+    assert told(mesh, rule, stands) is None
+
+
+def test_labels_are_carried_to_another_mesh_of_the_surface_and_not_through_a_wall() -> None:
+    plate = box((0.1, 0.1, 0.001))
+    labels = (plate.face_normals[:, 2] > 0.5).astype(np.uint8)
+    fine = plate.subdivide().subdivide().subdivide()
+    over = carried_over(labels, plate, fine)
+    flat = np.abs(fine.face_normals[:, 2]) > 0.5
+    assert np.array_equal(over[flat], (fine.face_normals[flat, 2] > 0).astype(np.uint8))

@@ -1,0 +1,100 @@
+"""The stage that tells parts: by a template's construction, by form, or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from handmade import mug, visual
+from manitwin.engine.stage import Draft
+from manitwin.formats.glb import read_glb, write_glb
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.known import known_of
+from manitwin.models.generators.templates.made import make, visual_parts
+from manitwin.models.generators.templates.text import read_text
+from manitwin.pipeline.item import Item
+from manitwin.pipeline.parts import PARTS_FILE, PartsStage
+
+NO_POINTS: dict[str, list[object]] = {"functional": [], "grasp": []}
+
+
+def draft_of(folder: Path, mesh: trimesh.Trimesh, parts: list[trimesh.Trimesh], name: str, known: object) -> Draft:
+    (folder / "visual.glb").write_bytes(write_glb(parts))
+    np.savez(folder / "solid.npz", vertices=mesh.vertices, faces=mesh.faces)
+    fields = {
+        "physical": {"center_of_mass_m": mesh.center_mass.tolist()},
+        "points": NO_POINTS,
+        "language": {"category": "object"},
+        "geometry": {"known": known},
+    }
+    paths = {key: folder / key for key in ("visual.glb", "solid.npz")}
+    return Draft("id", Item(file=None, name=name), 0, fields, paths)
+
+
+@pytest.mark.parametrize("category", ["hammer", "teapot", "book"])
+def test_parts_of_a_template_are_those_it_was_built_of(tmp_path: Path, category: str) -> None:
+    templates = load_templates()
+    made = make(templates[category], read_text(category, templates), np.random.default_rng(0))
+    solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
+    known = known_of(made, category).model_dump(mode="json")
+    draft = draft_of(tmp_path, solid, visual_parts(made), category, known)
+    table = PartsStage().run(draft, tmp_path)["parts"]
+    with np.load(tmp_path / PARTS_FILE) as arrays:
+        of_visual, of_solid = arrays["visual"], arrays["solid"]
+    names = [part["name"] for part in table]
+    assert set(names) == {made.mesh.names[i] for i in np.unique(made.mesh.part)}
+    assert {part["source"] for part in table} == {f"template:{category}"}
+    assert [names[i] for i in of_solid] == [made.mesh.names[i] for i in made.mesh.part]
+    assert np.bincount(of_visual).tolist() == [part["faces"] for part in table]
+    shown = read_glb(tmp_path / "visual.glb")
+    centers = np.concatenate([part.triangles_center for part in shown])
+    areas = np.concatenate([part.area_faces for part in shown])
+    for place, part in enumerate(table):
+        mine = of_visual == place
+        assert np.allclose(part["centroid_m"], np.average(centers[mine], axis=0, weights=areas[mine]), atol=1e-6)
+        true = solid.area_faces[made.mesh.part == made.mesh.names.index(part["name"])].sum() / solid.area
+        assert part["area_share"] == pytest.approx(true, abs=1e-4)
+
+
+def parts_of_mug(folder: Path, name: str, point: dict[str, object] | None = None) -> dict[str, float]:
+    mesh = mug()
+    draft = draft_of(folder, mesh, [visual(mesh, baseColorFactor=[200, 10, 10, 255])], name, None)
+    if point is not None:
+        draft.fields["points"] = NO_POINTS | {"grasp": [point]}
+    return {part["name"]: part["area_share"] for part in PartsStage().run(draft, folder)["parts"]}
+
+
+def test_parts_of_a_mesh_are_told_by_its_form(tmp_path: Path) -> None:
+    shares = parts_of_mug(tmp_path, "mug")
+    assert set(shares) == {"body", "handle"} and shares["handle"] < 0.3
+    with np.load(tmp_path / PARTS_FILE) as arrays:
+        assert set(arrays["visual"].tolist()) == set(arrays["solid"].tolist()) == {0, 1}
+
+
+def test_part_is_called_what_a_point_on_it_is_called(tmp_path: Path) -> None:
+    mesh = mug()
+    outermost = mesh.triangles_center[mesh.triangles_center[:, 0].argmax()].tolist()
+    assert set(parts_of_mug(tmp_path, "mug", {"position_m": outermost, "label": "Loop handle"})) == {
+        "body",
+        "loop handle",
+    }
+    assert set(parts_of_mug(tmp_path, "mug", {"position_m": outermost, "label": "far side"})) == {"body", "handle"}
+
+
+@pytest.mark.parametrize("name", ["bowl", "box", "gizmo"])
+def test_nothing_is_told_of_what_has_no_rule(tmp_path: Path, name: str) -> None:
+    assert parts_of_mug(tmp_path, name) == {}
+    with np.load(tmp_path / PARTS_FILE) as arrays:
+        assert (arrays["visual"] == 255).all() and (arrays["solid"] == 255).all()
+
+
+def test_faces_that_repair_has_changed_are_not_given_a_templates_parts(tmp_path: Path) -> None:
+    mesh = mug()
+    templates = load_templates()
+    known = known_of(make(templates["mug"], read_text("mug", templates), np.random.default_rng(0)), "mug")
+    shown = [visual(mesh, baseColorFactor=[200, 10, 10, 255])]
+    draft = draft_of(tmp_path, mesh, shown, "mug", known.model_dump(mode="json"))
+    assert {part["source"] for part in PartsStage().run(draft, tmp_path)["parts"]} == {"geometry:handled"}
