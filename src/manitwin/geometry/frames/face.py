@@ -19,6 +19,7 @@ _OBLONG = 1.15  # longer by shorter side from which a face's roll is not free
 _RAISED_M = 0.0002  # a button stands out, or lies deeper, by more
 _END_ON = 1.1  # matter behind an end by the end's width
 _BUTTON_SEARCH = 0.05  # of the longest side
+_FACING_COSINE = 0.85  # of a button's top and the point: a bevel beside it is not pressed
 _ON_BUTTON = 0.012  # of the longest side: how far the point may be from the patch
 _BUTTON_SHARE = 0.3  # of the longest side: a larger radius is a face
 
@@ -59,7 +60,9 @@ def button_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -
     found = [
         patch
         for patch in _patches(surface, point_m, normal, None, _BUTTON_SEARCH)
-        if _is_button(surface, patch) and _away(patch, surface, point_m) < _ON_BUTTON * surface.size_m
+        if patch.normal @ normal > _FACING_COSINE
+        and _is_button(surface, patch)
+        and _away(patch, surface, point_m) < _ON_BUTTON * surface.size_m
     ]
     if not found:
         return Unclear("no small patch stands out of what is around it")

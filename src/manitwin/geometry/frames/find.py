@@ -11,7 +11,7 @@ from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Ki
 from manitwin.geometry.frames.hole import hole_frame
 from manitwin.geometry.frames.opening import opening_frame
 from manitwin.geometry.frames.tip import tip_frame
-from manitwin.geometry.frames.words import direction_for, is_end, kinds_for
+from manitwin.geometry.frames.words import direction_for, is_end, kinds_for, pours
 
 
 def find_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label: str) -> Found:
@@ -34,11 +34,12 @@ def _of_kind(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label
         return face_frame(surface, point_m, normal, direction_for(label), is_end(label))
     if kind == "opening":
         return opening_frame(surface, point_m)
+    if kind == "tip":
+        return tip_frame(surface, point_m, normal, pours(label))
     return _BY_PLACE[kind](surface, point_m, normal)
 
 
 _BY_PLACE = {
-    "tip": tip_frame,
     "edge": edge_frame,
     "hole": hole_frame,
     "axis": axis_frame,

@@ -68,7 +68,9 @@ def _starts(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> lis
         axis = _open_axis(surface, center, out)
         if axis is not None:
             starts.append((center, axis))
-    return starts
+    middle = surface.mesh.bounds.mean(0)  # of a ring nothing else may look across: its walls are narrow and round
+    _, axes = np.linalg.eigh(np.cov((positions - positions.mean(0)).T))
+    return starts + [(middle, axis) for axis in axes.T]
 
 
 def _fan(direction: np.ndarray) -> np.ndarray:

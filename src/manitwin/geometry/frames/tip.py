@@ -14,12 +14,15 @@ _FAR_SHARE = 0.25  # of the longest side: an end farther away is not what the po
 _BLUNT = 0.75  # radius of the end by that of what is behind it within a tenth of the longest side, for short stubs
 
 
-def tip_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
+def tip_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, pours: bool = False) -> Found:
     """Return the end that a surface point is at or near: the outermost place, Z along the tip and out.
 
-    The direction is that of the long part around the point, towards its end; a lip that the rim is drawn out to (a jug's) is
-    found by its opening. Nothing of the object may lie straight ahead of a tip.
+    The direction is that of the long part around the point, towards its end; of what ``pours``, a lip that the rim
+    is drawn out to (a jug's) is found by its opening. Nothing of the object may lie straight ahead of a tip.
     """
+    lip = _lip(surface, point_m) if pours else None
+    if lip is not None:
+        return lip
     best: tuple[float, FeatureFrame] | None = None
     for direction, share in _directions(surface, point_m):
         frame = _end(surface, point_m, direction, share)
@@ -32,7 +35,7 @@ def tip_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> F
             best = (score, frame)
     if best is not None:
         return best[1]
-    return _lip(surface, point_m) or Unclear("nothing around the point ends in a tip")
+    return Unclear("nothing around the point ends in a tip")
 
 
 def _directions(surface: FramedMesh, point_m: np.ndarray) -> list[tuple[np.ndarray, float]]:
@@ -95,7 +98,7 @@ def _is_end(surface: FramedMesh, tip: np.ndarray, direction: np.ndarray, blunt: 
 def _lip(surface: FramedMesh, point_m: np.ndarray) -> FeatureFrame | None:
     """Return the lip that a rim is drawn out to, where the point is on that side."""
     opening = opening_frame(surface, point_m)
-    if isinstance(opening, Unclear) or opening.roll_free or surface.opening is None:
+    if isinstance(opening, Unclear) or opening.roll_free or surface.opening is None or opening.z[2] < 0.9:
         return None
     rim = rim_points(surface, surface.opening)
     rim = rim[np.isfinite(rim[:, 0])]

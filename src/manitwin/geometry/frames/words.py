@@ -35,6 +35,7 @@ _ALSO: tuple[tuple[str, tuple[Kind, ...]], ...] = (
 """What a word may mean of some things besides: not looked for by it, but no contradiction."""
 _UNSAID: tuple[Kind, ...] = ("surface",)
 _DOWN = re.compile(r"base\b|bottom|underside|\bfoot\b|sole", re.IGNORECASE)
+_POURS = re.compile(r"spout|pour", re.IGNORECASE)
 _WHOLE = re.compile(
     r"bristles|jaws?\b|wires|\bend\b|base\b|bottom|underside|\bfoot\b|sole|front|back\b|\btop\b|upper|surface|flap|\blid\b|\bcap\b",
     re.IGNORECASE,
@@ -77,3 +78,8 @@ def means_place(label: str, kind: Kind) -> bool:
     if kind in ("surface", "axis") or _INSIDE.search(label):
         return False
     return kinds_for(label)[0] == kind and _WHOLE.search(label) is None
+
+
+def pours(label: str) -> bool:
+    """Tell whether the word for a tip means what is poured over."""
+    return _POURS.search(label) is not None
