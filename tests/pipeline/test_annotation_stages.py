@@ -13,7 +13,7 @@ from handmade import candidates, mug, visual
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
 from manitwin.formats.glb import write_glb
-from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
+from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints, Subject
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.pipeline.caption import CaptionStage
 from manitwin.pipeline.item import Item
@@ -45,7 +45,7 @@ def draft(tmp_path: Path) -> Draft:
         "cameras": [],
     }
     paths = {key: tmp_path / key for key in ("visual.glb", "solid.npz", "views/", "marked/")}
-    fields |= {"size": None, "language": {"category": "red mug"}}
+    fields |= {"size": None, "called": None, "language": {"category": "red mug"}}
     return Draft("id", Item(file=None, name="red mug"), 0, fields, paths)
 
 
@@ -98,3 +98,29 @@ class Changes(RulesAnnotator):
 def test_points_that_are_no_candidates_are_no_answer(draft: Draft, tmp_path: Path, change, message: str) -> None:
     with pytest.raises(BadReply, match=message):
         PointsStage(Changes(change), GRIPPER).run(draft, tmp_path)
+
+
+class _Asked(RulesAnnotator):
+    """Keeps the subjects that it is asked about."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.subjects: list[Subject] = []
+
+    def describe(self, subject: Subject, material: str, extents_m: np.ndarray) -> Language:
+        self.subjects.append(subject)
+        return super().describe(subject, material, extents_m)
+
+    def select_points(self, request: PointsRequest) -> SelectedPoints:
+        self.subjects.append(request.subject)
+        return super().select_points(request)
+
+
+def test_what_it_was_taken_for_and_that_its_size_is_guessed_goes_on(draft: Draft, tmp_path: Path) -> None:
+    asked = _Asked()
+    for size in (None, {"value": 0.12}):
+        draft.fields |= {"size": size, "called": "beaker"}
+        CaptionStage(asked).run(draft, tmp_path)
+        PointsStage(asked, GRIPPER).run(draft, tmp_path)
+    assert [subject.known_as for subject in asked.subjects] == ["beaker", "red mug"] * 2
+    assert [subject.size_estimated for subject in asked.subjects] == [False, False, True, True]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -23,6 +24,7 @@ class CaptionStage:
         "solid.npz",
         "physical",
         "size",
+        "called",
         "views/",
         "cameras",
         "geometry?",
@@ -50,5 +52,6 @@ class CaptionStage:
             scale=physical["scale_applied"],
             size_estimated=draft.field("size") is not None,
         )
+        subject = replace(subject, known_as=draft.field("called"))
         language = self._annotator.describe(subject, physical["material"], np.array(physical["extents_m"]))
         return {"language": language.model_dump()}

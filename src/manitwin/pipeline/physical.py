@@ -33,9 +33,9 @@ class PhysicalStage:
     """Ask for size, mass and friction, scale the object, and compute the mass properties of its real shape."""
 
     name: ClassVar[str] = "physical"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras", "naming?")
-    writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings", "size")
+    writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings", "size", "called")
 
     def __init__(self, settings: PhysicalConfig, annotator: Annotator):
         self.settings = settings
@@ -48,7 +48,8 @@ class PhysicalStage:
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Write ``visual.glb`` and ``solid.npz`` in true metres; return ``physical``, what speaks against it, and ``size``.
 
-        ``size`` is the Estimate that gave the scale, of the longest axis in metres; None where the mesh had it.
+        ``size`` is the Estimate that gave the scale, of the longest axis in metres; None where the mesh had it. ``called`` is
+        what an annotator that looks took the object for.
 
         Raises Rejected where size, mass or density are beyond what a thing of this name has, BadReply where the
         annotator gives neither mass nor density.
@@ -83,7 +84,12 @@ class PhysicalStage:
             mass_distribution="solid" if estimates.wall_thickness_m is None else "shell",
         )
         said = None if metric or estimates.longest_axis_m is None else estimates.longest_axis_m.model_dump()
-        return {"physical": physical.model_dump(), "physical_findings": findings_of(estimates), "size": said}
+        return {
+            "physical": physical.model_dump(),
+            "physical_findings": findings_of(estimates),
+            "size": said,
+            "called": estimates.called,
+        }
 
     def _check_size(self, name: str | None, longest_m: float, said: Estimate | None) -> None:
         prior = lookup(name)

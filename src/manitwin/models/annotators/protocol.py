@@ -58,6 +58,7 @@ class PhysicalEstimates:
     for hollow things whose mesh is only an outer skin (None: the mesh is the solid matter, or full). ``mass_kg`` may be
     None where only ``bulk_density_kg_m3`` (mass per volume of the repaired mesh) is known: one of both is given.
     ``findings`` are contradictions that remained when the annotator was asked again; None: its answers were not examined.
+    ``called`` is what it took the object for, where it looked; None: it did not.
     """
 
     longest_axis_m: Estimate | None
@@ -69,6 +70,7 @@ class PhysicalEstimates:
     material: str
     wall_thickness_m: float | None
     findings: tuple[str, ...] | None = None
+    called: str | None = None
 
 
 @dataclass(frozen=True)

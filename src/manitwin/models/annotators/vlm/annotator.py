@@ -193,7 +193,7 @@ class VlmAnnotator:
         return [
             quality_question(unknown, prompts["quality"], self.picture_px),
             physical_question(unknown, prompts["physical"]),
-            captions_question(replace(subject, known_as=None), material, extents_m, prompts["captions"]),
+            captions_question(subject, material, extents_m, prompts["captions"]),
             functional_question(request, functional_numbering(request), prompts["functional_points"]),
             *grasps,
         ]

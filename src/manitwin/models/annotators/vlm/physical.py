@@ -135,4 +135,5 @@ def physical_estimates(
         material=answer.material,
         wall_thickness_m=answer.wall_thickness_m if hollow else None,
         findings=findings,
+        called=answer.object,
     )
