@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from picture_file import of_twin, save_picture
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageDraw, ImageFont, ImageOps
 
 import manitwin
 from manitwin.cli.annotator_questions import questions_about
@@ -289,7 +289,8 @@ def questions_picture() -> Image.Image:
         (5, 1),
     ):  # the first two grasp queries; of each view the clean one goes first
         pictures = [part.png for part in asked.questions[number].question.parts if isinstance(part, ChatPicture)]
-        shown.append(Image.open(io.BytesIO(pictures[picture])).convert("RGB").resize((QUESTION_PX, QUESTION_PX)))
+        one = Image.open(io.BytesIO(pictures[picture])).convert("RGB")
+        shown.append(ImageOps.pad(one, (QUESTION_PX, QUESTION_PX), color="white"))
     picture = Image.new("RGB", (QUESTION_PX * len(shown), QUESTION_PX), "white")
     for index, one in enumerate(shown):
         picture.paste(one, (QUESTION_PX * index, 0))

@@ -46,3 +46,7 @@ def test_moved_to_another_ground_only_the_ground_changes() -> None:
     moved = Frame(rgb, coverage, coverage).over(BACKDROP, DARK_GROUND)
     assert (moved[0, 0] == DARK_GROUND).all() and (moved[1, 1] == (10, 200, 30)).all()
     assert shown_object(moved).sum() == 4
+
+
+def test_dark_red_print_is_red_too() -> None:
+    assert marker_color([spotted((200, 170, 60), (120, 45, 45))]).name not in ("red", "yellow")

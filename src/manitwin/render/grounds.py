@@ -17,6 +17,7 @@ _ALIKE_LIGHTNESS = (
     22.0  # of CIELAB's 100: edges nearer than that to their ground are lost (looked at: white mugs on BACKDROP)
 )
 _ALIKE_COLOR = 38.0  # CIELAB distance under which a dot is taken for a spot of the object
+_ALIKE_HUE_DEG, _COLORFUL = 25.0, 25.0  # a darker or paler shade of a colour has its name too, where it is no grey
 _GROUND_TOLERANCE = 6  # what lossy pictures move a plain colour by
 _SPARSE = 2  # and so are those of every second row and column
 _THINNED = 20_000  # pixels are enough to know an object's colours
@@ -76,13 +77,24 @@ def marker_color(pictures: Sequence[np.ndarray]) -> MarkerColor:
     seen = _lab(_thinned(pixels))
     shares = []
     for color in MARKER_COLORS:
-        away = np.linalg.norm(seen - _lab(np.array([color.rgb], np.uint8)), axis=1)
-        shares.append(max(float((away < _ALIKE_COLOR).mean()), 0.01))
+        own = _lab(np.array([color.rgb], np.uint8))[0]
+        shades = _hue_apart_deg(seen, own) < _ALIKE_HUE_DEG
+        alike = (np.linalg.norm(seen - own, axis=1) < _ALIKE_COLOR) | (shades & (_chroma(seen) > _COLORFUL))
+        shares.append(max(float(alike.mean()), 0.01))
     return MARKER_COLORS[int(np.argmin(shares))]
 
 
 def _thinned(pixels: np.ndarray) -> np.ndarray:
     return pixels[:: max(1, len(pixels) // _THINNED)]
+
+
+def _chroma(lab: np.ndarray) -> np.ndarray:
+    return np.asarray(np.hypot(lab[..., 1], lab[..., 2]))
+
+
+def _hue_apart_deg(lab: np.ndarray, other: np.ndarray) -> np.ndarray:
+    apart = np.degrees(np.arctan2(lab[:, 2], lab[:, 1]) - np.arctan2(other[2], other[1]))
+    return np.asarray(np.abs((apart + 180) % 360 - 180))
 
 
 def _lab(rgb: np.ndarray) -> np.ndarray:
