@@ -11,6 +11,8 @@ import trimesh
 from handmade import mug, visual
 from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb, write_glb
+from manitwin.models.annotators.part_names import part_name
+from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of
 from manitwin.models.generators.templates.made import make, visual_parts
@@ -82,6 +84,22 @@ def test_part_is_called_what_a_point_on_it_is_called(tmp_path: Path) -> None:
         "loop handle",
     }
     assert set(parts_of_mug(tmp_path, "mug", {"position_m": outermost, "label": "far side"})) == {"body", "handle"}
+
+
+@pytest.mark.parametrize(
+    ("role", "category", "labels", "name"),
+    [
+        ("handle", "scissors", [], "handle"),  # its finger rings are a place on it
+        ("head", "scissors", [], "blades"),
+        ("head", "screwdriver", ["tip", "shaft"], "shaft"),
+        ("neck", "spoon", [], "neck"),
+        ("cap", "pump bottle", [], "nozzle"),
+        ("grip", "drill", ["pistol grip"], "pistol grip"),
+    ],
+)
+def test_name_is_that_of_the_whole_part(role: str, category: str, labels: list[str], name: str) -> None:
+    prior = lookup(category)
+    assert prior is not None and part_name(role, prior, labels) == name
 
 
 @pytest.mark.parametrize("name", ["bowl", "box", "gizmo"])

@@ -20,7 +20,7 @@ _FEATURES: dict[str, tuple[Feature, ...]] = {
 }
 """By role, the features whose label in a prior is the name of the whole part, the best first."""
 _WORDS: dict[str, frozenset[str]] = {
-    "handle": frozenset(["handle", "handles", "grip", "grips", "shaft", "loops", "rings"]),
+    "handle": frozenset(["handle", "handles", "grip", "grips", "shaft"]),
     "head": frozenset(["head", "blade", "blades", "shaft", "bowl", "tines", "jaws", "bristles", "beater", "wires"]),
     "body": frozenset(["body", "barrel", "wall", "side", "bottle"]),
     "cap": frozenset(["cap", "lid", "nozzle", "pump", "sprayer", "stopper", "top"]),
@@ -42,6 +42,8 @@ def part_name(role: str, prior: Prior, labels_there: Iterable[str]) -> str:
     """
     by_feature = {part.feature: part.label for part in reversed(prior.functional)}
     usual = next((by_feature[feature] for feature in _FEATURES.get(role, ()) if feature in by_feature), role)
+    if not _WORDS[role] & set(usual.lower().split()):
+        usual = role  # finger rings are a place on the handle
     said = [" ".join(label.lower().split()) for label in labels_there]
     if usual in said:
         return usual
