@@ -122,22 +122,11 @@ def test_object_that_the_hand_overlaps_with_its_last_hull_only_collides(engine: 
     assert try_one(engine, body, above([0, 0, 0])).outcome == "collides"
 
 
-@pytest.mark.parametrize(
-    ("extents_m", "mass_kg", "force_n"),
-    [
-        (CUBE_M, 0.01, 1000.0),
-        ([0.005, 0.04, 0.04], 0.001, 50.0),
-        ([0.001, 0.04, 0.04], 0.001, 50.0),
-        ([0.0005, 0.04, 0.04], 0.001, 50.0),
-    ],
-)
-def test_object_that_the_fingers_tunnel_into_never_counts(
-    engine: GraspTrial, extents_m: list[float], mass_kg: float, force_n: float
-) -> None:
+def test_object_that_the_fingers_tunnel_into_never_counts(engine: GraspTrial) -> None:
     # so light for the force that no solver keeps the fingers out of it: they end inside it, or meet as if it were not there
-    result = try_one(engine, box(extents_m, mass_kg), above([0, 0, 0]), replace(SETTINGS, force_n=force_n))
+    result = try_one(engine, box(CUBE_M, 0.01), above([0, 0, 0]), replace(SETTINGS, force_n=1000.0))
     assert result.outcome in {"penetrates", "misses"}
-    assert try_one(engine, box(extents_m, 0.1), above([0, 0, 0])).outcome == "held", "heavy enough to resist"
+    assert try_one(engine, box(CUBE_M, 0.1), above([0, 0, 0])).outcome == "held", "heavy enough to resist"
 
 
 def test_box_that_just_fits_is_held(engine: GraspTrial) -> None:

@@ -15,7 +15,7 @@ from manitwin.models.graspers.surface_sampling import AntipodalGrasper
 from manitwin.pipeline.grasp_regions import PartedSolid, region_columns
 from manitwin.pipeline.grasps import GraspsStage
 from manitwin.pipeline.point_trials import DISPROVED, PointTrialsStage
-from manitwin.pipeline.quality import point_checks
+from manitwin.pipeline.quality import agreement_checks, point_checks
 from manitwin.pipeline.tried import POINT_PROPOSALS, POINT_VERDICTS, read_arrays, read_tried
 from manitwin.pipeline.verify import VerifyStage
 from manitwin.twin.point_records import GraspPoint
@@ -134,3 +134,15 @@ def test_nobody_asked_means_nobody_answers(tmp_path: Path, least: int) -> None:
     run_all(draft, tmp_path, PointTrialsStage(settings, VerifyConfig(), grasper, later, PANDA))
     assert (later.asked > 0) == (least > 0)
     assert draft.field("grasp_points")["withdrawn"] == []
+
+
+def test_object_on_which_the_engines_disagree_has_a_failed_check() -> None:
+    def check(share: float | None) -> list[bool]:
+        return [c.passed for c in agreement_checks({"second_opinion": {"engine": "mujoco", "holds_share": share}})]
+
+    assert (check(0.78), check(0.9), check(None), agreement_checks({"second_opinion": None})) == (
+        [False],
+        [True],
+        [],
+        [],
+    )

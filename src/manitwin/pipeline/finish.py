@@ -31,7 +31,7 @@ class FinishStage:
     gripper: Gripper
 
     name: ClassVar[str] = "finish"
-    version: ClassVar[str] = "7"
+    version: ClassVar[str] = "8"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb", "solid.npz", "hulls.npz", "grasps.parquet", "photo.png?", "matte?", "naming?", "generation?", "geometry",
         "gate", "physical", "size", "collision", "language", "points", "frames_missing", GRASP_POINTS, "grasps",

@@ -15,6 +15,9 @@ UNCOVERED_LIMIT_M = 0.002
 CAVITY_LIMIT = 0.8
 """Of the open cavity that the hulls keep: less, and a container holds visibly less than it shows."""
 
+AGREEMENT_LIMIT = 0.9
+"""Of the verified grasps that a second engine holds: below it, the two disagree about the object and not about single grasps."""
+
 CENTER_OF_MASS_LIMIT = 0.1
 """Of the longest side: an uncertainty beyond it decides whether a grasp holds."""
 
@@ -263,10 +266,29 @@ def point_checks(draft: Draft) -> list[Check]:
     return [Check(name="held_at_points", passed=not said, value=float(least), message="; ".join(said))]
 
 
+def agreement_checks(grasps: dict[str, Any]) -> list[Check]:
+    """Return whether a second engine holds what the first one does; none where no other was asked or nothing held."""
+    second = grasps.get("second_opinion")
+    if second is None or second["holds_share"] is None:
+        return []
+    share = second["holds_share"]
+    message = "" if share >= AGREEMENT_LIMIT else f"share of the verified grasps that hold in {second['engine']} too"
+    return [
+        Check(
+            name="holds_in_second_engine",
+            passed=share >= AGREEMENT_LIMIT,
+            value=share,
+            limit=AGREEMENT_LIMIT,
+            message=message,
+        )
+    ]
+
+
 def _grasp_checks(draft: Draft) -> list[Check]:
     grasps = draft.field("grasps")
     return [
         *point_checks(draft),
+        *agreement_checks(grasps),
         Check(
             name="grasps_near_points",
             passed=not grasps["association_radius_widened"],

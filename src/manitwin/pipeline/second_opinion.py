@@ -31,7 +31,7 @@ class SecondOpinionStage:
     with both engines' verdicts.
     """
 
-    version = "2"
+    version = "3"
     needs: Resource = "cpu"
 
     def __init__(

@@ -3,6 +3,9 @@
 The settings are frozen: the share of grasps that hold can be moved from 12 to 96 % by them. Implicit integration at 2 ms,
 elliptic cones with an impedance ratio of 10, torsional friction (condim 4), contacts of 5 ms, and five no-slip iterations
 against the creep of soft contacts (MuJoCo manual, "Computation", section on slip; chosen once on 40 grasps of other objects).
+
+MuJoCo's contacts are springs per mass: the same pads that sink half a millimetre into a hammer sink seven into a bar of two
+grams, pass through it and drop it. So the impedance is the one at which they sink as far into anything (``even_impedance``).
 """
 
 from __future__ import annotations
@@ -35,6 +38,9 @@ FINGER_MASS_KG = 0.1
 MET_M = -0.001  # contacts and finger stops are soft: of 50 N they give half a millimetre on each side
 MAX_DRIVE_FORCE = 4.0  # as a multiple of the closing force: it never cuts the closing force itself
 FINGERS = ("finger_plus", "finger_minus")
+SINK_M = 0.0005  # the closing force on a single contact: what MuJoCo's default impedance gives of a heavy object
+LEAST_IMPEDANCE, MOST_IMPEDANCE = 0.95, 0.9999  # MuJoCo's default, and what it takes at most (mjMAXIMP)
+IMPEDANCE_WIDTH_M, IMPEDANCE_MIDPOINT, IMPEDANCE_POWER = 0.001, 0.5, 2.0  # MuJoCo's own defaults
 
 
 class MujocoTrial:
@@ -81,6 +87,7 @@ class _Scene:
     ):
         self.model, self.data = model, mujoco.MjData(model)
         self.target = SharedTarget(gripper.opening_m, settings, MET_M)
+        self.reached_m = self.target.value_m
         self.object = model.body(OBJECT).id
         self.fingers = [model.body(name).id for name in FINGERS]
         self.joints = [model.joint(name).qposadr[0] for name in FINGERS]
@@ -92,13 +99,19 @@ class _Scene:
     def advance(self, loads_m_s2: np.ndarray) -> None:
         """Take one step for each row of accelerations ``(N, 3)``."""
         model, data, gravity = self.model, self.data, self.model.opt.gravity
-        for load in loads_m_s2:
+        start, count = self.reached_m, len(loads_m_s2)
+        for number, load in enumerate(loads_m_s2, start=1):
             gravity[:] = load
+            data.ctrl[:] = start + (self.target.value_m - start) * number / count
             mujoco.mj_step(model, data)
+        self.reached_m = self.target.value_m
 
     def squeeze(self) -> None:
-        """Move the fingers' shared target on."""
-        self.data.ctrl[:] = self.target.move_on(float(self.data.qpos[self.joints].mean()))
+        """Move the fingers' shared target on: over the steps of the next frame, so that they close at an even speed.
+
+        Fingers that leap to each frame's target are twice as fast in between, and kick away what is light.
+        """
+        self.target.move_on(float(self.data.qpos[self.joints].mean()))
 
     def contacts(self) -> HandContacts:
         """Return how hard the +X and the -X finger press inwards, and the deepest overlap with the hand."""
@@ -130,9 +143,24 @@ def _model(body: RigidBody, gripper: ParallelGripper, settings: TrialSettings) -
     spec = new_spec(settings.timestep_s)
     spec.option.impratio, spec.option.noslip_iterations = IMPEDANCE_RATIO, NO_SLIP_ITERATIONS
     contact = contact_parameters((settings.finger_friction + body.friction_static) / 2, STIFF_SOLREF)
+    contact["solimp"] = even_impedance(body.mass_kg, settings.force_n)
     _add_hand(spec, gripper, settings, contact)
     add_object(spec, body, contact)
     return spec.compile()
+
+
+def even_impedance(mass_kg: float, force_n: float) -> list[float]:
+    """Return the ``solimp`` at which a contact of finger and object sinks ``SINK_M`` under the closing force, whatever its mass.
+
+    A contact at rest that carries f sinks by r = R f / k, with R = (1 - d) / d (1/m + 1/m_finger) and
+    k = 1 / (d timeconst dampratio)^2 (MuJoCo manual, "Computation", "Parameters"): at a fixed impedance d it sinks the
+    more the less the object weighs. Solved for d; the impedance of a first touch is as much softer as in MuJoCo's default.
+    """
+    per_mass = 1 / mass_kg + 1 / FINGER_MASS_KG
+    stiffness = 1 / (STIFF_SOLREF[0] * STIFF_SOLREF[1]) ** 2
+    yielding = SINK_M * stiffness / (force_n * per_mass)
+    impedance = float(np.clip(1 / (1 + yielding), LEAST_IMPEDANCE, MOST_IMPEDANCE))  # k at d = 1: d is near it
+    return [1 - 2 * (1 - impedance), impedance, IMPEDANCE_WIDTH_M, IMPEDANCE_MIDPOINT, IMPEDANCE_POWER]
 
 
 def _add_hand(

@@ -1,0 +1,44 @@
+"""Thin and light things between the pads: what each engine makes of them, against closed forms."""
+
+from __future__ import annotations
+
+import pytest
+
+from manitwin.physics.mujoco.body import STIFF_SOLREF
+from manitwin.physics.mujoco.trial import FINGER_MASS_KG, SINK_M, MujocoTrial, even_impedance
+from manitwin.physics.sapien.trial import SapienTrial
+from rigid_boxes import above, box, try_one
+
+SHEETS_M = [[0.005, 0.04, 0.04], [0.001, 0.04, 0.04], [0.0005, 0.04, 0.04]]
+BAR_M = [0.005, 0.2, 0.005]
+
+
+@pytest.mark.parametrize("extents_m", SHEETS_M)
+def test_sheet_of_a_gram_that_sapiens_fingers_tunnel_into_never_counts(extents_m: list[float]) -> None:
+    assert try_one(SapienTrial(), box(extents_m, 0.001), above([0, 0, 0])).outcome in {"penetrates", "misses"}
+    assert try_one(SapienTrial(), box(extents_m, 0.1), above([0, 0, 0])).outcome == "held", "heavy enough to resist"
+
+
+@pytest.mark.parametrize("extents_m", [BAR_M, *SHEETS_M])
+@pytest.mark.parametrize("mass_kg", [0.001, 0.01, 0.1])
+def test_mujocos_pads_sink_no_deeper_into_what_is_light(extents_m: list[float], mass_kg: float) -> None:
+    # at a fixed impedance a contact yields R f / k, R = (1 - d) / d (1/m + 1/m_finger): pads went through bars of a gram
+    result = try_one(MujocoTrial(), box(extents_m, mass_kg), above([0, 0, 0]))
+    assert result.outcome == "held"
+    assert result.penetration_m <= SINK_M
+    assert result.finger_forces_n == pytest.approx((50.0, 50.0), rel=0.02)
+
+
+def test_impedance_is_the_one_at_which_a_contact_yields_the_same_whatever_it_holds() -> None:
+    for mass_kg in (0.001, 0.01, 0.1, 0.3):
+        impedance = even_impedance(mass_kg, 50.0)[1]
+        yielding = (1 - impedance) / impedance * (1 / mass_kg + 1 / FINGER_MASS_KG)
+        stiffness = 1 / (impedance * STIFF_SOLREF[0]) ** 2
+        assert yielding * 50.0 / stiffness == pytest.approx(SINK_M, rel=0.1)
+
+
+@pytest.mark.parametrize("off_m", [0.0, 0.01, 0.019])
+def test_light_box_off_the_middle_is_pushed_there_and_not_kicked_away(off_m: float) -> None:
+    result = try_one(MujocoTrial(), box([0.04, 0.04, 0.04], 0.02), above([off_m, 0.006, 0.004]))
+    assert result.outcome == "held"
+    assert result.rotation_rad < 0.05
