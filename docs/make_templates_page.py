@@ -85,21 +85,23 @@ are verified (96.7 %). 111 of them were built before openings and poses were las
 Rejected are two speakers wider than the gripper opens, two rolling pins, which roll, and a trash
 can and a serving tray that fell from every grip at their rims.
 
-`python benchmarks/points.py --held-out`: the
-annotator `rules`, which is told none of a template's points, puts 97.4 % of them at their place (825 of 847; 58 categories x 5
-seeds; 5 are not judged), and 97.3 % in the half by which the rules were improved (582 of 598; 69 categories x 3; without
-`--held-out`). Candidates by farthest point sampling alone, without a closer look (`--plain`, 3 seeds each), give 97.4 and 97.2 %. From
-known features of their label the points are 5.5 and 4.3 mm away in the median (`--plain`: 8.2 and 11.2 mm), but nine of ten within
-37 and 51 mm (36 and 58): bases and tops, which are meant as a whole, are not moved to their middles. What it takes for right stands in `benchmarks/known_places.py`: a
-part, or a region of the template's frame, where a label speaks of no part. Labels that were wrong of a thing (the lid of a
-battery) were mended in both halves. Most wrong are an umbrella's tip, a flashlight's switch, and a bell's clapper.
+`python benchmarks/points.py --held-out`: the annotator `rules`, which is told none of a template's points, puts 97.4 % of
+them at their place (825 of 847; 58 categories x 5 seeds; 5 are not judged), and 97.3 % in the half by which the rules
+were improved (582 of 598; 69 categories x 3; without `--held-out`). Candidates by farthest point sampling alone, without
+a closer look (`--plain`, 3 seeds each), give 97.4 and 97.2 %. From known features of their label the points are 5.5 and
+4.3 mm away in the median (`--plain`: 8.2 and 11.2 mm), but nine of ten within 37 and 51 mm (36 and 58): bases and tops,
+which are meant as a whole, are not moved to their middles. What it takes for right stands in
+`benchmarks/known_places.py`: a part, or a region of the template's frame, where a label speaks of no part. Labels that
+were wrong of a thing (the lid of a battery) were mended in both halves. Most wrong are an umbrella's tip, a flashlight's
+switch, and a bell's clapper.
 
-`python benchmarks/frames.py --held-out`: frames from geometry, asked for at the candidate nearest to a known point, are right (opening
-5 mm and 3 degrees, face 3 mm and 3, hole 2 mm and 5, edge 10 degrees, tip 5 mm and 10, button 3 mm and 10) for 31 of 36 openings, 49
-of 62 faces, 7 of 10 holes, 3 of 8 edges, 12 of 26 tips and 9 of 20 buttons; wrong are 1, 6, 0, 0, 6 and 6, the others have no frame or
-are of another kind. The tuning half: 22 of 28, 46 of 48, 16 of 22, 12 of 16, 31 of 38, 9 of 14; wrong 0, 0, 1, 0, 5, 0. 0.07 CPU-s a
-thing. Buttons and tips that are no simple bump or end (a mouse's button, a trigger, a nozzle) are not to be relied on. The held-out half
-was looked at while buttons and spouts were mended, so it is not quite blind.
+`python benchmarks/frames.py --held-out`: frames from geometry, asked for at the candidate nearest to a known point, are
+right (opening 5 mm and 3 degrees, face 3 mm and 3, hole 2 mm and 5, edge 10 degrees, tip 5 mm and 10, button 3 mm and 10)
+for 31 of 36 openings, 49 of 62 faces, 7 of 10 holes, 3 of 8 edges, 12 of 26 tips and 9 of 20 buttons; wrong are 1, 6, 0,
+0, 6 and 6, the others have no frame or are of another kind. The tuning half: 22 of 28, 46 of 48, 16 of 22, 12 of 16, 31
+of 38, 9 of 14; wrong 0, 0, 1, 0, 5, 0. 0.07 CPU-s a thing. Buttons and tips that are no simple bump or end (a mouse's
+button, a trigger, a nozzle) are not to be relied on. The held-out half was looked at while buttons and spouts were
+mended, so it is not quite blind.
 
 This page is written by `python docs/make_templates_page.py`.
 """
