@@ -108,6 +108,11 @@ class Folders:
         (page / "scans").mkdir()
         trimesh.load(ROOT / "samples" / "mug.glb", force="mesh").export(page / "scans" / "mug.obj")
         (page / "list.csv").write_text("file,name,license\nsamples/mug.glb,mug,CC0-1.0\n")
+        if "--labels LABELS.csv" in said:
+            record = next(iter(sorted(self.dataset.glob("twins/*/*")))).name
+            (page / "LABELS.csv").write_text(
+                f"twin_id,category,plausible_mass_low_kg,plausible_mass_high_kg\n{record},mug,0.1,1\n"
+            )
         kinds: dict[str, Callable[[], Path]] = {
             "twins": lambda: self.twins,
             "DATASET": lambda: self.dataset,

@@ -90,6 +90,7 @@ def _shipped(folder: str) -> Callable[[], Iterable[str]]:
 
 
 UNITS = Choices("units", _of("m", "cm", "mm", "auto"))
+EVALUATIONS = Choices("evaluation", _of("annotations"))
 UP = Choices("up", _of("y", "z", "auto"))
 EXECUTORS = Choices("executor", _of("local", "ray", "inline"))
 ANNOTATORS = Choices("annotator", _backends("annotator"), spec=True)

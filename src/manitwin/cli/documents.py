@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from manitwin.api import EpisodesReport
     from manitwin.cli.causes import Cause
     from manitwin.cli.dry_run import Plan
+    from manitwin.dataset.evaluation.annotations import AnnotationReport
     from manitwin.engine.drive import RunReport
     from manitwin.engine.ledger.progress import ItemStory, Progress
     from manitwin.pipeline.build_report import BuildReport, ItemResult
@@ -227,4 +228,20 @@ def _folder(listing: FolderListing) -> Document:
         "inputs": [str(path) for path in listing.inputs],
         "parts": {str(path): str(whole) for path, whole in listing.parts.items()},
         "left": {str(path): why for path, why in listing.left.items()},
+    }
+
+
+def annotations_document(report: AnnotationReport) -> Document:
+    """Return the scores of annotations: shares by dimension with their intervals, and every question."""
+    from manitwin.dataset.evaluation.annotation_scores import wilson_interval
+
+    return {
+        "twins": report.twins,
+        "shares": {
+            name: {"right": right, "asked": asked, "interval": list(wilson_interval(right, asked))}
+            for name, (right, asked) in report.shares().items()
+        },
+        "scores": [asdict(score) for score in report.scores],
+        "distances": [asdict(distance) for distance in report.distances],
+        "without_twin": list(report.without_twin),
     }

@@ -23,6 +23,7 @@ from manitwin.cli.commands.audit import audit
 from manitwin.cli.commands.build import build, run
 from manitwin.cli.commands.carve import carve
 from manitwin.cli.commands.doctor import doctor
+from manitwin.cli.commands.evaluate import evaluate
 from manitwin.cli.commands.export import export
 from manitwin.cli.commands.fake import fake
 from manitwin.cli.commands.import_ import import_
@@ -89,7 +90,7 @@ register(app, reported(run, own_log=True), "run", hidden=True)
 for making in (index, stats, publish, export):
     register(app, reported(making))
 register(app, reported(import_), "import")
-for other in (status, retry, check, query, doctor, models, fake, prompts, audit, carve):
+for other in (status, retry, check, query, doctor, models, fake, prompts, audit, carve, evaluate):
     register(app, other)
 
 

@@ -1,0 +1,113 @@
+"""How a twin's annotations are scored against labels: the rules, each a question that is answered yes, no or not at all."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.dataset.evaluation.labels import Interval, Label
+from manitwin.models.annotators.priors import normalised
+from manitwin.twin.record import TwinRecord
+
+DIMENSIONS = ("category", "language", "functional", "physical", "grasp")
+"""The paper's dimensions of annotation quality."""
+MASS_FACTOR = 1.6
+_SAME = {"gray": "grey", "aluminum": "aluminium", "golden": "gold", "transparent": "clear"}
+
+
+@dataclass(frozen=True)
+class Score:
+    """One question about one twin: of which dimension, what was asked, the answer, and what was said against what is true."""
+
+    twin_id: str
+    dimension: str
+    question: str
+    right: bool
+    said: str
+    truth: str
+
+
+def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
+    """Yield every question that the label can answer; a dimension without a label has none."""
+    language, physical, points = record.language, record.physical, record.points
+    if language is None or physical is None or points is None:
+        return
+
+    def score(dimension: str, question: str, right: bool, said: object, truth: object) -> Score:
+        return Score(record.twin_id, dimension, question, bool(right), str(said), _text(truth))
+
+    if label.categories:
+        names = {normalised(name) for name in label.categories}
+        yield score("category", "category", normalised(language.category) in names, language.category, label.categories)
+    for question, said, truth in (
+        ("color", language.color, label.colors),
+        ("material", language.material, label.materials),
+    ):
+        if truth:
+            yield score("language", question, _names_one(said, truth), said, truth)
+    for point in points.functional if label.parts else ():
+        yield score("functional", point.id, _is_one_of(point.label, label.parts), point.label, label.parts)
+    if label.mass_kg is not None:
+        yield from _of_mass(score, record, label.mass_kg)
+    if label.longest_side_m is not None:
+        longest, side = max(physical.extents_m), label.longest_side_m
+        yield score("physical", "longest side", side.low <= longest <= side.high, f"{longest:.3f} m", side)
+    for grasp in points.grasp:
+        if label.grasp_types:
+            yield score("grasp", f"{grasp.id} type", grasp.type in label.grasp_types, grasp.type, label.grasp_types)
+        region = grasp.label or ""
+        if region and (label.good_regions or label.bad_regions):
+            bad = _is_one_of(region, label.bad_regions) and not _is_one_of(region, label.good_regions)
+            yield score("grasp", f"{grasp.id} region", not bad, region, label.good_regions)
+
+
+def _of_mass(score, record: TwinRecord, mass: Interval) -> Iterator[Score]:  # type: ignore[no-untyped-def]
+    assert record.physical is not None
+    said = record.physical.mass_kg
+    text = f"{said.value:.3g} kg ({said.low:.3g} to {said.high:.3g})"
+    factor = max(said.value / mass.middle, mass.middle / said.value)
+    yield score("physical", "mass interval", said.low <= mass.middle <= said.high, text, mass)
+    yield score("physical", f"mass within {MASS_FACTOR}", factor <= MASS_FACTOR, text, mass)
+
+
+def matches(name: str, other: str) -> bool:
+    """Tell whether two names of a part mean the same: equal, or all words of one among those of the other, plurals alike."""
+    one, two = _words(name), _words(other)
+    return bool(one and two) and (one <= two or two <= one)
+
+
+def _is_one_of(name: str, truth: Iterable[str]) -> bool:
+    return any(matches(name, each) for each in truth)
+
+
+def _names_one(said: str, truth: Iterable[str]) -> bool:
+    """Tell whether a text names at least one of the labelled words: one dominant colour, one material is enough."""
+    words = _words(re.sub(r"\([^)]*\)", " ", said))
+    return any(_words(each) <= words for each in truth)
+
+
+def _words(text: str) -> frozenset[str]:
+    found = re.findall(r"[a-z]+", text.lower())
+    plain = (_SAME.get(word, word) for word in found)
+    return frozenset(
+        word[:-1] if len(word) > 3 and word.endswith("s") and not word.endswith("ss") else word for word in plain
+    )
+
+
+def _text(truth: object) -> str:
+    if isinstance(truth, Interval):
+        return f"{truth.low:.3g} to {truth.high:.3g}"
+    return "; ".join(map(str, truth)) if isinstance(truth, tuple) else str(truth)
+
+
+def wilson_interval(right: int, of: int, z: float = 1.959963984540054) -> tuple[float, float]:
+    """Return the 95 % interval of a share (Wilson 1927, eq. 4): (0, 1) of nothing."""
+    if of == 0:
+        return 0.0, 1.0
+    share, square = right / of, z * z / of
+    middle = (share + square / 2) / (1 + square)
+    half = z * float(np.sqrt(share * (1 - share) / of + square / (4 * of))) / (1 + square)
+    return max(0.0, middle - half), min(1.0, middle + half)

@@ -1,0 +1,102 @@
+"""Truth labels of objects: a CSV file with one row an object, empty where nothing is to be scored."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from manitwin.errors import UsageError, choose_from
+from manitwin.formats.csv_file import read_csv
+
+LIST_COLUMNS = (
+    "category_synonyms", "colors", "materials", "functional_parts", "good_grasp_regions", "bad_grasp_regions",
+    "typical_grasp_type",
+)  # fmt: skip
+NUMBER_COLUMNS = (
+    "plausible_mass_low_kg", "plausible_mass_high_kg", "longest_side_low_m", "longest_side_high_m",
+)  # fmt: skip
+COLUMNS = ("file", "twin_id", "kind", "category", *LIST_COLUMNS, *NUMBER_COLUMNS, "hollow", "stands_upright", "notes")
+MOST_ROWS = 1_000_000
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Plausible values; ``middle`` is the geometric mean of the ends."""
+
+    low: float
+    high: float
+
+    @property
+    def middle(self) -> float:
+        """The value that is compared: the geometric mean."""
+        return math.sqrt(self.low * self.high)
+
+
+@dataclass(frozen=True)
+class Label:
+    """The truth of one object; empty lists and None are not scored. ``file`` is the input, ``twin_id`` where that is known."""
+
+    file: str
+    twin_id: str | None
+    categories: tuple[str, ...]
+    colors: tuple[str, ...]
+    materials: tuple[str, ...]
+    parts: tuple[str, ...]
+    good_regions: tuple[str, ...]
+    bad_regions: tuple[str, ...]
+    grasp_types: tuple[str, ...]
+    mass_kg: Interval | None
+    longest_side_m: Interval | None
+
+
+def read_labels(path: Path) -> list[Label]:
+    """Read a file of labels; raises UsageError naming the line where a column is unknown or a number is none."""
+    labels: list[Label] = []
+    for line, row in read_csv(path, UsageError):
+        for name in row:
+            if name not in COLUMNS:
+                raise UsageError(f"{path}: {choose_from('column', name, COLUMNS)}")
+        if len(labels) == MOST_ROWS:
+            raise UsageError(f"{path}: more than {MOST_ROWS:,} rows; split the file")
+        said = {name: (row.get(name) or "").strip() for name in COLUMNS}
+        if not (said["file"] or said["twin_id"]):
+            raise UsageError(f"{path}:{line}: neither file nor twin_id; say which object this is")
+        labels.append(_label(said, f"{path}:{line}"))
+    if not labels:
+        raise UsageError(f"{path}: no labels; give a header with some of {', '.join(COLUMNS)}, and rows")
+    return labels
+
+
+def _label(said: Mapping[str, str], where: str) -> Label:
+    lists = {name: _list(said[name]) for name in LIST_COLUMNS}
+    return Label(
+        file=said["file"],
+        twin_id=said["twin_id"] or None,
+        categories=(said["category"], *lists["category_synonyms"]) if said["category"] else (),
+        colors=lists["colors"],
+        materials=lists["materials"],
+        parts=tuple(part.partition("=")[0].strip() for part in lists["functional_parts"]),
+        good_regions=lists["good_grasp_regions"],
+        bad_regions=lists["bad_grasp_regions"],
+        grasp_types=lists["typical_grasp_type"],
+        mass_kg=_interval(said, "plausible_mass_low_kg", "plausible_mass_high_kg", where),
+        longest_side_m=_interval(said, "longest_side_low_m", "longest_side_high_m", where),
+    )
+
+
+def _list(text: str) -> tuple[str, ...]:
+    return tuple(part.strip() for part in text.split(";") if part.strip())
+
+
+def _interval(said: Mapping[str, str], low: str, high: str, where: str) -> Interval | None:
+    if not said[low] and not said[high]:
+        return None
+    try:
+        interval = Interval(float(said[low]), float(said[high]))
+    except ValueError:
+        raise UsageError(f"{where}: {low} and {high} are {said[low]!r} and {said[high]!r}, not two numbers") from None
+    if not 0 < interval.low <= interval.high < math.inf:
+        raise UsageError(f"{where}: {low} {interval.low:g} to {high} {interval.high:g} is no interval above 0")
+    return interval
