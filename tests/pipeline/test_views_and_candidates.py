@@ -18,7 +18,7 @@ from manitwin.pipeline.candidates import CandidatesStage
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.views import ViewsStage
 from manitwin.render.cameras import Camera, project
-from manitwin.render.markers import DOT
+from manitwin.render.grounds import marker_color
 from manitwin.render.surfaces import plain_part
 
 SCALE = 0.5
@@ -91,6 +91,9 @@ def test_every_candidate_is_marked_on_some_view_and_only_where_seen(made: tuple[
     visible = draft.field("visible_candidates")
     assert sorted({i for ids in visible for i in ids}) == list(range(42))
     outside = np.linalg.norm(positions[:, :2], axis=1) > 0.0399
+    views = [np.asarray(Image.open(folder / "views" / f"rgb_{i:02d}.webp").convert("RGB")) for i in range(8)]
+    color = marker_color(views)
+    assert color.name != "red", "the cup is red-brown"
     for index, ids in enumerate(visible):
         camera = Camera.from_json(draft.field("cameras")[index]).scaled(SCALE)
         marked = np.asarray(Image.open(folder / "marked" / f"marked_{index:02d}.webp").convert("RGB")).astype(int)
@@ -101,7 +104,7 @@ def test_every_candidate_is_marked_on_some_view_and_only_where_seen(made: tuple[
             facing = float(toward @ positions[i, :2]) / (np.linalg.norm(toward) * 0.04)
             if abs(facing) > 0.15 and 0.005 < positions[i, 2] < 0.095:
                 assert (i in ids) == (facing > 0)
-        dots = [np.abs(marked[int(y), int(x)] - DOT).max() < 90 for x, y in pixels[ids]]
+        dots = [np.abs(marked[int(y), int(x)] - color.rgb).max() < 90 for x, y in pixels[ids]]
         assert np.mean(dots) > 0.8  # numbers may lie over a dot where it is crowded; WebP shifts colours
 
 

@@ -37,6 +37,13 @@ def request_of_mug(tmp_path_factory: pytest.TempPathFactory) -> PointsRequest:
     return points_request(mug(), tmp_path_factory.mktemp("views"), "mug")
 
 
+@pytest.fixture
+def without_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For what does not depend on pictures: drawing those of a vote takes longer than all else."""
+    monkeypatch.setattr("manitwin.models.annotators.vlm.points.marked_views", lambda *_: ([], "red"))
+    monkeypatch.setattr("manitwin.models.annotators.vlm.points.views_of_vote", lambda request, *_: own_views(request))
+
+
 def ids_of(question: Question) -> list[str]:
     return question.schema["properties"]["points"]["items"]["properties"]["id"]["enum"]
 
@@ -80,6 +87,7 @@ def good_functional(request: PointsRequest) -> dict[str, Any]:
     return functional(("rim", str(numbers[top])), ("base", str(numbers[base])))
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_same_places_win_whatever_their_numbers_are(request_of_mug: PointsRequest) -> None:
     request = request_of_mug
     handle, wall = nearest(request, (0.075, 0, 0.05))[0], nearest(request, (0, 0.04, 0.05))[0]
@@ -99,6 +107,7 @@ def test_same_places_win_whatever_their_numbers_are(request_of_mug: PointsReques
     assert selected.grasp[0].position_m == request.positions_m[handle].tolist()
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_model_that_says_the_lowest_numbers_gets_no_majority(request_of_mug: PointsRequest) -> None:
     def lowest(question: Question) -> dict[str, Any]:
         return grasps(*(("body", number, "power", 0.9) for number in ids_of(question)[:2]))
@@ -164,6 +173,7 @@ def test_drawn_number_is_that_of_the_query(request_of_mug: PointsRequest) -> Non
     assert box(11) == box(11) and box(11) != box(12)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_neighbours_support_each_other(request_of_mug: PointsRequest) -> None:
     request = request_of_mug
     near = nearest(request, (0, 0.04, 0.05), 2)
@@ -190,6 +200,7 @@ def _voted(
     return selected.grasp, selected.findings
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_support_comes_before_confidence_and_a_tie_is_said(request_of_mug: PointsRequest) -> None:
     request = request_of_mug
     back, wall = nearest(request, (-0.04, 0, 0.05))[0], nearest(request, (0, 0.04, 0.05))[0]
@@ -212,6 +223,7 @@ def test_support_comes_before_confidence_and_a_tie_is_said(request_of_mug: Point
     assert any("tied" in finding for finding in findings)
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_contradicted_label_is_asked_again_then_marked_and_trusted_less(request_of_mug: PointsRequest) -> None:
     request = request_of_mug
     numbers = functional_numbering(request).numbers
@@ -227,6 +239,7 @@ def test_contradicted_label_is_asked_again_then_marked_and_trusted_less(request_
     assert corrected.findings == () and {point.confidence for point in corrected.functional} == {0.8}
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_grasp_wider_than_the_fingers_is_asked_again_then_marked(request_of_mug: PointsRequest) -> None:
     request = replace(request_of_mug, max_opening_m=0.004)  # the wall has 3 mm, the handle 10
     handle, back = nearest(request, (0.075, 0, 0.05))[0], nearest(request, (-0.04, 0, 0.05))[0]
@@ -238,6 +251,7 @@ def test_grasp_wider_than_the_fingers_is_asked_again_then_marked(request_of_mug:
     )
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_one_vote_asks_twice_in_all(request_of_mug: PointsRequest) -> None:
     votes = by_place(request_of_mug, ("body", 1, "power", 0.9), ("body", 2, "power", 0.8))
     chat = ScriptedChat(good_functional(request_of_mug), votes)
@@ -245,6 +259,7 @@ def test_one_vote_asks_twice_in_all(request_of_mug: PointsRequest) -> None:
     assert len(chat.asked) == 2 and [point.confidence for point in selected.grasp] == [0.9, 0.8]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_number_written_as_a_number_is_the_same_id(request_of_mug: PointsRequest) -> None:
     answer = good_functional(request_of_mug)
     for point in answer["points"]:
@@ -268,6 +283,7 @@ def test_each_vote_has_other_views_order_numbers_and_words(request_of_mug: Point
     assert len({text.split(".")[-2] for text in words}) == 3 and len({q.instructions for q in grasp}) == 1
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_votes_are_asked_at_the_same_time(request_of_mug: PointsRequest) -> None:
     votes = by_place(request_of_mug, ("body", 1, "power", 0.9), ("body", 2, "power", 0.8))
     together = threading.Barrier(3, timeout=30)  # one after the other, the first would wait for ever
@@ -280,6 +296,7 @@ def test_votes_are_asked_at_the_same_time(request_of_mug: PointsRequest) -> None
     assert [point.candidate for point in selected.grasp] == [1, 2]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_mirrored_places_support_each_other(request_of_mug: PointsRequest) -> None:
     request = request_of_mug
     left, far = nearest(request, (0, 0.04, 0.05))[0], nearest(request, (0.075, 0, 0.05))[0]
