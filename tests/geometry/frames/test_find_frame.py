@@ -64,8 +64,9 @@ def test_opening_of_a_cup_pours_away_from_its_handle() -> None:
     assert found(cup(handle=False), [-0.0385, 0, 0.09], [0, 0, 1], "rim").roll_free
 
 
-def test_loop_of_a_handle_is_a_hole() -> None:
-    frame = found(cup(), [0.08, 0, 0.045], [1, 0, 0], "handle hole")
+@pytest.mark.parametrize("label", ["handle hole", "handle"])
+def test_loop_of_a_handle_is_a_hole_and_the_mouth_beside_it_is_not(label: str) -> None:
+    frame = found(cup(), [0.08, 0, 0.045], [1, 0, 0], label)
     assert frame.kind == "hole" and abs(frame.z @ [0, 1, 0]) > np.cos(np.radians(5))
     assert abs(frame.position_m[1]) < 0.002
 

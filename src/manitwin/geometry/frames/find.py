@@ -34,6 +34,8 @@ def _of_kind(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label
         return face_frame(surface, point_m, normal, direction_for(label), is_end(label))
     if kind == "opening":
         return opening_frame(surface, point_m)
+    if kind == "hole":
+        return hole_frame(surface, point_m, normal, through=kinds_for(label)[0] != "hole")
     if kind == "tip":
         return tip_frame(surface, point_m, normal, pours(label))
     return _BY_PLACE[kind](surface, point_m, normal)
@@ -41,7 +43,6 @@ def _of_kind(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label
 
 _BY_PLACE = {
     "edge": edge_frame,
-    "hole": hole_frame,
     "axis": axis_frame,
     "button": button_frame,
     "surface": surface_frame,

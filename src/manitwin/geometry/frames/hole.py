@@ -15,17 +15,22 @@ _SLOT = 0.9  # of the largest circle's radius: as much room as the middle of a s
 _LEAST_RADIUS_M = 0.0008
 _SEARCH_SHARE, _SEEDS = 0.2, 60  # of the longest side around the point, and how many samples there are asked
 _LEVEL = 0.01  # by which a place must be narrower for each metre along the axis: a bore is equally narrow everywhere
+_BESIDE_RADII = (
+    1.5  # of the radius: a point farther from the wall is not of this hole; a handle's is not the mouth beside it
+)
+_FEW = 2  # starts found around the point: where there are more, the middle of the thing is no better
 _ON_WALL = 0.3  # of the radius: a point that near to a hole's wall means that hole
 _FAN_RAD = np.radians(12)
 _FAR = 0.6  # of the longest side: walls beyond are not a hole's
 
 
-def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
+def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, through: bool = False) -> Found:
     """Return the hole whose wall or rim a surface point is on: its axis by the walls' normals, the inscribed circle's radius.
 
     A through hole's frame is in its middle, Z towards the side that looks up or along +X; a blind one's at its mouth, Z out.
     X leads to the centre of mass. The axis is the direction across the normals of the walls that are seen from inside: exact
-    for a cylinder and for a torus.
+    for a cylinder and for a torus. ``through``: only a hole that is open at both ends, as a handle's loop is and the mouth beside
+    it is not.
     """
     best: tuple[float, np.ndarray, np.ndarray, float] | None = None
     for center, axis in _starts(surface, point_m, normal):
@@ -35,7 +40,9 @@ def hole_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> 
         center, axis, radius = fitted
         beside = float(np.linalg.norm(np.cross(point_m - center, axis)))
         score = abs(beside - radius) / radius
-        if beside < 4.0 * radius + 0.02 * surface.size_m and (best is None or score < best[0]):
+        if through and any(_closed(surface, center, axis, radius)):
+            continue
+        if score < _BESIDE_RADII and (best is None or score < best[0]):
             best = (score, center, axis, radius)
             if score < _ON_WALL:
                 break
@@ -70,7 +77,7 @@ def _starts(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> lis
             starts.append((center, axis))
     middle = surface.mesh.bounds.mean(0)  # of a ring nothing else may look across: its walls are narrow and round
     _, axes = np.linalg.eigh(np.cov((positions - positions.mean(0)).T))
-    return starts + [(middle, axis) for axis in axes.T]
+    return starts if len(starts) > _FEW else starts + [(middle, axis) for axis in axes.T]
 
 
 def _fan(direction: np.ndarray) -> np.ndarray:
@@ -184,15 +191,20 @@ def _widest(flat: np.ndarray, axis: np.ndarray) -> np.ndarray:
     return np.asarray(basis[:, :2] @ (middle if rooms[1] > _SLOT * rooms[0] else best))
 
 
-def _framed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: float) -> Found:
-    """Place a hole's frame in its middle, or at its mouth where one end is closed."""
-    both = np.stack([axis, -axis])
+def _closed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: float) -> list[bool]:
+    """Tell whether a hole is closed ahead and behind: most of nine rays along its axis meet something."""
     ring = rotation_of(axis)
     angle = np.arange(8) * np.pi / 4
     spokes = np.cos(angle)[:, None] * ring[:, 0] + np.sin(angle)[:, None] * ring[:, 1]
     from_m = center + 0.4 * radius * np.concatenate([np.zeros((1, 3)), spokes])
-    ends = [surface.caster.first_hits(from_m, np.repeat(d[None], 9, 0))[0] for d in both]
-    closed = [bool(np.mean(np.isfinite(end)) > 0.7) for end in ends]
+    ends = [surface.caster.first_hits(from_m, np.repeat(d[None], 9, 0))[0] for d in (axis, -axis)]
+    return [bool(np.mean(np.isfinite(end)) > 0.7) for end in ends]
+
+
+def _framed(surface: FramedMesh, center: np.ndarray, axis: np.ndarray, radius: float) -> Found:
+    """Place a hole's frame in its middle, or at its mouth where one end is closed."""
+    both = np.stack([axis, -axis])
+    closed = _closed(surface, center, axis, radius)
     if all(closed):
         return Unclear("the hollow at the point has no mouth")
     reach = [_mouth_m(surface, center, d, radius) for d in both]
