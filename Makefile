@@ -9,9 +9,12 @@ setup:
 demo: setup
 	@$(BIN)/manitwin build samples/samples.csv -o demo
 
-# a file's tests stay in one process: they share what is dear to make
+# one process more than cores, four at most: many tests wait for what they started
+WORKERS ?= $(shell cores=$$(nproc); echo $$((cores < 4 ? cores + 1 : 4)))
+
+# a file's tests stay in one process: they share what is dear to make. Files begin in the order of tests/conftest.py
 test: setup
-	@$(BIN)/python -m pytest -m "not slow" -n auto --maxprocesses 4 --dist loadfile
+	@$(BIN)/python -m pytest -m "not slow" -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 # strict: a warning, or a reference that leads nowhere, fails it
 docs: setup

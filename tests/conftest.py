@@ -45,6 +45,19 @@ def shared_data() -> Path:
     return SHARED_DATA
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let files of whole programs begin first: a long one that begins last leaves all other processes idle."""
+    items.sort(key=lambda item: _WHOLE_PROGRAMS.get(item.path.relative_to(_TESTS).parts[0], 2))
+
+
+_WHOLE_PROGRAMS = {
+    **dict.fromkeys(("test_build.py", "test_build_commands.py", "test_bad_inputs.py", "test_served_models.py"), 0),
+    **dict.fromkeys(("docs", "fuzz", "examples", "engine", "cli"), 1),
+}
+"""What begins first of the tests, by folder or file; the rest as collected."""
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
