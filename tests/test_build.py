@@ -68,7 +68,7 @@ def _checks(twin: Twin) -> list[Check]:
     return twin.record.quality.checks
 
 
-@pytest.mark.parametrize("kind", ["image", "mesh"])
+@pytest.mark.parametrize("kind", [pytest.param("image", marks=pytest.mark.slow), "mesh"])
 def test_same_input_and_seed_give_the_same_twin(samples: dict[str, Twin], kind: str, tmp_path: Path) -> None:
     twin = samples[kind]
     source = twin.folder / twin.record.source.file
@@ -206,7 +206,7 @@ def test_require_agreement_verifies_only_what_both_engines_hold(thorough: Twin, 
     assert before is not None and after is not None and before.second_opinion is not None
     assert before.second_opinion.holds_share is not None
     assert after.verified == round(before.second_opinion.holds_share * before.verified)
-    assert after.verified + sum(after.failures.values()) == after.simulated == 16
+    assert after.verified + sum(after.failures.values()) == after.simulated == before.simulated >= 16
     assert all(twin.grasps().columns["holds_in_second_engine"])
     assert set(twin.grasps().outcome) == {"held"}
 

@@ -162,6 +162,7 @@ def test_other_settings_make_again_what_is_given_and_without_inputs_all(tmp_path
     assert "2 of 2 items ended" in status.stdout
 
 
+@pytest.mark.slow
 def test_tables_are_there_at_once(tmp_path: Path, manifest: Path) -> None:
     manitwin("build", manifest, "-o", "data", "--quick", folder=tmp_path)
     asked = manitwin("query", "data", "reason = 'empty'", "--table", "rejections", "-f", "csv", folder=tmp_path)

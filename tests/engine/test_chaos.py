@@ -118,6 +118,7 @@ def _group_of(stat: Path) -> int | None:
     return None if state == "Z" else int(group)
 
 
+@pytest.mark.slow
 def test_a_killed_driver_loses_what_was_running_and_nothing_else(tmp_path: Path, recipe: RehearsalRecipe) -> None:
     root, log, gate = tmp_path / "d", tmp_path / "log", tmp_path / "gate"
     environment = {**os.environ, "PYTHONPATH": f"{Path(__file__).parent}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"}
@@ -173,6 +174,7 @@ def test_a_full_disk_stops_the_run_and_leaves_nothing_half_written(
     assert all_ended_once(second, root, 20) and set(second.states.values()) == {"accepted"}
 
 
+@pytest.mark.slow
 def test_items_that_wait_for_a_service_hold_no_core(tmp_path: Path, recipe: RehearsalRecipe) -> None:
     recipe = replace(recipe, plan=(("a", "cpu"), ("ask", "vlm"), ("c", "cpu")))
     answered = tmp_path / "answered"

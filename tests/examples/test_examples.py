@@ -62,12 +62,14 @@ def test_the_mujoco_scene_can_say_that_a_grasp_misses(built: tuple[Path, str], t
     assert rose < 0, "it falls"
 
 
+@pytest.mark.slow
 def test_a_layout_is_exported_and_rests_in_mujoco(built: tuple[Path, str]) -> None:
     printed = run("layout_to_mjcf.py", built[0], "twins", "scenes")
     found = re.search(r"3 bodies; in one second none moves by more than ([\d.]+) mm", printed)
     assert found and float(found[1]) < 1.0, printed
 
 
+@pytest.mark.slow
 def test_episodes_are_read_without_the_package(built: tuple[Path, str]) -> None:
     printed = run("plain_episodes.py", built[0], "twins", "episodes")
     assert "'kept'" in printed
@@ -84,6 +86,7 @@ def test_the_notebook_of_one_twin_shows_its_card_views_hulls_and_grasps(
     assert "'held'" in words(book)
 
 
+@pytest.mark.slow
 def test_the_notebook_of_a_data_set_counts_what_is_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for number, category in enumerate(("brick", "brick", "kettle")):
         write_brick(tmp_path / "dataset", number, category)

@@ -60,6 +60,7 @@ def real_rejection(folder: Path, extents_m: list[float], mass_kg: float, tips_m:
     proposed_draft(folder, ["held"] * len(tips_m), draft=draft)
     arrays = dict(np.load(folder / "proposals.npz"))
     arrays["gripper_to_object"] = np.stack([above(tip) for tip in tips_m])
+    arrays["depth_m"] = np.full(len(tips_m), PANDA.tip_depth_m)
     np.savez(folder / "proposals.npz", **arrays)
     with pytest.raises(Rejected) as answer:
         run_all(draft, folder, VerifyStage(VerifyConfig(), SapienTrial(), PANDA))

@@ -55,7 +55,7 @@ def test_every_stage_that_goes_by_the_name_reads_it() -> None:
         stages = stages_for(kind, BuildConfig())
         names = [stage.name for stage in stages]
         assert names.index("name") == (1 if kind == "image" else names.index("gate") - 1)
-        asked = {"generate", "mesh", "gate", "physical", "caption", "points", "finish"}
+        asked = {"generate", "mesh", "gate", "physical", "caption", "points", "parts", "finish"}
         assert {s.name for s in stages if "naming?" in s.reads} == asked & set(names)
     assert "name" not in [stage.name for stage in stages_for("text", BuildConfig())]
 

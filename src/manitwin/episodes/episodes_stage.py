@@ -121,7 +121,7 @@ class EpisodesStage:
             return table_setting(skill, target, self._pool, self._placeable_of, self.settings.others, workspace, rng)
         assert batch.scene_id is not None and self.scenes is not None
         scene = Scene.read(Path(self.scenes) / scene_name(batch.scene_id), self.dataset)
-        return scene_setting(skill, scene, self._pool, self._is_graspable, workspace, rng)
+        return scene_setting(skill, scene, lambda: self._pool, self._is_graspable, workspace, rng)
 
     def _placeable_of(self, twin: PoolTwin) -> Placeable:
         return self._placeable(twin.twin_id)

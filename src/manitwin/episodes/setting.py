@@ -74,12 +74,15 @@ def table_setting(
 def scene_setting(
     skill: Skill | None,
     scene: Scene,
-    pool: Pool,
+    pool: Callable[[], Pool],
     graspable: Callable[[str], bool],
     workspace: Workspace,
     rng: np.random.Generator,
 ) -> Setting | None:
-    """Choose a target in reach and a goal in a scene, and the partner that the skill wants; None: there is none."""
+    """Choose a target in reach and a goal in a scene, and the partner that the skill wants; None: there is none.
+
+    ``pool`` is only asked for by a skill: it is of all twins, not of the scene's.
+    """
     objects, record = tuple(scene.placed_objects()), scene.record
     supporting = {each.supported_by for each in record.objects}
     able = [
@@ -97,7 +100,7 @@ def scene_setting(
                 task = PickPlaceTask(objects, target, goal)
                 return Setting(task, record.furniture, record.ambient, record.lights, scene.record.scene_id)
             continue
-        around = Surroundings(objects, pool, area, boxes)
+        around = Surroundings(objects, pool(), area, boxes)
         for partner in _partners(skill, around, target, rng):
             found = set_goal(skill, around, target, partner, rng)
             if found is not None:

@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.printable import printable_line
+from manitwin.geometry.poses import quaternion_wxyz, rotation_from_quaternion_wxyz
 from manitwin.twin.point_records import FunctionalFrame
 from manitwin.twin.record_values import Finite, Matrix3, Matrix4, Record, Vector3
 
@@ -154,7 +155,7 @@ def _moved(point: GivenPoint, transform: np.ndarray) -> GivenPoint:
         for name in ("normal", "approach", "closing")
     }
     position = transform[:3, :3] @ point.position_m + transform[:3, 3]
-    frame = None if point.frame is None else point.frame.moved(transform)
+    frame = None if point.frame is None else _frame_moved(point.frame, transform)
     return point.model_copy(update={"position_m": position.tolist(), "frame": frame, **directions})
 
 
@@ -173,3 +174,11 @@ def read_import_record(path: Path) -> ImportRecord:
         place = ".".join(str(part) for part in first["loc"])
         where = printable_line(place, max_characters=120)
         raise UsageError(f"{path}: {where}: {first['msg']}; import the asset again") from error
+
+
+def _frame_moved(frame: FunctionalFrame, transform: np.ndarray) -> FunctionalFrame:
+    """Return a frame under a rigid transform ``(4, 4)`` of the object frame."""
+    rotation = transform[:3, :3] @ rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz))
+    position = transform[:3, :3] @ frame.position_m + transform[:3, 3]
+    turned = quaternion_wxyz(rotation).tolist()
+    return frame.model_copy(update={"position_m": position.tolist(), "quaternion_wxyz": turned})

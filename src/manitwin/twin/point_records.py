@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from manitwin.geometry.poses import quaternion_wxyz, rotation_from_quaternion_wxyz
 from manitwin.twin.record_values import Finite, Quaternion, Record, Unit, Vector3
 
 GraspType = Literal["parallel_jaw", "pinch", "power", "three_finger", "enveloping"]  # the paper's five
@@ -58,13 +57,6 @@ class FunctionalFrame(Record):
         if abs(length - 1) > _UNIT_TOLERANCE:
             raise ValueError(f"quaternion_wxyz has length {length:g}, that of a rotation has 1")
         return self
-
-    def moved(self, transform: np.ndarray) -> FunctionalFrame:
-        """Return the frame under a rigid transform ``(4, 4)`` of the object frame."""
-        rotation = transform[:3, :3] @ rotation_from_quaternion_wxyz(np.array(self.quaternion_wxyz))
-        position = transform[:3, :3] @ self.position_m + transform[:3, 3]
-        turned = quaternion_wxyz(rotation).tolist()
-        return self.model_copy(update={"position_m": position.tolist(), "quaternion_wxyz": turned})
 
     def scaled(self, factor: float) -> FunctionalFrame:
         """Return the frame of the thing at another size."""

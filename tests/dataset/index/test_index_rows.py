@@ -18,6 +18,8 @@ from manitwin.twin.grasp_table import SCHEMA
 from manitwin.twin.store import read_record
 from twin_folders import box, grasp_table, twin_id, write_accepted, write_rejected
 
+STAGES = len(STAGE_ORDER[3:])  # of a mesh
+
 
 def test_every_table_has_exactly_the_columns_of_its_schema(tmp_path: Path) -> None:
     for write in (write_accepted, write_rejected):
@@ -64,9 +66,9 @@ def test_accepted_twin_says_in_its_row_what_its_record_says(tmp_path: Path) -> N
         "placements": 3,
         "upright_probability": 0.625,
         "failed_checks": ["known_name"],
-        "seconds": 30.0,
-        "cpu_seconds": 15.0,
-        "cost_usd": 1.875,
+        "seconds": 2.0 * STAGES,
+        "cpu_seconds": 1.0 * STAGES,
+        "cost_usd": 0.125 * STAGES,
         "config_sha256": "c0",
         "shape_descriptor": pytest.approx(shape_descriptor(box(), seed=0).values.tolist(), abs=1e-4),  # GLB is float32
     }
@@ -76,7 +78,7 @@ def test_accepted_twin_says_in_its_row_what_its_record_says(tmp_path: Path) -> N
         12,
         3,
         0,
-        15,
+        STAGES,
     ]
 
 

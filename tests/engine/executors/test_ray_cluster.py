@@ -46,6 +46,7 @@ def test_a_stage_that_hangs_is_given_up(
     assert len(list((tmp_path / "relative" / ".work").glob("*/a/*/result.json"))) == 1, "where the driver was started"
 
 
+@pytest.mark.slow
 def test_items_that_wait_for_a_service_hold_no_core(connected: str, tmp_path: Path) -> None:
     down, limit, order = tmp_path / "down", tmp_path / "limit", list[str]()
     down.touch()

@@ -18,7 +18,13 @@ def evaluate(
         str, options.existing("A data set, or a folder of twins.", "DATASET", "a data set, or a folder of twins")
     ],
     labels: Annotated[
-        Path, typer.Option("--labels", help="Truth labels, a row an object (docs/evaluation.md).", metavar="LABELS.csv")
+        Path,
+        typer.Option(
+            "--labels",
+            help="Truth labels, a row an object (docs/evaluation.md).",
+            metavar="LABELS.csv",
+            callback=choices.must_exist("a CSV file of labels"),
+        ),
     ],
     json: Json = False,
 ) -> None:
