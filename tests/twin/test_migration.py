@@ -2,6 +2,7 @@ import json
 from pathlib import Path
 
 import pytest
+from rejected_records import rejected_record
 
 from manitwin.errors import TwinError
 from manitwin.twin.migration import SCHEMA_VERSION, migrated
@@ -12,15 +13,6 @@ POINT = {
     "id": "f0", "candidate": 0, "position_m": [0, 0, 0], "normal": [0, 0, 1], "label": "tip", "description": "a tip",
     "confidence": 0.5, "rationale": "outermost",
 }  # fmt: skip
-REJECTED = {
-    "twin_id": "abc",
-    "name": None,
-    "status": "rejected",
-    "rejection": {"stage": "input", "reason": "empty", "detail": "nothing in it"},
-    "source": {"kind": "image", "file": "source.png", "sha256": "0", "license": "unknown"},
-    "provenance": {"manitwin_version": "0", "config_sha256": "0", "seed": 0, "stages": {}},
-    "quality": {"checks": []},
-}
 
 
 @pytest.fixture
@@ -28,7 +20,7 @@ def of_version_1(tmp_path: Path) -> Path:
     folder = tmp_path / "abc"
     folder.mkdir()
     (folder / "source.png").write_bytes(b"")
-    seal(folder, REJECTED)
+    seal(folder, rejected_record())
     said = json.loads((folder / RECORD).read_text()) | {"schema_version": 1}
     said["points"] = {
         "candidates": {"positions_m": [[0, 0, 0]], "normals": [[0, 0, 1]]},

@@ -2,22 +2,11 @@ import json
 from pathlib import Path
 
 import pytest
+from rejected_records import rejected_record
 
 from manitwin.errors import TwinError
 from manitwin.twin.migration import SCHEMA_VERSION
 from manitwin.twin.store import read_record, replace_folder, revision_of, seal, write_bytes_atomically
-
-
-def rejected_record() -> dict:
-    return {
-        "twin_id": "abc",
-        "name": None,
-        "status": "rejected",
-        "rejection": {"stage": "input", "reason": "empty", "detail": "nothing in it"},
-        "source": {"kind": "image", "file": "source.png", "sha256": "0", "license": "unknown"},
-        "provenance": {"manitwin_version": "0", "config_sha256": "0", "seed": 0, "stages": {}},
-        "quality": {"checks": []},
-    }
 
 
 @pytest.fixture

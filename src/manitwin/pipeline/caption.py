@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,7 +10,7 @@ import numpy as np
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.models.annotators.protocol import Annotator
-from manitwin.pipeline.object_state import read_subject
+from manitwin.pipeline.object_state import read_scaled_subject
 
 
 class CaptionStage:
@@ -44,14 +43,6 @@ class CaptionStage:
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return ``language``."""
         physical = draft.field("physical")
-        subject = read_subject(
-            draft,
-            solid="solid.npz",
-            visual="visual.glb",
-            metric=True,
-            scale=physical["scale_applied"],
-            size_estimated=draft.field("size") is not None,
-        )
-        subject = replace(subject, known_as=draft.field("called"))
+        subject = read_scaled_subject(draft, known_as=draft.field("called"))
         language = self._annotator.describe(subject, physical["material"], np.array(physical["extents_m"]))
         return {"language": language.model_dump()}

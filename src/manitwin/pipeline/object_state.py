@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -74,6 +75,19 @@ def read_subject(
         given=given if given is None or scale == 1.0 else given.scaled(scale),
         size_estimated=size_estimated,
     )
+
+
+def read_scaled_subject(draft: Draft[Item], *, known_as: str | None) -> Subject:
+    """Read the subject at the size that the physical stage gave it; ``known_as`` is what it was found to be since."""
+    subject = read_subject(
+        draft,
+        solid="solid.npz",
+        visual="visual.glb",
+        metric=True,
+        scale=draft.field("physical")["scale_applied"],
+        size_estimated=draft.field("size") is not None,
+    )
+    return replace(subject, known_as=known_as)
 
 
 def read_given(draft: Draft[Item]) -> ImportRecord | None:

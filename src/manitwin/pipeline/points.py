@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -17,7 +16,7 @@ from manitwin.geometry.frames.feature import FramedMesh
 from manitwin.models.annotators.point_rules import spare_grasp_points
 from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints, Subject
 from manitwin.pipeline.frames import with_frames
-from manitwin.pipeline.object_state import findings_of, pictures, read_subject
+from manitwin.pipeline.object_state import findings_of, pictures, read_scaled_subject
 from manitwin.pipeline.refinement import refined_points
 from manitwin.render.raycast import merged, seen_tolerance_m
 from manitwin.robots.grippers.gripper import Gripper
@@ -57,16 +56,8 @@ class PointsStage:
     def run(self, draft: Draft, folder: Path) -> dict[str, Any]:
         """Return ``points`` ``{functional, grasp}``; raises BadReply for too few, too many, or no candidates."""
         candidates, physical = draft.field("candidates"), draft.field("physical")
-        subject = read_subject(
-            draft,
-            solid="solid.npz",
-            visual="visual.glb",
-            metric=True,
-            scale=physical["scale_applied"],
-            size_estimated=draft.field("size") is not None,
-        )
         request = PointsRequest(
-            subject=replace(subject, known_as=draft.field("language")["category"]),
+            subject=read_scaled_subject(draft, known_as=draft.field("language")["category"]),
             positions_m=np.array(candidates["positions_m"]),
             normals=np.array(candidates["normals"]),
             marked_views=pictures(draft.path("marked/"), "marked"),

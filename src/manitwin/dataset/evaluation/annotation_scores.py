@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from manitwin.dataset.evaluation.labels import Interval, Label
 from manitwin.models.annotators.priors import normalised
 from manitwin.twin.record import TwinRecord
+from manitwin.twin.record_values import Estimate
 
 DIMENSIONS = ("category", "language", "functional", "physical", "grasp")
 """The paper's dimensions of annotation quality."""
@@ -36,9 +38,7 @@ def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
     if language is None or physical is None or points is None:
         return
 
-    def score(dimension: str, question: str, right: bool, said: object, truth: object) -> Score:
-        return Score(record.twin_id, dimension, question, bool(right), str(said), _text(truth))
-
+    score = partial(_score, record.twin_id)
     if label.categories:
         names = {normalised(name) for name in label.categories}
         yield score("category", "category", normalised(language.category) in names, language.category, label.categories)
@@ -51,7 +51,7 @@ def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
     for point in points.functional if label.parts else ():
         yield score("functional", point.id, _is_one_of(point.label, label.parts), point.label, label.parts)
     if label.mass_kg is not None:
-        yield from _of_mass(score, record, label.mass_kg)
+        yield from _of_mass(record.twin_id, physical.mass_kg, label.mass_kg)
     if label.longest_side_m is not None:
         longest, side = max(physical.extents_m), label.longest_side_m
         yield score("physical", "longest side", side.low <= longest <= side.high, f"{longest:.3f} m", side)
@@ -64,13 +64,17 @@ def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
             yield score("grasp", f"{grasp.id} region", not bad, region, label.good_regions)
 
 
-def _of_mass(score, record: TwinRecord, mass: Interval) -> Iterator[Score]:  # type: ignore[no-untyped-def]
-    assert record.physical is not None
-    said = record.physical.mass_kg
+def _of_mass(twin_id: str, said: Estimate, true: Interval) -> Iterator[Score]:
     text = f"{said.value:.3g} kg ({said.low:.3g} to {said.high:.3g})"
-    factor = max(said.value / mass.middle, mass.middle / said.value)
-    yield score("physical", "mass interval", said.low <= mass.middle <= said.high, text, mass)
-    yield score("physical", f"mass within {MASS_FACTOR}", factor <= MASS_FACTOR, text, mass)
+    factor = max(said.value / true.middle, true.middle / said.value)
+    yield _score(twin_id, "physical", "mass interval", said.low <= true.middle <= said.high, text, true)
+    yield _score(twin_id, "physical", f"mass within {MASS_FACTOR}", factor <= MASS_FACTOR, text, true)
+
+
+def _score(
+    twin_id: str, dimension: str, question: str, right: bool, said: str, truth: Interval | tuple[str, ...]
+) -> Score:
+    return Score(twin_id, dimension, question, right, said, _text(truth))
 
 
 def matches(name: str, other: str) -> bool:
@@ -97,10 +101,8 @@ def _words(text: str) -> frozenset[str]:
     )
 
 
-def _text(truth: object) -> str:
-    if isinstance(truth, Interval):
-        return f"{truth.low:.3g} to {truth.high:.3g}"
-    return "; ".join(map(str, truth)) if isinstance(truth, tuple) else str(truth)
+def _text(truth: Interval | tuple[str, ...]) -> str:
+    return f"{truth.low:.3g} to {truth.high:.3g}" if isinstance(truth, Interval) else "; ".join(truth)
 
 
 def wilson_interval(right: int, of: int, z: float = 1.959963984540054) -> tuple[float, float]:

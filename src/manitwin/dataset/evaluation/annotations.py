@@ -123,7 +123,7 @@ def _inputs(dataset: str) -> Mapping[str, str]:
 
 def _path_of(item: str, ledger: Path) -> str:
     said = parse_json_object(item, str(ledger), UsageError)
-    return next((str(said[name]) for name in ("file", "path", "input") if said.get(name)), "")
+    return str(said.get("file") or "")
 
 
 def _twin_of(file: str, paths: Mapping[str, str]) -> str | None:

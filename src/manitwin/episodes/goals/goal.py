@@ -14,13 +14,11 @@ class Signature:
     """How a predicate is written: what its second argument is, and the unit and default of its value; None: it has none.
 
     ``second`` is ``object`` (another object of the scene), ``fixture`` (a peg, a plate) or ``place`` (a marked position).
-    ``by_event``: it is true of something that happened, and stays true afterwards.
     """
 
     second: str | None = None
     unit: str | None = None
     default: float | None = None
-    by_event: bool = False
 
 
 SIGNATURES: Mapping[str, Signature] = {
@@ -37,9 +35,9 @@ SIGNATURES: Mapping[str, Signature] = {
     "undisturbed": Signature(),
     "pushed_to": Signature("place", "m", 0.02),
     "hung": Signature("fixture"),
-    "poured": Signature("object", "share", 0.9, by_event=False),
-    "pressed": Signature(None, "N", 5.0, by_event=True),
-    "struck": Signature("object", "m/s", 0.15, by_event=True),
+    "poured": Signature("object", "share", 0.9),
+    "pressed": Signature(None, "N", 5.0),
+    "struck": Signature("object", "m/s", 0.15),
 }
 """Every predicate of the language; ``docs/skills.md`` says what each measures."""
 

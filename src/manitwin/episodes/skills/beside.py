@@ -7,13 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.goals.spatial import SECTOR_RAD, SIDE_GAP_M, SIDES
 from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprint_at, on_its_surface
 from manitwin.episodes.skills.skill import Skill, Surroundings
 from manitwin.geometry.boxes import separation_m
 from manitwin.geometry.poses import transform, transform_points
-from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
 TRIED = 400
@@ -26,16 +24,12 @@ class Beside(Skill):
     """Set the target down on one side of its partner, or on any (``near``), on the same surface, turned at random."""
 
     name: str
+    predicate: str
     has_partner: bool = True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
         """Accept any two."""
         return partner is not None
-
-    def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return the side."""
-        assert partner is not None
-        return Goal((Literal(self.name, target.name, partner.name),))
 
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
@@ -76,7 +70,7 @@ class Beside(Skill):
         return float(np.arctan2(side[1], side[0]) + INSIDE_SHARE * SECTOR_RAD * rng.uniform(-1, 1))
 
 
-SIDE_SKILLS = tuple(Beside(name) for name in (*SIDES, "near"))
+SIDE_SKILLS = tuple(Beside(name, predicate=name) for name in (*SIDES, "near"))
 
 
 def _reach_m(corners: np.ndarray, middle: np.ndarray) -> float:

@@ -8,13 +8,11 @@ from itertools import zip_longest
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.skills.dropping import rest_after_drop
 from manitwin.episodes.skills.skill import Skill, Surroundings, tries
 from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.hull_distance import PlacedParts
 from manitwin.geometry.poses import rotation_between, transform
-from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.stacking import RIM_SLACK, Mouth, mouth_of, open_poses, put_into
 
@@ -29,7 +27,7 @@ PERTURBED, OFF_M, OFF_RAD = 3, 0.005, np.radians(3)
 class PlaceIn(Skill):
     """Put the target into its partner, a vessel that opens upward."""
 
-    name, has_partner, most_poses = "place_in", True, 6
+    name, predicate, has_partner, most_poses = "place_in", "in", True, 6
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
         """Accept a vessel that is deeper than a plate, with a rim wider than the target's two smaller sides."""
@@ -39,11 +37,6 @@ class PlaceIn(Skill):
         if opening is None or opening.depth_m < LEAST_DEPTH_M:
             return False
         return _radius_on_end(pool.body(target.twin_id).parts.whole) < opening.rim_radius_m
-
-    def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: the target is in the vessel."""
-        assert partner is not None
-        return Goal((Literal("in", target.name, partner.name),))
 
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator

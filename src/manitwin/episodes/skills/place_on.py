@@ -7,12 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.skills.dropping import rest_after_drop
 from manitwin.episodes.skills.skill import Skill, Surroundings
 from manitwin.geometry.hull_distance import PlacedParts
 from manitwin.geometry.poses import rotation_angle_rad, transform, transform_points
-from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.placing import draw_pose, on_plane
 from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin
 from manitwin.scenes.layouts.stacking import Level, level_end, lower
@@ -31,6 +29,7 @@ class PlaceOn(Skill):
 
     name: str
     same_category: bool = False
+    predicate: str = "on"
     has_partner: bool = True
     most_poses: int = 4
 
@@ -40,11 +39,6 @@ class PlaceOn(Skill):
             return False
         best = max(partner.poses, key=lambda pose: (pose.upright, pose.probability))
         return _top(pool.body(partner.twin_id).parts.at(best.object_to_plane)) is not None
-
-    def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: the target stands on its partner."""
-        assert partner is not None
-        return Goal((Literal("on", target.name, partner.name),))
 
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator

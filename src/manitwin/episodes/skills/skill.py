@@ -10,7 +10,7 @@ from itertools import islice
 import numpy as np
 
 from manitwin.episodes.goals.evaluation import evaluate
-from manitwin.episodes.goals.goal import Goal
+from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.goals.world_state import ObjectState, WorldState
 from manitwin.episodes.pick_place_tasks import PlacingArea
 from manitwin.geometry.cavity import Opening
@@ -62,11 +62,13 @@ class SkillGoal:
 class Skill(ABC):
     """A skill: ``name`` is that on the command line, ``has_partner`` tells whether a second object takes part.
 
-    ``most_poses``: so many goal poses are planned for, one after the other, before a goal counts as impossible to plan.
+    ``predicate`` is that of its goal. ``most_poses``: so many goal poses are planned for, one after the other, before a goal
+    counts as impossible to plan.
     """
 
     name: str
     has_partner: bool
+    predicate: str
     most_poses: int = 12
 
     @abstractmethod
@@ -74,14 +76,14 @@ class Skill(ABC):
         """Tell whether these two can take part, by what is known of them: sizes, openings, placements."""
 
     @abstractmethod
-    def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return the goal in the goal language."""
-
-    @abstractmethod
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
         """Yield poses ``(4, 4)`` of the target that reach the goal when it is let go there; none: there is no room."""
+
+    def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
+        """Return the goal: the predicate of the target, and of the partner where there is one."""
+        return Goal((Literal(self.predicate, target.name, None if partner is None else partner.name),))
 
     def begins_in(self, target: PoolTwin) -> Sequence[StandingPose]:
         """Return the placements that the target may begin in: its likeliest one, upright where it has such."""

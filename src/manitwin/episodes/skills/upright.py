@@ -6,11 +6,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.goals.spatial import UPRIGHT_RAD
 from manitwin.episodes.pick_place_tasks import footprint_at, free_poses
 from manitwin.episodes.skills.skill import Skill, Surroundings
-from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 
 POSES = 12
@@ -19,7 +17,7 @@ POSES = 12
 class Upright(Skill):
     """Set the target down in an upright placement; it begins in one that is not."""
 
-    name, has_partner = "upright", False
+    name, predicate, has_partner = "upright", "upright", False
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
         """Accept a twin that stands, and that also stays in some other placement."""
@@ -28,10 +26,6 @@ class Upright(Skill):
     def begins_in(self, target: PoolTwin) -> Sequence[StandingPose]:
         """Return the placements on its side."""
         return lying_poses(target)
-
-    def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
-        """Return: the target is upright."""
-        return Goal((Literal("upright", target.name),))
 
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
