@@ -128,9 +128,7 @@ def test_touch_of_one_step_between_two_rows_is_not_missed(
     robot, planner = panda()
     execution = Execution(world, robot, TrialSettings(50.0, 1.0, timestep_s=1 / 120), planner.tip_pose)
     pair = ("panda_link7", "board")
-    monkeypatch.setattr(
-        world.contacts, "unplanned", lambda contacts, in_hand: {pair} if execution.steps == 10 else set()
-    )
+    monkeypatch.setattr(world.contacts, "unplanned", lambda *_, **__: {pair} if execution.steps == 10 else set())
     execution.wait(phase, 18)
     assert execution.unplanned == {pair}
     assert execution.recording().unplanned_contact.tolist() == [False, False, True, False]

@@ -8,16 +8,21 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from sapien import physx
 
+from manitwin.episodes.events import EventWatch
+from manitwin.episodes.goals.world_state import Event
 from manitwin.episodes.planning.problem import Motion, Phase
 from manitwin.episodes.recorder import Recorder
 from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.geometry.poses import inverse
+from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 from manitwin.physics.trial_phases import SharedTarget
 from manitwin.robots.robot import Robot
 
-IN_HAND = frozenset({Phase.CLOSE, Phase.LIFT, Phase.CARRY, Phase.LOWER, Phase.OPEN})
+IN_HAND = frozenset(
+    {Phase.CLOSE, Phase.LIFT, Phase.CARRY, Phase.LOWER, Phase.OPEN, Phase.ACT, Phase.HOLD, Phase.RETURN}
+)
 STILL_ROWS, REST_ROWS = 5, 10  # 0.25 s and 0.5 s
 FRAME_S = 1 / 60  # between two looks at how hard the hand presses
 STEADY_FRAMES = 6  # the hand presses for so long before it moves on
@@ -46,6 +51,8 @@ class Execution:
         self._opening_target_m = robot.gripper.opening_m
         self._shared = SharedTarget(robot.gripper.opening_m, closing)
         self._presses = False
+        self.meant: MeantContacts = NONE_MEANT
+        self.watches: list[EventWatch] = []
         self.steps = 0
         self.unplanned: set[tuple[str, str]] = set()
         self.pressing: frozenset[frozenset[str]] = frozenset()
@@ -62,16 +69,29 @@ class Execution:
         """Return what was recorded so far."""
         return self._recorder.recording(self._tip_pose)
 
-    def follow(self, motion: Motion) -> None:
-        """Move the arm along a motion and wait until it has come to rest."""
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """What the ``watches`` have latched."""
+        return tuple(event for watch in self.watches for event in watch.events)
+
+    def follow(self, motion: Motion, until: Callable[[], bool] | None = None) -> bool:
+        """Move the arm along a motion and wait until it has come to rest.
+
+        A guarded move ends as soon as ``until`` is true, which is asked after every step, and the arm stays where it then is
+        told to be. Returns whether it went all the way.
+        """
         robot = self._world.robot
         for positions, velocities in zip(motion.positions_rad, motion.velocities_rad_s, strict=True):
             # the drives pull to where the arm is to be in the middle of the step, or it would run ahead of its targets
             robot.set_targets(positions - velocities * (self._closing.timestep_s / 2), velocities)
             self.commanded_rad = positions
             self._advance(motion.phase)
+            if until is not None and until():
+                robot.set_targets(self.commanded_rad, np.zeros_like(self.commanded_rad))
+                return False
         robot.set_targets(self.commanded_rad, np.zeros_like(self.commanded_rad))
         self.wait(motion.phase, self._steps(TRACKING_S))
+        return True
 
     def wait(self, phase: Phase, steps: int) -> None:
         """Stay where the robot is told to be."""
@@ -153,7 +173,9 @@ class Execution:
                 self._record(phase, before, contacts)
 
     def _watch(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
-        unplanned = self._world.contacts.unplanned(contacts, in_hand=phase in IN_HAND)
+        unplanned = self._world.contacts.unplanned(contacts, in_hand=phase in IN_HAND, meant=self.meant)
+        for watch in self.watches:
+            watch.look(self._world.contacts, contacts, self.length_s)
         self.unplanned.update(unplanned)
         self._unplanned_since_row = self._unplanned_since_row or bool(unplanned)
 

@@ -84,7 +84,8 @@ class GraspCandidates:
 
     def _without_room(self, world: ProblemWorld, gripper_to_world: np.ndarray) -> np.ndarray:
         flat = gripper_to_world.reshape(-1, 4, 4)
-        inside = self._room.is_inside(flat, world.problem.static_boxes, self._settings.clearance_m)
+        boxes = (*world.problem.static_boxes, *world.problem.fixtures)
+        inside = self._room.is_inside(flat, boxes, self._settings.clearance_m)
         return inside.reshape(gripper_to_world.shape[:2])
 
     def first_look(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:

@@ -53,7 +53,7 @@ def obstacle_shapes(
     target = store(problem.target.body)
     start, goal = pose_of(problem.target.object_to_world), pose_of(goal_object_to_world)
     placed: list[tuple[str, Any, Any]] = []
-    for box in problem.static_boxes:
+    for box in (*problem.static_boxes, *problem.fixtures):
         shape = coal.Box(2 * np.asarray(box.half_extents_m, float))
         shape.computeLocalAABB()
         placed.append((box.name, shape, pose_of(box.box_to_world)))

@@ -18,7 +18,10 @@ PlanFailure = Literal[
 
 
 class Phase(IntEnum):
-    """The phase of an episode; the numbers are part of the recorded format."""
+    """The phase of an episode; the numbers are part of the recorded format.
+
+    ACT is what a skill does with what it holds (or with the closed hand), HOLD is to stay there, RETURN the way back.
+    """
 
     REACH = 0
     APPROACH = 1
@@ -29,6 +32,9 @@ class Phase(IntEnum):
     OPEN = 6
     RETREAT = 7
     REST = 8
+    ACT = 9
+    HOLD = 10
+    RETURN = 11
 
 
 @dataclass(frozen=True)
@@ -42,7 +48,10 @@ class Grasp:
 
 @dataclass(frozen=True)
 class PickPlaceProblem:
-    """Move ``target`` to ``goal_object_to_world``, upright as it stands, with the first of ``grasps`` that can be planned."""
+    """Move ``target`` to ``goal_object_to_world``, upright as it stands, with the first of ``grasps`` that can be planned.
+
+    ``static_boxes`` are the furniture, ``fixtures`` the boxes that a skill works with; nothing of either moves.
+    """
 
     target: PlacedObject
     goal_object_to_world: np.ndarray
@@ -50,6 +59,7 @@ class PickPlaceProblem:
     obstacles: tuple[PlacedObject, ...] = ()
     static_boxes: tuple[StaticBox, ...] = ()
     seed: int = 0
+    fixtures: tuple[StaticBox, ...] = ()
 
 
 @dataclass(frozen=True)

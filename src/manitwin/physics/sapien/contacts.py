@@ -20,9 +20,32 @@ class Role(IntEnum):
     TARGET = 4
     OTHER = 5
     FURNITURE = 6
+    FIXTURE = 7
 
 
 ROBOT_NAME = "robot"
+
+
+@dataclass(frozen=True)
+class MeantContacts:
+    """The contacts that are meant for a while, by the names of bodies: of the fingers, and of the target in the hand.
+
+    Without ``target`` it is not asked what the target touches, as in pick-and-place.
+    """
+
+    fingers: frozenset[str] = frozenset()
+    target: frozenset[str] | None = None
+
+
+NONE_MEANT = MeantContacts()
+
+
+@dataclass(frozen=True)
+class Push:
+    """What presses on a body: the force ``(3,)`` on it, N, along the contacts' normals, and its middle ``(3,)``, m; world."""
+
+    force_n: np.ndarray
+    at_m: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -42,7 +65,12 @@ class ContactReader:
         bodies: Iterable[tuple[physx.PhysxBaseComponent, str, Role]],
         max_contact_force_n: float,
     ):
-        """Take every body with its name and role."""
+        """Take every body with its name and role.
+
+        ``has_strangers`` is to be set where there are bodies without one (granules): their contacts are left out then, which
+        takes time where there are many.
+        """
+        self.has_strangers = False
         self._system, self._max_impulse = system, max_contact_force_n * system.timestep
         self._roles: dict[physx.PhysxBaseComponent, Role] = {}
         self._names: dict[physx.PhysxBaseComponent, str] = {}
@@ -52,7 +80,27 @@ class ContactReader:
     def read(self) -> Sequence[physx.PhysxContact]:
         """Return the contacts of the last step, of which the others tell; expensive where many hulls stand on a table."""
         contacts: Sequence[physx.PhysxContact] = self._system.get_contacts()
+        if self.has_strangers:
+            known = self._roles
+            return [each for each in contacts if each.bodies[0] in known and each.bodies[1] in known]
         return contacts
+
+    def push(self, contacts: Iterable[physx.PhysxContact], on: str, by: frozenset[str]) -> Push | None:
+        """Return how some bodies press on another one, all by their names; None where none does."""
+        impulse, places, weights = np.zeros(3), list[np.ndarray](), list[float]()
+        for contact in contacts:
+            first, second = (self._names[body] for body in contact.bodies)
+            if not ((first == on and second in by) or (second == on and first in by)):
+                continue
+            sign = 1.0 if first == on else -1.0
+            for point in contact.points:
+                if point.impulse.any():
+                    impulse = impulse + sign * point.impulse
+                    places.append(point.position)
+                    weights.append(float(np.linalg.norm(point.impulse)))
+        if not places:
+            return None
+        return Push(impulse / self._system.timestep, np.average(places, axis=0, weights=weights))
 
     def touches(self, contacts: Iterable[physx.PhysxContact]) -> Touches:
         """Return what touches the target."""
@@ -83,20 +131,25 @@ class ContactReader:
     def _public_name(self, body: physx.PhysxBaseComponent) -> str:
         return ROBOT_NAME if self._roles[body] < Role.TARGET else self._names[body]
 
-    def unplanned(self, contacts: Iterable[physx.PhysxContact], *, in_hand: bool) -> set[tuple[str, str]]:
+    def unplanned(
+        self, contacts: Iterable[physx.PhysxContact], *, in_hand: bool, meant: MeantContacts = NONE_MEANT
+    ) -> set[tuple[str, str]]:
         """Return the names of what touches with more than the allowed force and should not, the robot's part first.
 
-        While the target is ``in_hand``, the palm may touch it.
+        While the target is ``in_hand``, the palm may touch it. What is ``meant`` is allowed, pair by pair.
         """
         impulses: dict[tuple[str, str], np.ndarray] = {}
         forbidden = _FORBIDDEN_IN_HAND if in_hand else _FORBIDDEN
         for contact in contacts:
             first, second = contact.bodies
-            if not forbidden[self._roles[first]][self._roles[second]]:
+            one, other = self._roles[first], self._roles[second]
+            if not forbidden[one][other] and (meant.target is None or not _is_of_target(one, other)):
                 continue
             sign = 1.0
-            if self._roles[first] > self._roles[second]:
-                first, second, sign = second, first, -1.0
+            if one > other:
+                first, second, sign, one = second, first, -1.0, other
+            if self._names[second] in ((meant.target or ()) if one == Role.TARGET else _fingers(one, meant)):
+                continue
             pair = self._names[first], self._names[second]
             impulses[pair] = impulses.get(pair, 0.0) + sign * _impulse(contact)
         return {pair for pair, impulse in impulses.items() if np.linalg.norm(impulse) > self._max_impulse}
@@ -111,6 +164,15 @@ def _forbidden(in_hand: bool) -> list[list[bool]]:
         return other > Role.TARGET or part == Role.ARM or (part == Role.HAND and not in_hand)
 
     return [[is_forbidden(min(one, two), max(one, two)) for two in Role] for one in Role]
+
+
+def _is_of_target(one: Role, other: Role) -> bool:
+    """Tell whether the target touches what is not of the robot."""
+    return min(one, other) == Role.TARGET
+
+
+def _fingers(part: Role, meant: MeantContacts) -> frozenset[str]:
+    return meant.fingers if part <= Role.MINUS_FINGER else frozenset()
 
 
 _FORBIDDEN, _FORBIDDEN_IN_HAND = _forbidden(False), _forbidden(True)

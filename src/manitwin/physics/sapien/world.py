@@ -1,4 +1,4 @@
-"""The physics of a task in SAPIEN: a robot, the target, the other objects and the furniture.
+"""The physics of a task in SAPIEN: a robot, the target, the other objects, the furniture and fixtures.
 
 Weight acts as SAPIEN has it: the drive that ``hand_scene`` replaces it with gains nothing here (42 episodes with heavy
 things turned by 5.0 degrees in the hand with it and by 3.4 without, at 50 solver iterations).
@@ -41,6 +41,7 @@ class RobotWorld:
         target: PlacedObject,
         others: Sequence[PlacedObject] = (),
         boxes: Sequence[StaticBox] = (),
+        fixtures: Sequence[StaticBox] = (),
         *,
         closing_force_n: float,
         timestep_s: float,
@@ -61,14 +62,18 @@ class RobotWorld:
         self.target = self.placed.index(target)
         self._system = system_with_gravity(timestep_s)
         self._scene = sapien.Scene([self._system])
-        surfaces = [self._add_box(box, furniture_friction) for box in boxes]
+        standing = [*boxes, *fixtures]
+        surfaces = [self._add_box(box, furniture_friction) for box in standing]
+        bearing = [Role.FURNITURE] * len(boxes) + [Role.FIXTURE] * len(fixtures)
         self._loan = COOKED.lent([placed.body.hulls for placed in self.placed])
         self.bodies = [
             self._add_object(placed, shapes) for placed, shapes in zip(self.placed, self._loan.__enter__(), strict=True)
         ]
         self.robot = SapienRobot(self._scene, robot, finger_force_n=closing_force_n, contact_offset_m=contact_offset_m)
         self.expect_load(False)
-        self.contacts = ContactReader(self._system, self._roles(robot, boxes, surfaces), max_contact_force_n)
+        self.contacts = ContactReader(
+            self._system, self._roles(robot, standing, surfaces, bearing), max_contact_force_n
+        )
 
     def __enter__(self) -> RobotWorld:
         return self
@@ -78,6 +83,12 @@ class RobotWorld:
     ) -> None:
         del self.contacts, self.robot, self.bodies, self._scene, self._system
         self._loan.__exit__(kind, error, trace)
+
+    def add_strangers(self, entities: Sequence[sapien.Entity]) -> None:
+        """Add bodies that have no name and no role; contacts leave them out."""
+        for entity in entities:
+            self._scene.add_entity(entity)
+        self.contacts.has_strangers = True
 
     def step(self, count: int = 1) -> None:
         """Let ``count`` timesteps pass."""
@@ -124,10 +135,14 @@ class RobotWorld:
         return component
 
     def _roles(
-        self, robot: Robot, boxes: Sequence[StaticBox], surfaces: Sequence[physx.PhysxRigidStaticComponent]
+        self,
+        robot: Robot,
+        boxes: Sequence[StaticBox],
+        surfaces: Sequence[physx.PhysxRigidStaticComponent],
+        bearing: Sequence[Role],
     ) -> list[tuple[physx.PhysxBaseComponent, str, Role]]:
         """Give every body its name and role; the robot's base does not move and touches nothing by accident."""
-        roles = [(surface, box.name, Role.FURNITURE) for surface, box in zip(surfaces, boxes, strict=True)]
+        roles = [(surface, box.name, role) for surface, box, role in zip(surfaces, boxes, bearing, strict=True)]
         for number, (body, placed) in enumerate(zip(self.bodies, self.placed, strict=True)):
             roles.append((body, placed.name, Role.TARGET if number == self.target else Role.OTHER))
         fingers = dict(zip(robot.finger_links, (Role.PLUS_FINGER, Role.MINUS_FINGER), strict=True))

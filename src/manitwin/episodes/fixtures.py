@@ -1,0 +1,98 @@
+"""Fixtures: what a skill needs beside twins: a peg on a stand, a block to strike, a panel with a button. Boxes that stay."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manitwin.episodes.goals.world_state import Peg
+from manitwin.geometry.boxes import footprint
+from manitwin.geometry.poses import transform, transform_points
+from manitwin.geometry.rigid_body import StaticBox
+
+PEG_RISES_RAD = np.radians(10)  # towards its tip, as coat hooks do: what hangs slides to the post
+PEG_RADIUS_M, PEG_LENGTH_M, PEG_HEIGHT_M = 0.004, 0.09, 0.28
+POST_HALF_M, FOOT_HALF_M, FOOT_HALF_HEIGHT_M = 0.012, 0.05, 0.006
+BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M = 0.05, 0.03
+PANEL_HALF_M, PANEL_HALF_HEIGHT_M = (0.07, 0.05), 0.02
+BUTTON_HALF_M, BUTTON_HALF_HEIGHT_M = 0.010, 0.003
+
+_CORNERS = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
+
+
+@dataclass(frozen=True)
+class Fixture:
+    """Boxes that stand where they are, each a body of the episode's world under its own name.
+
+    ``frame_to_world (4, 4)`` is where it works, at the box ``name``: a peg's foot with Z to its tip and X upward, the middle
+    of a face or a button with Z out of it. ``size_m`` is a peg's length, the half width of a face or a button.
+    """
+
+    kind: Literal["peg", "block", "panel"]
+    name: str
+    boxes: tuple[StaticBox, ...]
+    frame_to_world: np.ndarray
+    size_m: float
+
+    @property
+    def footprint_m(self) -> np.ndarray:
+        """The corners ``(K, 2)`` of what it covers, seen from above."""
+        return footprint(np.concatenate([_corners(box) for box in self.boxes]))
+
+    @property
+    def peg(self) -> Peg | None:
+        """The peg that things hang on; None for another kind."""
+        if self.kind != "peg":
+            return None
+        return Peg(self.frame_to_world[:3, 3], self.frame_to_world[:3, 2], self.size_m, PEG_RADIUS_M)
+
+
+def peg_stand(position_m: np.ndarray, yaw_rad: float, *, height_m: float = PEG_HEIGHT_M, name: str = "peg") -> Fixture:
+    """Return a peg 8 mm thick and 9 cm long that rises by 10 degrees from a post on a foot.
+
+    ``position_m (3,)`` is on the table below the peg's foot, which is ``height_m`` above; the peg points along ``yaw_rad``.
+    """
+    upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
+    along = upright[:3, :3] @ np.array([np.cos(PEG_RISES_RAD), 0.0, np.sin(PEG_RISES_RAD)])
+    across = upright[:3, 1]
+    upward = np.cross(along, across)
+    foot_m = upright[:3, 3] + [0.0, 0.0, height_m]
+    rotation = np.stack([upward, np.cross(along, upward), along], axis=1)
+    half_m = np.array([PEG_RADIUS_M, PEG_RADIUS_M, PEG_LENGTH_M / 2])
+    behind = upright @ transform(translation=np.array([-POST_HALF_M, 0.0, (height_m + POST_HALF_M) / 2]))
+    post = StaticBox(f"{name}_post", np.array([POST_HALF_M, POST_HALF_M, (height_m + POST_HALF_M) / 2]), behind)
+    below = upright @ transform(translation=np.array([-POST_HALF_M, 0.0, FOOT_HALF_HEIGHT_M]))
+    foot = StaticBox(f"{name}_foot", np.array([FOOT_HALF_M, FOOT_HALF_M, FOOT_HALF_HEIGHT_M]), below)
+    peg = StaticBox(name, half_m, transform(rotation, foot_m + along * PEG_LENGTH_M / 2))
+    return Fixture("peg", name, (peg, post, foot), transform(rotation, foot_m), PEG_LENGTH_M)
+
+
+def block(position_m: np.ndarray, yaw_rad: float, *, name: str = "block") -> Fixture:
+    """Return a block 10 x 10 x 6 cm that stands on the table at ``position_m (3,)``; it works at its top."""
+    upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
+    half_m = np.array([BLOCK_HALF_M, BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M])
+    middle = upright @ transform(translation=np.array([0.0, 0.0, BLOCK_HALF_HEIGHT_M]))
+    top = upright @ transform(translation=np.array([0.0, 0.0, 2 * BLOCK_HALF_HEIGHT_M]))
+    return Fixture("block", name, (StaticBox(name, half_m, middle),), top, BLOCK_HALF_M)
+
+
+def panel(position_m: np.ndarray, yaw_rad: float, *, name: str = "button") -> Fixture:
+    """Return a flat box on the table at ``position_m (3,)`` with a button 2 cm wide that stands out of it by 6 mm."""
+    upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
+    housing_m = np.array([*PANEL_HALF_M, PANEL_HALF_HEIGHT_M])
+    button_m = np.array([BUTTON_HALF_M, BUTTON_HALF_M, BUTTON_HALF_HEIGHT_M])
+    level_m = 2 * PANEL_HALF_HEIGHT_M
+
+    def at(height_m: float) -> np.ndarray:
+        return upright @ transform(translation=np.array([0.0, 0.0, height_m]))
+
+    housing = StaticBox(f"{name}_panel", housing_m, at(PANEL_HALF_HEIGHT_M))
+    button = StaticBox(name, button_m, at(level_m + BUTTON_HALF_HEIGHT_M))
+    return Fixture("panel", name, (button, housing), at(level_m + 2 * BUTTON_HALF_HEIGHT_M), BUTTON_HALF_M)
+
+
+def _corners(box: StaticBox) -> np.ndarray:
+    return transform_points(box.box_to_world, _CORNERS * box.half_extents_m)
