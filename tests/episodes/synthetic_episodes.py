@@ -68,6 +68,17 @@ def recording(seed: int, steps: int, arm: int = 7, things: int = 3) -> Recording
     )
 
 
+def with_granules(given: StoredEpisode, count: int = 9) -> StoredEpisode:
+    """The episode with granules that pass, one a step, from the target to the object after it, the last one beside it."""
+    taken, things = given.recording, len(given.objects)
+    rows, other = taken.steps + 1, (taken.target + 1) % things
+    held = np.zeros((rows, things), np.int16)
+    gone = np.minimum(np.arange(rows), count)
+    held[:, taken.target], held[:, other] = count - gone, np.minimum(gone, count - 1)
+    positions = np.linspace(0, 1, rows * count * 3, dtype=np.float32).reshape(rows, count, 3)
+    return replace(given, recording=replace(taken, granule_positions_m=positions, granules_in_objects=held))
+
+
 def attempt(number: int, *, outcome: str = "kept", robot_name: str = "panda", **changes: Any) -> Attempt:
     category = CATEGORIES[number % len(CATEGORIES)]
     executed, ended = (

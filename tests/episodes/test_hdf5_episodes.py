@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from synthetic_episodes import episode, recording, robot
+from synthetic_episodes import episode, recording, robot, with_granules
 
 from manitwin.episodes.hdf5_file import EpisodeFile, write_episodes
 from manitwin.episodes.hdf5_merge import METADATA, TRAJECTORIES, merge_episodes
@@ -39,7 +39,7 @@ def test_episodes_come_back_as_they_were(tmp_path: Path) -> None:
         episode(0),
         episode(1, steps=1),
         episode(2, of=robot(6, "ur5"), things=1),
-        episode(3, steps=200, things=12),
+        with_granules(episode(3, steps=200, things=12)),
     ]
     assert write_episodes(tmp_path / "a.h5", given) == 4
     with EpisodeFile(tmp_path / "a.h5") as file:
@@ -47,6 +47,22 @@ def test_episodes_come_back_as_they_were(tmp_path: Path) -> None:
         assert all(same(one, other) for one, other in zip(given, file, strict=True))
         with pytest.raises(IndexError):
             file[4]
+
+
+def test_granules_are_absent_where_there_are_none_and_refused_where_they_do_not_fit(tmp_path: Path) -> None:
+    given = with_granules(episode(1))
+    write_episodes(tmp_path / "a.h5", [episode(0), given])
+    with h5py.File(tmp_path / "a.h5", "r+") as file:
+        assert "granules_in_objects" not in file["traj_0/manitwin"]
+        assert file["traj_1/manitwin/granules_in_objects"].dtype == np.int16
+        del file["traj_1/manitwin/granule_positions_m"]
+        file["traj_1/manitwin/granule_positions_m"] = np.zeros((3, 9, 3), np.float32)
+    with EpisodeFile(tmp_path / "a.h5") as file, pytest.raises(EpisodesError, match="granules have the shapes"):
+        file[1]
+    assert given.recording.granules_in_objects is not None
+    short = replace(given.recording, granules_in_objects=given.recording.granules_in_objects[:-1])
+    with pytest.raises(EpisodesError, match="granules_in_objects has the shape"):
+        write_episodes(tmp_path / "b.h5", [replace(given, recording=short)])
 
 
 def test_same_episodes_give_the_same_bytes_at_any_time(tmp_path: Path) -> None:

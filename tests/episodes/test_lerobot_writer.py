@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from lerobot_sets import HEIGHT_PX, WIDTH_PX, camera, color_rgb, episodes, written
-from synthetic_episodes import episode, robot
+from synthetic_episodes import episode, robot, with_granules
 
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
@@ -53,6 +53,17 @@ def test_frames_are_those_of_the_recordings(found: LeRobotSet) -> None:
         assert np.array_equal(frames["index"], np.arange(begin, begin + steps))
         begin += steps
     assert found.info["total_frames"] == begin
+
+
+def test_frames_count_granules_where_a_set_has_them(found: LeRobotSet, tmp_path: Path) -> None:
+    assert "observation.granules" not in found.features
+    write_lerobot([episode(0), with_granules(episode(1))], tmp_path / "set", granules=True)
+    counted = read_lerobot(tmp_path / "set")
+    assert counted.features["observation.granules"]["names"] == ["in_target", "in_others", "in_none"]
+    assert not counted.frames(0)["observation.granules"].any()
+    counts = counted.frames(1)["observation.granules"]
+    assert counts[:3].tolist() == [[9, 0, 0], [8, 1, 0], [7, 2, 0]]
+    assert counts[-1].tolist() == [0, 8, 1]
 
 
 def test_features_are_named_and_typed(found: LeRobotSet) -> None:

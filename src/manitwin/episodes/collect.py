@@ -9,7 +9,7 @@ from pathlib import Path
 from manitwin.episodes.attempts import ATTEMPTS, merge_attempts, read_attempts, success_of
 from manitwin.episodes.batch import BATCH_RECORD, BATCHES, REMEDY_OF_REPEATS
 from manitwin.episodes.episodes_stage import EPISODES
-from manitwin.episodes.hdf5_file import EpisodeFile
+from manitwin.episodes.hdf5_file import EpisodeFile, has_granules
 from manitwin.episodes.hdf5_merge import merge_episodes
 from manitwin.episodes.lerobot.write import write_lerobot
 from manitwin.episodes.stored_episode import StoredEpisode
@@ -74,6 +74,15 @@ def stored_episodes(folders: Iterable[Path]) -> Iterator[StoredEpisode]:
             yield from file
 
 
+def any_granules(folders: Iterable[Path]) -> bool:
+    """Tell whether a kept episode of batches has granules."""
+    for folder in folders:
+        with EpisodeFile(folder / EPISODES) as file:
+            if any(has_granules(file.content, f"traj_{number}") for number in range(len(file))):
+                return True
+    return False
+
+
 def collect(out: Path, formats: list[str]) -> Collected:
     """Write the table of attempts and the data sets of the kept episodes; each appears whole or not at all."""
     folders = batch_folders(out)
@@ -81,7 +90,7 @@ def collect(out: Path, formats: list[str]) -> Collected:
     if MANISKILL in formats:
         merge_episodes([folder / EPISODES for folder in folders], out / MANISKILL)
     if LEROBOT in formats and kept:
-        write_lerobot(stored_episodes(folders), out / LEROBOT)
+        write_lerobot(stored_episodes(folders), out / LEROBOT, granules=any_granules(folders))
     return _collected(out)
 
 

@@ -25,7 +25,7 @@ from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
 from manitwin.episodes.batch import batch_name
 from manitwin.episodes.cameras import NamedCamera, named_cameras
-from manitwin.episodes.collect import LEROBOT, batch_folders, stored_episodes
+from manitwin.episodes.collect import LEROBOT, any_granules, batch_folders, stored_episodes
 from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
@@ -252,7 +252,7 @@ def write_with_pictures(out: Path, cameras: tuple[str, ...]) -> LeRobotSummary:
             for camera in cameras:
                 clips[camera][episode_id] = Clip(place / f"{camera}.mp4", first)
     videos = [CameraVideos(camera, clips[camera]) for camera in cameras]
-    return write_lerobot(stored_episodes(folders), out / LEROBOT, videos=videos)
+    return write_lerobot(stored_episodes(folders), out / LEROBOT, videos=videos, granules=any_granules(folders))
 
 
 def _said(out: Path) -> dict[str, str]:

@@ -45,8 +45,13 @@ EXTRA = "manitwin"
 _NAME = r"^[0-9A-Za-z_-][0-9A-Za-z_. -]*$"
 """What can be the name of a group in the file, and of a twin's folder."""
 
-_KINDS: dict[str, type] = {"phase": np.uint8, "target_on_support": bool, "unplanned_contact": bool}
+_KINDS: dict[str, type] = {
+    "phase": np.uint8, "target_on_support": bool, "unplanned_contact": bool, "granules_in_objects": np.int16,
+}  # fmt: skip
 """All other arrays are float32."""
+
+_GRANULES = ("granule_positions_m", "granules_in_objects")
+"""Only of episodes that have granules."""
 
 _COMPRESSED_BYTES = 512
 """Smaller arrays are stored as they are: they would not get smaller."""
@@ -190,6 +195,7 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
         f"{EXTRA}/action_tip_pose": np.hstack([recording.action_tip_position_m, recording.action_tip_quaternion_wxyz]),
         f"{EXTRA}/action_joint_delta": joint_delta(recording),
         f"{EXTRA}/action_tip_delta": tip_delta(recording),
+        **{f"{EXTRA}/{name}": found for name in _GRANULES if (found := getattr(recording, name)) is not None},
     }
     for name, array in arrays.items():
         packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "chunks": array.shape}
@@ -218,6 +224,11 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
     actions = array("actions", arm + 1)
     extra = {name: array(f"{EXTRA}/{name}") for name in ("phase", "target_on_support", "unplanned_contact")}
     extra["finger_forces_n"] = array(f"{EXTRA}/finger_forces_n", 2)
+    if has_granules(content, group):
+        extra |= {name: content.array(f"{group}/{EXTRA}/{name}") for name in _GRANULES}
+        middles, held = (extra[name].shape for name in _GRANULES)
+        if len(middles) != 3 or middles[::2] != (len(states), 3) or held != states.shape[:2]:
+            raise EpisodesError(f"{where}: granules have the shapes {middles} and {held}; {_REMEDY}")
     recording = Recording(
         target=said["target"],
         joint_positions_rad=positions[:, :arm],
@@ -238,6 +249,11 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
     return StoredEpisode(attempt_from(said["attempt"]), recording, robot, objects, said["facts"])
 
 
+def has_granules(content: Hdf5, group: str) -> bool:
+    """Tell whether a trajectory of a file has granules."""
+    return content.has(f"{group}/{EXTRA}/{_GRANULES[1]}")
+
+
 def checked(episode: StoredEpisode) -> Recording:
     """Return the recording with the types of the file: float32, phases uint8, flags bool.
 
@@ -253,9 +269,11 @@ def checked(episode: StoredEpisode) -> Recording:
     for entry in fields(Recording):
         if entry.name == "target":
             continue
+        if entry.name in _GRANULES and getattr(recording, entry.name) is None:
+            continue
         array = np.asarray(getattr(recording, entry.name))
         rows = steps if entry.name.startswith("action_") or entry.name == "phase" else steps + 1
-        shape = (rows, *_widths(arm, things).get(entry.name, ()))
+        shape = (rows, *_widths(arm, things, recording).get(entry.name, ()))
         if array.shape != shape:
             raise EpisodesError(
                 f"episode {name}: {entry.name} has the shape {array.shape}, not {shape}; record it again"
@@ -267,8 +285,11 @@ def checked(episode: StoredEpisode) -> Recording:
     return Recording(target=recording.target, **arrays)
 
 
-def _widths(arm: int, things: int) -> dict[str, tuple[int, ...]]:
+def _widths(arm: int, things: int, recording: Recording) -> dict[str, tuple[int, ...]]:
+    positions = recording.granule_positions_m
     return {
+        "granule_positions_m": () if positions is None else (*positions.shape[1:2], 3),
+        "granules_in_objects": (things,),
         "joint_positions_rad": (arm,),
         "joint_velocities_rad_s": (arm,),
         "tip_position_m": (3,),

@@ -18,6 +18,8 @@ class Recording:
     ``target``. ``gripper_opening_m`` is the distance between the pads. The tip is the twin's grasp frame (+Z approach, X
     closing). ``phase (T,)`` holds numbers of ``planning.problem.Phase``. ``finger_forces_n`` press on the target;
     ``unplanned_contact`` says that the robot touched with more than 0.5 N what it should not, since the state before.
+    Where there are granules, ``granule_positions_m (T + 1, N, 3)`` are their middles and ``granules_in_objects (T + 1, O)``
+    says how many each object holds.
     """
 
     target: int
@@ -38,6 +40,8 @@ class Recording:
     action_tip_position_m: np.ndarray
     action_tip_quaternion_wxyz: np.ndarray
     phase: np.ndarray
+    granule_positions_m: np.ndarray | None = None
+    granules_in_objects: np.ndarray | None = None
 
     @property
     def steps(self) -> int:

@@ -10,10 +10,11 @@ import numpy as np
 import pyarrow as pa
 
 from manitwin.episodes.lerobot.lerobot_format import DEFAULT_FEATURES
-from manitwin.episodes.recording import RATE_HZ, joint_delta, tip_delta
+from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta
 from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode
 
 OPENING = "gripper_opening_m"
+GRANULES = "observation.granules"
 _POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 _TWIST = ("dx_m", "dy_m", "dz_m", "rx_rad", "ry_rad", "rz_rad")
 
@@ -43,14 +44,15 @@ class Feature:
         return value if self.names is None else pa.list_(value, self.width)
 
 
-def features_of(robot: RecordedRobot) -> tuple[Feature, ...]:
-    """Return the features of a robot's episodes in the order of the columns."""
+def features_of(robot: RecordedRobot, *, granules: bool = False) -> tuple[Feature, ...]:
+    """Return the features of a robot's episodes in the order of the columns, with or without counts of ``granules``."""
     joints = robot.arm_joints
     return (
         Feature("observation.state", "float32", (*joints, OPENING)),
         Feature("observation.velocity", "float32", joints),
         Feature("observation.tip_pose", "float32", _POSE),
         Feature("observation.target_pose", "float32", _POSE),
+        *([Feature(GRANULES, "int64", ("in_target", "in_others", "in_none"))] if granules else []),
         Feature("action", "float32", (*joints, OPENING)),
         Feature("action.joint_delta", "float32", (*joints, OPENING)),
         Feature("action.tip_delta", "float32", (*_TWIST, OPENING)),
@@ -77,6 +79,7 @@ def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task
         "observation.velocity": recording.joint_velocities_rad_s[now],
         "observation.tip_pose": np.hstack([recording.tip_position_m, recording.tip_quaternion_wxyz])[now],
         "observation.target_pose": np.hstack(poses),
+        GRANULES: _granule_counts(episode.recording),
         "action": np.hstack([recording.action_joint_positions_rad, recording.action_gripper_opening_m[:, None]]),
         "action.joint_delta": joint_delta(recording),
         "action.tip_delta": tip_delta(recording),
@@ -89,6 +92,16 @@ def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task
         "index": first_index + number,
         "task_index": np.full(steps, task_index),
     }
+
+
+def _granule_counts(recording: Recording) -> np.ndarray:
+    """Return how many granules are in the target, in other vessels and in none ``(T, 3)``; zeros where there are none."""
+    positions, held = recording.granule_positions_m, recording.granules_in_objects
+    if positions is None or held is None:
+        return np.zeros((recording.steps, 3), np.int64)
+    in_target = held[:-1, recording.target].astype(np.int64)
+    in_others = held[:-1].sum(1, dtype=np.int64) - in_target
+    return np.stack([in_target, in_others, positions.shape[1] - in_target - in_others], axis=1)
 
 
 def schema_of(features: tuple[Feature, ...]) -> pa.Schema:

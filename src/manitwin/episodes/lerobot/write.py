@@ -52,12 +52,13 @@ def write_lerobot(
     seed: int = 0,
     data_files_size_in_mb: int = DATA_FILES_SIZE_IN_MB,
     videos: Sequence[CameraVideos] = (),
+    granules: bool = False,
 ) -> LeRobotSummary:
     """Write the episodes of one robot as a data set, numbered as they come; it appears whole or not at all.
 
     Every instruction is a task; ``seed`` and the episode's id choose the one that its frames have. With ``videos`` each
-    episode must have pictures of every camera. One episode is in memory at a time. The same episodes give the same bytes.
-    Raises EpisodesError for no episode, several robots, an episode without instructions, and pictures that do not fit.
+    episode must have pictures of every camera; with ``granules`` frames tell where these are (zeros for an episode without).
+    One episode is in memory at a time. The same episodes give the same bytes. Raises EpisodesError for no episode, several robots, an episode without instructions, and pictures that do not fit.
     """
     with folder_beside(place) as root:
         writer: _Set | None = None
@@ -65,7 +66,7 @@ def write_lerobot(
             for episode in episodes:
                 if writer is None:
                     columns = [VideoColumns(camera, root) for camera in videos]
-                    writer = stack.enter_context(_Set(root, episode, seed, data_files_size_in_mb, columns))
+                    writer = stack.enter_context(_Set(root, episode, seed, data_files_size_in_mb, columns, granules))
                 writer.add(episode)
         if writer is None:
             raise EpisodesError(f"{place}: no episode, and LeRobot reads no empty set; keep at least one episode")
@@ -77,10 +78,16 @@ class _Set:
     """A data set while it is written."""
 
     def __init__(
-        self, root: Path, first: StoredEpisode, seed: int, data_files_size_in_mb: int, videos: list[VideoColumns]
+        self,
+        root: Path,
+        first: StoredEpisode,
+        seed: int,
+        data_files_size_in_mb: int,
+        videos: list[VideoColumns],
+        granules: bool,
     ):
         self.root, self.robot, self.seed, self.videos = root, first.robot, seed, videos
-        self.features: tuple[Feature, ...] = features_of(first.robot)
+        self.features: tuple[Feature, ...] = features_of(first.robot, granules=granules)
         self.schema = schema_of(self.features)
         self.data = _DataFiles(root, self.schema, data_files_size_in_mb)
         self.size_mb = data_files_size_in_mb
@@ -111,6 +118,7 @@ class _Set:
             self.tasks.setdefault(task, len(self.tasks))
         chosen = self.tasks[_chosen(tasks, self.seed, attempt.episode_id)]
         frames = frames_of(episode, self.rows.count, self.frames, chosen)
+        frames = {feature.name: frames[feature.name] for feature in self.features}
         chunk, file = self.data.write(table_of(frames, self.features, self.schema))
         statistics = episode_statistics(frames)
         row: dict[str, Any] = {

@@ -19,7 +19,7 @@ from manitwin.dataset.publish.privacy import check_words, places_of
 from manitwin.dataset.publish.publication import EPISODES, Publication
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.attempts import ATTEMPTS, Success, merge_attempts, read_attempts, success_of, write_attempts
-from manitwin.episodes.collect import batch_folders, stored_episodes
+from manitwin.episodes.collect import any_granules, batch_folders, stored_episodes
 from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episode_pictures import PICTURES, batch_name, read_pictures
 from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
@@ -147,7 +147,7 @@ def publish_episodes(
             made = scratch / "made"
             films = films_of(episodes, batches, chosen.episodes.published.keys(), scratch / "films")
             kept = (each for each in stored_episodes(batches) if each.attempt.episode_id in chosen.episodes.published)
-            write_lerobot(kept, made, videos=films)
+            write_lerobot(kept, made, videos=films, granules=any_granules(batches))
             checked = read_lerobot(made)
             rows = _write_tables(episodes, chosen, made)
             success = success_of(each for each in read_attempts(episodes / ATTEMPTS) if chosen.tells_of(each))

@@ -1,0 +1,124 @@
+"""Granules: equal spheres in a vessel that stand for what is poured or stirred.
+
+What they are made of is measured: PhysX keeps 20 to 240 of them in thin hulls without one passing through, at 4 iterations of
+its solver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sapien
+from sapien import physx
+from scipy.spatial import ConvexHull
+
+from manitwin.geometry.cavity import Opening
+from manitwin.geometry.poses import rotation_between, transform_points
+from manitwin.physics.sapien.body import entity_at
+
+GRANULES = 60
+FILL_SHARE = 0.16  # of what a vessel holds to the brim: heaps of dry grains stay below its rim when it is carried
+PACKING = 0.55  # of spheres that were dropped and not shaken (loose random packing)
+RADIUS_M = (0.003, 0.008)
+MOST_OF_RIM = 0.2  # of the rim's radius: larger ones jam
+FALL_S = 0.6
+
+_DENSITY_KG_M3, _FRICTION, _RESTITUTION = 1000.0, 0.4, 0.1
+_LINEAR_DAMPING, _ANGULAR_DAMPING = 0.05, 1.0  # per s; spheres would roll for ever
+_OFFSET_SHARE = 0.2  # of the radius
+_ITERATIONS, _MAX_DEPENETRATION_M_S = 4, 0.5  # faster, and what is pressed against a wall shoots out of the vessel
+_SPACING = 2.15  # radii between two of the lattice
+_WIDTH_SHARE = 0.8  # of the rim's radius
+
+
+@dataclass(frozen=True)
+class GranuleFill:
+    """Granules before they fall: their middles ``(N, 3)`` in the frame of the vessel ``name``, and their radius, m."""
+
+    name: str
+    centers_m: np.ndarray
+    radius_m: float
+
+    @property
+    def volume_m3(self) -> float:
+        """What they take in a heap."""
+        return float(len(self.centers_m) * 4 / 3 * np.pi * self.radius_m**3 / PACKING)
+
+
+def fill(name: str, opening: Opening, hulls: Sequence[np.ndarray], rng: np.random.Generator) -> GranuleFill | None:
+    """Return 60 granules for a vessel, or fewer where they would be too small; None where it has no room for ten.
+
+    They take ``FILL_SHARE`` of its volume and stand in a loose lattice above its floor, clear of its ``hulls``, each
+    ``(V, 3)`` m.
+    """
+    content_m3 = FILL_SHARE * PACKING * opening.volume_m3
+    most_m = min(RADIUS_M[1], MOST_OF_RIM * opening.rim_radius_m)
+    radius_m = float(np.clip(np.cbrt(content_m3 / (GRANULES * 4 / 3 * np.pi)), RADIUS_M[0], most_m))
+    count = min(GRANULES, int(content_m3 / (4 / 3 * np.pi * radius_m**3)) + 1)
+    if most_m < RADIUS_M[0] or count < 10:
+        return None
+    centers_m = _lattice(opening, hulls, count, radius_m, rng)
+    return None if centers_m is None else GranuleFill(name, centers_m, radius_m)
+
+
+def _lattice(
+    opening: Opening, hulls: Sequence[np.ndarray], count: int, radius_m: float, rng: np.random.Generator
+) -> np.ndarray | None:
+    """Fill layers from below, each in a random order, until there are enough; None where they would heap over the rim."""
+    wide_m, step_m = max(_WIDTH_SHARE * opening.rim_radius_m - radius_m, 1.01 * radius_m), _SPACING * radius_m
+    planes = [ConvexHull(hull).equations for hull in hulls]
+    to_object = rotation_between(np.array([0.0, 0, 1]), opening.axis)
+    reach = int(wide_m // step_m) + 1
+    flat = np.arange(-reach, reach + 1) * step_m
+    layer = np.stack(np.meshgrid(flat, flat, indexing="ij"), axis=-1).reshape(-1, 2)
+    layer = layer[np.hypot(*layer.T) <= wide_m]
+    found: list[np.ndarray] = []
+    missing, height_m = count, -opening.depth_m + 1.5 * radius_m
+    while missing > 0:
+        if height_m > opening.depth_m:
+            return None
+        points = np.column_stack([layer, np.full(len(layer), height_m)])[rng.permutation(len(layer))]
+        points = points @ to_object.T + opening.center_m
+        free = ~np.any([_within(points, each, radius_m) for each in planes], axis=0)
+        found.append(points[free][:missing])
+        missing -= len(found[-1])
+        height_m += step_m
+    shaken = rng.uniform(-0.05 * radius_m, 0.05 * radius_m, (count, 3))
+    return np.concatenate(found) + shaken
+
+
+def _within(points: np.ndarray, planes: np.ndarray, radius_m: float) -> np.ndarray:
+    """Tell which spheres reach into a hull, by the planes ``(F, 4)`` of its faces."""
+    return np.asarray((points @ planes[:, :3].T + planes[:, 3]).max(1) < 1.02 * radius_m)
+
+
+class Granules:
+    """Granules in a scene."""
+
+    def __init__(self, scene: sapien.Scene, fill: GranuleFill, vessel_to_world: np.ndarray):
+        """Put them above the vessel's floor; they fall from the next step on."""
+        self.radius_m = fill.radius_m
+        material = physx.PhysxMaterial(_FRICTION, _FRICTION, _RESTITUTION)
+        self._bodies = []
+        for center in transform_points(vessel_to_world, fill.centers_m):
+            body = _granule(fill.radius_m, material)
+            scene.add_entity(entity_at(body, sapien.Pose(center), "granule"))
+            self._bodies.append(body)
+
+    def positions_m(self) -> np.ndarray:
+        """Return their middles ``(N, 3)`` in the world."""
+        return np.array([body.entity_pose.p for body in self._bodies], float)
+
+
+def _granule(radius_m: float, material: physx.PhysxMaterial) -> physx.PhysxRigidDynamicComponent:
+    shape = physx.PhysxCollisionShapeSphere(radius_m, material)
+    shape.density, shape.contact_offset = _DENSITY_KG_M3, _OFFSET_SHARE * radius_m
+    body = physx.PhysxRigidDynamicComponent()
+    body.attach(shape)
+    body.solver_position_iterations, body.solver_velocity_iterations = _ITERATIONS, 1
+    body.max_depenetration_velocity = _MAX_DEPENETRATION_M_S
+    body.set_linear_damping(_LINEAR_DAMPING)
+    body.set_angular_damping(_ANGULAR_DAMPING)
+    return body
