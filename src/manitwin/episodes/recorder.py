@@ -23,6 +23,7 @@ class _State(NamedTuple):
     object_quaternions_wxyz: list[np.ndarray]
     object_linear_velocities_m_s: list[np.ndarray]
     object_angular_velocities_rad_s: list[np.ndarray]
+    granule_positions_m: np.ndarray | None
 
 
 class _Action(NamedTuple):
@@ -64,6 +65,7 @@ class Recorder:
             np.array(states.pop("tip_to_world")),
             np.array([tip_pose(q) for q in told["joint_positions_rad"]]),
         )
+        granules_m = states.pop("granule_positions_m")
         object_quaternions = _continuous(np.array(states.pop("object_quaternions_wxyz")))
         tip_quaternions = _continuous(quaternion_wxyz(tips[:, :3, :3]))
         told_quaternions = _continuous(np.concatenate([tip_quaternions[:1], quaternion_wxyz(told_tips[:, :3, :3])]))
@@ -81,6 +83,7 @@ class Recorder:
             action_tip_position_m=told_tips[:, :3, 3].astype(np.float32),
             action_tip_quaternion_wxyz=told_quaternions[1:].astype(np.float32),
             phase=np.array(told["phase"], np.uint8),
+            granule_positions_m=None if granules_m[0] is None else np.array(granules_m, np.float32),
         )
 
     def _state(self, joint_velocities_rad_s: np.ndarray) -> _State:
@@ -95,6 +98,7 @@ class Recorder:
             object_quaternions_wxyz=[pose.q for pose in poses],
             object_linear_velocities_m_s=[body.linear_velocity for body in bodies],
             object_angular_velocities_rad_s=[body.angular_velocity for body in bodies],
+            granule_positions_m=None if (granules := self._world.granules) is None else granules.positions_m(),
         )
 
 

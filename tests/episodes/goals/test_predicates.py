@@ -120,9 +120,14 @@ def test_upright_lifted_pushed_and_undisturbed() -> None:
     assert judge(state(raised, ("item", ROBOT)), Literal("lifted", "item", value=0.11)).failure == "too_low"
     assert judge(state(raised), Literal("lifted", "item", value=0.05)).failure == "not_held"
     assert judge(state(raised), Literal("undisturbed", "item")).failure == "moved"
-    there = replace(state(thing(at(0.3, 0.01, 0.02))), places_m={"mark": np.array([0.3, 0, 0])})
-    assert judge(there, Literal("pushed_to", "item", "mark", 0.011)).holds
+    marks = {"mark": np.array([0.3, 0, 0])}
+    push = Event("pushed", "item", None, {"rise_m": 0.002})
+    there = replace(state(thing(at(0.3, 0.01, 0.02))), places_m=marks, events=(push,))
+    literal = Literal("pushed_to", "item", "mark", 0.011)
+    assert judge(there, literal).holds
     assert judge(there, Literal("pushed_to", "item", "mark", 0.009)).failure == "beside_it"
+    assert judge(replace(there, events=()), literal).failure == "not_touched"
+    assert judge(replace(there, events=(replace(push, values={"rise_m": 0.05}),)), literal).failure == "lifted"
 
 
 def poured(inside: int, spilt: int, left: int) -> WorldState:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from manitwin.episodes.goals import functional, spatial
+from manitwin.episodes.goals import functional, spatial, tool_use
 from manitwin.episodes.goals.goal import SIGNATURES, Goal, Literal
 from manitwin.episodes.goals.spatial import Judgement
 from manitwin.episodes.goals.world_state import WorldState
@@ -25,6 +25,10 @@ JUDGES: Mapping[str, Callable[[WorldState, Literal], Judgement]] = {
     "poured": functional.poured,
     "pressed": functional.pressed,
     "struck": functional.struck,
+    "stirred": tool_use.stirred,
+    "wiped": tool_use.wiped,
+    "cut_motion": tool_use.cut_motion,
+    "aimed": tool_use.aimed,
 }
 assert JUDGES.keys() == SIGNATURES.keys(), "every predicate has a judge"
 

@@ -38,6 +38,10 @@ SIGNATURES: Mapping[str, Signature] = {
     "poured": Signature("object", "share", 0.9),
     "pressed": Signature(None, "N", 5.0),
     "struck": Signature("object", "m/s", 0.15),
+    "stirred": Signature("object", "share", 0.75),
+    "wiped": Signature("place", "share", 0.8),
+    "cut_motion": Signature("place", "share", 0.8),
+    "aimed": Signature("object", "rad", 0.15),
 }
 """Every predicate of the language; ``docs/skills.md`` says what each measures."""
 

@@ -27,6 +27,7 @@ SIDE_GAP_M = (0.0, 0.14)
 UPRIGHT_RAD = np.radians(10)
 OPENS_UPWARD = np.cos(np.radians(12))
 LEAST_INSIDE_M = 0.02
+MOST_RISE_M = 0.01
 DISTURBED_M, DISTURBED_RAD = 0.01, np.radians(5)
 
 
@@ -154,11 +155,26 @@ def undisturbed(state: WorldState, literal: Literal) -> Judgement:
 
 
 def pushed_to(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object's centre of mass is over a place, the value away at most, and that it rests there."""
+    """Judge that an object was pushed over a place, its centre of mass the value away at most, and rests there.
+
+    Pushed is what the robot's hand touched (an event) and what never rose by more than 1 cm.
+    """
     assert literal.value is not None and literal.second is not None
     thing = state.of(literal.subject)
     off_m = float(np.linalg.norm(thing.center_of_mass_m[:2] - state.place(literal.second)[:2]))
-    return judged({"beside_it": off_m <= literal.value, "moving": thing.at_rest}, {"off_m": off_m})
+    rises_m = [
+        event.values["rise_m"] for event in state.events if (event.kind, event.subject) == ("pushed", literal.subject)
+    ]
+    return judged(
+        {
+            "beside_it": off_m <= literal.value,
+            "not_touched": bool(rises_m),
+            "lifted": max(rises_m, default=0.0) <= MOST_RISE_M,
+            "not_released": not state.touch(literal.subject, ROBOT),
+            "moving": thing.at_rest,
+        },
+        {"off_m": off_m, "rise_m": max(rises_m, default=0.0)},
+    )
 
 
 _DOT_M = 1e-4 * np.array([[1.0, 0], [-0.5, 0.8], [-0.5, -0.8]])  # a point as the smallest polygon

@@ -58,7 +58,8 @@ def write_lerobot(
 
     Every instruction is a task; ``seed`` and the episode's id choose the one that its frames have. With ``videos`` each
     episode must have pictures of every camera; with ``granules`` frames tell where these are (zeros for an episode without).
-    One episode is in memory at a time. The same episodes give the same bytes. Raises EpisodesError for no episode, several robots, an episode without instructions, and pictures that do not fit.
+    One episode is in memory at a time. The same episodes give the same bytes. Raises EpisodesError for no episode, several
+    robots, an episode without instructions, and pictures that do not fit.
     """
     with folder_beside(place) as root:
         writer: _Set | None = None

@@ -81,7 +81,9 @@ def _lattice(
             return None
         points = np.column_stack([layer, np.full(len(layer), height_m)])[rng.permutation(len(layer))]
         points = points @ to_object.T + opening.center_m
-        free = ~np.any([_within(points, each, radius_m) for each in planes], axis=0)
+        free = np.ones(len(points), bool)
+        for each in planes:
+            free &= ~_within(points, each, radius_m)
         found.append(points[free][:missing])
         missing -= len(found[-1])
         height_m += step_m
@@ -95,17 +97,18 @@ def _within(points: np.ndarray, planes: np.ndarray, radius_m: float) -> np.ndarr
 
 
 class Granules:
-    """Granules in a scene."""
+    """The bodies of granules, each an entity that no scene has yet."""
 
-    def __init__(self, scene: sapien.Scene, fill: GranuleFill, vessel_to_world: np.ndarray):
-        """Put them above the vessel's floor; they fall from the next step on."""
+    def __init__(self, fill: GranuleFill, vessel_to_world: np.ndarray):
+        """Put them above the floor of their vessel at its pose ``(4, 4)``."""
         self.radius_m = fill.radius_m
         material = physx.PhysxMaterial(_FRICTION, _FRICTION, _RESTITUTION)
-        self._bodies = []
-        for center in transform_points(vessel_to_world, fill.centers_m):
-            body = _granule(fill.radius_m, material)
-            scene.add_entity(entity_at(body, sapien.Pose(center), "granule"))
-            self._bodies.append(body)
+        centers_m = transform_points(vessel_to_world, fill.centers_m)
+        self._bodies = [_granule(fill.radius_m, material) for _ in centers_m]
+        self.entities = [
+            entity_at(body, sapien.Pose(center), "granule")
+            for body, center in zip(self._bodies, centers_m, strict=True)
+        ]
 
     def positions_m(self) -> np.ndarray:
         """Return their middles ``(N, 3)`` in the world."""

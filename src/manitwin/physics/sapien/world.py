@@ -17,6 +17,7 @@ from sapien import physx
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, StaticBox
 from manitwin.physics.sapien.body import entity_at, graspable_component, static_box, static_plane
 from manitwin.physics.sapien.contacts import ContactReader, Role
+from manitwin.physics.sapien.granules import FALL_S, GranuleFill, Granules
 from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.scene import system_with_gravity
 from manitwin.physics.sapien.settle import Rest, RestLimits, RestWatch, settle
@@ -30,7 +31,7 @@ LEAST_TABLE_M = 0.3
 
 
 class RobotWorld:
-    """A robot before a scene; its objects are in the order of their names, the target at ``target``.
+    """A robot before a scene; its objects are in the order of their names, the target at ``target``; ``granules``, if any.
 
     To be used in a ``with`` statement: at its end the cooked hulls are lent to other scenes, and nothing of it may be used.
     """
@@ -65,6 +66,7 @@ class RobotWorld:
         standing = [*boxes, *fixtures]
         surfaces = [self._add_box(box, furniture_friction) for box in standing]
         bearing = [Role.FURNITURE] * len(boxes) + [Role.FIXTURE] * len(fixtures)
+        self.granules: Granules | None = None
         self._loan = COOKED.lent([placed.body.hulls for placed in self.placed])
         self.bodies = [
             self._add_object(placed, shapes) for placed, shapes in zip(self.placed, self._loan.__enter__(), strict=True)
@@ -81,7 +83,7 @@ class RobotWorld:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        del self.contacts, self.robot, self.bodies, self._scene, self._system
+        del self.contacts, self.robot, self.bodies, self.granules, self._scene, self._system
         self._loan.__exit__(kind, error, trace)
 
     def add_strangers(self, entities: Sequence[sapien.Entity]) -> None:
@@ -89,6 +91,13 @@ class RobotWorld:
         for entity in entities:
             self._scene.add_entity(entity)
         self.contacts.has_strangers = True
+
+    def add_granules(self, fill: GranuleFill) -> None:
+        """Put granules into the vessel that they are for, and let them fall."""
+        number = [placed.name for placed in self.placed].index(fill.name)
+        self.granules = Granules(fill, self.object_to_world(number))
+        self.add_strangers(self.granules.entities)
+        self.step(round(FALL_S / self._timestep_s))
 
     def step(self, count: int = 1) -> None:
         """Let ``count`` timesteps pass."""

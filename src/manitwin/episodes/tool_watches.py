@@ -1,0 +1,245 @@
+"""Watches of what is done with a tool or with the hand alone: pushed, stirred, wiped, moved along a cut, aimed.
+
+Like those of ``events``, each looks at every step that it is shown; what it measures is judged later (``goals.tool_use``).
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from sapien import physx
+from scipy.spatial import ConvexHull
+
+from manitwin.episodes.events import Pose
+from manitwin.episodes.goals.tool_use import AIMED_M
+from manitwin.episodes.goals.world_state import Event
+from manitwin.geometry.cavity import Opening
+from manitwin.geometry.poses import inverse, transform_points
+from manitwin.physics.sapien.contacts import ContactReader
+
+SECTORS = 12
+STIRRED_BAND = (0.15, 1.0)  # of the rim's radius
+STIRRED_DEPTH = 0.3  # of the vessel's, below its rim
+CELL_M = 0.01
+WIPING_N = (1.0, 5.0)
+SMOOTHED_LOOKS = 12  # the force of one step is noise: a tenth of a second
+FACE_M = 0.002  # what is no farther from the plane than this belongs to the face
+CUT_OFF_M, CUT_RAD, CUT_STEP_M = 0.005, np.radians(10), 0.005
+AIMED_RAD = 0.15
+
+
+@dataclass
+class PushWatch:
+    """Latches that ``subject`` was touched by bodies of the robot, and how high its ``center`` rose meanwhile."""
+
+    subject: str
+    by: frozenset[str]
+    center: Callable[[], np.ndarray]
+    force_n: float = 0.0
+    _start_m: float | None = None
+    _rise_m: float = 0.0
+    _touched: bool = False
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """One event where it was touched: ``rise_m``."""
+        return (Event("pushed", self.subject, None, {"rise_m": self._rise_m}),) if self._touched else ()
+
+    def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
+        """Look at the contacts of the last step."""
+        push, height_m = reader.push(contacts, self.subject, self.by), float(self.center()[2])
+        self.force_n = 0.0 if push is None else float(np.linalg.norm(push.force_n))
+        self._touched = self._touched or self.force_n > 0
+        self._start_m = height_m if self._start_m is None else self._start_m
+        self._rise_m = max(self._rise_m, height_m - self._start_m)
+
+
+@dataclass
+class StirWatch:
+    """Latches through which sectors of a vessel a tool's ``end (3,)`` went, below a third of its depth.
+
+    ``granules`` gives their middles ``(N, 3)``. Values: ``sectors``, the share of twelve; ``moved``, the share of granules
+    that moved by more than their width.
+    """
+
+    tool: str
+    vessel: str
+    end: Callable[[], np.ndarray]
+    vessel_to_world: Pose
+    opening: Opening
+    granules: Callable[[], np.ndarray]
+    granule_radius_m: float
+    force_n: float = 0.0
+    _visited: np.ndarray = field(default_factory=lambda: np.zeros(SECTORS, bool))
+    _start: np.ndarray | None = None
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """One event where the end was in the vessel."""
+        if self._start is None or not self._visited.any():
+            return ()
+        moved = np.linalg.norm(self.granules() - self._start, axis=1) > 2 * self.granule_radius_m
+        values = {"sectors": float(self._visited.mean()), "moved": float(moved.mean())}
+        return (Event("stirred", self.tool, self.vessel, values),)
+
+    def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
+        """Look where the end is."""
+        if self._start is None:
+            self._start = self.granules()
+        pose, opening = self.vessel_to_world(), self.opening
+        offset = transform_points(inverse(pose), self.end()[None])[0] - opening.center_m
+        height_m = float(offset @ opening.axis)
+        across = offset - height_m * opening.axis
+        out_m = float(np.linalg.norm(across))
+        low, high = (share * opening.rim_radius_m for share in STIRRED_BAND)
+        if height_m > -STIRRED_DEPTH * opening.depth_m or not low <= out_m <= high:
+            return
+        x, y = _beside(opening.axis)
+        angle = float(np.arctan2(across @ y, across @ x)) % (2 * np.pi)
+        self._visited[int(angle / (2 * np.pi) * SECTORS) % SECTORS] = True
+
+
+@dataclass
+class WipeWatch:
+    """Latches which cells (1 cm) of a level patch a tool's face swept while it pressed on ``surface`` with 1 to 5 N.
+
+    ``patch_to_world`` is the patch's middle with Z up, ``half_m (2,)`` its half extents. Values: ``share`` swept, ``force_n``
+    in the mean while it touched, ``in_band``, the share of that time with such a force.
+    """
+
+    tool: str
+    surface: str
+    place: str
+    patch_to_world: np.ndarray
+    half_m: np.ndarray
+    tool_points_m: np.ndarray
+    tool_to_world: Pose
+    force_n: float = 0.0
+    _recent: deque[float] = field(default_factory=lambda: deque(maxlen=SMOOTHED_LOOKS))
+    _forces: list[float] = field(default_factory=list)
+    _swept: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Lay out the cells."""
+        axes = [np.arange(-half + CELL_M / 2, half, CELL_M) for half in self.half_m]
+        self._cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+        self._swept = np.zeros(len(self._cells), bool)
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """One event where it touched."""
+        if not self._forces:
+            return ()
+        forces = np.array(self._forces)
+        in_band = (forces >= WIPING_N[0]) & (forces <= WIPING_N[1])
+        values = {"share": self._swept.mean(), "force_n": forces.mean(), "in_band": in_band.mean()}
+        return (Event("wiped", self.tool, self.place, {name: float(value) for name, value in values.items()}),)
+
+    def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
+        """Look how hard it presses, and on which cells."""
+        push = reader.push(contacts, self.tool, frozenset({self.surface}))
+        self._recent.append(0.0 if push is None else float(np.linalg.norm(push.force_n)))
+        self.force_n = float(np.mean(self._recent))
+        if not any(self._recent):
+            return
+        self._forces.append(self.force_n)
+        if not WIPING_N[0] <= self.force_n <= WIPING_N[1]:
+            return
+        points = transform_points(inverse(self.patch_to_world) @ self.tool_to_world(), self.tool_points_m)
+        face = points[points[:, 2] < points[:, 2].min() + FACE_M, :2]
+        if len(face) < 3 or np.linalg.matrix_rank(face - face[0], tol=1e-4) < 2:
+            return
+        planes = ConvexHull(face).equations
+        self._swept |= (self._cells @ planes[:, :2].T + planes[:, 2] <= 0).all(1)
+
+
+@dataclass
+class CutWatch:
+    """Latches how much of a line an edge went along: within 5 mm of it, and 10 degrees from it and from upright.
+
+    ``line_to_world`` has its origin in the line's middle, X along it, Z up; ``edge`` gives the edge's frame (X along it, Z out
+    of it). Values: ``share`` of the line; ``off_m``, ``angle_rad``, the least that they were.
+    """
+
+    tool: str
+    place: str
+    line_to_world: np.ndarray
+    length_m: float
+    edge: Pose
+    edge_length_m: float
+    force_n: float = 0.0
+    _off_m: float = np.inf
+    _angle_rad: float = np.inf
+    _met: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Lay out the places along the line."""
+        self._places_m = np.arange(-self.length_m / 2, self.length_m / 2 + 1e-9, CUT_STEP_M)
+        self._met = np.zeros(len(self._places_m), bool)
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """One event where the edge came near."""
+        if not np.isfinite(self._off_m):
+            return ()
+        values = {"share": float(self._met.mean()), "off_m": self._off_m, "angle_rad": self._angle_rad}
+        return (Event("cut_motion", self.tool, self.place, values),)
+
+    def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
+        """Look where the edge is."""
+        edge = inverse(self.line_to_world) @ self.edge()
+        along = edge[:3, 0] * (1.0 if edge[0, 0] >= 0 else -1.0)
+        cosines = np.clip([along[0], -edge[2, 2]], -1, 1)
+        angle_rad = float(np.arccos(cosines).max())
+        to_line = (self._places_m - edge[0, 3]) / max(along[0], 1e-6)
+        beside = edge[1:3, 3] + to_line[:, None] * along[1:]
+        off_m = np.where(np.abs(to_line) <= self.edge_length_m / 2, np.linalg.norm(beside, axis=1), np.inf)
+        if angle_rad <= CUT_RAD:
+            self._met |= off_m <= CUT_OFF_M
+        if off_m.min() < self._off_m:
+            self._off_m, self._angle_rad = float(off_m.min()), angle_rad
+
+
+@dataclass
+class AimWatch:
+    """Latches the longest while for which a nozzle (Z out of it) pointed at ``target (3,)``, and how well at its best."""
+
+    tool: str
+    second: str
+    nozzle: Pose
+    target: Callable[[], np.ndarray]
+    timestep_s: float
+    force_n: float = 0.0
+    _looks: int = 0
+    _longest: int = 0
+    _best: tuple[float, float] | None = None
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """One event: ``angle_rad``, ``distance_m`` at its best, ``held_s``."""
+        if self._best is None:
+            return ()
+        values = {"angle_rad": self._best[0], "distance_m": self._best[1], "held_s": self._longest * self.timestep_s}
+        return (Event("aimed", self.tool, self.second, values),)
+
+    def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
+        """Look where the nozzle points."""
+        nozzle = self.nozzle()
+        way = self.target() - nozzle[:3, 3]
+        distance_m = float(np.linalg.norm(way))
+        angle_rad = float(np.arccos(np.clip(nozzle[:3, 2] @ way / max(distance_m, 1e-9), -1, 1)))
+        on_it = angle_rad <= AIMED_RAD and AIMED_M[0] <= distance_m <= AIMED_M[1]
+        self._looks = self._looks + 1 if on_it else 0
+        self._longest = max(self._longest, self._looks)
+        if self._best is None or angle_rad < self._best[0]:
+            self._best = angle_rad, distance_m
+
+
+def _beside(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return two directions across an axis ``(3,)``."""
+    x = np.cross(axis, [0.0, 1.0, 0.0] if abs(axis[1]) < 0.9 else [1.0, 0.0, 0.0])
+    x = x / np.linalg.norm(x)
+    return x, np.cross(axis, x)
