@@ -65,8 +65,9 @@ def rehearse(
         ledger.add_items(items(texts))
         sweep = partial(sweep_work, where)
         driver = Driver(
-            ledger, executor, recipe, settings, on_ended=ended.append, sweep=sweep, max_cost_usd=max_cost_usd
-        )
+            ledger, executor, recipe, settings, on_ended=ended.append, sweep=sweep, max_cost_usd=max_cost_usd,
+            remove=lambda item_id: where.remove(recipe.folder_of(item_id)),
+        )  # fmt: skip
         result = driver.run()
         wrong = [found.what for found in disagreements(ledger, where, settings.keep_work)]
         rows = ledger.connection.execute(

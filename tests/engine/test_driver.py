@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,6 +11,10 @@ from rehearsals import rehearse, runs
 
 from manitwin.config import RunConfig
 from manitwin.dataset.index.parts import indexed_twins
+from manitwin.engine.ledger.ledger import Ledger
+from manitwin.engine.recipe import Identity
+from manitwin.errors import Rejected
+from manitwin.pipeline.item import Item
 from manitwin.twin.dataset_root import twin_name
 from rehearsal_recipe import RehearsalRecipe
 
@@ -57,8 +62,6 @@ def test_a_changed_stage_is_done_again_with_what_follows_and_nothing_else(
 
 
 def test_two_items_of_one_twin_make_one_folder(tmp_path: Path, recipe: RehearsalRecipe) -> None:
-    from manitwin.pipeline.item import Item
-
     run = rehearse(tmp_path / "d", ["same"], recipe=recipe)
     assert run.states == {"same": "accepted"}
     from manitwin.engine.ledger.ledger import Ledger
@@ -70,6 +73,31 @@ def test_two_items_of_one_twin_make_one_folder(tmp_path: Path, recipe: Rehearsal
     assert [event.state for event in again.ended] == ["duplicate"]
     assert "item 1" in again.ended[0].detail
     assert len(folders(tmp_path / "d")) == 1 and again.wrong == []
+
+
+def test_the_rejection_of_what_stood_in_an_inputs_place_goes_when_the_input_is_changed(
+    tmp_path: Path, recipe: RehearsalRecipe
+) -> None:
+    input_file = tmp_path / "box.obj"
+
+    class OfBytes(RehearsalRecipe):
+        """Tells its items by the bytes of a file, and refuses those that say so."""
+
+        def identify(self, payload: Item) -> Identity:
+            said = input_file.read_text()
+            refused = Rejected("degenerate", said, "gate") if said == "broken" else None
+            return Identity(f"{sum(said.encode()):016x}", "text", refused)
+
+    recipe = OfBytes(log=tmp_path / "log")
+    input_file.write_text("broken")
+    first = rehearse(tmp_path / "d", ["box"], recipe=recipe)
+    assert first.states == {"box": "rejected"} and len(indexed_twins(first.root)) == 1
+    input_file.write_text("a box")
+    with closing(Ledger(tmp_path / "d" / "ledger.sqlite")) as ledger:
+        ledger.reopen([1])
+    second = rehearse(tmp_path / "d", recipe=recipe)
+    assert second.states == {"box": "accepted"} and second.wrong == []
+    assert len(folders(tmp_path / "d")) == 1 and set(indexed_twins(second.root)) == folders(tmp_path / "d")
 
 
 def test_what_fails_is_tried_three_times_and_quarantined_with_its_error(

@@ -114,7 +114,7 @@ def drive(
         with _executor(executor, address, setup, settings, opened) as engine:
             driver = Driver(
                 ledger, engine, recipe, settings, on_ended=ended, on_stage=on_stage, sweep=partial(sweep, root),
-                max_cost_usd=max_cost_usd, given=given,
+                remove=lambda item_id: root.remove(recipe.folder_of(item_id)), max_cost_usd=max_cost_usd, given=given,
             )  # fmt: skip
             on_start(items, opened)
             result = driver.run()

@@ -42,7 +42,8 @@ class RunResult:
 
 
 class Driver:
-    """One run over a ledger's open items; ``sweep`` deletes what a worker left half-made of an item that is given up.
+    """One run over a ledger's open items; ``sweep`` deletes what a worker left half-made of an item that is given up,
+    ``remove`` the finished folder of an id.
 
     ``given`` are the numbers of the items that are made again where another recipe made them; none: all.
     """
@@ -55,13 +56,14 @@ class Driver:
         settings: RunConfig,
         on_ended: Callable[[ItemEnded], None] = lambda event: None,
         sweep: Callable[[str], None] = lambda item_id: None,
+        remove: Callable[[str], None] = lambda item_id: None,
         clock: Callable[[], float] = time.monotonic,
         max_cost_usd: float | None = None,
         on_stage: OnStage = lambda event: None,
         given: Collection[int] = (),
     ):
         self.ledger, self.executor, self.recipe, self.settings = ledger, executor, recipe, settings
-        self._announcer, self._sweep, self._clock = Announcer(on_stage, on_ended), sweep, clock
+        self._announcer, self._sweep, self._remove, self._clock = Announcer(on_stage, on_ended), sweep, remove, clock
         self._gates = {
             needs: Gate(settings.vlm_per_minute if needs == "vlm" else None, settings.patience_s, clock)
             for needs in RESOURCES
@@ -222,6 +224,10 @@ class Driver:
             error=answer,
         )  # fmt: skip
         self._announcer.stage_ended(flight, INPUT, "done" if answer is None else "rejected", detail=answer or "")
+        superseded = self.ledger.superseded_rejection(flight.number, reply.item_id)
+        if superseded is not None:  # the reason why something else was rejected that stood in the input's place
+            self._remove(superseded)
+            self._tables.removed(superseded)
         other = self.ledger.identify(flight.number, reply.item_id, reply.kind)
         flight.task = replace(flight.task, item_id=reply.item_id)
         if other is not None:

@@ -89,7 +89,7 @@ class Finish:
 
 @dataclass(frozen=True)
 class WriteTables:
-    """Add finished folders to the tables; with none, merge what was added in parts."""
+    """Add finished folders to the tables, and take out those that are gone; with no ids, merge what was added in parts."""
 
     item_ids: tuple[str, ...]
     needs: Resource = "cpu"

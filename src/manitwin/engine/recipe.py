@@ -49,7 +49,7 @@ class Tables(Protocol):
     """Tables over all finished folders of a data set, written by workers while a run goes on. It is sent to every worker."""
 
     def add(self, root: DatasetRoot, ids: Sequence[str]) -> None:
-        """Add finished folders, new or made again."""
+        """Add finished folders, new or made again; of ids whose folder is gone the rows are taken out."""
         ...
 
     def merge(self, root: DatasetRoot) -> None:

@@ -17,11 +17,16 @@ class TableWriter:
         self._ledger, self._every, self._attempts = ledger, every, attempts
         self._under_way: WriteTables | None = None
         self._ended, self._failures = 0, 0
+        self._removed: set[str] = set()
         self._merged = True
 
     def item_ended(self) -> None:
         """Count an item that may have left a twin for the tables."""
         self._ended += 1
+
+    def removed(self, item_id: str) -> None:
+        """Note that a finished folder was removed: the tables are to lose its rows."""
+        self._removed.add(item_id)
 
     def due(self) -> WriteTables | None:
         """Return the next job once enough items have ended and no other job is under way."""
@@ -46,6 +51,7 @@ class TableWriter:
                 return f"the index cannot be written: {reply.message}; `manitwin check` says what is wrong"
         elif job is not None and job.item_ids:
             self._ledger.indexed(job.item_ids)
+            self._removed -= set(job.item_ids)
             self._merged = False
             self._failures = 0
         else:
@@ -54,7 +60,7 @@ class TableWriter:
 
     def _of_unwritten_twins(self) -> WriteTables | None:
         self._ended = 0
-        item_ids = tuple(self._ledger.not_indexed(10 * self._every))
+        item_ids = (*self._ledger.not_indexed(10 * self._every), *sorted(self._removed))
         return self._begun(WriteTables(item_ids)) if item_ids else None
 
     def _begun(self, job: WriteTables) -> WriteTables:

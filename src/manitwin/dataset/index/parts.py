@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
-import pyarrow.dataset as pads
 from pyarrow.fs import FSSpecHandler, LocalFileSystem, PyFileSystem
 
 from manitwin.dataset.index.part_list import (
@@ -35,6 +34,7 @@ from manitwin.dataset.index.twins import local_files
 from manitwin.errors import UsageError
 from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.store import RECORD
 
 MERGE_WIDTH = 8
 """So many parts of one order of size are merged into one: a twin is written log8 times, and readers open few files."""
@@ -52,8 +52,9 @@ class IndexTables:
     """The index as the tables that a run keeps of its twins."""
 
     def add(self, root: DatasetRoot, ids: Sequence[str]) -> None:
-        """Index finished twins, new or built again, as one more part."""
-        write_part(root, ids)
+        """Index finished twins, new or built again, as one more part; those whose folder is gone are taken out."""
+        there = [twin_id for twin_id in ids if root.exists(f"{root.twin_name(twin_id)}/{RECORD}")]
+        write_part(root, there, gone=[twin_id for twin_id in ids if twin_id not in there])
 
     def merge(self, root: DatasetRoot) -> None:
         """Merge all parts into few large ones."""
@@ -73,24 +74,25 @@ class IndexTables:
         return False
 
 
-def write_part(root: DatasetRoot, ids: Iterable[str]) -> IndexPart | None:
+def write_part(root: DatasetRoot, ids: Iterable[str], *, gone: Iterable[str] = ()) -> IndexPart | None:
     """Index finished twins, new or built again, as one more part; returns it, or None where no ids are given.
 
-    A twin that an older part has is taken out of it: that part is written again, under another name. Where that makes
+    A twin that an older part has is taken out of it, and so are those that are ``gone``: that part is written again, under
+    another name. Where that makes
     eight parts of about one size, they become one, and the part returned may be in that already. Raises TwinError for a
     folder that cannot be read; the index then is what it was.
     """
     wanted = sorted(set(ids))
+    changed = sorted({*wanted, *gone})
     before = read_part_list(root) or PartList()
     sweep(root, before)
-    if not wanted:
+    if not changed:
         return None
     writer = _Writer(root, before)
-    older = writer.parts_with(wanted)
-    writer.add(_joined(rows_of_twins(root, wanted)))
-    part = writer.parts[-1]
+    older = writer.parts_with(changed)
+    part = writer.add(_joined(rows_of_twins(root, wanted))) if wanted else None
     for each in older:
-        writer.replace([each], without=frozenset(wanted))
+        writer.replace([each], without=frozenset(changed))
     while alike := _alike(writer.parts):
         writer.replace(alike)
     writer.finish()
@@ -164,10 +166,12 @@ class _Writer:
         wanted = set(ids)
         return [part for part in near if not wanted.isdisjoint(twin_ids(files_of(self.root, [part]), self.fs).tolist())]
 
-    def add(self, rows: dict[str, pa.Table]) -> None:
-        """Write rows as a part of their own."""
-        self.parts.append(write_rows(self.root, self.next, rows))
+    def add(self, rows: dict[str, pa.Table]) -> IndexPart:
+        """Write rows as a part of their own; returns it."""
+        part = write_rows(self.root, self.next, rows)
+        self.parts.append(part)
         self.next += 1
+        return part
 
     def replace(self, parts: list[IndexPart], without: frozenset[str] = frozenset()) -> None:
         """Write the rows of parts again, merged, without those of some twins."""
@@ -195,6 +199,8 @@ def files_of(root: DatasetRoot, parts: Sequence[IndexPart]) -> Files:
 
 def read_rows(files: Files, table: str, fs: Any, *, columns: list[str] | None = None, where: Any = None) -> pa.Table:
     """Return the rows of a table's files that satisfy a pyarrow expression."""
+    import pyarrow.dataset as pads  # brings pandas, and few that import this module read rows
+
     try:
         source = pads.dataset(list(files[table]), schema=TABLES[table], format="parquet", filesystem=fs)
         return source.to_table(columns=columns, filter=where)

@@ -160,6 +160,15 @@ class Ledger:
         )
         return dict(rows)
 
+    def superseded_rejection(self, number: int, twin_id: str) -> str | None:
+        """Return the id under which an item was rejected before its input was changed, where no other item has it."""
+        row = self.connection.execute(
+            "SELECT twin_id FROM items WHERE number = ? AND twin_id <> ? AND reason IS NOT NULL AND revision IS NOT NULL"
+            " AND twin_id NOT IN (SELECT twin_id FROM items WHERE number <> ? AND twin_id IS NOT NULL)",
+            (number, twin_id, number),
+        ).fetchone()
+        return None if row is None else str(row[0])
+
     def identify(self, number: int, twin_id: str, kind: str) -> int | None:
         """Note whose twin an item is; where another item makes the same twin, end this one and return the other's number."""
         first = self.connection.execute(
