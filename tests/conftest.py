@@ -5,12 +5,16 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Generator, Iterator
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
 import pytest
 import typer.main
 import typer.testing
+
+from manitwin.errors import RendererMissing
+from manitwin.render.device import require_renderer
 
 SHARED_DATA = Path(__file__).resolve().parent.parent.parent / "shared" / "data"
 
@@ -33,6 +37,13 @@ def commands_built_once() -> Iterator[None]:
         patch.setattr(typer.main, "get_command", built)
         patch.setattr(typer.testing, "_get_command", built)
         yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def renderer_found_once() -> None:
+    """Look for a device that renders once a process: programs that tests start are told of it, and need not look again."""
+    with suppress(RendererMissing):
+        require_renderer()
 
 
 @pytest.fixture(scope="session")

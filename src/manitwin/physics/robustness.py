@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import RigidBody
@@ -132,6 +132,8 @@ def draw_perturbations(spread: Spread, count: int, seed: int) -> list[Perturbati
 
     Shifts and turns are uniform in their balls, factors uniform, masses uniform in their logarithm.
     """
+    from scipy.stats import qmc  # a second or so of imports that only trials need
+
     # a scrambled Sobol sequence is balanced at powers of two only; the first of a longer one are the same points
     unit = qmc.Sobol(d=15, scramble=True, seed=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
     low, high = np.log(spread.mass_kg)
@@ -154,7 +156,7 @@ def _between(interval: tuple[float, float], share: float) -> float:
 
 def _in_ball(unit: np.ndarray) -> np.ndarray:
     """Turn four numbers in [0, 1] into a point ``(3,)`` uniform in the unit ball: a direction and a radius."""
-    direction = norm.ppf(np.clip(unit[:3], 1e-9, 1 - 1e-9))
+    direction = ndtri(np.clip(unit[:3], 1e-9, 1 - 1e-9))
     return np.asarray(direction / np.linalg.norm(direction) * np.cbrt(unit[3]))
 
 

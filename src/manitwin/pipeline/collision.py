@@ -15,7 +15,6 @@ from manitwin.errors import Rejected
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.hulls.decomposition import convex_decomposition
 from manitwin.geometry.hulls.error import hull_error
-from manitwin.physics.sapien.settle import ball_stays_inside
 from manitwin.pipeline.object_state import load_solid
 
 HULLS = "hulls.npz"
@@ -59,6 +58,8 @@ class CollisionStage:
         error = hull_error(solid, found.hulls, opening, np.random.default_rng(draft.seed), settings.error_samples)
         keeps_opening, notes = None, list(found.notes)
         if opening is not None and error.cavity_kept is not None:
+            from manitwin.physics.sapien.settle import ball_stays_inside  # the engine loads where a stage needs it
+
             ball_in = ball_stays_inside(found.hulls, opening)
             keeps_opening = ball_in and error.cavity_kept >= settings.least_cavity_kept
             if not keeps_opening:

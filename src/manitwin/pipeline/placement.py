@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -19,10 +19,11 @@ from manitwin.geometry.hulls.reduction import convex_corners
 from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.geometry.stable_poses import easiest_tilt, stable_poses
-from manitwin.physics.mujoco.settle import settle_on_plane_in_mujoco
-from manitwin.physics.sapien.settle import Settled, settle_on_plane
 from manitwin.pipeline.object_state import load_body, load_solid
 from manitwin.twin.resting import rest_of
+
+if TYPE_CHECKING:
+    from manitwin.physics.sapien.settle import Settled
 
 UP = np.array([0.0, 0.0, 1.0])
 SAME_POSE_DEG = 5.0
@@ -156,6 +157,10 @@ class _Shape:
         easily: it must not go on. A body that rests ``loosely`` is nudged the other way too, and must fall back to within
         ``SNAP_DEG`` from both.
         """
+        from manitwin.physics.sapien.settle import (
+            settle_on_plane,  # an engine loads when a stage runs, not with the recipe
+        )
+
         if not rests:
             return []
         level = np.array([rest.rotation for rest in rests])
@@ -184,6 +189,8 @@ class _Shape:
 
     def _stays_in_second_engine(self, pose: np.ndarray, level: np.ndarray, most_rad: float) -> bool:
         """Tell whether the body stays in another solver too: on a narrow facet, the two need not agree."""
+        from manitwin.physics.mujoco.settle import settle_on_plane_in_mujoco
+
         drop_m, seconds = self.settings.drop_m, self.settings.seconds
         again = settle_on_plane_in_mujoco(self.plane_body, [pose], drop_m=drop_m, seconds=seconds)[0]
         return self._stayed(again, level, most_rad)
