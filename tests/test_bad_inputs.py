@@ -34,7 +34,7 @@ REJECTED = {
     "zero_faces.obj": ("input", {"no_faces"}, "face"),
     "scene_four_objects.glb": ("gate", {"several_objects"}, "4"),
 }
-FEW_GRASPS = manitwin.config.BuildConfig(grasps={"simulated": 10, "unfiltered": 2})
+FEW_GRASPS = manitwin.config.BuildConfig(grasps={"simulated": 10, "unfiltered": 2, "least_per_point": 0})
 NAMES = {
     "cmyk.jpg": "fork",
     "gray16.png": "flashlight",

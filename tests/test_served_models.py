@@ -56,6 +56,8 @@ attempts = 3
 [grasps]
 simulated = 20
 unfiltered = 0
+least_per_point = 2
+tries_per_point = 4
 [second_opinion]
 enabled = false
 [robustness]

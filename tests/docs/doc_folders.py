@@ -24,6 +24,8 @@ from twin_folders import twin_id
 SMALL = """\
 grasps.simulated = 20
 grasps.unfiltered = 0
+grasps.least_per_point = 2
+grasps.tries_per_point = 4
 second_opinion.enabled = false
 robustness.enabled = false
 """

@@ -14,7 +14,9 @@ from manitwin.assets.importers.importer import import_assets
 from manitwin.config import BuildConfig
 
 QUICK = BuildConfig(
-    grasps={"simulated": 12, "unfiltered": 4}, second_opinion={"enabled": False}, robustness={"enabled": False}
+    grasps={"simulated": 12, "unfiltered": 4, "least_per_point": 0},
+    second_opinion={"enabled": False},
+    robustness={"enabled": False},
 )
 
 
