@@ -116,3 +116,30 @@ def test_only_metal_is_gold() -> None:
     assert names(part) == ["dark yellow"]
     part.visual.material.metallicFactor = 1.0
     assert names(part) == ["gold"]
+
+
+def test_a_matter_under_more_and_less_light_is_one_colour() -> None:
+    white = [(230, 230, 228), (200, 200, 199), (172, 172, 170)]  # 79, 58 and 41 % of the light
+    assert names(squares(*((rgb, 1 / 3) for rgb in white))) == ["light grey"]
+    dark = [(30, 30, 31), (45, 45, 46), (80, 80, 82)]
+    assert names(squares(*((rgb, 1 / 3) for rgb in dark))) == ["dark grey"]
+    red = [(214, 44, 48), (196, 38, 43), (110, 19, 22)]
+    assert names(squares(*((rgb, 1 / 3) for rgb in red))) == ["red"]
+
+
+def test_black_and_white_stay_two() -> None:
+    assert names(squares(((235, 235, 235), 0.5), ((20, 20, 20), 0.5))) == ["white", "black"]
+
+
+def test_the_inside_of_a_deep_vessel_does_not_count() -> None:
+    cup = trimesh.creation.annulus(r_min=0.028, r_max=0.03, height=0.2)
+    bottom = trimesh.creation.cylinder(0.029, 0.002, transform=trimesh.transformations.translation_matrix([0, 0, -0.1]))
+    outward = np.einsum("ij,ij->i", cup.face_normals[:, :2], cup.triangles_center[:, :2]) > -1e-6
+    inner = trimesh.Trimesh(cup.vertices, cup.faces[~outward], process=False)
+    outer = trimesh.Trimesh(cup.vertices, cup.faces[outward], process=False)
+    parts = (
+        visual(outer, name="outside", baseColorFactor=[200, 10, 10, 255]),
+        visual(inner, name="inside", baseColorFactor=[2, 2, 2, 255]),
+        visual(bottom, name="bottom", baseColorFactor=[200, 10, 10, 255]),
+    )
+    assert [color.name for color in measure_colors(parts, np.random.default_rng(0))] == ["red"]

@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 
 from manitwin.formats.meshes.textures import linear_to_srgb, material_of, uv_of
+from manitwin.geometry.openness import open_share
 from manitwin.geometry.sampling import sample_surface
 
 # (name, sRGB hex). Several shades share a name. Names and regions follow the ISCC-NBS centroid colours (Kelly and Judd
@@ -57,8 +58,12 @@ UNTEXTURED = "unknown color (untextured)"
 _SAMPLES = 3000
 _CLUSTERS = 8
 _SAME_COLOR = 16.0  # CIELAB distance under which clusters are shades of one colour
+_LIGHTNESS = 0.5  # how much a difference in lightness counts of one in tint
+_LEAST_OPEN = 1 / 3  # of the surroundings: the bottom of a mug sees less, and hardly anybody sees it
+_LEAST_SEEN = 1 / 4
 _LEAST_SHARE = 0.12  # of the surface, to be named beside the main colour
 _MOST_NAMES = 3
+_MOST_OF = 2 / 3  # of a family's share: it is called as its member of that much
 # Base colours that readers and modelling tools write where nobody has chosen one: white (glTF 2.0, 5.22.2) and the grey
 # of 0.8 (the default Kd of OBJ material libraries and of Blender).
 _DEFAULT_COLORS = ((255, 255, 255), (204, 204, 204))
@@ -107,9 +112,22 @@ def measure_colors(parts: tuple[trimesh.Trimesh, ...], rng: np.random.Generator)
     if not colored or areas.sum() <= 0:
         return []
     counts = np.maximum(np.round(_SAMPLES * areas / areas.sum()).astype(int), 1)
-    samples = np.vstack([_base_colors(part, count, rng) for part, count in zip(colored, counts, strict=True)])
+    samples = [_base_colors(part, count, rng) for part, count in zip(colored, counts, strict=True)]
+    colors, points, normals = (np.vstack(each) for each in zip(*samples, strict=True))
+    seen = seen_from_outside(_joined(parts), points, normals)
     metallic = any(float(material_of(part).metallicFactor or 0.0) > _METALLIC for part in colored)
-    return _named_shares(lab_from_srgb(samples), metallic)
+    return named_colors(lab_from_srgb(colors[seen]), metallic)
+
+
+def seen_from_outside(mesh: trimesh.Trimesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return whether each surface point ``(N, 3)`` can well be seen from outside; True for all where hardly any can."""
+    seen = open_share(mesh, points, normals) >= _LEAST_OPEN
+    return seen if seen.mean() >= _LEAST_SEEN else np.ones(len(points), dtype=bool)
+
+
+def _joined(parts: tuple[trimesh.Trimesh, ...]) -> trimesh.Trimesh:
+    vertices, faces = trimesh.util.append_faces([part.vertices for part in parts], [part.faces for part in parts])
+    return trimesh.Trimesh(vertices, faces, process=False)
 
 
 def _has_color(part: trimesh.Trimesh) -> bool:
@@ -121,13 +139,15 @@ def _has_color(part: trimesh.Trimesh) -> bool:
     return color not in _DEFAULT_COLORS or named_white
 
 
-def _base_colors(part: trimesh.Trimesh, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Return the base colour ``(count, 3)`` as sRGB in 0..1 at points spread evenly over the part's surface."""
+def _base_colors(
+    part: trimesh.Trimesh, count: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the base colour (sRGB in 0..1), place and outward normal, ``(count, 3)`` each, spread evenly over the part."""
     material, uv = material_of(part), uv_of(part)
     factor = np.asarray(material.baseColorFactor, dtype=float)[:3] / 255  # linear, as glTF has it
+    points, normals, faces = sample_surface(part, count, rng)
     if material.baseColorTexture is None or uv is None:
-        return np.repeat(linear_to_srgb(factor)[None], count, axis=0)
-    points, _, faces = sample_surface(part, count, rng)
+        return np.repeat(linear_to_srgb(factor)[None], count, axis=0), points, normals
     corners = trimesh.triangles.points_to_barycentric(part.triangles[faces], points)
     at = np.einsum("ni,nij->nj", corners, uv[part.faces[faces]])
     image = np.asarray(material.baseColorTexture.convert("RGB"))
@@ -136,10 +156,14 @@ def _base_colors(part: trimesh.Trimesh, count: int, rng: np.random.Generator) ->
     row = np.floor(((1.0 - at[:, 1]) % 1.0) * height).astype(int) % height
     texture = image[row, column] / 255
     linear = np.where(texture <= 0.04045, texture / 12.92, ((texture + 0.055) / 1.055) ** 2.4)
-    return np.clip(linear_to_srgb(linear * factor), 0, 1)
+    return np.clip(linear_to_srgb(linear * factor), 0, 1), points, normals
 
 
-def _named_shares(lab: np.ndarray, metallic: bool) -> list[ColorShare]:
+def named_colors(lab: np.ndarray, metallic: bool) -> list[ColorShare]:
+    """Return up to three named colours of what a camera saw of a surface at places ``(N, 3)`` CIELAB, as people order them.
+
+    Places that one matter may show under more or less light are one matter: a scan's texture holds the light of its capture.
+    """
     centers, labels = _merged(*_k_means(lab))
     shares: dict[str, float] = {}
     for index in range(len(centers)):
@@ -150,13 +174,15 @@ def _named_shares(lab: np.ndarray, metallic: bool) -> list[ColorShare]:
 
 
 def _by_family(shares: dict[str, float]) -> dict[str, float]:
-    """Join shades that are one colour to a person; a shade that is alone keeps its name."""
+    """Join shades that are one colour to a person, called as the one that is most of it; a shade alone keeps its name."""
     members: dict[str, list[str]] = {}
     for name in shares:
         members.setdefault(_FAMILIES.get(name, name), []).append(name)
-    return {
-        family if len(names) > 1 else names[0]: sum(shares[name] for name in names) for family, names in members.items()
-    }
+    joined: dict[str, float] = {}
+    for family, names in members.items():
+        share, main = sum(shares[name] for name in names), max(names, key=lambda name: shares[name])
+        joined[main if shares[main] >= _MOST_OF * share else family] = share
+    return joined
 
 
 def _ranked(shares: dict[str, float]) -> list[ColorShare]:
@@ -169,16 +195,28 @@ def _ranked(shares: dict[str, float]) -> list[ColorShare]:
 def _k_means(lab: np.ndarray, rounds: int = 15) -> tuple[np.ndarray, np.ndarray]:
     """Cluster colours ``(N, 3)``: Lloyd's k-means from far-apart starts, so that equal input gives equal clusters."""
     centers = [np.median(lab, axis=0)]
-    distance = np.linalg.norm(lab - centers[0], axis=1)
+    distance = _apart(lab, centers[0])
     while len(centers) < _CLUSTERS and distance.max() > _SAME_COLOR / 2:
         centers.append(lab[int(distance.argmax())])
-        distance = np.minimum(distance, np.linalg.norm(lab - centers[-1], axis=1))
+        distance = np.minimum(distance, _apart(lab, centers[-1]))
     middle = np.array(centers)
     for _ in range(rounds):
-        labels = np.linalg.norm(lab[:, None] - middle, axis=2).argmin(1)
+        labels = _apart(lab[:, None], middle).argmin(1)
         middle = np.array([lab[labels == i].mean(0) if (labels == i).any() else middle[i] for i in range(len(middle))])
-    labels = np.linalg.norm(lab[:, None] - middle, axis=2).argmin(1)
+    labels = _apart(lab[:, None], middle).argmin(1)
     return middle, labels
+
+
+def _apart(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return how far colours ``(..., 3)`` are from being one matter's under more and less light.
+
+    Light scales XYZ, and so a* and b* with L* + 16 (CIE 15:2004, 8.2.1): they are compared as under the light of the
+    darker one. Lightness counts half, as for acceptability in CMC(2:1) (Clarke, McDonald, Rigg 1984).
+    """
+    light_one, light_other = one[..., :1] + 16, other[..., :1] + 16
+    darker = np.minimum(light_one, light_other)
+    tint = one[..., 1:] * darker / light_one - other[..., 1:] * darker / light_other
+    return np.asarray(np.sqrt((tint**2).sum(-1) + (_LIGHTNESS * (light_one - light_other)[..., 0]) ** 2))
 
 
 def _merged(centers: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -187,7 +225,7 @@ def _merged(centers: np.ndarray, labels: np.ndarray) -> tuple[np.ndarray, np.nda
     groups = [[i] for i in range(len(centers)) if sizes[i]]
     means = [centers[g[0]] for g in groups]
     while len(groups) > 1:
-        gap = np.linalg.norm(np.array(means)[:, None] - np.array(means), axis=2) + 1e9 * np.eye(len(means))
+        gap = _apart(np.array(means)[:, None], np.array(means)) + 1e9 * np.eye(len(means))
         a, b = sorted(int(i) for i in np.unravel_index(int(gap.argmin()), gap.shape))
         if gap[a, b] >= _SAME_COLOR:
             break
