@@ -101,7 +101,17 @@ ROBOTS = Choices("robot", _shipped("robots/definitions"), or_file=".toml")
 SKILLS = Choices(
     "skill",
     _of(
-        "pick_place", "place_on", "place_in", "stack", "left_of", "right_of", "behind", "in_front_of", "near", "upright"
+        "pick_place",
+        "place_on",
+        "place_in",
+        "stack",
+        "left_of",
+        "right_of",
+        "behind",
+        "in_front_of",
+        "near",
+        "upright",
+        "hang",
     ),
 )
 SURFACES = Choices("surface", _of("table", "shelf", "tray"))

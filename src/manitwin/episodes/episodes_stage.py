@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,9 @@ from manitwin.config import Resource
 from manitwin.engine.stage import Draft, tell_part
 from manitwin.episodes.attempts import ATTEMPTS, Attempt, write_attempts
 from manitwin.episodes.batch import Batch
-from manitwin.episodes.episode import EpisodeFacts, run_episode
+from manitwin.episodes.episode import run_episode
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.fixtures import to_json
 from manitwin.episodes.goals.goal_instructions import goal_instructions
 from manitwin.episodes.hdf5_file import write_episodes
 from manitwin.episodes.instructions import episode_instructions
@@ -155,6 +158,7 @@ class EpisodesStage:
             obstacles=tuple(each for place, each in enumerate(task.objects) if place != task.target),
             static_boxes=tuple(furniture_boxes(setting.furniture)),
             seed=seed,
+            fixtures=tuple(box for fixture in setting.fixtures for box in fixture.boxes),
         )
         facts, recording = run_episode(problem, self._planner, self._robot, self.settings.episode, setting.skill_goal)
         spoken = self._instructions(setting, seed)
@@ -172,6 +176,10 @@ class EpisodesStage:
             "lights": [light.model_dump(mode="json") for light in setting.lights],
             "twin_revision": twin.record.revision,
         }
+        if setting.fixtures:
+            said["fixtures"] = [to_json(fixture) for fixture in setting.fixtures]
+        if facts.events:
+            said["events"] = [asdict(event) for event in facts.events]
         return StoredEpisode(attempt, recording, recorded_robot(self._robot), objects, said)
 
     def _instructions(self, setting: Setting, seed: int) -> tuple[str, ...]:

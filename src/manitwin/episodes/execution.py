@@ -93,6 +93,15 @@ class Execution:
         self.wait(motion.phase, self._steps(TRACKING_S))
         return True
 
+    def yield_here(self) -> None:
+        """Take the joints as they are for those that they are told to be: what presses against the arm presses no more."""
+        self.commanded_rad = self._world.robot.joint_positions()
+        self._world.robot.set_targets(self.commanded_rad, np.zeros_like(self.commanded_rad))
+
+    def wait_s(self, phase: Phase, time_s: float) -> None:
+        """Stay for a while."""
+        self.wait(phase, self._steps(time_s))
+
     def wait(self, phase: Phase, steps: int) -> None:
         """Stay where the robot is told to be."""
         for _ in range(steps):

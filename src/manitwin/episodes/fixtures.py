@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.goals.world_state import Peg
 from manitwin.geometry.boxes import footprint
-from manitwin.geometry.poses import transform, transform_points
+from manitwin.geometry.poses import quaternion_wxyz, transform, transform_points
 from manitwin.geometry.rigid_body import StaticBox
 
 PEG_RISES_RAD = np.radians(10)  # towards its tip, as coat hooks do: what hangs slides to the post
@@ -41,6 +41,11 @@ class Fixture:
     def footprint_m(self) -> np.ndarray:
         """The corners ``(K, 2)`` of what it covers, seen from above."""
         return footprint(np.concatenate([_corners(box) for box in self.boxes]))
+
+    @property
+    def bearing(self) -> frozenset[str]:
+        """The names of those boxes that count as furniture when something lies on them: all but where it works, and a post."""
+        return frozenset(box.name for box in self.boxes) - {self.name, f"{self.name}_post"}
 
     @property
     def peg(self) -> Peg | None:
@@ -92,6 +97,20 @@ def panel(position_m: np.ndarray, yaw_rad: float, *, name: str = "button") -> Fi
     housing = StaticBox(f"{name}_panel", housing_m, at(PANEL_HALF_HEIGHT_M))
     button = StaticBox(name, button_m, at(level_m + BUTTON_HALF_HEIGHT_M))
     return Fixture("panel", name, (button, housing), at(level_m + 2 * BUTTON_HALF_HEIGHT_M), BUTTON_HALF_M)
+
+
+def to_json(fixture: Fixture) -> dict[str, Any]:
+    """Return a fixture as plain values: what episodes keep of it."""
+    boxes = [
+        {
+            "name": box.name,
+            "half_extents_m": np.asarray(box.half_extents_m, float).tolist(),
+            "position_m": box.box_to_world[:3, 3].tolist(),
+            "quaternion_wxyz": quaternion_wxyz(box.box_to_world[:3, :3]).tolist(),
+        }
+        for box in fixture.boxes
+    ]
+    return {"kind": fixture.kind, "name": fixture.name, "boxes": boxes}
 
 
 def _corners(box: StaticBox) -> np.ndarray:

@@ -84,7 +84,7 @@ class PlacingArea:
         """Draw a pose for a footprint ``(K, 2)`` that is free of those that are ``taken``; None where none was found."""
         for _ in range(POSES_TRIED):
             pose = _pose(self.workspace, rng)
-            if self._holds(_at(corners, pose)) and _clear(_at(corners, pose), taken):
+            if self.holds(_at(corners, pose)) and _clear(_at(corners, pose), taken):
                 return pose
         return None
 
@@ -93,9 +93,10 @@ class PlacingArea:
         workspace, radius_m = self.workspace, float(np.linalg.norm(position_m))
         angle_rad = abs(float(np.arctan2(position_m[1], position_m[0])))
         in_reach = workspace.min_radius_m <= radius_m <= workspace.max_radius_m
-        return in_reach and angle_rad <= workspace.half_angle_rad and self._holds(corners)
+        return in_reach and angle_rad <= workspace.half_angle_rad and self.holds(corners)
 
-    def _holds(self, corners: np.ndarray) -> bool:
+    def holds(self, corners: np.ndarray) -> bool:
+        """Tell whether a footprint ``(K, 2)`` is wholly on the surface, and clear of the arm's foot."""
         inside = np.abs(corners - self.support.center_m) <= self.support.half_extents_m
         # nothing may stand in the arm's foot, whatever its centre's distance
         clear_of_base = np.linalg.norm(corners, axis=1).min() > self.workspace.min_radius_m / 2

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from manitwin.episodes.fixtures import Fixture
 from manitwin.episodes.pick_place_tasks import (
     PickPlaceTask,
     Placeable,
@@ -15,7 +16,7 @@ from manitwin.episodes.pick_place_tasks import (
     sample_objects,
     sample_task,
 )
-from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, set_goal
+from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
 from manitwin.robots.robot import Workspace
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.surroundings import make_furniture, make_lights
@@ -35,6 +36,11 @@ class Setting:
     lights: tuple[Light, ...]
     scene_id: str | None = None
     skill_goal: SkillGoal | None = None
+
+    @property
+    def fixtures(self) -> tuple[Fixture, ...]:
+        """What the skill needs beside objects."""
+        return () if self.skill_goal is None else self.skill_goal.fixtures
 
 
 def table_setting(
@@ -65,7 +71,7 @@ def table_setting(
         if objects is None:
             return None
         around = Surroundings(objects, pool, area, tuple(furniture_boxes(furniture)))
-        found = set_goal(skill, around, 0, 1 if skill.has_partner else None, rng)
+        found = skill.set_goal(around, 0, 1 if skill.has_partner else None, rng)
         if found is not None:
             return Setting(PickPlaceTask(objects, 0, found.poses[0]), furniture, ambient, lights, None, found)
     return None
@@ -102,7 +108,7 @@ def scene_setting(
             continue
         around = Surroundings(objects, pool(), area, boxes)
         for partner in _partners(skill, around, target, rng):
-            found = set_goal(skill, around, target, partner, rng)
+            found = skill.set_goal(around, target, partner, rng)
             if found is not None:
                 task = PickPlaceTask(objects, target, found.poses[0])
                 return Setting(task, record.furniture, record.ambient, record.lights, scene.record.scene_id, found)

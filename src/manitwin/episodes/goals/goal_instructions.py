@@ -49,6 +49,18 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "stand {a} up", "put {a} upright", "{a} has fallen over: stand {it} up", "set {a} back on {its} base",
         "pick up {a} and put {it} down upright", "please stand {a} upright again",
     ),
+    "hung": (
+        "hang {a} on the peg", "hang up {a}", "put {a} on the hook", "pick up {a} and hang {it} on the peg",
+        "take {a} and slip {it} over the peg", "please hang {a} up by its hole",
+    ),
+    "pressed": (
+        "press {a}", "push down on {a} with your fingertips", "press down on {a}", "give {a} a push from above",
+        "close your hand and press {a}", "please press {a} once",
+    ),
+    "struck": (
+        "strike the block with {a}", "hit the block with {a}", "use {a} to strike the block",
+        "pick up {a} and hit the block with {it}", "knock on the block with {a}", "please give the block a blow with {a}",
+    ),
 }  # fmt: skip
 """The templates of each predicate; the last one of each is held out for tests of policies (``held_out``)."""
 
@@ -72,7 +84,7 @@ def goal_instructions(
     templates = TEMPLATES[literal.predicate]
     templates = templates[-1:] if held_out else templates[:-1]
     subjects = _names(literal.subject, words)
-    seconds = [None] if literal.second is None else _names(literal.second, words)
+    seconds = [None] if literal.second not in words else _names(str(literal.second), words)  # fixtures have no names
     rng = np.random.default_rng(seed)
     pairs = list(product(subjects, seconds))
     templates = tuple(templates[i] for i in rng.permutation(len(templates)))

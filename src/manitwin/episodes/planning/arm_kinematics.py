@@ -25,9 +25,9 @@ STALLED_AFTER = (
 class ArmKinematics:
     """An arm of n joints whose limits are those of the URDF; what turns further than once turns once, about its home."""
 
-    def __init__(self, robot: Robot):
-        """Build the model of ``robot``'s arm with open fingers."""
-        self.body: KinematicBody = arm_of(robot)
+    def __init__(self, robot: Robot, opening_m: float | None = None):
+        """Build the model of ``robot``'s arm with open fingers, or with the distance ``opening_m`` between the pads."""
+        self.body: KinematicBody = arm_of(robot, opening_m)
         self.home = np.asarray(robot.home_rad, float)
         model = self.body.model
         lower, upper = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)

@@ -13,6 +13,9 @@ from manitwin.episodes.planning.libraries import pin
 from manitwin.episodes.planning.obstacle_shapes import ObstacleShapes, obstacle_shapes, pose_of
 from manitwin.episodes.planning.problem import Phase, PickPlaceProblem, PlannerSettings
 
+STANDING = "target"
+"""The name of the target's shapes where it stands."""
+
 
 class CollisionWorld:
     """A body among obstacles, and the target twice: where it stands, and in the hand.
@@ -31,14 +34,15 @@ class CollisionWorld:
         robot = range(body.geometry.ngeoms)
         statics = [self._add(s.name, 0, s.pose, s.shape) for s in obstacles.statics]
         standing = [self._add(f"target {i}", 0, obstacles.start, s) for i, s in enumerate(obstacles.target_hulls)]
-        whole = self._add("target", 0, obstacles.start, obstacles.target_whole)
+        whole = self._add(STANDING, 0, obstacles.start, obstacles.target_whole)
         self._standing = [*standing, whole]
         self._held = [self._add(f"held {i}", body.joint, obstacles.start, s) for i, s in enumerate(obstacles.carried)]
-        self._pairs = _Pairs(self._geometry.ngeoms, body, robot, statics, standing, whole, self._held)
+        names = [static.name for static in obstacles.statics]
+        self._pairs = _Pairs(self._geometry.ngeoms, body, robot, statics, standing, whole, self._held, names)
         self._geometry.setCollisionPairs(self._pairs.ever(), True)
         self._collision = self._geometry.createData()
         self._manager = broad_phase(self._model, self._geometry, self._collision)
-        self._entered: tuple[Phase, float] | None = None
+        self._entered: tuple[Phase, float, frozenset[str]] | None = None
 
     def _add(self, name: str, joint: int, pose: Any, shape: Any) -> int:
         return int(self._geometry.addGeometryObject(pin.GeometryObject(name, joint, pose, shape)))
@@ -49,17 +53,23 @@ class CollisionWorld:
         for index in self._held:
             self._geometry.geometryObjects[index].placement = placement
 
-    def enter(self, phase: Phase, margin_m: float | None = None) -> None:
-        """Test from now on what a phase forbids, with its own margin or with another."""
+    def enter(self, phase: Phase, margin_m: float | None = None, meant: frozenset[str] = frozenset()) -> None:
+        """Test from now on what a phase forbids, with its own margin or with another.
+
+        Of the things named ``meant`` (the target where it stands: ``STANDING``) nothing is tested against what is held, and
+        against the fingers where nothing is: pair by pair, all else keeps its clearance.
+        """
         if margin_m is None:
             margin_m = self._margin_m if phase in (Phase.REACH, Phase.CARRY) else self._clearance_m
-        if self._entered == (phase, margin_m):
+        if self._entered == (phase, margin_m, meant):
             return
-        self._entered = (phase, margin_m)
+        self._entered = (phase, margin_m, meant)
         stands_at = self._obstacles.goal if phase is Phase.RETREAT else self._obstacles.start
         for index in self._standing:
             self._geometry.geometryObjects[index].placement = stands_at
         active, margins = self._pairs.of(phase, margin_m, self._obstacles)
+        if meant:
+            active = active & ~self._pairs.meant(meant)
         self._collision.setActiveCollisionPairs(self._geometry, active, True)
         self._collision.setSecurityMargins(self._geometry, margins, True, True)
 
@@ -89,7 +99,9 @@ class _Pairs:
         standing: list[int],
         whole: int,
         held: list[int],
+        names: list[str],
     ):
+        self._names, self._fingers, self._standing = names, sorted(body.fingers), [*standing, whole]
         joints = [int(shape.parentJoint) for shape in body.geometry.geometryObjects]
         self._statics, self._held = statics, held
         moving = [i for i in robot if joints[i] > 0]
@@ -124,6 +136,16 @@ class _Pairs:
         """Return the pairs that any phase tests."""
         return np.logical_or.reduce(list(self._of_phase.values()))
 
+    def meant(self, names: frozenset[str]) -> np.ndarray:
+        """Return the pairs of what is held, and of the fingers, with things by their names."""
+        things = [index for index, name in zip(self._statics, self._names, strict=True) if name in names]
+        pairs = np.zeros_like(self._own)
+        pairs[np.ix_(things, self._held)] = True
+        pairs[np.ix_(self._fingers, things)] = True
+        if STANDING in names:
+            pairs[np.ix_(self._fingers, self._standing)] = True
+        return pairs
+
     def of(self, phase: Phase, margin_m: float, obstacles: ObstacleShapes) -> tuple[np.ndarray, np.ndarray]:
         """Return a phase's pairs and the clearance of each."""
         key = (phase, margin_m)
@@ -156,16 +178,19 @@ class ProblemWorld:
         hand: KinematicBody,
         store: ShapeStore,
         settings: PlannerSettings,
+        *,
+        as_hulls: bool = False,
     ):
-        """Build both worlds."""
-        self.problem, self.goal_object_to_world = problem, goal_object_to_world
-        shapes = obstacle_shapes(problem, goal_object_to_world, store, settings.margin_m)
+        """Build both worlds; ``as_hulls``: the target is carried as its own hulls, so that its holes and cavities are free."""
+        self.problem, self.goal_object_to_world, self._as_hulls = problem, goal_object_to_world, as_hulls
+        shapes = obstacle_shapes(problem, goal_object_to_world, store, settings.margin_m, as_hulls=as_hulls)
         self.arm = CollisionWorld(arm, shapes, margin_m=settings.margin_m, clearance_m=settings.clearance_m)
         self._hand = CollisionWorld(hand, shapes, margin_m=settings.margin_m, clearance_m=settings.clearance_m)
 
-    def is_of(self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray) -> bool:
-        """Tell whether this is the world of this very problem with such a goal."""
-        return self.problem is problem and np.array_equal(self.goal_object_to_world, goal_object_to_world)
+    def is_of(self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray, *, as_hulls: bool = False) -> bool:
+        """Tell whether this is the world of this very problem with such a goal, its target carried as asked for."""
+        same = self.problem is problem and self._as_hulls == as_hulls
+        return same and np.array_equal(self.goal_object_to_world, goal_object_to_world)
 
     def hold(self, gripper_to_object: np.ndarray) -> None:
         """Put the held target where a grasp has it."""

@@ -21,7 +21,7 @@ class KinematicBody:
     """A model, its convex collision shapes with the pairs to be tested, and the joint that the gripper is fixed to.
 
     ``gripper_to_joint`` is the pose of the twin's grasp frame in the frame of ``joint``. ``touching`` are the shapes that
-    may touch the target when they hold it.
+    may touch the target when they hold it, ``fingers`` those of them that are the fingers.
     """
 
     model: Any
@@ -29,16 +29,18 @@ class KinematicBody:
     joint: int
     gripper_to_joint: Any
     touching: frozenset[int]
+    fingers: frozenset[int] = frozenset()
 
 
-def arm_of(robot: Robot) -> KinematicBody:
-    """Build the arm with its fingers open; joints are ``robot.arm_joints`` in their order."""
+def arm_of(robot: Robot, opening_m: float | None = None) -> KinematicBody:
+    """Build the arm with its fingers open, or as wide as said; joints are ``robot.arm_joints`` in their order."""
+    opening_m = robot.gripper.opening_m if opening_m is None else opening_m
     urdf = _without_continuous_joints(robot.urdf)
     model = pin.buildModelFromXML(urdf)
     geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, None, [])
     configuration = pin.neutral(model)
     for name in robot.finger_joints:
-        configuration[model.joints[model.getJointId(name)].idx_q] = robot.gripper.opening_m / 2
+        configuration[model.joints[model.getJointId(name)].idx_q] = opening_m / 2
     locked = [i for i in range(1, model.njoints) if model.names[i] not in robot.arm_joints]
     model, geometry = pin.buildReducedModel(model, geometry, locked, configuration)
     tip = model.frames[model.getFrameId(robot.tip_link)]
@@ -60,6 +62,7 @@ def arm_of(robot: Robot) -> KinematicBody:
         joint=tip.parentJoint,
         gripper_to_joint=tip.placement * pin.SE3(np.ascontiguousarray(robot.gripper_to_tip)),
         touching=frozenset(i for i, link in enumerate(links) if link in holding),
+        fingers=frozenset(i for i, link in enumerate(links) if link in robot.finger_links),
     )
 
 
@@ -67,7 +70,7 @@ def floating_hand_of(arm: KinematicBody) -> KinematicBody:
     """Return what moves with the gripper as a body of its own; its configuration is the grasp frame's pose, quaternion xyzw."""
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "gripper")
-    geometry, touching = pin.GeometryModel(), set()
+    geometry, touching, fingers = pin.GeometryModel(), set[int](), set[int]()
     joint_to_gripper = arm.gripper_to_joint.inverse()
     for i, shape in enumerate(arm.geometry.geometryObjects):
         if shape.parentJoint == arm.joint:
@@ -75,7 +78,9 @@ def floating_hand_of(arm: KinematicBody) -> KinematicBody:
             index = geometry.addGeometryObject(pin.GeometryObject(shape.name, joint, placement, shape.geometry))
             if i in arm.touching:
                 touching.add(index)
-    return KinematicBody(model, geometry, joint, pin.SE3.Identity(), frozenset(touching))
+            if i in arm.fingers:
+                fingers.add(index)
+    return KinematicBody(model, geometry, joint, pin.SE3.Identity(), frozenset(touching), frozenset(fingers))
 
 
 def broad_phase(model: Any, geometry: Any, data: Any) -> Any:

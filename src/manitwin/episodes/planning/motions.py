@@ -27,6 +27,7 @@ class Motions:
         self._arm, self._timestep_s, self._settings = arm, timestep_s, settings
         self._velocity_limits = np.asarray(robot.velocity_limits_rad_s, float)
         self._acceleration_limits = np.asarray(robot.acceleration_limits_rad_s2, float)
+        self.limits = self._velocity_limits, self._acceleration_limits
 
     def line(
         self, world: CollisionWorld, phase: Phase, start: np.ndarray, end_to_world: np.ndarray

@@ -43,12 +43,17 @@ class ObstacleShapes:
 
 
 def obstacle_shapes(
-    problem: PickPlaceProblem, goal_object_to_world: np.ndarray, store: ShapeStore, margin_m: float
+    problem: PickPlaceProblem,
+    goal_object_to_world: np.ndarray,
+    store: ShapeStore,
+    margin_m: float,
+    *,
+    as_hulls: bool = False,
 ) -> ObstacleShapes:
-    """Stand each object as one hull where nothing is lost by it, else as its own hulls.
+    """Stand each object as one hull where nothing is lost by it, else as its own hulls; likewise what is carried.
 
     Nothing is lost where the one hull stays ``margin_m`` away from the target at start and goal, and is as good as solid
-    or out of the hand's way.
+    or out of the hand's way. ``as_hulls``: the target is carried as its hulls whatever is around.
     """
     target = store(problem.target.body)
     start, goal = pose_of(problem.target.object_to_world), pose_of(goal_object_to_world)
@@ -65,7 +70,7 @@ def obstacle_shapes(
     at_start = [signed_distance_m(target.whole, start, shape, pose) for _, shape, pose in placed]
     at_goal = [signed_distance_m(target.whole, goal, shape, pose) for _, shape, pose in placed]
     carried = (target.whole,)
-    if min([*at_start, *at_goal], default=0.0) < -SINK_M:
+    if as_hulls or min([*at_start, *at_goal], default=0.0) < -SINK_M:
         carried = target.hulls
         at_start = [_least_m(carried, start, shape, pose) for _, shape, pose in placed]
         at_goal = [_least_m(carried, goal, shape, pose) for _, shape, pose in placed]

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from manitwin.episodes.planning.arm_kinematics import ArmKinematics
-from manitwin.episodes.planning.arm_solutions import ArmSolutions, KnownPoses
+from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.collision_world import ProblemWorld
-from manitwin.episodes.planning.convex_shapes import ShapeStore
-from manitwin.episodes.planning.grasp_candidates import TURNS, GraspCandidates, HandRoom
-from manitwin.episodes.planning.kinematic_body import floating_hand_of
-from manitwin.episodes.planning.motions import Motions
+from manitwin.episodes.planning.grasp_candidates import TURNS
+from manitwin.episodes.planning.grasp_tally import GraspTally
 from manitwin.episodes.planning.placement import Placement, PlacementPlanner, goals_after_slip
 from manitwin.episodes.planning.problem import (
     Grasp,
+    Grasped,
     Motion,
     Phase,
     PickPlacePlan,
@@ -26,7 +23,6 @@ from manitwin.episodes.planning.problem import (
     PlanReport,
     later,
 )
-from manitwin.episodes.planning.straight_lines import LineEnds
 from manitwin.robots.robot import Robot
 
 
@@ -34,17 +30,17 @@ class PickPlacePlanner:
     """Plans for one robot; deterministic for a problem's seed, with work counted and never timed."""
 
     def __init__(self, robot: Robot, timestep_s: float = 1 / 120, settings: PlannerSettings | None = None):
-        """Build the models of arm and hand; the shapes of bodies are kept from one problem to the next."""
-        self.robot, self.settings = robot, settings or PlannerSettings()
-        self.arm = ArmKinematics(robot)
-        self._hand = floating_hand_of(self.arm.body)
-        known, self._ends = KnownPoses(self.arm), LineEnds(self.settings)
-        self._candidates = GraspCandidates(HandRoom(self._hand), known, self.settings)
-        self._solutions = ArmSolutions(self.arm, known, self.settings)
-        self._motions = Motions(robot, self.arm, timestep_s, self.settings)
+        """Build the models of arm and hand."""
+        self.parts = parts = ArmPlanning(robot, timestep_s, settings)
+        self.robot, self.settings, self.arm = robot, parts.settings, parts.arm
+        self._ends, self._candidates, self._solutions = parts.ends, parts.candidates, parts.solutions
+        self._motions, self._world_of = parts.motions, parts.world_of
         self._placements = PlacementPlanner(self.arm, self._solutions, self._motions, self._ends)
-        self._shapes = ShapeStore()
-        self._world: ProblemWorld | None = None
+
+    @cached_property
+    def closed(self) -> ArmPlanning:
+        """The same arm with a closed hand, which presses and pushes."""
+        return ArmPlanning(self.robot, self.parts.timestep_s, self.settings, opening_m=0.0)
 
     def tip_pose(self, joint_positions_rad: np.ndarray) -> np.ndarray:
         """Return the twin's grasp frame in the world ``(4, 4)`` (+Z approach, X closing)."""
@@ -57,26 +53,25 @@ class PickPlacePlanner:
         that it came to.
         """
         world, rng = self._world_of(problem, problem.goal_object_to_world), np.random.default_rng(problem.seed)
-        tally = _Tally()
+        tally = GraspTally()
         for candidate in self._candidates.of(world):
             grasp, failure = problem.grasps[candidate.index], candidate.failure
             if failure is None:
                 if tally.is_new(candidate.index) and len(tally.beyond_a_look) == self.settings.max_grasps:
-                    return tally.report(None)
+                    return PlanReport(None, tally.count_tried, tally.reasons)
                 tally.beyond_a_look.add(candidate.index)
                 outcome = self._plan_grasp(world, grasp, candidate.gripper_to_object, rng)
                 if isinstance(outcome, PickPlacePlan):
-                    tally.failures.pop(candidate.index, None)
-                    tally.tried.add(candidate.index)
-                    return tally.report(outcome)
+                    tally.succeed(candidate.index)
+                    return PlanReport(outcome, tally.count_tried, tally.reasons)
                 failure = outcome
             tally.count(candidate.index, failure)
-        return tally.report(None)
+        return PlanReport(None, tally.count_tried, tally.reasons)
 
     def plan_place(
         self,
         problem: PickPlaceProblem,
-        plan: PickPlacePlan,
+        plan: Grasped,
         joint_positions_rad: np.ndarray,
         gripper_to_object: np.ndarray,
         goal_object_to_world: np.ndarray,
@@ -111,15 +106,6 @@ class PickPlacePlanner:
             any(self._can_approach(world, grasp.gripper_to_object @ turn) for turn in TURNS) for grasp in problem.grasps
         )
         return good / max(1, len(problem.grasps))
-
-    def _world_of(self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray) -> ProblemWorld:
-        """Return the world of a problem; that of the last one is kept, for what is planned anew in it."""
-        last = self._world
-        if last is None or not last.is_of(problem, goal_object_to_world):
-            self._world = last = ProblemWorld(
-                problem, goal_object_to_world, self.arm.body, self._hand, self._shapes, self.settings
-            )
-        return last
 
     def _can_approach(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> bool:
         if self._candidates.look_at_approach(world, gripper_to_object) is not None:
@@ -171,22 +157,3 @@ class PickPlacePlanner:
         if not isinstance(reach, Motion):
             return reach
         return PickPlacePlan(grasp, gripper_to_object, reach, approached, lifted, carry, lower, retreat)
-
-
-@dataclass
-class _Tally:
-    """The grasps that were tried, beyond a look or not, and what they failed of."""
-
-    tried: set[int] = field(default_factory=set)
-    beyond_a_look: set[int] = field(default_factory=set)
-    failures: dict[int, PlanFailure] = field(default_factory=dict)
-
-    def is_new(self, index: int) -> bool:
-        return index not in self.beyond_a_look
-
-    def count(self, index: int, failure: PlanFailure) -> None:
-        self.tried.add(index)
-        self.failures[index] = later(failure, self.failures.get(index, failure))
-
-    def report(self, plan: PickPlacePlan | None) -> PlanReport:
-        return PlanReport(plan, len(self.tried), Counter(self.failures.values()))

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Literal, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 
 from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 
 PlanFailure = Literal[
-    "outside_workspace", "no_inverse_kinematics", "approach_blocked", "lift_blocked", "place_unreachable", "lower_blocked",
-    "retreat_blocked", "no_path", "no_time_parameterization",
+    "blocks_function", "outside_workspace", "no_inverse_kinematics", "approach_blocked", "lift_blocked", "place_unreachable",
+    "lower_blocked", "retreat_blocked", "path_unreachable", "path_blocked", "path_slow", "no_path", "no_time_parameterization",
 ]  # fmt: skip
 
 
@@ -69,6 +69,15 @@ class Motion:
     phase: Phase
     positions_rad: np.ndarray
     velocities_rad_s: np.ndarray
+
+
+class Grasped(Protocol):
+    """The protocol of a plan that says how it holds the target."""
+
+    @property
+    def gripper_to_object(self) -> np.ndarray:
+        """The grasp's pose ``(4, 4)`` that is used."""
+        ...
 
 
 @dataclass(frozen=True)

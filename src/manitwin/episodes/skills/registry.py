@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from manitwin.episodes.skills.beside import SIDE_SKILLS
+from manitwin.episodes.skills.hang import Hang
 from manitwin.episodes.skills.place_in import PlaceIn
 from manitwin.episodes.skills.place_on import PLACE_ON, STACK
 from manitwin.episodes.skills.skill import Skill
@@ -14,7 +15,7 @@ from manitwin.errors import UsageError, choose_from
 PICK_PLACE = "pick_place"
 """Moves an object to a pose drawn at random: its goal is that pose, not one in words."""
 
-_SKILLS: tuple[Skill, ...] = (PLACE_ON, PlaceIn(), STACK, *SIDE_SKILLS, Upright())
+_SKILLS: tuple[Skill, ...] = (PLACE_ON, PlaceIn(), STACK, *SIDE_SKILLS, Upright(), Hang())
 
 SKILLS: Mapping[str, Skill] = {skill.name: skill for skill in _SKILLS}
 

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 
 import numpy as np
 
+from manitwin.episodes.fixtures import Fixture
 from manitwin.episodes.goals.evaluation import evaluate
 from manitwin.episodes.goals.goal import Goal, Literal
-from manitwin.episodes.goals.world_state import ObjectState, WorldState
+from manitwin.episodes.goals.world_state import Hole, ObjectState, WorldState
 from manitwin.episodes.pick_place_tasks import PlacingArea
+from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.hull_distance import ConvexParts, PlacedParts
 from manitwin.geometry.rigid_body import PlacedObject, StaticBox
 from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin, StandingPose
+from manitwin.scenes.layouts.twin_frames import TwinFrame
 
 
 @dataclass(frozen=True)
@@ -50,13 +53,24 @@ class Surroundings:
 class SkillGoal:
     """A goal, the poses ``object_to_world (4, 4)`` of the target that should reach it, best first, and who takes part.
 
-    ``partner`` is the object that the goal is about beside the target. ``openings`` are those of the objects, by name.
+    ``partner`` is the object that the goal is about beside the target. ``openings``, ``holes`` and ``frames`` are those of the
+    objects, by name. Of a skill that moves the target along a held path there is the ``path`` that is made once all has come to
+    rest, and its ``fixtures``; the one pose is then that of the beginning.
     """
 
     goal: Goal
     poses: tuple[np.ndarray, ...]
     partner: str | None
     openings: Mapping[str, Opening]
+    holes: Mapping[str, Hole] = field(default_factory=dict)
+    frames: Mapping[str, tuple[TwinFrame, ...]] = field(default_factory=dict)
+    fixtures: tuple[Fixture, ...] = ()
+    path: Callable[[HeldScene], HeldTask] | None = None
+
+    @property
+    def is_of_a_path(self) -> bool:
+        """True where the goal is reached on the way and not by where the target is let go."""
+        return self.path is not None
 
 
 class Skill(ABC):
@@ -89,6 +103,12 @@ class Skill(ABC):
         """Return the placements that the target may begin in: its likeliest one, upright where it has such."""
         return [max(target.poses, key=lambda pose: (pose.upright, pose.probability))]
 
+    def set_goal(
+        self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
+    ) -> SkillGoal | None:
+        """Return the goal in some surroundings with the first poses that are found; None where there is none."""
+        return set_goal(self, around, target, partner, rng)
+
 
 def set_goal(
     skill: Skill, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
@@ -104,12 +124,14 @@ def set_goal(
     poses = tuple(islice(skill.poses(around, target, partner, rng), skill.most_poses))
     if not poses:
         return None
-    openings: dict[str, Opening] = {}
-    for number in (target, *([] if partner is None else [partner])):
-        opening = around.body(number).opening
-        if opening is not None:
-            openings[around.objects[number].name] = opening
-    return SkillGoal(goal, poses, None if second is None else second.name, openings)
+    numbers = (target, *([] if partner is None else [partner]))
+    return SkillGoal(goal, poses, None if second is None else second.name, openings_of(around, numbers))
+
+
+def openings_of(around: Surroundings, numbers: Sequence[int]) -> dict[str, Opening]:
+    """Return the openings of those objects that have one, by name."""
+    found = {around.objects[number].name: around.body(number).opening for number in numbers}
+    return {name: opening for name, opening in found.items() if opening is not None}
 
 
 def _state_at_rest(objects: Sequence[PlacedObject]) -> WorldState:

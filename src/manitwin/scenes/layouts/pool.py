@@ -17,6 +17,7 @@ from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.hull_distance import ConvexParts
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
+from manitwin.scenes.layouts.twin_frames import LabelledPoint, TwinFrame, twin_frames
 from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.record import Placement
 from manitwin.twin.store import RECORD, REMEDY
@@ -40,13 +41,17 @@ class StandingPose:
 
 @dataclass(frozen=True)
 class PoolTwin:
-    """A twin as far as drawing it needs; ``vessel``: it has an opening that its hulls keep."""
+    """A twin as far as drawing it needs; ``vessel``: it has an opening that its hulls keep.
+
+    ``frames`` are those of its functional points.
+    """
 
     twin_id: str
     revision: str
     category: str
     poses: tuple[StandingPose, ...]
     vessel: bool
+    frames: tuple[TwinFrame, ...] = ()
 
     @property
     def stands(self) -> bool:
@@ -166,6 +171,10 @@ class _Language(BaseModel):
     category: str
 
 
+class _Points(BaseModel):
+    functional: list[LabelledPoint] = []
+
+
 class _Standing(BaseModel):
     """What the pool wants of an accepted record: to validate all of a hundred thousand of them would take minutes."""
 
@@ -174,6 +183,7 @@ class _Standing(BaseModel):
     placements: list[Placement]
     mesh: _Mesh
     language: _Language
+    points: _Points = _Points()
 
 
 def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
@@ -200,5 +210,10 @@ def _pool_twin(content: bytes, name: str) -> PoolTwin | None:
     if not poses:
         return None
     return PoolTwin(
-        record.twin_id, record.revision, record.language.category, poses, record.mesh.hulls.keeps_opening is True
+        record.twin_id,
+        record.revision,
+        record.language.category,
+        poses,
+        record.mesh.hulls.keeps_opening is True,
+        twin_frames(record.points.functional),
     )

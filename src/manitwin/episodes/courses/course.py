@@ -1,0 +1,107 @@
+"""What courses share: where an episode starts from, how an object is grasped and lifted, and how an episode ends early."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.events import EventWatch
+from manitwin.episodes.execution import Execution
+from manitwin.episodes.outcome import moved_m
+from manitwin.episodes.planning.problem import Grasped, Motion, PickPlacePlan, PickPlaceProblem, PlanReport
+from manitwin.episodes.settings import EpisodeSettings
+from manitwin.episodes.skills.skill import SkillGoal
+from manitwin.geometry.poses import inverse, transform_points
+from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.physics.sapien.world import RobotWorld
+
+LEAST_LIFT_SHARE = 0.5  # of what the hand rose: less, and the object was left behind
+
+
+class Ended(Exception):
+    """The episode ends here, with its outcome."""
+
+
+class Planner(Protocol):
+    """The protocol of an episode's planner (``planning.pick_place.PickPlacePlanner``)."""
+
+    def plan(self, problem: PickPlaceProblem) -> PlanReport:
+        """Plan all of it."""
+        ...
+
+    def plan_place(
+        self, problem: PickPlaceProblem, plan: PickPlacePlan, joint_positions_rad: np.ndarray,
+        gripper_to_object_measured: np.ndarray, goal: np.ndarray, with_carry: bool,
+    ) -> tuple[Motion | None, Motion, Motion] | None:  # fmt: skip
+        """Plan carry, lower and retreat again."""
+        ...
+
+    def tip_pose(self, q: np.ndarray) -> np.ndarray:
+        """Return the pose ``(4, 4)`` of the grasp frame in the world."""
+        ...
+
+
+@dataclass
+class Start:
+    """What an episode starts from: the problem and all ``objects`` (in the world's order) where they have come to rest."""
+
+    problem: PickPlaceProblem
+    objects: tuple[PlacedObject, ...]
+    planner: Planner
+    settings: EpisodeSettings
+    skill_goal: SkillGoal | None
+
+
+class Course(ABC):
+    """What the robot does; ``facts`` are filled in on the way."""
+
+    def __init__(self, start: Start, facts: EpisodeFacts):
+        """Take where the episode starts from."""
+        self.start, self.facts = start, facts
+        self.problem = start.problem
+        self.goal_object_to_world = start.problem.goal_object_to_world
+
+    @abstractmethod
+    def plan(self) -> bool:
+        """Plan all of it; False where there is no plan."""
+
+    @abstractmethod
+    def execute(self, execution: Execution) -> None:
+        """Carry the plan out; raises Ended where it cannot go on."""
+
+    def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
+        """Return what is to be watched for events."""
+        return ()
+
+    def grasp_and_lift(self, execution: Execution, reach: Motion, approach: Motion, lift: Motion) -> None:
+        """Reach, approach, close and lift; raises Ended where the object is left behind."""
+        tip_pose = self.start.planner.tip_pose
+        execution.follow(reach)
+        execution.follow(approach)
+        execution.close()
+        closed_height_m = self.height_m(execution)
+        hand_height_m = tip_pose(execution.commanded_rad)[2, 3]
+        execution.follow(lift)
+        rise_m = tip_pose(execution.commanded_rad)[2, 3] - hand_height_m
+        if self.height_m(execution) - closed_height_m < LEAST_LIFT_SHARE * rise_m:
+            raise Ended("not_lifted")
+
+    def height_m(self, execution: Execution) -> float:
+        """Return how high the target's centre of mass is."""
+        center = self.problem.target.body.center_of_mass_m[None]
+        return float(transform_points(execution.target_to_world(), center)[0, 2])
+
+    def check_held(self, execution: Execution) -> None:
+        """Raise Ended where the fingers have lost the target."""
+        if not min(execution.touches.finger_forces_n) > 0:
+            raise Ended("dropped")
+
+    def measure_slip(self, plan: Grasped, execution: Execution) -> None:
+        """Take down how far the target has moved in the hand."""
+        planned, measured = inverse(plan.gripper_to_object), inverse(execution.gripper_to_object())
+        self.facts.slip_m = moved_m(planned, measured, self.problem.target.body.center_of_mass_m)

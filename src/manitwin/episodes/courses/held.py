@@ -1,0 +1,215 @@
+"""Held paths in physics: grasp, lift, then follow what the skill says, planned again from what is measured in the hand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from manitwin.episodes.courses.course import Course, Ended, Start
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.events import EventWatch
+from manitwin.episodes.execution import Execution
+from manitwin.episodes.planning.closed_hand import fingertip_corners
+from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner, HeldPlan, joint_spline
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.problem import Motion, Phase
+from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask
+from manitwin.physics.sapien.contacts import MeantContacts
+from manitwin.physics.sapien.world import RobotWorld
+
+BACK_S = 1.2
+YIELDED_S, PRESSED_S = 0.1, 0.2  # after the touch of a blow, and of a press
+PEAK_OF_QUINTIC = 1.875  # its largest by its mean speed
+
+
+class HeldCourse(Course):
+    """Follows a skill's held path; where nothing can be planned anew, what was planned before is followed."""
+
+    def __init__(self, start: Start, facts: EpisodeFacts):
+        """Ask the skill for its task."""
+        super().__init__(start, facts)
+        goal, planner = start.skill_goal, start.planner
+        assert goal is not None
+        assert goal.path is not None
+        assert isinstance(planner, PickPlacePlanner), "held paths are planned with the models of this planner"
+        self._own = planner
+        robot = planner.robot
+        scene = HeldScene(
+            target=self.problem.target,
+            objects={each.name: each for each in start.objects},
+            partner=next((each for each in start.objects if each.name == goal.partner), None),
+            frames=goal.frames,
+            fixtures=goal.fixtures,
+            fingers=frozenset(robot.finger_links),
+            fingertips_m=fingertip_corners(planner.closed),
+            tip_depth_m=robot.gripper.tip_depth_m,
+            rng=np.random.default_rng((self.problem.seed, 3)),
+        )
+        self.task: HeldTask = goal.path(scene)
+        self._planner = HeldPathPlanner(planner.closed if self.task.empty else planner.parts, empty=self.task.empty)
+        self._watch: EventWatch | None = None
+
+    def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
+        """Return the task's watch."""
+        self._watch = None if self.task.watch is None else self.task.watch(world)
+        return () if self._watch is None else (self._watch,)
+
+    def plan(self) -> bool:
+        """Plan with the grasps that leave the function free, those that do so best first."""
+        task = self.task
+        if task.empty:
+            found = self._planner.plan_empty(self.problem, task.paths, longest_s=task.longest_s)
+            if not isinstance(found, tuple):
+                self.facts.plan_failures.update(found)
+                return False
+            self._reach, self._held, self._joints = found
+            return True
+        ranks = [(task.rank(grasp.gripper_to_object), grasp) for grasp in self.problem.grasps]
+        free = [(rank, grasp) for rank, grasp in ranks if rank is not None]
+        grasps = tuple(grasp for _, grasp in sorted(free, key=lambda each: each[0]))
+        blocking = len(ranks) - len(free)
+        self.problem = replace(self.problem, grasps=grasps)
+        plan, report = self._planner.plan(self.problem, task.paths, as_hulls=task.as_hulls, longest_s=task.longest_s)
+        self.facts.grasps_tried = report.tried + blocking
+        self.facts.plan_failures += report.failures
+        if blocking:
+            self.facts.plan_failures["blocks_function"] += blocking
+        if plan is None:
+            return False
+        self._plan, self._held, self._joints = plan, plan.held, plan.joints
+        self.facts.grasp = plan.grasp
+        return True
+
+    def execute(self, execution: Execution) -> None:
+        """Grasp and lift (or close the hand), carry, follow the path, and end as the task says."""
+        if self.task.empty:
+            execution.close()
+            execution.follow(self._reach)
+            self._grasp_now = np.eye(4)
+        else:
+            self._take(self._plan, execution)
+        been = self._act(execution)
+        self._rest_there(execution)
+        if self.task.ending == "let_go":
+            self._let_go(execution)
+            return
+        self._go_back(execution, been)
+        if not self.task.empty:
+            self.check_held(execution)
+        if self.task.ending == "put_back":
+            self._put_back(execution)
+
+    def _take(self, plan: HeldPlan, execution: Execution) -> None:
+        """Grasp, lift, measure the object in the hand, plan carry and path anew, and carry."""
+        self.grasp_and_lift(execution, plan.reach, plan.approach, plan.lift)
+        measured = execution.gripper_to_object()
+        others = [path for path in self.task.paths if path is not plan.held]
+        found = self._planner.again(
+            self.problem,
+            [plan.held, *others],
+            measured,
+            execution.commanded_rad,
+            plan.joints(0.0),
+            as_hulls=self.task.as_hulls,
+            longest_s=self.task.longest_s,
+        )
+        self._grasp_now, carry = plan.gripper_to_object, plan.carry
+        if found is not None:
+            carry, self._held, self._joints = found
+            self._grasp_now = measured
+        self.facts.replans["after_lift" if found is not None else "after_lift_failed"] += 1
+        execution.meant = MeantContacts(target=frozenset())
+        execution.follow(carry)
+        self.measure_slip(plan, execution)
+        self.check_held(execution)
+
+    def _act(self, execution: Execution) -> list[np.ndarray]:
+        """Follow the path; returns the joint positions ``(n,)`` that it went through, for the way back."""
+        task, count, meant = self.task, len(self._held.poses), self._held.meant
+        execution.meant = MeantContacts(fingers=meant) if task.empty else MeantContacts(target=meant)
+        been = [execution.commanded_rad]
+        smooth = count if task.guard is None else task.guard.first
+        parts = min(task.measured, smooth)
+        cuts = [round(smooth * part / parts) for part in range(parts + 1)] if parts else [0]
+        for first, end in pairwise(cuts):
+            joints = self._onward(self._held.part(first, end), execution, (end - 1) / (count - 1))
+            execution.follow(self._planner.timed(joints, task.duration_s / parts, Phase.ACT))
+            been.append(execution.commanded_rad)
+        if task.guard is not None:
+            self._guarded(task.guard, self._held.part(smooth, count), execution)
+        return been
+
+    def _onward(self, part: HeldPath, execution: Execution, place: float) -> CubicSpline:
+        """Plan through some poses from where the arm is: as measured, else as before, else straight to where it was to be."""
+        grasps = [self._grasp_now] if self.task.empty else [execution.gripper_to_object(), self._grasp_now]
+        for grasp, name in zip(grasps, ("onward", "onward_unmeasured"), strict=False):
+            found = self._planner.onward(
+                self.problem, part, grasp, execution.commanded_rad, as_hulls=self.task.as_hulls
+            )
+            if found is not None:
+                self.facts.replans[name] += 1
+                return found
+        self.facts.replans["onward_failed"] += 1
+        return joint_spline(np.array([execution.commanded_rad, self._joints(place)]))
+
+    def _guarded(self, guard: Guard, part: HeldPath, execution: Execution) -> None:
+        """Move on until what is watched presses with the guard's force, then hold still (or yield, after a blow)."""
+        watch = self._watch
+        assert watch is not None, "a guarded move asks its watch for the force"
+        joints = self._onward(part, execution, 1.0)
+        tips = [self.start.planner.tip_pose(joints(place))[:3, 3] for place in np.linspace(0, 1, 5)]
+        way_m = float(np.linalg.norm(np.diff(tips, axis=0), axis=1).sum())
+        duration_s = guard.duration_s if guard.speed_m_s is None else PEAK_OF_QUINTIC * way_m / guard.speed_m_s
+        motion = self._planner.timed(joints, duration_s, Phase.ACT, beyond=guard.beyond)
+        touched: Callable[[], bool] = lambda: watch.force_n >= guard.stop_n  # noqa: E731
+        execution.follow(motion, until=touched)
+        if guard.beyond > 1:
+            execution.yield_here()
+        execution.wait_s(Phase.HOLD, YIELDED_S if guard.beyond > 1 else PRESSED_S)
+
+    def _rest_there(self, execution: Execution) -> None:
+        if self.task.hold_s:
+            execution.wait_s(Phase.HOLD, self.task.hold_s)
+        if not self.task.empty:
+            self.check_held(execution)
+
+    def _let_go(self, execution: Execution) -> None:
+        """Open the hand and withdraw it as far as there is room."""
+        execution.meant = MeantContacts()
+        execution.open()
+        away = self._planner.withdraw(self.problem, execution.target_to_world(), execution.commanded_rad)
+        self.facts.replans["withdrawn" if away is not None else "not_withdrawn"] += 1
+        if away is not None:
+            execution.follow(away)
+
+    def _go_back(self, execution: Execution, been: list[np.ndarray]) -> None:
+        """Go back along the path as planned from here, else as the arm came."""
+        poses = self._held.poses[:1] if self.task.guard is not None else self._held.poses[::-1][1:]
+        way = HeldPath(poses, self._held.meant)
+        grasp = self._grasp_now if self.task.empty else execution.gripper_to_object()
+        joints = self._planner.onward(self.problem, way, grasp, execution.commanded_rad, as_hulls=self.task.as_hulls)
+        self.facts.replans["back" if joints is not None else "back_as_it_came"] += 1
+        if joints is None:
+            joints = joint_spline(np.array([execution.commanded_rad, *been[::-1]]))
+        execution.follow(self._planner.timed(joints, BACK_S, Phase.RETURN))
+
+    def _put_back(self, execution: Execution) -> None:
+        """Set the target down where it was; raises Ended where that cannot be planned."""
+        execution.meant = MeantContacts()
+        goal = self.problem.target.object_to_world.copy()
+        goal[2, 3] += self.start.settings.release_height_m
+        found = self._own.plan_place(
+            self.problem, self._plan, execution.commanded_rad, execution.gripper_to_object(), goal, True
+        )
+        if found is None:
+            raise Ended("replan_failed")
+        carry, lower, retreat = found
+        assert isinstance(carry, Motion)
+        execution.follow(carry)
+        execution.follow(lower)
+        execution.open()
+        execution.follow(retreat)

@@ -1,0 +1,87 @@
+"""Judging an episode: the state of the world that goals are judged on, and what the outcome is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from manitwin.episodes.courses.course import Start
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.execution import Execution
+from manitwin.episodes.goals.evaluation import evaluate
+from manitwin.episodes.goals.world_state import Event, ObjectState, WorldState
+from manitwin.episodes.outcome import is_at_rest, is_disturbed, moved_m, placement_errors, placement_outcome
+from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.physics.sapien.world import RobotWorld
+
+
+def is_reached_already(start: Start, world: RobotWorld) -> bool:
+    """Tell whether a goal is true of the start."""
+    if start.skill_goal is None:
+        return False
+    touching = frozenset(world.contacts.pressing(world.contacts.read()))
+    state = state_of(start, [each.object_to_world for each in start.objects], touching)
+    return evaluate(state, start.skill_goal.goal).reached
+
+
+def state_of(
+    start: Start,
+    object_to_world: Sequence[np.ndarray],
+    touching: frozenset[frozenset[str]],
+    at_rest: Sequence[bool] | None = None,
+    events: tuple[Event, ...] = (),
+) -> WorldState:
+    """Return what a goal is judged on, from the objects' poses ``(4, 4)`` in the order of the world."""
+    goal = start.skill_goal
+    assert goal is not None
+    rests = at_rest if at_rest is not None else [True] * len(start.objects)
+    objects = {
+        begun.name: ObjectState(
+            begun.body, pose, begun.object_to_world, still, goal.openings.get(begun.name), goal.holes.get(begun.name)
+        )
+        for begun, pose, still in zip(start.objects, object_to_world, rests, strict=True)
+    }
+    furniture = {box.name for box in start.problem.static_boxes}
+    furniture |= {name for fixture in goal.fixtures for name in fixture.bearing}
+    pegs = {fixture.name: peg for fixture in goal.fixtures if (peg := fixture.peg) is not None}
+    return WorldState(objects, touching, frozenset(furniture), events, pegs=pegs)
+
+
+def judge(
+    start: Start, goal_object_to_world: np.ndarray, facts: EpisodeFacts, world: RobotWorld, execution: Execution
+) -> None:
+    """Wait until all is at rest, and take down the outcome."""
+    settings, target = start.settings, start.objects[world.target]
+    last = execution.rest(round(settings.max_rest_s / settings.timestep_s))
+    errors = placement_errors(execution.target_to_world(), goal_object_to_world, target.body.center_of_mass_m)
+    at_rest = [
+        is_at_rest([row[number] for row in last], placed.body.center_of_mass_m, settings)
+        for number, placed in enumerate(world.placed)
+    ]
+    if start.skill_goal is None or not start.skill_goal.is_of_a_path:
+        facts.errors = errors
+    if start.skill_goal is None:
+        released = max(execution.touches.finger_forces_n) == 0
+        failure = placement_outcome(errors, at_rest=at_rest[world.target], released=released, settings=settings)
+    else:
+        state = state_of(start, last[-1], execution.pressing, at_rest, execution.events)
+        facts.evaluation = evaluate(state, start.skill_goal.goal)
+        failure = None if facts.evaluation.reached else "goal_missed"
+    if failure is None and any(
+        _is_disturbed(start, placed, last[-1][number])
+        for number, placed in enumerate(start.objects)
+        if number != world.target
+    ):
+        failure = "disturbed"
+    if failure in (None, "disturbed") and execution.unplanned:
+        failure = "unplanned_contact"
+    facts.outcome = failure or "kept"
+
+
+def _is_disturbed(start: Start, placed: PlacedObject, after: np.ndarray) -> bool:
+    """Tell whether an object that was to stay moved; a partner that something is put on or into may move a little more."""
+    settings, center = start.settings, placed.body.center_of_mass_m
+    if start.skill_goal is not None and placed.name == start.skill_goal.partner:
+        return moved_m(placed.object_to_world, after, center) > settings.max_partner_moved_m
+    return is_disturbed(placed.object_to_world, after, center, settings)

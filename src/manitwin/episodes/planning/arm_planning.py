@@ -1,0 +1,49 @@
+"""What planners of one arm share: its models, the planners of single motions, and the world of the last problem."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.episodes.planning.arm_kinematics import ArmKinematics
+from manitwin.episodes.planning.arm_solutions import ArmSolutions, KnownPoses
+from manitwin.episodes.planning.collision_world import ProblemWorld
+from manitwin.episodes.planning.convex_shapes import ShapeStore
+from manitwin.episodes.planning.grasp_candidates import GraspCandidates, HandRoom
+from manitwin.episodes.planning.kinematic_body import floating_hand_of
+from manitwin.episodes.planning.motions import Motions
+from manitwin.episodes.planning.problem import PickPlaceProblem, PlannerSettings
+from manitwin.episodes.planning.straight_lines import LineEnds
+from manitwin.robots.robot import Robot
+
+
+class ArmPlanning:
+    """The arm and its hand with the fingers as far apart as they open, or as said; shapes are kept between problems."""
+
+    def __init__(
+        self,
+        robot: Robot,
+        timestep_s: float = 1 / 120,
+        settings: PlannerSettings | None = None,
+        opening_m: float | None = None,
+    ):
+        """Build the models of arm and hand; ``opening_m`` 0: the closed hand, which presses and pushes."""
+        self.robot, self.timestep_s, self.settings = robot, timestep_s, settings or PlannerSettings()
+        self.arm = ArmKinematics(robot, opening_m)
+        self.hand = floating_hand_of(self.arm.body)
+        self.known, self.ends = KnownPoses(self.arm), LineEnds(self.settings)
+        self.candidates = GraspCandidates(HandRoom(self.hand), self.known, self.settings)
+        self.solutions = ArmSolutions(self.arm, self.known, self.settings)
+        self.motions = Motions(robot, self.arm, timestep_s, self.settings)
+        self._shapes = ShapeStore()
+        self._world: ProblemWorld | None = None
+
+    def world_of(
+        self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray, *, as_hulls: bool = False
+    ) -> ProblemWorld:
+        """Return the world of a problem; that of the last one is kept, for what is planned anew in it."""
+        last = self._world
+        if last is None or not last.is_of(problem, goal_object_to_world, as_hulls=as_hulls):
+            self._world = last = ProblemWorld(
+                problem, goal_object_to_world, self.arm.body, self.hand, self._shapes, self.settings, as_hulls=as_hulls
+            )
+        return last

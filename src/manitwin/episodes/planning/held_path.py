@@ -1,0 +1,302 @@
+"""Held paths: an object in the hand, or the closed hand itself, goes through poses one after another.
+
+How to use it: a skill gives ``HeldPath``s, ``object_to_world`` poses from its frames (one path for each choice of what is
+free: an azimuth, a sign, a roll), and ranks the grasps. ``plan`` finds the first grasp and path that can be reached, lifted
+and followed; after the lift ``again`` plans carry and path from the pose that was measured in the hand; ``onward`` plans the
+rest of the poses from wherever the arm is; ``timed`` makes a motion of a path. What cannot be planned anew is no reason to
+give up: the path from before still serves. Inverse kinematics by continuation: each knot from where the last two lead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from manitwin.episodes.planning.arm_planning import ArmPlanning
+from manitwin.episodes.planning.collision_world import STANDING, ProblemWorld
+from manitwin.episodes.planning.grasp_tally import GraspTally
+from manitwin.episodes.planning.joint_paths import path_lengths
+from manitwin.episodes.planning.path_timing import time_quintic
+from manitwin.episodes.planning.problem import (
+    Grasp,
+    Motion,
+    Phase,
+    PickPlaceProblem,
+    PlanFailure,
+    PlanReport,
+    later,
+)
+
+STARTS = 4  # known configurations from which the first pose is looked for
+LARGEST_KNOT_RAD, FROM_WHERE_IT_IS_RAD = 0.6, 0.9  # a larger change between knots is a jump to another branch
+ITERATIONS = 30
+MOST_PAIRS = 400  # of a grasp and a path, 1 to 5 ms each
+SAME_RAD = 0.05
+WITHDRAWN_M = (0.10, 0.05, 0.025)
+
+
+@dataclass(frozen=True)
+class HeldPath:
+    """Poses ``(K, 4, 4)`` in the world: of the object that is held, of the grasp frame where the hand is closed and empty.
+
+    From knot ``meant_from`` on the bodies named ``meant`` may be touched: by what is held, by the fingers of an empty hand.
+    """
+
+    poses: np.ndarray
+    meant: frozenset[str] = frozenset()
+    meant_from: int = 0
+
+    def part(self, first: int, end: int) -> HeldPath:
+        """Return the path from a knot to before another one."""
+        return replace(self, poses=self.poses[first:end], meant_from=max(0, self.meant_from - first))
+
+
+@dataclass(frozen=True)
+class HeldPlan:
+    """One grasp's motions: reach, approach, (close), lift, carry to the path's first pose; and the joints' path (timed later)."""
+
+    grasp: Grasp
+    gripper_to_object: np.ndarray
+    reach: Motion
+    approach: Motion
+    lift: Motion
+    carry: Motion
+    held: HeldPath
+    joints: CubicSpline
+
+
+class HeldPathPlanner:
+    """Plans held paths for one arm; deterministic for a problem's seed.
+
+    ``as_hulls``: what is held is carried as its own hulls, for functions of its holes and cavities. ``longest_s``: a path
+    that takes longer at the joints' limits is not taken (near singularities some take 20 s).
+    """
+
+    def __init__(self, parts: ArmPlanning, *, empty: bool = False):
+        """Take the models and single motions of an arm; ``empty``: its hand holds nothing, and must not touch the target."""
+        self.parts, self._phase = parts, Phase.REACH if empty else Phase.CARRY
+
+    def plan(
+        self, problem: PickPlaceProblem, paths: Sequence[HeldPath], *, as_hulls: bool, longest_s: float
+    ) -> tuple[HeldPlan | None, PlanReport]:
+        """Plan with the first of ``problem.grasps``, itself or turned by 180 degrees, and the first path that it can follow.
+
+        The report has no plan of its own, only what was tried and what it failed of.
+        """
+        world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
+        rng, tally, pairs = np.random.default_rng(problem.seed), GraspTally(), 0
+        for candidate in self.parts.candidates.of(world):
+            failure: PlanFailure | None = candidate.failure
+            for path in paths if failure is None else ():
+                pairs += 1
+                outcome = self._plan_pair(world, candidate.index, candidate.gripper_to_object, path, longest_s, rng)
+                if isinstance(outcome, HeldPlan):
+                    tally.succeed(candidate.index)
+                    return outcome, PlanReport(None, tally.count_tried, tally.reasons)
+                failure = outcome if failure is None else later(failure, outcome)
+                if pairs == MOST_PAIRS:
+                    break
+            tally.count(candidate.index, failure or "path_unreachable")
+            if pairs == MOST_PAIRS:
+                break
+        return None, PlanReport(None, tally.count_tried, tally.reasons)
+
+    def plan_empty(
+        self, problem: PickPlaceProblem, paths: Sequence[HeldPath], *, longest_s: float
+    ) -> tuple[Motion, HeldPath, CubicSpline] | Sequence[PlanFailure]:
+        """Plan to reach the first path that the empty hand can follow, from home: reach, path and its joints; or why not."""
+        world = self.parts.world_of(problem, problem.target.object_to_world)
+        rng, failures = np.random.default_rng(problem.seed), list[PlanFailure]()
+        for path in paths:
+            joints = self._follow(world, path, np.eye(4), self.parts.arm.home)
+            if isinstance(joints, CubicSpline):
+                if self._shortest_s(joints) > longest_s:
+                    failures.append("path_slow")
+                    continue
+                reach = self.parts.motions.free(world.arm, Phase.REACH, self.parts.arm.home, joints(0.0), rng)
+                if isinstance(reach, Motion):
+                    return reach, path, joints
+                failures.append(reach)
+            else:
+                failures.append(joints)
+        return failures
+
+    def again(
+        self,
+        problem: PickPlaceProblem,
+        paths: Sequence[HeldPath],
+        gripper_to_object: np.ndarray,
+        joints_rad: np.ndarray,
+        near_rad: np.ndarray,
+        *,
+        as_hulls: bool,
+        longest_s: float,
+    ) -> tuple[Motion, HeldPath, CubicSpline] | None:
+        """Plan carry and path anew from where the arm is and the pose in the hand that was measured; the first path that can.
+
+        ``near_rad`` is where the path began before. None: there is no way.
+        """
+        world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
+        world.hold(gripper_to_object)
+        rng = np.random.default_rng((problem.seed, 2))
+        for path in paths:
+            joints = self._follow(world, path, gripper_to_object, near_rad)
+            if not isinstance(joints, CubicSpline) or self._shortest_s(joints) > longest_s:
+                continue
+            carry = self.parts.motions.free(world.arm, Phase.CARRY, np.asarray(joints_rad, float), joints(0.0), rng)
+            if isinstance(carry, Motion):
+                return carry, path, joints
+        return None
+
+    def onward(
+        self,
+        problem: PickPlaceProblem,
+        path: HeldPath,
+        gripper_to_object: np.ndarray,
+        joints_rad: np.ndarray,
+        *,
+        as_hulls: bool,
+    ) -> CubicSpline | None:
+        """Plan from where the arm is through all poses of a path, with the pose in the hand as measured; None: no way."""
+        world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
+        world.hold(gripper_to_object)
+        hands = path.poses @ gripper_to_object
+        here = np.asarray(joints_rad, float)
+        knots = self._continue(world, path, hands, [here], largest_rad=FROM_WHERE_IT_IS_RAD)
+        return joint_spline(knots) if isinstance(knots, np.ndarray) else None
+
+    def timed(self, joints: CubicSpline, duration_s: float, phase: Phase, *, beyond: float = 1.0) -> Motion:
+        """Time a path over ``duration_s`` or as long as the joints' limits ask for, by ``path_timing.time_quintic``."""
+        parts = self.parts
+        positions, velocities = time_quintic(joints, parts.motions.limits, duration_s, parts.timestep_s, beyond)
+        return Motion(phase, positions, velocities)
+
+    def withdraw(self, problem: PickPlaceProblem, object_to_world: np.ndarray, joints_rad: np.ndarray) -> Motion | None:
+        """Plan the open hand's way back along its approach from an object that stands (or hangs) where it is now.
+
+        10 cm, less where that is blocked, None where nothing is free.
+        """
+        world = self.parts.world_of(problem, object_to_world, as_hulls=True)
+        here = self.parts.arm.gripper_pose(np.asarray(joints_rad, float))
+        for way_m in WITHDRAWN_M:
+            end = here.copy()
+            end[:3, 3] -= way_m * here[:3, 2]
+            line = self.parts.motions.line(world.arm, Phase.RETREAT, np.asarray(joints_rad, float), end)
+            if line is not None:
+                return self.parts.motions.timed(Phase.RETREAT, line)
+        return None
+
+    def _plan_pair(
+        self,
+        world: ProblemWorld,
+        index: int,
+        gripper_to_object: np.ndarray,
+        path: HeldPath,
+        longest_s: float,
+        rng: np.random.Generator,
+    ) -> HeldPlan | PlanFailure:
+        """Plan one pose of a grasp with one path, cheapest first: path, approach, lift, carry, reach."""
+        parts = self.parts
+        world.hold(gripper_to_object)
+        joints = self._follow(world, path, gripper_to_object, parts.arm.home)
+        if not isinstance(joints, CubicSpline):
+            return joints
+        if self._shortest_s(joints) > longest_s:
+            return "path_slow"
+        grasped = world.problem.target.object_to_world @ gripper_to_object
+        solutions, converged = parts.solutions.of(world.arm, Phase.APPROACH, grasped, joints(0.0))
+        failure: PlanFailure = "approach_blocked" if converged else "no_inverse_kinematics"
+        for at_grasp in solutions:
+            there = parts.arm.gripper_pose(at_grasp)
+            approach = parts.motions.line(world.arm, Phase.APPROACH, at_grasp, parts.ends.before(there))
+            if approach is None:
+                continue
+            lift = parts.motions.line(world.arm, Phase.LIFT, at_grasp, parts.ends.above(there))
+            if lift is None:
+                failure = later(failure, "lift_blocked")
+                continue
+            lifted = parts.motions.timed(Phase.LIFT, lift)
+            carry = parts.motions.free(world.arm, Phase.CARRY, lifted.positions_rad[-1], joints(0.0), rng)
+            if not isinstance(carry, Motion):
+                failure = later(failure, carry)
+                continue
+            approached = parts.motions.timed(Phase.APPROACH, approach, backwards=True)
+            reach = parts.motions.free(world.arm, Phase.REACH, parts.arm.home, approached.positions_rad[0], rng)
+            if isinstance(reach, Motion):
+                grasp = world.problem.grasps[index]
+                return HeldPlan(grasp, gripper_to_object, reach, approached, lifted, carry, path, joints)
+            failure = later(failure, reach)
+        return failure
+
+    def _follow(
+        self,
+        world: ProblemWorld,
+        path: HeldPath,
+        gripper_to_object: np.ndarray,
+        near_rad: np.ndarray,
+    ) -> CubicSpline | PlanFailure:
+        """Return the joints' path, begun at the solution nearest to a configuration or at known ones; or why there is none."""
+        hands = path.poses @ gripper_to_object
+        if any(self.parts.known.out_of_reach(hands[k]) for k in (0, len(hands) // 2, -1)):
+            return "path_unreachable"
+        failure: PlanFailure = "path_unreachable"
+        seen: list[np.ndarray] = []
+        for start in (near_rad, *self.parts.known.nearest(hands[0], STARTS)):
+            first = self.parts.arm.inverse(hands[0], start)
+            if first is None or any(np.abs(first - other).max() < SAME_RAD for other in seen):
+                continue
+            seen.append(first)
+            knots = self._begin(world, path, hands, first)
+            if isinstance(knots, np.ndarray):
+                return joint_spline(knots)
+            failure = later(failure, knots)
+        return failure
+
+    def _begin(
+        self, world: ProblemWorld, path: HeldPath, hands: np.ndarray, first_rad: np.ndarray
+    ) -> np.ndarray | PlanFailure:
+        """Return free knots ``(K, n)``, the first of which is given."""
+        self._enter(world, path, 0)
+        if not world.arm.is_free(first_rad):
+            return "path_blocked"
+        return self._continue(world, path.part(1, len(path.poses)), hands[1:], [first_rad])
+
+    def _continue(
+        self,
+        world: ProblemWorld,
+        path: HeldPath,
+        hands: np.ndarray,
+        knots: list[np.ndarray],
+        largest_rad: float = LARGEST_KNOT_RAD,
+    ) -> np.ndarray | PlanFailure:
+        """Return knots that go on from where the last of ``knots`` is; every new one is free, and the middle before it."""
+        arm, knots = self.parts.arm, list(knots)
+        for number, hand in enumerate(hands):
+            guess = knots[-1] if len(knots) == 1 else np.clip(2 * knots[-1] - knots[-2], arm.lower, arm.upper)
+            knot = arm.inverse(hand, guess, ITERATIONS)
+            if knot is None or np.abs(knot - knots[-1]).max() > largest_rad:
+                return "path_unreachable"
+            self._enter(world, path, number)
+            middle_counts = len(knots) > 1 or largest_rad == LARGEST_KNOT_RAD
+            if not world.arm.is_free(knot) or (middle_counts and not world.arm.is_free((knot + knots[-1]) / 2)):
+                return "path_blocked"
+            knots.append(knot)
+        return np.array(knots)
+
+    def _enter(self, world: ProblemWorld, path: HeldPath, number: int) -> None:
+        meant = path.meant if number >= path.meant_from else frozenset[str]()
+        if world.problem.target.name in meant:
+            meant = meant | {STANDING}
+        world.arm.enter(self._phase, self.parts.settings.clearance_m, meant)
+
+    def _shortest_s(self, joints: CubicSpline) -> float:
+        return len(self.timed(joints, 1.0, Phase.ACT).positions_rad) * self.parts.timestep_s
+
+
+def joint_spline(knots: np.ndarray) -> CubicSpline:
+    """Return the path through knots ``(K, n)`` over [0, 1] by chord length: by number it would stall and rush."""
+    lengths = path_lengths(knots) + 1e-6 * np.arange(len(knots))
+    return CubicSpline(lengths / lengths[-1], knots)

@@ -1,0 +1,90 @@
+"""Skills that use what is in the hand: they say where fixtures stand, and make the held path once all has come to rest."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterator
+
+import numpy as np
+
+from manitwin.episodes.fixtures import Fixture
+from manitwin.episodes.goals.world_state import Hole
+from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprint_at
+from manitwin.episodes.skills.held_task import HeldScene, HeldTask
+from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, openings_of
+from manitwin.geometry.boxes import separation_m
+from manitwin.scenes.layouts.pool import PoolTwin
+from manitwin.scenes.layouts.twin_frames import TwinFrame
+
+FIXTURES_TRIED = 60
+
+
+class HeldSkill(Skill):
+    """A skill of a held path. A new one says ``suits`` (by ``frames_of``), ``task``, its ``goal``, and its ``fixture`` if any."""
+
+    has_partner = False
+
+    @abstractmethod
+    def task(self, scene: HeldScene) -> HeldTask:
+        """Return what is to be done, from where everything has come to rest."""
+
+    def fixture(self, around: Surroundings, target: int, rng: np.random.Generator) -> Fixture | None:
+        """Draw a fixture somewhere in reach; it is taken where it stands clear of all objects. None: the skill has none."""
+        return None
+
+    def poses(
+        self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
+    ) -> Iterator[np.ndarray]:
+        """Yield where the target is: what counts is the way."""
+        yield around.objects[target].object_to_world
+
+    def set_goal(
+        self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
+    ) -> SkillGoal | None:
+        """Return the goal with its fixtures; None where there is no room for them."""
+        fixtures = self._fixtures(around, target, rng)
+        if fixtures is None:
+            return None
+        numbers = (target, *([] if partner is None else [partner]))
+        frames = {around.objects[number].name: around.twin(number).frames for number in numbers}
+        holes = {name: hole for name, of_it in frames.items() if (hole := hole_of(of_it)) is not None}
+        second = None if partner is None else around.objects[partner]
+        return SkillGoal(
+            self.goal(around.objects[target], second),
+            tuple(self.poses(around, target, partner, rng)),
+            None if second is None else second.name,
+            openings_of(around, numbers),
+            holes,
+            frames,
+            fixtures,
+            self.task,
+        )
+
+    def _fixtures(self, around: Surroundings, target: int, rng: np.random.Generator) -> tuple[Fixture, ...] | None:
+        taken = [footprint_at(each.body, each.object_to_world) for each in around.objects]
+        for _ in range(FIXTURES_TRIED):
+            drawn = self.fixture(around, target, rng)
+            if drawn is None:
+                return ()
+            clear = all(separation_m(drawn.footprint_m, each) >= MIN_GAP_M for each in taken)
+            if clear and around.area.wider().holds(drawn.footprint_m):
+                return (drawn,)
+        return None
+
+
+def frames_of(twin: PoolTwin, *kinds: str) -> tuple[TwinFrame, ...]:
+    """Return a twin's frames of some kinds, in their order."""
+    return tuple(frame for frame in twin.frames if frame.kind in kinds)
+
+
+def hole_frame_of(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:
+    """Return the widest hole's frame."""
+    return max((frame for frame in frames if frame.kind == "hole"), key=lambda frame: frame.size_m, default=None)
+
+
+def hole_of(frames: tuple[TwinFrame, ...]) -> Hole | None:
+    """Return the widest hole of a thing, in its frame."""
+    frame = hole_frame_of(frames)
+    if frame is None:
+        return None
+    return Hole(frame.frame_to_object[:3, 3], frame.frame_to_object[:3, 2], frame.size_m)

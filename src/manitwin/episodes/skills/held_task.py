@@ -1,0 +1,76 @@
+"""What a skill asks to be done with a thing in the hand (or with the closed hand): paths, grasps, guards, endings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from manitwin.episodes.events import EventWatch
+from manitwin.episodes.fixtures import Fixture
+from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.physics.sapien.world import RobotWorld
+from manitwin.scenes.layouts.twin_frames import TwinFrame
+
+MEASURED_TIMES = 4
+
+
+@dataclass(frozen=True)
+class HeldScene:
+    """What a skill sees once all has come to rest: where things are, their frames, the fixtures, and the hand.
+
+    ``fingers`` are the names of the finger links; ``fingertips_m (N, 3)`` the corners of the closed fingers in the grasp
+    frame, ``tip_depth_m`` how far along its Z the middle of the pads is.
+    """
+
+    target: PlacedObject
+    objects: Mapping[str, PlacedObject]
+    partner: PlacedObject | None
+    frames: Mapping[str, tuple[TwinFrame, ...]]
+    fixtures: tuple[Fixture, ...]
+    fingers: frozenset[str]
+    fingertips_m: np.ndarray
+    tip_depth_m: float
+    rng: np.random.Generator
+
+
+@dataclass(frozen=True)
+class Guard:
+    """A guarded move: from knot ``first`` on, until what is watched presses with ``stop_n``.
+
+    It goes at ``speed_m_s`` at most, or as a blow: as fast as ``duration_s`` says, fastest at the end of the path
+    (``beyond`` > 1, see ``path_timing``), and yielding as soon as it touches.
+    """
+
+    first: int
+    stop_n: float
+    speed_m_s: float | None = None
+    duration_s: float = 0.5
+    beyond: float = 1.0
+
+
+@dataclass(frozen=True)
+class HeldTask:
+    """One skill's work: ``paths`` are alternatives, of which the first that can be planned is taken.
+
+    ``rank`` orders grasps ``gripper_to_object (4, 4)``, the least first; None: its fingers block the function. ``empty``: the
+    closed hand itself moves, and nothing is grasped. ``as_hulls``: the target is carried as its hulls. The path takes
+    ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
+    ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or
+    put back where it was. ``watch`` makes what latches events, and what a guard asks for the force.
+    """
+
+    paths: tuple[HeldPath, ...]
+    rank: Callable[[np.ndarray], float | None] = lambda _: 0.0
+    empty: bool = False
+    as_hulls: bool = False
+    duration_s: float = 3.0
+    longest_s: float = 6.0
+    measured: int = MEASURED_TIMES
+    hold_s: float = 0.0
+    ending: Literal["let_go", "keep", "put_back"] = "let_go"
+    guard: Guard | None = None
+    watch: Callable[[RobotWorld], EventWatch] | None = None
