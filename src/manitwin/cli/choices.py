@@ -112,6 +112,7 @@ SKILLS = Choices(
         "near",
         "upright",
         "hang",
+        "pour",
     ),
 )
 SURFACES = Choices("surface", _of("table", "shelf", "tray"))

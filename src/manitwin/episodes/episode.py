@@ -11,6 +11,8 @@ from manitwin.episodes.courses.held import HeldCourse
 from manitwin.episodes.courses.pick_place import PickPlaceCourse
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import FRAME_S, Execution
+from manitwin.episodes.goals.world_state import Granules
+from manitwin.episodes.granule_counts import held_by, with_granule_counts
 from manitwin.episodes.judging import is_reached_already, judge
 from manitwin.episodes.outcome import moved_m, turned_rad
 from manitwin.episodes.planning.problem import PickPlaceProblem
@@ -54,6 +56,8 @@ def run_episode(
             facts.unplanned = tuple(sorted(execution.unplanned))
             facts.events = execution.events
             recording = execution.recording()
+            if world.granules is not None and skill_goal is not None:
+                recording = with_granule_counts(recording, start.objects, skill_goal.openings, world.granules.radius_m)
             del execution, course
     return facts, recording
 
@@ -89,6 +93,8 @@ def _settled(
     world: RobotWorld,
 ) -> Start | None:
     """Let the objects come to rest and make the problem that of where they are; None where one does not stand."""
+    if skill_goal is not None and skill_goal.granules is not None:
+        world.add_granules(skill_goal.granules)
     world.settle(settings.max_settle_s)
     rested = tuple(
         replace(placed, object_to_world=world.object_to_world(number)) for number, placed in enumerate(world.placed)
@@ -103,7 +109,11 @@ def _settled(
         target=rested[world.target],
         obstacles=tuple(placed for number, placed in enumerate(rested) if number != world.target),
     )
-    return Start(settled, rested, planner, settings, skill_goal)
+    start = Start(settled, rested, planner, settings, skill_goal)
+    if skill_goal is not None and world.granules is not None:
+        granules = Granules(world.granules.positions_m(), world.granules.radius_m)
+        start.granules_in = held_by(rested, [each.object_to_world for each in rested], skill_goal.openings, granules)
+    return start
 
 
 def _closing(robot: Robot, settings: EpisodeSettings) -> TrialSettings:

@@ -178,6 +178,8 @@ class EpisodesStage:
         }
         if setting.fixtures:
             said["fixtures"] = [to_json(fixture) for fixture in setting.fixtures]
+        if setting.skill_goal is not None and setting.skill_goal.granules is not None:
+            said["granule_radius_m"] = setting.skill_goal.granules.radius_m
         if facts.events:
             said["events"] = [asdict(event) for event in facts.events]
         return StoredEpisode(attempt, recording, recorded_robot(self._robot), objects, said)

@@ -10,7 +10,7 @@ from manitwin.episodes.courses.course import Start
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.goals.evaluation import evaluate
-from manitwin.episodes.goals.world_state import Event, ObjectState, WorldState
+from manitwin.episodes.goals.world_state import Event, Granules, ObjectState, WorldState
 from manitwin.episodes.outcome import is_at_rest, is_disturbed, moved_m, placement_errors, placement_outcome
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
@@ -21,12 +21,13 @@ def is_reached_already(start: Start, world: RobotWorld) -> bool:
     if start.skill_goal is None:
         return False
     touching = frozenset(world.contacts.pressing(world.contacts.read()))
-    state = state_of(start, [each.object_to_world for each in start.objects], touching)
+    state = state_of(start, world, [each.object_to_world for each in start.objects], touching)
     return evaluate(state, start.skill_goal.goal).reached
 
 
 def state_of(
     start: Start,
+    world: RobotWorld,
     object_to_world: Sequence[np.ndarray],
     touching: frozenset[frozenset[str]],
     at_rest: Sequence[bool] | None = None,
@@ -45,7 +46,9 @@ def state_of(
     furniture = {box.name for box in start.problem.static_boxes}
     furniture |= {name for fixture in goal.fixtures for name in fixture.bearing}
     pegs = {fixture.name: peg for fixture in goal.fixtures if (peg := fixture.peg) is not None}
-    return WorldState(objects, touching, frozenset(furniture), events, pegs=pegs)
+    made = world.granules
+    granules = None if made is None else Granules(made.positions_m(), made.radius_m)
+    return WorldState(objects, touching, frozenset(furniture), events, goal.places_m, pegs, granules, start.granules_in)
 
 
 def judge(
@@ -65,7 +68,7 @@ def judge(
         released = max(execution.touches.finger_forces_n) == 0
         failure = placement_outcome(errors, at_rest=at_rest[world.target], released=released, settings=settings)
     else:
-        state = state_of(start, last[-1], execution.pressing, at_rest, execution.events)
+        state = state_of(start, world, last[-1], execution.pressing, at_rest, execution.events)
         facts.evaluation = evaluate(state, start.skill_goal.goal)
         failure = None if facts.evaluation.reached else "goal_missed"
     if failure is None and any(

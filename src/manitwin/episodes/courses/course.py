@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -48,13 +48,17 @@ class Planner(Protocol):
 
 @dataclass
 class Start:
-    """What an episode starts from: the problem and all ``objects`` (in the world's order) where they have come to rest."""
+    """What an episode starts from: the problem and all ``objects`` (in the world's order) where they have come to rest.
+
+    ``granules_in`` says how many granules each of them holds.
+    """
 
     problem: PickPlaceProblem
     objects: tuple[PlacedObject, ...]
     planner: Planner
     settings: EpisodeSettings
     skill_goal: SkillGoal | None
+    granules_in: Mapping[str, int] = field(default_factory=dict)
 
 
 class Course(ABC):

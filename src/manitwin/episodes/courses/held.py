@@ -43,6 +43,8 @@ class HeldCourse(Course):
             objects={each.name: each for each in start.objects},
             partner=next((each for each in start.objects if each.name == goal.partner), None),
             frames=goal.frames,
+            openings=goal.openings,
+            places_m=goal.places_m,
             fixtures=goal.fixtures,
             fingers=frozenset(robot.finger_links),
             fingertips_m=fingertip_corners(planner.closed),
@@ -68,7 +70,7 @@ class HeldCourse(Course):
                 return False
             self._reach, self._held, self._joints = found
             return True
-        ranks = [(task.rank(grasp.gripper_to_object), grasp) for grasp in self.problem.grasps]
+        ranks = [(task.rank(grasp), grasp) for grasp in self.problem.grasps]
         free = [(rank, grasp) for rank, grasp in ranks if rank is not None]
         grasps = tuple(grasp for _, grasp in sorted(free, key=lambda each: each[0]))
         blocking = len(ranks) - len(free)

@@ -3,30 +3,49 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from manitwin.episodes.goals.goal import Literal
 from manitwin.episodes.goals.spatial import Judgement, judged
 from manitwin.episodes.goals.world_state import ROBOT, Event, Granules, ObjectState, WorldState
+from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import inverse, transform_points
 
 MOST_SPILT = 0.05
 PRESS_RADIUS_M, PRESS_RAD = 0.012, np.radians(30)
 STRIKE_RAD = np.radians(15)
 HANG_SLACK_M = 0.006
+BELLY = 1.5  # rim radii
 
 
 def granules_in(vessel: ObjectState, granules: Granules) -> np.ndarray:
-    """Return for each granule whether it lies in a vessel's cavity: the cylinder of its rim, down to its deepest point."""
-    opening = vessel.opening
-    if opening is None:
+    """Return for each granule whether it lies in a vessel's cavity."""
+    if vessel.opening is None:
         return np.zeros(len(granules.positions_m), bool)
-    from_rim_m = transform_points(inverse(vessel.object_to_world), granules.positions_m) - opening.center_m
+    positions_m = transform_points(inverse(vessel.object_to_world), granules.positions_m)
+    return cavity_holds(vessel.opening, np.concatenate(vessel.body.hulls), positions_m, granules.radius_m)
+
+
+def cavity_holds(
+    opening: Opening, corners_m: np.ndarray, positions_m: np.ndarray, granule_radius_m: float
+) -> np.ndarray:
+    """Return for granules ``(..., 3)`` in a vessel's frame whether they lie in its cavity, ``(...)``.
+
+    That is the cylinder of its rim, down to its deepest point, and below the rim all that is within the convex hull of the
+    vessel's ``corners_m (V, 3)`` and half as far again from the axis as the rim: what lies in a belly below a neck.
+    """
+    from_rim_m = positions_m - opening.center_m
     along_m = from_rim_m @ opening.axis
-    out_m = np.linalg.norm(from_rim_m - along_m[:, None] * opening.axis, axis=1)
-    radius_m = granules.radius_m
-    return np.asarray(
-        (along_m < radius_m) & (along_m > -opening.depth_m - radius_m) & (out_m < opening.rim_radius_m + 0.3 * radius_m)
-    )
+    out_m = np.linalg.norm(from_rim_m - along_m[..., None] * opening.axis, axis=-1)
+    under_rim = (along_m < granule_radius_m) & (along_m > -opening.depth_m - granule_radius_m)
+    in_neck = out_m < opening.rim_radius_m + 0.3 * granule_radius_m
+    wide = under_rim & ~in_neck & (along_m < 0) & (out_m < BELLY * opening.rim_radius_m)
+    if not wide.any():
+        return np.asarray(under_rim & in_neck)
+    planes = ConvexHull(corners_m).equations
+    in_belly = np.zeros_like(wide)
+    in_belly[wide] = (positions_m[wide] @ planes[:, :3].T + planes[:, 3]).max(1) < 0
+    return np.asarray((under_rim & in_neck) | in_belly)
 
 
 def poured(state: WorldState, literal: Literal) -> Judgement:

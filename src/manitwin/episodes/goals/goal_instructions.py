@@ -53,6 +53,10 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "hang {a} on the peg", "hang up {a}", "put {a} on the hook", "pick up {a} and hang {it} on the peg",
         "take {a} and slip {it} over the peg", "please hang {a} up by its hole",
     ),
+    "poured": (
+        "pour what is in {a} into {b}", "empty {a} into {b}", "pour from {a} into {b}", "tip {a} out into {b}",
+        "pick up {a}, pour it out into {b} and put {it} back", "please fill {b} with what is in {a}",
+    ),
     "pressed": (
         "press {a}", "push down on {a} with your fingertips", "press down on {a}", "give {a} a push from above",
         "close your hand and press {a}", "please press {a} once",

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from manitwin.episodes.fixtures import PEG_HEIGHT_M, PEG_LENGTH_M, PEG_RADIUS_M, Fixture, peg_stand
 from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill, frames_of, hole_frame_of
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.skill import Surroundings
@@ -63,8 +64,8 @@ class Hang(HeldSkill):
                 poses = _onto(turned, frame.size_m) @ inverse(hole_to_object)
                 paths.append(HeldPath(poses, frozenset({PEG}), meant_from=SLIDING_KNOTS))
 
-        def rank(gripper_to_object: np.ndarray) -> float | None:
-            tips = transform_points(gripper_to_object, np.array([[0.0, 0, scene.tip_depth_m]]))[0]
+        def rank(grasp: Grasp) -> float | None:
+            tips = transform_points(grasp.gripper_to_object, np.array([[0.0, 0, scene.tip_depth_m]]))[0]
             away_m = float(np.linalg.norm(tips - hole))
             return None if away_m < FINGERS_CLEAR_M else 0.0
 

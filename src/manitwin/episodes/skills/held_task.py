@@ -11,6 +11,8 @@ import numpy as np
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.fixtures import Fixture
 from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.problem import Grasp
+from manitwin.geometry.cavity import Opening
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.scenes.layouts.twin_frames import TwinFrame
@@ -22,14 +24,16 @@ MEASURED_TIMES = 4
 class HeldScene:
     """What a skill sees once all has come to rest: where things are, their frames, the fixtures, and the hand.
 
-    ``fingers`` are the names of the finger links; ``fingertips_m (N, 3)`` the corners of the closed fingers in the grasp
-    frame, ``tip_depth_m`` how far along its Z the middle of the pads is.
+    ``openings`` and ``places_m`` are those of the goal. ``fingers`` are the names of the finger links; ``fingertips_m (N, 3)``
+    the corners of the closed fingers in the grasp frame, ``tip_depth_m`` how far along its Z the middle of the pads is.
     """
 
     target: PlacedObject
     objects: Mapping[str, PlacedObject]
     partner: PlacedObject | None
     frames: Mapping[str, tuple[TwinFrame, ...]]
+    openings: Mapping[str, Opening]
+    places_m: Mapping[str, np.ndarray]
     fixtures: tuple[Fixture, ...]
     fingers: frozenset[str]
     fingertips_m: np.ndarray
@@ -56,7 +60,7 @@ class Guard:
 class HeldTask:
     """One skill's work: ``paths`` are alternatives, of which the first that can be planned is taken.
 
-    ``rank`` orders grasps ``gripper_to_object (4, 4)``, the least first; None: its fingers block the function. ``empty``: the
+    ``rank`` orders grasps, the least first; None: its fingers block the function. ``empty``: the
     closed hand itself moves, and nothing is grasped. ``as_hulls``: the target is carried as its hulls. The path takes
     ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
     ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or
@@ -64,7 +68,7 @@ class HeldTask:
     """
 
     paths: tuple[HeldPath, ...]
-    rank: Callable[[np.ndarray], float | None] = lambda _: 0.0
+    rank: Callable[[Grasp], float | None] = lambda _: 0.0
     empty: bool = False
     as_hulls: bool = False
     duration_s: float = 3.0

@@ -8,6 +8,7 @@ from manitwin.episodes.skills.beside import SIDE_SKILLS
 from manitwin.episodes.skills.hang import Hang
 from manitwin.episodes.skills.place_in import PlaceIn
 from manitwin.episodes.skills.place_on import PLACE_ON, STACK
+from manitwin.episodes.skills.pour import Pour
 from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.skills.upright import Upright
 from manitwin.errors import UsageError, choose_from
@@ -15,7 +16,15 @@ from manitwin.errors import UsageError, choose_from
 PICK_PLACE = "pick_place"
 """Moves an object to a pose drawn at random: its goal is that pose, not one in words."""
 
-_SKILLS: tuple[Skill, ...] = (PLACE_ON, PlaceIn(), STACK, *SIDE_SKILLS, Upright(), Hang())
+_SKILLS: tuple[Skill, ...] = (
+    PLACE_ON,
+    PlaceIn(),
+    STACK,
+    *SIDE_SKILLS,
+    Upright(),
+    Hang(),
+    Pour(),
+)
 
 SKILLS: Mapping[str, Skill] = {skill.name: skill for skill in _SKILLS}
 

@@ -18,6 +18,7 @@ from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.hull_distance import ConvexParts, PlacedParts
 from manitwin.geometry.rigid_body import PlacedObject, StaticBox
+from manitwin.physics.sapien.granules import GranuleFill
 from manitwin.scenes.layouts.pool import Pool, PoolBody, PoolTwin, StandingPose
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 
@@ -55,7 +56,8 @@ class SkillGoal:
 
     ``partner`` is the object that the goal is about beside the target. ``openings``, ``holes`` and ``frames`` are those of the
     objects, by name. Of a skill that moves the target along a held path there is the ``path`` that is made once all has come to
-    rest, and its ``fixtures``; the one pose is then that of the beginning.
+    rest, and its ``fixtures``; the one pose is then that of the beginning. ``granules`` lie in one of the objects;
+    ``places_m`` are marked places ``(3,)`` in the world.
     """
 
     goal: Goal
@@ -66,6 +68,8 @@ class SkillGoal:
     frames: Mapping[str, tuple[TwinFrame, ...]] = field(default_factory=dict)
     fixtures: tuple[Fixture, ...] = ()
     path: Callable[[HeldScene], HeldTask] | None = None
+    granules: GranuleFill | None = None
+    places_m: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def is_of_a_path(self) -> bool:

@@ -82,7 +82,9 @@ class ContactReader:
         contacts: Sequence[physx.PhysxContact] = self._system.get_contacts()
         if self.has_strangers:
             known = self._roles
-            return [each for each in contacts if each.bodies[0] in known and each.bodies[1] in known]
+            return [
+                each for each in contacts for one, two in (each.bodies,) if one in known and two in known
+            ]  # bodies are made anew each time they are asked for
         return contacts
 
     def push(self, contacts: Iterable[physx.PhysxContact], on: str, by: frozenset[str]) -> Push | None:
