@@ -130,3 +130,33 @@ def test_mass_from_density_alone_is_density_times_volume(tmp_path: Path) -> None
 def test_an_answer_without_mass_or_density_is_no_answer(tmp_path: Path) -> None:
     with pytest.raises(BadReply, match="neither a mass nor a bulk density"):
         run(cup(), tmp_path, None, annotator=Says(mass_kg=None, bulk_density_kg_m3=None))
+
+
+def hammer() -> trimesh.Trimesh:
+    """A wooden handle of 28 cm that ends in the middle of a steel head, both boxes, lying on z = 0."""
+    handle = trimesh.creation.box(
+        [0.29, 0.025, 0.03], transform=trimesh.transformations.translation_matrix([-0.145, 0, 0.015])
+    )
+    head = trimesh.creation.box(
+        [0.035, 0.11, 0.03], transform=trimesh.transformations.translation_matrix([0, 0, 0.015])
+    )
+    return trimesh.boolean.union([handle, head], engine="manifold")
+
+
+def test_a_hammer_balances_at_its_steel_head(tmp_path: Path) -> None:
+    mesh = hammer()
+    physical = run(mesh, tmp_path, "hammer")
+    wood, steel = 650 * 0.025 * 0.03 * 0.2725, 7850 * 0.035 * 0.11 * 0.03
+    truth = wood * (-0.0175 - 0.2725 / 2) / (wood + steel)
+    assert physical.mass_distribution == "parts"
+    assert physical.center_of_mass_m[0] == pytest.approx(truth, abs=0.01)  # the border of the head, by form
+    assert mesh.center_mass[0] < truth - 0.05
+    assert physical.center_of_mass_uncertainty_m > 0.01
+    moments = np.linalg.eigvalsh(physical.inertia_kg_m2)
+    assert moments[0] > 0 and moments[2] <= moments[0] + moments[1]
+
+
+def test_materials_of_which_one_part_has_none_are_not_guessed(tmp_path: Path) -> None:
+    physical = run(hammer(), tmp_path, "hammer", annotator=Says(part_materials={"head": "steel"}))
+    assert physical.mass_distribution == "solid"
+    assert physical.center_of_mass_m == pytest.approx(hammer().center_mass, abs=1e-5)

@@ -166,7 +166,7 @@ class Physical(Record):
     center_of_mass_m: Vector3
     center_of_mass_uncertainty_m: Finite
     inertia_kg_m2: Matrix3
-    mass_distribution: Literal["solid", "shell"]
+    mass_distribution: Literal["solid", "shell", "parts"]
 
     @model_validator(mode="after")
     def _possible(self) -> Physical:

@@ -13,7 +13,7 @@ from handmade import cup
 from manitwin.errors import BadReply, Rejected
 from manitwin.models.annotators.priors import load_materials
 from manitwin.models.annotators.protocol import PhysicalEstimates
-from manitwin.models.annotators.vlm.physical import Matter, physical_question
+from manitwin.models.annotators.vlm.physical import Matter, PhysicalAnswer, part_materials, physical_question
 from manitwin.models.annotators.vlm.prompt_files import load_prompts
 from manitwin.models.annotators.vlm.question_parts import size_phrase
 
@@ -185,3 +185,19 @@ def test_material_that_no_picture_tells_may_be_said_to_be_unknown(tmp_path: Path
 
 def test_materials_are_those_of_the_table() -> None:
     assert {*Matter.__args__} - {"other", "unknown"} == {*load_materials()} - {"unknown"}  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("name", "said", "told"),
+    [
+        ("fork", "head, neck and tang=steel; handle=plastic", {"head": "steel", "neck": "steel", "handle": "plastic"}),
+        ("hammer", "head=steel; handle=wood; grip=rubber", {"head": "steel", "neck": "wood", "handle": "wood"}),
+        ("frying pan", "body=aluminium; handle=plastic; bracket=steel", {"body": "aluminium", "handle": "plastic"}),
+        ("hammer", "shaft=steel; head=unknown", None),  # a shaft may be head, neck or handle
+        ("cup", "body=ceramic; handle=wood", None),  # a form whose parts no rule tells
+    ],
+)
+def test_materials_go_to_the_parts_that_they_name(name: str, said: str, told: dict[str, str] | None) -> None:
+    rows = [dict(zip(("part", "material"), row.split("="), strict=True)) for row in said.split("; ")]
+    answer = PhysicalAnswer.model_validate({**GOOD, "object": name, "materials": rows})
+    assert part_materials(answer, name) == told

@@ -16,6 +16,16 @@ from manitwin.geometry.parts.protrusions import Protrusion
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape
 
 PartRule = Literal["handled", "spouted", "capped", "stemmed", "ended", "pistol"]
+PartRole = Literal["body", "handle", "spout", "cap", "bowl", "stem", "foot", "head", "neck", "housing", "grip"]
+ROLES: dict[PartRule, tuple[PartRole, ...]] = {
+    "handled": ("body", "handle"),
+    "spouted": ("body", "handle", "spout"),
+    "capped": ("body", "cap"),
+    "stemmed": ("bowl", "stem", "foot"),
+    "ended": ("head", "neck", "handle"),
+    "pistol": ("housing", "grip"),
+}
+"""The parts that each rule may tell."""
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 from manitwin.geometry.parts.features import Feature
@@ -33,6 +34,15 @@ _WORDS: dict[str, frozenset[str]] = {
     "housing": frozenset(["housing", "body", "barrel"]),
 }
 """By role, the words of which a label has one where it names the whole part and no place on it."""
+
+
+def roles_named(label: str, roles: Iterable[str]) -> list[str]:
+    """Return which of ``roles`` a label names ('blade and neck': head, neck); a word that may name several names none."""
+    known, named = list(roles), []
+    for word in re.findall(r"[a-z]+", label.lower()):
+        meant = [word] if word in known else [role for role in known if word in _WORDS[role]]
+        named += meant if len(meant) == 1 else []
+    return list(dict.fromkeys(named))
 
 
 def part_name(role: str, prior: Prior, labels_there: Iterable[str]) -> str:

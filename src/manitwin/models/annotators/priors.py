@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from manitwin.errors import ManiTwinError, choose_from
 from manitwin.formats.toml_file import parse_toml
 from manitwin.geometry.parts.features import Feature
-from manitwin.geometry.parts.part_rules import PartRule
+from manitwin.geometry.parts.part_rules import PartRole, PartRule
 from manitwin.geometry.parts.shape import HeadEnd
 from manitwin.twin.point_records import GraspType
 from manitwin.twin.record_values import Estimate, Finite, Record
@@ -107,7 +107,8 @@ class Prior(Form):
     ``longest_axis_m`` is that of the oriented box. ``bulk_density_kg_m3`` is mass per volume of a repaired scan, not of
     the matter; None where a scan's volume says nothing of the mass. ``stands``: whether it is put down upright (None:
     either). ``like`` is the category whose numbers it has for want of its own. ``counter`` is what such things are counted
-    by ('pair of'). ``measured`` names the published measurements; ``sources`` says where the rest is from.
+    by ('pair of'). ``part_materials`` are the materials of its parts by role, where they are of unlike matter. ``measured``
+    names the published measurements; ``sources`` says where the rest is from.
     """
 
     category: str
@@ -124,6 +125,7 @@ class Prior(Form):
     function: str
     like: str | None = None
     counter: str | None = None
+    part_materials: dict[PartRole, str] = Field(default_factory=dict)
     sources: tuple[str, ...] = Field(min_length=1)
     measured: tuple[str, ...]
 
@@ -160,6 +162,9 @@ def _prior(category: str, row: dict[str, Any], domain: str, defaults: dict[str, 
     form_name, surface = row.pop("form"), row.pop("surface")
     if form_name not in forms:
         raise ManiTwinError(f"{domain}.toml [{category}]: {choose_from('form', form_name, forms)}")
+    for material in row.get("part_materials", {}).values():
+        if material not in materials:
+            raise ManiTwinError(f"{domain}.toml [{category}]: {choose_from('part material', material, materials)}")
     if surface not in materials:
         raise ManiTwinError(f"{domain}.toml [{category}]: {choose_from('surface material', surface, materials)}")
     contact = materials[surface]

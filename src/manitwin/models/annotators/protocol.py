@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -57,6 +58,7 @@ class PhysicalEstimates:
     ``longest_axis_m`` is the longest axis of the oriented box (None: keep the scale as it is). ``wall_thickness_m`` is given
     for hollow things whose mesh is only an outer skin (None: the mesh is the solid matter, or full). ``mass_kg`` may be
     None where only ``bulk_density_kg_m3`` (mass per volume of the repaired mesh) is known: one of both is given.
+    ``part_materials`` names a material of the priors by the role of a part, where parts are of unlike matter (None: not said).
     ``findings`` are contradictions that remained when the annotator was asked again; None: its answers were not examined.
     ``called`` is what it took the object for, where it looked; None: it did not.
     """
@@ -70,6 +72,7 @@ class PhysicalEstimates:
     material: str
     wall_thickness_m: float | None
     findings: tuple[str, ...] | None = None
+    part_materials: Mapping[str, str] | None = None
     called: str | None = None
 
 

@@ -85,6 +85,7 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
         restitution=prior.restitution.estimate(prior.source),
         material=prior.material,
         wall_thickness_m=_wall_thickness(subject, prior, scale),
+        part_materials={str(role): material for role, material in prior.part_materials.items()} or None,
     )
 
 

@@ -7,6 +7,9 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from manitwin.geometry.parts.part_rules import ROLES
+from manitwin.models.annotators.part_names import roles_named
+from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import extents_of, name_line, size_phrase
@@ -116,6 +119,25 @@ def _size_said(subject: Subject) -> str:
     )
 
 
+def part_materials(answer: PhysicalAnswer, name: str | None) -> dict[str, str] | None:
+    """Return the materials of parts by role, of several named for one that with more of the mass; None where no parts are named.
+
+    A neck of which nothing is said is of the matter that such a thing's neck shares with head or handle (priors).
+    """
+    prior = lookup(name) or lookup(answer.object)
+    if prior is None or prior.parts is None:
+        return None
+    said: dict[str, str] = {}
+    for part in answer.materials:
+        for role in roles_named(part.part, ROLES[prior.parts]):
+            said.setdefault(role, part.material)
+    if "neck" not in said and {"head", "handle"} <= said.keys():
+        usual = prior.part_materials
+        said["neck"] = said["handle" if usual and usual.get("neck") == usual.get("handle") else "head"]
+    told = {role: material for role, material in said.items() if material not in ("other", "unknown")}
+    return told or None
+
+
 def physical_estimates(
     answer: PhysicalAnswer, subject: Subject, model: str, *, outer_skin: bool, findings: tuple[str, ...]
 ) -> PhysicalEstimates:
@@ -136,4 +158,5 @@ def physical_estimates(
         wall_thickness_m=answer.wall_thickness_m if hollow else None,
         findings=findings,
         called=answer.object,
+        part_materials=part_materials(answer, subject.name),
     )
