@@ -9,11 +9,14 @@ import numpy as np
 from scipy import ndimage
 
 from manitwin.models.matting.background import Background, connected_to, length
+from manitwin.models.matting.ground_inside import ground_inside
 from manitwin.models.matting.hard_shadow import PENUMBRA_PX, edge_width_px
 from manitwin.models.matting.outline import dilated, disk, eroded, opened
 from manitwin.models.matting.segmentation import Segmentation
+from manitwin.models.matting.shade_strips import shade_strips
 
 MOST_ZOOM = 1.6  # beyond that a photo's blur, not its pixels, says how fine its outlines are
+WIDER = 1.3  # than the photo's own blur: its edges differ by 1.2 times, as made photos show
 FRAME_EDGE = 5.0  # L*a*b* per pixel: an edge in focus of an object, not shading
 
 
@@ -28,6 +31,8 @@ class MatteScores:
     agreement of two independent opinions; ``whole`` little lies outside the largest connected part;
     ``plain`` how uniform the background is; ``outermost`` share of the outline with no edge beyond it, in what passes for
     shade, that is nearly as sharp; ``sharply_bounded`` how little of it is as soft as a shadow's edge with shade inside;
+    ``unshaded`` how little along it has the ground's own tint, dimmed, where the rest has other colours;
+    ``solid`` how little of it, enclosed by the rest, has the ground's own tint: a hole may be filled;
     ``thick`` how small its outline is against its area: a third of a pixel off all around is 5 % of a thin thing.
     """
 
@@ -41,6 +46,8 @@ class MatteScores:
     plain: float
     outermost: float
     sharply_bounded: float
+    unshaded: float
+    solid: float
     thick: float
 
     @property
@@ -81,6 +88,7 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0) -> MatteScores:
     false = float((background.distance[outside] > 4).mean()) if outside.sum() > 0.5 * outline.sum() else 0.0
     _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
+    strips = shade_strips(background, mask, segmentation.gradient)
     return MatteScores(
         on_edges=_ramp(on_edges, 0.4, 0.9),
         crisp=_ramp(float(np.median(sharpest[free])) / typical if free.any() else 0.0, 0.15, 0.5),
@@ -88,10 +96,14 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0) -> MatteScores:
         complete=_ramp(1 - _left_over(segmentation) / mask.sum(), 0.3, 0.9),
         uncut=_ramp(-float((mask & border).sum()) / 2 / _longest(mask), -0.06, -0.01),
         stable=_ramp(segmentation.agreement, 0.6, 0.95),
-        whole=_ramp(float(areas.max() / areas.sum()), 0.8, 1.0),
+        whole=_ramp(float(areas.max() / areas.sum()), 0.88, 1.0),
         plain=_ramp(-background.noise_lab - 20 * background.unexplained, -12, -3),
         outermost=_ramp(-_overshadowed(segmentation, outline), -0.25, -0.05),
         sharply_bounded=_ramp(-_softly_bounded(segmentation, outline), -0.4, -0.15),
+        unshaded=_ramp(-float((strips.shadow | strips.doubtful).sum() / mask.sum()), -0.05, -0.01),
+        solid=_ramp(
+            -ground_inside(background, mask, segmentation.gradient, segmentation.edge_threshold), -0.008, -0.002
+        ),
         thick=_ramp(-outline.sum() / mask.sum() / min(zoom, MOST_ZOOM), -0.25, -0.12),
     )
 
@@ -121,22 +133,28 @@ def _overshadowed(segmentation: Segmentation, outline: np.ndarray) -> float:
     """Return the share of the outline that has an edge beyond it, in the shade beside it, at least 0.7 times as sharp.
 
     A shadow's own edge is softer than the outline of what casts it, so a sharp one is the rim of a grey or clear part. A
-    shadow with a visible edge was judged by more than that, and does not count.
+    shadow with a visible edge was judged by more than that, and does not count. What the ground has as often farther out, where
+    no part of the object is, is its texture.
     """
     mask, gradient = segmentation.mask, segmentation.gradient
     distance, nearest = ndimage.distance_transform_edt(~mask, return_indices=True)
     shade = (segmentation.shadow | segmentation.background.shade) & ~dilated(segmentation.hard, 6)
-    beside = shade & (distance > 5) & (distance < 0.1 * max(mask.shape))
-    beyond = np.zeros(mask.shape, np.float32)
-    np.maximum.at(beyond, (nearest[0][beside], nearest[1][beside]), gradient[beside])
-    sharper = cv2.dilate(beyond, disk(3)) > 0.7 * cv2.dilate(gradient, disk(3))
-    return float(sharper[outline].mean())
+    reach = 0.1 * max(mask.shape)
+    outline_edge = cv2.dilate(gradient, disk(3))
+    shares = []
+    for near, far in ((5, reach), (reach, 2 * reach - 5)):
+        beside = shade & (distance > near) & (distance < far)
+        beyond = np.zeros(mask.shape, np.float32)
+        np.maximum.at(beyond, (nearest[0][beside], nearest[1][beside]), gradient[beside])
+        shares.append(float((cv2.dilate(beyond, disk(3)) > 0.7 * outline_edge)[outline].mean()))
+    return max(0.0, shares[0] - shares[1])
 
 
 def _softly_bounded(segmentation: Segmentation, outline: np.ndarray) -> float:
     """Return the share of the outline where a penumbra, not an edge, leads to the background's colour, dimmed.
 
-    That is the outline of a shadow: seen on a grey object, where nothing else tells the shadow that hangs on it.
+    That is the outline of a shadow: seen on a grey object, where nothing else tells the shadow that hangs on it. The sharper
+    quarter of the outline says how wide the photo's own blur is.
     """
     inner = eroded(segmentation.mask, 5)
     if not inner.any():
@@ -144,9 +162,12 @@ def _softly_bounded(segmentation: Segmentation, outline: np.ndarray) -> float:
     distance, nearest = ndimage.distance_transform_edt(~inner, return_indices=True)
     depth = cv2.blur(length(segmentation.background.residual), (3, 3))
     width_px = edge_width_px(depth[nearest[0], nearest[1]], cv2.dilate(segmentation.gradient, disk(4)))
-    soft = (width_px > PENUMBRA_PX) & segmentation.background.shade[nearest[0], nearest[1]]
     at = outline & (distance < 9)
-    return float(soft[at].mean()) if at.any() else 0.0
+    if not at.any():
+        return 0.0
+    limit_px = max(PENUMBRA_PX, WIDER * float(np.percentile(width_px[at], 25)))
+    soft = (width_px > limit_px) & segmentation.background.shade[nearest[0], nearest[1]]
+    return float(soft[at].mean())
 
 
 def _left_over(segmentation: Segmentation) -> float:

@@ -29,6 +29,8 @@ _CAUSES = {
     "stable": "two ways of looking at it do not agree on what it is",
     "whole": "it falls apart into pieces",
     "plain": "the background is too cluttered",
+    "unshaded": "part of its outline has the background's colour, dimmed: a shadow may hang on it",
+    "solid": "the ground may be seen through it, or it has parts of the ground's colour inside",
     "thick": "it is thin for so small a photo, so its outline is a large part of it",
     "sharply_bounded": "it is as grey as a shadow, and part of its outline as soft as one: a shadow may hang on it",
     "outermost": "what looks like its shadow has edges as sharp as its outline, so a clear or grey part of it may be lost",

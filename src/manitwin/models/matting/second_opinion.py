@@ -13,9 +13,13 @@ import cv2
 import numpy as np
 
 from manitwin.models.matting.background import border_ring, length
+from manitwin.models.matting.outline import dilated, eroded
 
 SIDE_PX = 288
 SHADES = (0.82, 0.64, 0.46)  # of the background's linear light: what shadows of a lit scene leave
+CLOSER = 1.3  # times as fine, or a second look is not worth it
+MARGIN = 0.15  # of a thing's longer side: the surroundings that are looked at again
+BLURRED_PX = 4  # at ``SIDE_PX``: how far off the first look's outline may be
 LEAST_PIXELS = 30
 SECTORS, LEAST_SECTORS = 32, 5  # of the directions from the picture's middle
 NEAR_LAB = 9.0
@@ -35,12 +39,47 @@ class Bracket:
 
 
 def colour_opinion(rgb: np.ndarray) -> Bracket:
-    """Return what colours alone say of ``rgb`` (H, W, 3) uint8, cut at ``SIDE_PX``.
+    """Return what colours alone say of ``rgb`` (H, W, 3) uint8, cut at ``SIDE_PX``, of a small thing's surroundings again.
 
-    With the shades of the border's colours as background, shadows go, and grey parts of an object with them; without them both
-    stay. The object is between the two.
+    The first look says what the object is, the second where its outline runs. With the shades of the border's colours as
+    background, shadows go, and grey parts of an object with them; without them both stay. The object is between the two.
     """
-    scale = min(1.0, SIDE_PX / max(rgb.shape[:2]))
+    far = _seen(rgb, SIDE_PX, None)
+    box = _around(far.possible)
+    if box is None:
+        return far
+    blurred_px = max(2, round(BLURRED_PX * max(rgb.shape[:2]) / SIDE_PX))
+    longest = max(side.stop - side.start for side in box)
+    side_px = min(max(rgb.shape[:2]), round(SIDE_PX * max(rgb.shape[:2]) / longest))
+    if side_px < CLOSER * min(SIDE_PX, max(rgb.shape[:2])):
+        return far
+    near = _seen(rgb, side_px, box)
+    return Bracket(
+        *(_redrawn(*looks, blurred_px) for looks in ((far.certain, near.certain), (far.possible, near.possible)))
+    )
+
+
+def _redrawn(far: np.ndarray, near: np.ndarray, band_px: int) -> np.ndarray:
+    """Return the mask (H, W) of the first look with the outline of the closer one, where that is within a band of its own."""
+    along = dilated(far, band_px) & ~eroded(far, band_px)
+    return np.asarray(np.where(along, near, far))
+
+
+def _around(mask: np.ndarray) -> tuple[slice, slice] | None:
+    """Return the rows and columns of a mask (H, W) with a margin; None of an empty one."""
+    rows, columns = np.nonzero(mask)
+    if not len(rows):
+        return None
+    margin = round(MARGIN * max(np.ptp(rows), np.ptp(columns))) + 8
+    return (
+        slice(max(0, int(rows.min()) - margin), min(mask.shape[0], int(rows.max()) + margin + 1)),
+        slice(max(0, int(columns.min()) - margin), min(mask.shape[1], int(columns.max()) + margin + 1)),
+    )
+
+
+def _seen(rgb: np.ndarray, side_px: int, box: tuple[slice, slice] | None) -> Bracket:
+    """Return what colours say of ``rgb`` at a size, of nothing but a ``box`` of it where one is given."""
+    scale = min(1.0, side_px / max(rgb.shape[:2]))
     small = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     small = cv2.bilateralFilter(small, 5, 18, 2)
     ring = border_ring(*small.shape[:2])
@@ -49,9 +88,20 @@ def colour_opinion(rgb: np.ndarray) -> Bracket:
     far = float(np.clip(TEXTURES * texture, LEAST_FAR_LAB, MOST_FAR_LAB))
     border = _colours_of_background(lab, ring)
     shades = np.concatenate([border, *(_shaded(border, share) for share in SHADES)])
-    certain, possible = (_cut(lab, ring, known, far) for known in (shades, border))
-    size = rgb.shape[1::-1]
-    return Bracket(*(cv2.resize(m, size, interpolation=cv2.INTER_LINEAR) > 0.5 for m in (certain, possible)))
+    height, width = ring.shape
+    part: tuple[slice, ...] = (slice(None), slice(None))
+    if box is not None:
+        part = tuple(
+            slice(int(side.start * scale), min(n, int(np.ceil(side.stop * scale))))
+            for side, n in zip(box, ring.shape, strict=True)
+        )
+        ring = border_ring(*lab[part].shape[:2])
+    masks = []
+    for known in (shades, border):
+        whole = np.zeros((height, width), np.float32)
+        whole[part] = _cut(np.ascontiguousarray(lab[part]), ring, known, far)
+        masks.append(cv2.resize(whole, rgb.shape[1::-1], interpolation=cv2.INTER_LINEAR) > 0.5)
+    return Bracket(*masks)
 
 
 def _flattened(lab: np.ndarray, ring: np.ndarray) -> np.ndarray:

@@ -14,12 +14,14 @@ from manitwin.models.matting.outline import (
     dilated,
     edge_threshold,
     edges,
+    eroded,
     flood,
     gradient_magnitude,
     opened,
     without_small_holes,
 )
 from manitwin.models.matting.second_opinion import Bracket, colour_opinion
+from manitwin.models.matting.shade_strips import shade_strips
 from manitwin.models.matting.shadow import cast_shadow, gaps
 
 SAME = 0.97  # agreement beyond which there is nothing to settle
@@ -69,11 +71,18 @@ def segment(rgb: np.ndarray) -> Segmentation:
     hard = hard_shadow(background, candidate & ~shadow & ~seen_through, gradient)
     shadow |= hard
     solid = candidate & ~shadow & ~seen_through
-    first = _graph_cut(background, solid, core_px=6, doubt=3.0, seed=0)
+    first = _graph_cut(background, solid, hard, core_px=6, doubt=3.0, seed=0)
+    strips = shade_strips(background, first, gradient).shadow
+    if strips.any():
+        hard |= strips
+        shadow |= strips
+        first = without_specks(first & ~strips)
     colours = colour_opinion(rgb)
     joined, agreement = reconciled(first, colours, shadow | seen_through)
     second = (
-        first if agreement > SAME else _graph_cut(background, joined, core_px=6, doubt=3.0, seed=0) & ~_away(joined)
+        first
+        if agreement > SAME
+        else _graph_cut(background, joined, hard & ~joined, core_px=6, doubt=3.0, seed=0) & ~_away(joined)
     )
     mask = to_half_contrast(background, second)
     return Segmentation(mask, background, gradient, threshold, shadow & ~mask, hard & ~mask, agreement, colours)
@@ -123,11 +132,13 @@ def _away(mask: np.ndarray) -> np.ndarray:
     return ~dilated(mask, 3)
 
 
-def _graph_cut(background: Background, solid: np.ndarray, *, core_px: int, doubt: float, seed: int) -> np.ndarray:
+def _graph_cut(
+    background: Background, solid: np.ndarray, shadow: np.ndarray, *, core_px: int, doubt: float, seed: int
+) -> np.ndarray:
     """Cut along the edges near the outline (GrabCut: Rother, Kolmogorov, Blake 2004) on the residual colours.
 
     Only pixels within ``core_px`` of the outline can still change sides, or four times that where they are nearer than
-    ``doubt`` to the background; those start there.
+    ``doubt`` to the background; those start there. A known ``shadow`` is background and teaches its shades, but for its rim.
     """
     if not solid.any():
         return solid
@@ -138,6 +149,7 @@ def _graph_cut(background: Background, solid: np.ndarray, *, core_px: int, doubt
     doubtful = background.distance < doubt
     labels[solid & doubtful & (depth <= 4 * core_px)] = cv2.GC_PR_BGD
     labels[solid & (depth > core_px) & (~doubtful | (depth > 4 * core_px))] = cv2.GC_FGD
+    labels[eroded(shadow, 1)] = cv2.GC_BGD
     if not ((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)).any():
         return np.zeros(solid.shape, bool)
     # residuals amplified: the background becomes one tight cluster at mid-grey whatever the light does

@@ -11,6 +11,8 @@ from manitwin.models.matting.outline import dilated, eroded, flood, holds, opene
 MAX_PENUMBRA = 3.5  # L*a*b* units per pixel at working size; cast shadows of the studied photos have 1.5 to 3.3
 MOST_HELD = 0.04  # of a gap: what encloses a print is a label
 CLEARLY = 2.5  # times what a gap's colour is off the background's: its rim is off by as much at least
+SHADED_TINT = 0.03  # spread of the channels' ratios; of ground seen through made loops 0.007 to 0.022
+SHADED_SLOPE = 1.5  # L*a*b* per pixel: half the steepest of a shadow without an edge
 RISE = 0.05  # of the background's light: what shading and noise add on a way into a shadow
 TINTED = 0.25  # the same where a second, coloured light fills the shadow
 
@@ -90,12 +92,13 @@ def _object_edge(certain: np.ndarray, candidate: np.ndarray, gradient: np.ndarra
 def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, threshold: float) -> np.ndarray:
     """Return enclosed regions through which the background is seen: the hole of a ring, the eye of a handle.
 
-    Such a region has the expected colour, or that colour evenly shaded, no more drawing than the border has, and a rim that
-    differs from both clearly.
+    Such a region has the expected colour, or that colour evenly shaded, no more drawing than the border has (or no more than a
+    shadow of the ground's own tint), and a rim that differs from both clearly.
     """
     ratio = background.light_ratio
     shade = ratio.mean(2)
-    even = (shade > 0.45) & (shade < MAX_SHADE) & (length(ratio / shade[..., None] - 1) < 0.12 * np.sqrt(3))
+    tint = length(ratio / shade[..., None] - 1) / np.sqrt(3)
+    even = (shade > 0.45) & (shade < MAX_SHADE) & (tint < 0.12)
     quiet = candidate & (gradient < 4 * threshold) & ((background.distance < 4) | even)
     contrast = length(background.residual)
     usual = float(np.median(gradient[background.border])) + threshold
@@ -113,6 +116,7 @@ def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, th
         rim_contrast = contrast[box][rim]
         inner = eroded(part, 2)
         drawn = float(np.percentile(gradient[box][inner], 75)) if inner.any() else 0.0
+        quietly = drawn < usual or (drawn < SHADED_SLOPE and float(np.percentile(tint[box][part], 75)) < SHADED_TINT)
         own = max(1.5, 0.8 * background.noise_lab)
         clear = float(np.percentile(rim_contrast, 25))
         same = bias < own and np.median(rim_contrast) > CLEARLY * max(own, bias)
@@ -122,7 +126,7 @@ def gaps(background: Background, candidate: np.ndarray, gradient: np.ndarray, th
             area > 0.01 * candidate.sum() and np.hypot(*residual[1:]) < 3 and np.percentile(distant, 20) > 12
         )
         if certain or (
-            drawn < usual and holds(part) < MOST_HELD * area and (same or (shaded and area > 4e-4 * candidate.size))
+            quietly and holds(part) < MOST_HELD * area and (same or (shaded and area > 4e-4 * candidate.size))
         ):
             found[box] |= part
     see_through = even | (background.distance < 4)

@@ -1,0 +1,51 @@
+"""Ground that may be seen inside a mask: through a loop, a handle or a slot."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from manitwin.models.matting.background import Background, length
+from manitwin.models.matting.outline import dilated, disk, eroded, holds
+
+LEAST_LIGHT, MOST_LIGHT = 0.3, 1.03  # of the ground's
+SAME_TINT = 0.025  # spread of the channels' ratios; ground seen through made loops and slots has 0.007 to 0.022
+SAME_CHROMA = 1.6  # L*a*b*, besides the ground's noise
+RIM = 3.5  # L*a*b*: nowhere does it run on into what surrounds it
+RIM_PX = 3
+MOST_HELD = 0.04  # what encloses a print is a label
+LEAST_SHARE = 1e-3
+
+
+def ground_inside(background: Background, mask: np.ndarray, gradient: np.ndarray, threshold: float) -> float:
+    """Return the share of ``mask`` (H, W) that it encloses on all sides and that has the ground's tint, in light or shade.
+
+    It may be a hole, or a grey part of a thing on grey: what cannot be told apart is doubted.
+    """
+    ratio = background.light_ratio
+    light = ratio.mean(2)
+    tint = length(ratio / np.maximum(light, 1e-3)[..., None] - 1) / np.sqrt(3)
+    same = (light > LEAST_LIGHT) & (light < MOST_LIGHT) & (tint < 4 * SAME_TINT)
+    steepest = 0.25 * float(np.percentile(cv2.dilate(gradient, disk(3))[mask], 75))
+    quiet = eroded(mask, RIM_PX) & (same | (background.distance < 4)) & (gradient < max(4 * threshold, steepest))
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(quiet.astype(np.uint8), connectivity=4)
+    total, outside = 0, ~mask
+    for index in range(1, count):
+        left, top, width, height, area = stats[index]
+        if area < max(8, LEAST_SHARE * mask.sum()):
+            continue
+        box = np.s_[max(0, top - 6) : top + height + 6, max(0, left - 6) : left + width + 6]
+        part = labels[box] == index
+        around = dilated(part, RIM_PX + 1)
+        rim = around & ~dilated(part, 1)
+        residual = np.median(background.residual[box][part], 0)
+        step = length(background.residual[box] - residual)
+        if (
+            not (around & outside[box]).any()
+            and float(np.median(tint[box][part])) < SAME_TINT
+            and float(np.hypot(*residual[1:])) < SAME_CHROMA + background.noise_lab
+            and float(np.percentile(step[rim], 20)) > RIM
+            and holds(part) < MOST_HELD * area
+        ):
+            total += int(area)
+    return total / max(int(mask.sum()), 1)
