@@ -86,6 +86,7 @@ READ = {
     "nest-asyncio2": ("BSD-2-Clause", "licenses/LICENSE"),
     "pebble": ("LGPL-3.0-only", "licenses/LICENSE"),
     "prompt-toolkit": ("BSD-3-Clause", "licenses/LICENSE"),
+    "pycocotools": ("BSD-2-Clause", "METADATA"),
     "pycollada": ("BSD-3-Clause", "licenses/COPYING"),
     "pyopengl": ("LicenseRef-BSD", "METADATA"),
     "pyperclip": ("BSD-3-Clause", "licenses/LICENSE.txt"),
@@ -104,7 +105,8 @@ READ = {
 }
 """Licences read by a person, each with the file of the wheel that states it.
 
-``LicenseRef-BSD``: the classifier says BSD, and the wheel has no text that says of how many clauses. ``LicenseRef-matplotlib``:
+``LicenseRef-BSD``: the classifier says BSD, and the wheel has no text that says of how many clauses.
+That of pycocotools is called FreeBSD, which is the one of two. ``LicenseRef-matplotlib``:
 matplotlib's own, modelled on the PSF's. docutils' emacs mode, under the GPL, is not in its wheel. The wheel of Pebble names
 the LGPL and carries the text of version 3.
 """

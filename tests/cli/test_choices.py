@@ -24,6 +24,7 @@ from manitwin.models.weights.catalog import KNOWN_WEIGHTS
 from manitwin.pipeline.manifest import Units, Up
 from manitwin.robots.grippers.gripper import shipped_grippers
 from manitwin.robots.load import load_robot, shipped_robots
+from manitwin.scenes.perception.segmentation import FORMATS as SEGMENTATIONS
 from manitwin.scenes.settings import LayoutSettings
 
 
@@ -45,6 +46,7 @@ def literal(section: type, name: str) -> set[str]:
         (choices.CODECS, literal(PicturesConfig, "codec")),
         (choices.EPISODE_FORMATS, set(collect.FORMATS)),
         (choices.EXPORT_FORMATS, {"all", *formats()}),
+        (choices.SEGMENTATION_FORMATS, set(SEGMENTATIONS)),
         (choices.IMPORT_FORMATS, {"auto", *ASSET_FORMATS}),
         (choices.QUERY_FORMATS, set(WRITERS)),
         (choices.TABLES, set(TABLES)),

@@ -58,7 +58,7 @@ def words(name: str, file: str) -> str:
 
 SIGNS = {
     "Apache-2.0": "apache",
-    "BSD-2-Clause": "redistributions in binary form must reproduce|bsd 2-clause license",
+    "BSD-2-Clause": "redistributions in binary form must reproduce|bsd 2-clause license|license: freebsd",
     "BSD-3-Clause": "endorse or promote products|bsd 3-clause",
     "LGPL-3.0-only": "gnu lesser general public license version 3",
     "LicenseRef-BSD": "license :: osi approved :: bsd license",

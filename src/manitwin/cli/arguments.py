@@ -11,7 +11,21 @@ from typer.core import TyperCommand
 from manitwin.errors import UsageError
 
 PLACES = frozenset(
-    {"inputs", "paths", "twins", "twin", "dataset", "source", "episodes", "out", "config", "record", "log", "labels"}
+    {
+        "inputs",
+        "paths",
+        "twins",
+        "twin",
+        "dataset",
+        "source",
+        "episodes",
+        "scenes",
+        "out",
+        "config",
+        "record",
+        "log",
+        "labels",
+    }
 )
 """The parameters, of whatever command, that name files, folders or URLs."""
 LONGEST_PLACE = 4095

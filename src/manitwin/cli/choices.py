@@ -124,6 +124,7 @@ EXPORT_FORMATS = Choices("format", lambda: ["all", *_backends("exporter")()], li
 IMPORT_FORMATS = Choices(
     "format", _of("auto", "twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
 )
+SEGMENTATION_FORMATS = Choices("format", _of("coco", "coco-panoptic", "cityscapes", "bop", "pointcloud"))
 AUDIT_FORMATS = Choices("format", _of("text", "json", "sarif"))
 QUERY_FORMATS = Choices("format", _of("table", "csv", "json", "ids"))
 TABLES = Choices("table", _of("twins", "points", "grasps", "placements", "rejections", "stages"))

@@ -34,6 +34,7 @@ from manitwin.cli.commands.prompts import prompts
 from manitwin.cli.commands.publish import publish
 from manitwin.cli.commands.query import query
 from manitwin.cli.commands.render import render
+from manitwin.cli.commands.segmentation import segmentation
 from manitwin.cli.commands.stats import stats
 from manitwin.cli.commands.status import status
 from manitwin.cli.commands.trajectories import trajectories
@@ -87,7 +88,7 @@ def _manitwin(
 for watched in (build, layout, trajectories, render):
     register(app, reported(watched, own_log=True))
 register(app, reported(run, own_log=True), "run", hidden=True)
-for making in (index, stats, publish, export):
+for making in (index, stats, publish, export, segmentation):
     register(app, reported(making))
 register(app, reported(import_), "import")
 for other in (status, retry, check, query, doctor, models, fake, prompts, audit, carve, evaluate):

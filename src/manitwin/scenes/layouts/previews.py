@@ -17,19 +17,21 @@ from PIL import Image, ImageDraw, ImageFont
 from manitwin.errors import InputError, UsageError
 from manitwin.formats.glb import read_glb
 from manitwin.formats.image_file import read_image
+from manitwin.formats.label_picture import label_picture
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
-from manitwin.render.cameras import Camera, look_at
 from manitwin.render.false_colors import depth_picture, id_color, ids_picture
 from manitwin.render.scene_renderer import SceneFrame, SceneRenderer
 from manitwin.scenes.furniture_pictures import add_furniture, lighting_of
 from manitwin.scenes.layouts.layouts_recipe import PICTURES
 from manitwin.scenes.layouts.layouts_run import CONTACT_SHEET, accepted_scenes
-from manitwin.scenes.scene import SCENE, SceneCamera, SceneRecord
+from manitwin.scenes.perception.object_views import SeenShape
+from manitwin.scenes.perception.scene_truth import PICTURES_FACTS
+from manitwin.scenes.perception.scene_views import intrinsics, scene_camera, scene_parts, views_and_parts
+from manitwin.scenes.scene import SCENE, SceneRecord
 from manitwin.scenes.scene_files import parse_scene, scene_name
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
 
-PICTURES_FACTS = "pictures.json"
 WEBP_QUALITY = 90
 DEPTH_UNIT_M = 0.001
 """Depth is written in whole millimetres, as the cameras that it stands for write it: up to 65 m in 16 bits."""
@@ -55,7 +57,7 @@ def scene_pictures(
             pose = transform(rotation_from_quaternion_wxyz(np.array(thing.quaternion_wxyz)), np.array(thing.position_m))
             renderer.add(thing.name, read_glb(twin_folder(thing.twin_id) / "visual.glb"), pose)
         add_furniture(renderer, record.furniture, seed=zlib.crc32(record.scene_id.encode()))
-        cameras = [_camera(each, width_px, height_px) for each in record.cameras]
+        cameras = [scene_camera(each, width_px, height_px) for each in record.cameras]
         frames = renderer.render(cameras, geometry=True)
         ids = renderer.ids
     return dict(zip((each.name for each in record.cameras), frames, strict=True)), ids
@@ -69,34 +71,40 @@ def write_previews(
     For each camera: ``NAME_rgb.webp``; ``NAME_depth.png`` (16 bits, millimetres along the viewing axis, 0: nothing);
     ``NAME_normals.png`` (world frame, 8 bits: 255 (n + 1) / 2, black: nothing); ``NAME_ids.png`` (8 bits, 16 where there are
     more than 255 things; 0: floor and backdrop); to look at, depth and ids in colours that are explained beside them:
-    ``NAME_depth_colors.png``, ``NAME_ids_colors.png``. ``pictures.json`` has the ids by name, their colours (RGB) and the
-    cameras: ``camera_to_world`` (OpenGL axes: x right, y up, looking along -z), the focal length in pixels, the size. Raises
-    as ``scene_pictures`` does.
+    ``NAME_depth_colors.png``, ``NAME_ids_colors.png``; ``NAME_parts.png``, the numbers of ``parts`` (0: none). ``pictures.json``
+    has the ids by name, their colours (RGB), the parts by number, and the cameras: ``camera_to_world`` (OpenGL axes: x right,
+    y up, looking along -z), the size, ``K`` with the upper left pixel's centre at (0.5, 0.5), and of each object what
+    ``ObjectView`` says. Raises as ``scene_pictures`` does, and TwinError.
     """
     frames, ids = scene_pictures(record, twin_folder, width_px=size_px, height_px=size_px)
     folder.mkdir(parents=True, exist_ok=True)
     facts: dict[str, object] = {"scene_id": record.scene_id, "depth_unit_m": DEPTH_UNIT_M, "ids": ids}
     facts["colors_rgb"] = {name: id_color(number) for name, number in ids.items()}
-    facts["cameras"] = {
-        each.name: {
+    shapes = {
+        each: SeenShape.of_twin(twin_folder(each)) for each in sorted({thing.twin_id for thing in record.objects})
+    }
+    parts = scene_parts(record, shapes)
+    facts["parts"] = {str(number): part.to_json() for number, part in enumerate(parts, 1)}
+    cameras: dict[str, object] = {}
+    for each in record.cameras:
+        camera = scene_camera(each, size_px, size_px)
+        views, part_numbers = views_and_parts(record, shapes, parts, camera, frames[each.name].ids, ids)
+        (folder / f"{each.name}_parts.png").write_bytes(label_picture(part_numbers))
+        cameras[each.name] = {
             "camera_to_world": camera.camera_to_object.tolist(),
             "focal_px": camera.focal_px,
+            "K": intrinsics(camera),
             "width_px": size_px,
             "height_px": size_px,
+            "objects": {name: view.to_json() for name, view in views.items()},
         }
-        for each in record.cameras
-        for camera in [_camera(each, size_px, size_px)]
-    }
+    facts["cameras"] = cameras
     called = {thing.name: f"{thing.name} {thing.category}" for thing in record.objects}
     names = {called.get(name, name): number for name, number in ids.items()}
     files = [path for name, frame in frames.items() for path in _write_frame(frame, folder, name, names)]
     (folder / PICTURES_FACTS).write_text(json.dumps(facts, indent=1) + "\n")
+    files += [folder / f"{each.name}_parts.png" for each in record.cameras]
     return sorted([*files, folder / PICTURES_FACTS])
-
-
-def _camera(camera: SceneCamera, width_px: int, height_px: int) -> Camera:
-    pose = look_at(np.array(camera.position_m), np.array(camera.target_m))
-    return Camera(pose, camera.fov_y_rad, width_px, height_px)
 
 
 def _write_frame(frame: SceneFrame, folder: Path, name: str, ids_by_name: Mapping[str, int]) -> list[Path]:

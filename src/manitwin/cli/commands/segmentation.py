@@ -1,0 +1,48 @@
+"""``manitwin segmentation``: drawn scenes as data sets on which segmenters and pose estimators train."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import out_console
+
+
+def segmentation(
+    scenes: Annotated[
+        Path,
+        options.existing(
+            "Scenes that `manitwin layout --pictures` drew, or one of them.", "SCENES", "a folder of drawn scenes"
+        ),
+    ],
+    out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
+    form: Annotated[
+        str, choices.SEGMENTATION_FORMATS.option("--format", help="coco, coco-panoptic, cityscapes, bop, pointcloud.")
+    ],
+    dataset: Annotated[
+        Path | None,
+        typer.Option(
+            "--twins",
+            help="Where the scenes' twins are; default: where the scenes say.",
+            metavar="DATASET",
+            callback=choices.must_exist("the data set that the scenes were sampled from"),
+        ),
+    ] = None,
+    validation_share: Annotated[
+        float, typer.Option("--val", help="The share of scenes that go into the split val.", min=0, max=1)
+    ] = 0.1,
+    points: Annotated[
+        int, typer.Option(help="Points of a scene's cloud, at most.", callback=choices.count_of("--points"))
+    ] = 100_000,
+) -> None:
+    """Write instances, classes and parts of drawn scenes: masks, panoptic pictures, poses, point clouds."""
+    from manitwin.scenes.perception.segmentation import write_segmentation
+
+    done = write_segmentation(scenes, out, form, dataset=dataset, validation_share=validation_share, points=points)
+    out_console.print(
+        f"{done.scenes:,} scenes, {done.pictures:,} pictures, {done.categories:,} categories,"
+        f" {done.part_kinds:,} kinds of parts: {done.files:,} files in {out}"
+    )

@@ -1,0 +1,37 @@
+"""PNG pictures of whole numbers (ids, millimetres): 8 or 16 bits a pixel, written plainly, read without trust."""
+
+from __future__ import annotations
+
+import io
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from manitwin.formats.bounded_file import Refusal
+from manitwin.formats.printable import printable_line
+
+MAX_PICTURE_BYTES = 256 << 20
+MAX_PICTURE_PX = 16384
+_MODES = {"L": np.uint8, "I;16": np.uint16}
+
+
+def label_picture(numbers: np.ndarray) -> bytes:
+    """Return numbers ``(H, W)`` of at most 65,535 as a PNG, of 8 bits where they fit; equal numbers give equal bytes."""
+    wide = numbers.size > 0 and int(numbers.max()) > np.iinfo(np.uint8).max
+    return bytes(cv2.imencode(".png", numbers.astype(np.uint16 if wide else np.uint8))[1].tobytes())
+
+
+def parse_label_picture(content: bytes, name: str, refuse: Refusal, *, remedy: str) -> np.ndarray:
+    """Return the numbers ``(H, W)`` of a PNG's content; raises what ``refuse`` makes of one line for anything else."""
+    called = printable_line(name)
+    try:
+        with Image.open(io.BytesIO(content), formats=("PNG",)) as picture:
+            if picture.mode not in _MODES:
+                raise refuse(f"{called}: has {picture.mode} pixels, not one whole number each; {remedy}")
+            if max(picture.size) > MAX_PICTURE_PX:
+                raise refuse(f"{called}: {picture.size[0]} x {picture.size[1]} pixels; {remedy}")
+            return np.asarray(picture, _MODES[picture.mode])
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        cause = printable_line(str(error), max_characters=120)
+        raise refuse(f"{called}: is no PNG that can be read ({cause}); {remedy}") from error

@@ -1,0 +1,129 @@
+"""Object models as BOP has them: meshes in millimetres about the centre of their box, and their symmetries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist
+
+from manitwin.geometry.poses import transform
+from manitwin.geometry.sampling import sample_surface
+from manitwin.geometry.symmetry import Symmetries, find_symmetries
+from manitwin.render.raycast import merged
+from manitwin.twin.loaded_twin import Twin
+
+MM = 1000.0
+COLOR_SAMPLES = 4000
+MOST_COLOR_APART = 24.0
+"""Of 255, the median distance in RGB of a surface and itself after a turn: what noise and shading of a capture make."""
+
+
+@dataclass(frozen=True)
+class BopModel:
+    """A twin as a BOP object: its mesh in the object frame (m), and the colour ``(V, 3) uint8`` of each vertex."""
+
+    twin_id: str
+    mesh: trimesh.Trimesh
+    colors: np.ndarray
+
+    @classmethod
+    def of_twin(cls, folder: Path) -> BopModel:
+        """Read that of a twin's folder; raises TwinError."""
+        twin = Twin(folder)
+        mesh = merged(twin.visual)
+        colors = np.concatenate([_vertex_colors(part) for part in twin.visual])
+        return cls(twin.record.twin_id, mesh, colors)
+
+    @property
+    def center_m(self) -> np.ndarray:
+        """The centre of the box: BOP's origin, in the object frame."""
+        return np.asarray(self.mesh.bounds.mean(0))
+
+    @property
+    def bop_to_object(self) -> np.ndarray:
+        """The pose ``(4, 4)`` of BOP's model frame in the object frame, m."""
+        return transform(translation=self.center_m)
+
+    def ply(self) -> bytes:
+        """Return the mesh as a binary PLY in millimetres about the centre of its box."""
+        moved = self.mesh.copy()
+        moved.visual = trimesh.visual.ColorVisuals(moved, vertex_colors=self.colors)
+        moved.apply_translation(-self.center_m)
+        moved.apply_scale(MM)
+        content = moved.export(file_type="ply", vertex_normal=True)
+        assert isinstance(content, bytes)
+        return content
+
+    @cached_property
+    def symmetries(self) -> Symmetries:
+        """The symmetries of its shape."""
+        return find_symmetries(self.mesh, np.random.default_rng(0))
+
+    def info(self) -> dict[str, Any]:
+        """Return its entry in ``models_info.json``: box, diameter and symmetries of the shape, and, under names of its own, of
+        shape and colour: a printed box is symmetric in depth pictures only."""
+        low_mm = (self.mesh.bounds[0] - self.center_m) * MM
+        extents_mm = self.mesh.extents * MM
+        info: dict[str, Any] = {"diameter": _diameter(np.asarray(self.mesh.vertices)) * MM}
+        info |= {f"min_{axis}": float(low_mm[i]) for i, axis in enumerate("xyz")}
+        info |= {f"size_{axis}": float(extents_mm[i]) for i, axis in enumerate("xyz")}
+        turns = [motion for motion in self.symmetries.motions[1:] if np.linalg.det(motion) > 0]
+        same_color = [motion for motion in turns if self._same_color(motion)]
+        info |= self._named(turns, self.symmetries.axis is not None, "")
+        round_in_color = self.symmetries.axis is not None and all(
+            self._same_color(_about(self.symmetries.axis, angle)) for angle in (0.7, 1.9, 3.3)
+        )
+        info |= self._named(same_color, round_in_color, "_with_color")
+        return info
+
+    def _named(self, turns: list[np.ndarray], is_round: bool, suffix: str) -> dict[str, Any]:
+        """Return symmetries in BOP's form, mm about its origin; a body of revolution keeps the turns that swap its ends."""
+        found: dict[str, Any] = {}
+        offset_mm = (self.symmetries.center_m - self.center_m) * MM
+        axis = self.symmetries.axis
+        if is_round and axis is not None:
+            found[f"symmetries_continuous{suffix}"] = [{"axis": axis.tolist(), "offset": offset_mm.tolist()}]
+            turns = [motion for motion in turns if motion @ axis @ axis < 0][:1]
+        if turns:
+            found[f"symmetries_discrete{suffix}"] = [
+                transform(motion, offset_mm - motion @ offset_mm).ravel().tolist() for motion in turns
+            ]
+        return found
+
+    @cached_property
+    def _colored(self) -> tuple[np.ndarray, np.ndarray, cKDTree]:
+        points, _, faces = sample_surface(self.mesh, COLOR_SAMPLES, np.random.default_rng(0))
+        colors = self.colors[np.asarray(self.mesh.faces)[faces]].mean(1)
+        return points, colors, cKDTree(points)
+
+    def _same_color(self, motion: np.ndarray) -> bool:
+        points, colors, tree = self._colored
+        center = self.symmetries.center_m
+        _, nearest = tree.query((points - center) @ motion.T + center)
+        apart = np.linalg.norm(colors[nearest] - colors, axis=1)
+        return bool(np.median(apart) < MOST_COLOR_APART and np.mean(apart > 3 * MOST_COLOR_APART) < 0.05)
+
+
+def _vertex_colors(part: trimesh.Trimesh) -> np.ndarray:
+    """Return the base colour ``(V, 3) uint8`` at the vertices of a visual part."""
+    visual = part.visual
+    if isinstance(visual, trimesh.visual.ColorVisuals):
+        return np.asarray(visual.vertex_colors)[:, :3]
+    assert isinstance(visual, trimesh.visual.TextureVisuals)
+    found = visual.material.main_color if visual.uv is None else visual.material.to_color(visual.uv)
+    return np.broadcast_to(np.asarray(found, np.uint8)[..., :3], (len(part.vertices), 3))
+
+
+def _diameter(vertices_m: np.ndarray) -> float:
+    corners = trimesh.convex.convex_hull(vertices_m).vertices
+    return float(pdist(corners).max())
+
+
+def _about(axis: np.ndarray, angle_rad: float) -> np.ndarray:
+    return np.asarray(trimesh.transformations.rotation_matrix(angle_rad, axis)[:3, :3])

@@ -1,0 +1,62 @@
+"""The classes of a data set of scenes: categories of objects, names of their parts, and what is no object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth
+
+BACKGROUND, FURNITURE = "background", "furniture"
+STUFF = (BACKGROUND, FURNITURE)
+"""What is no object: the floor and the backdrop, and the boxes that objects stand on."""
+
+
+@dataclass(frozen=True)
+class Classes:
+    """The categories and the parts (``category/name``) of all scenes, sorted; each numbered from 1.
+
+    In pictures of classes ``STUFF`` come behind the categories.
+    """
+
+    categories: tuple[str, ...]
+    parts: tuple[str, ...]
+
+    @cached_property
+    def category_ids(self) -> dict[str, int]:
+        """The number of each category and stuff class."""
+        return {name: number for number, name in enumerate((*self.categories, *STUFF), 1)}
+
+    @cached_property
+    def part_ids(self) -> dict[str, int]:
+        """The number of each kind of part."""
+        return {name: number for number, name in enumerate(self.parts, 1)}
+
+    @classmethod
+    def of(cls, scenes: Iterable[SceneTruth]) -> Classes:
+        """Return those of some scenes."""
+        categories, parts = set[str](), set[str]()
+        for scene in scenes:
+            categories |= {thing.category for thing in scene.record.objects}
+            parts |= {f"{part.category}/{part.name}" for part in scene.parts.values()}
+        return cls(tuple(sorted(categories)), tuple(sorted(parts)))
+
+    def class_picture(self, scene: SceneTruth, picture: PictureTruth) -> np.ndarray:
+        """Return the class ``(H, W) uint16`` at each pixel's centre."""
+        table = np.full(
+            int(max(picture.ids.max(), *scene.ids.values(), 0)) + 1, self.category_ids[FURNITURE], np.uint16
+        )
+        table[0] = self.category_ids[BACKGROUND]
+        for thing in scene.record.objects:
+            table[scene.ids[thing.name]] = self.category_ids[thing.category]
+        return table[picture.ids]
+
+    def part_picture(self, scene: SceneTruth, picture: PictureTruth) -> np.ndarray:
+        """Return the kind of part ``(H, W) uint16`` at each pixel's centre, 0 where none is."""
+        table = np.zeros(int(max(picture.parts.max(), *scene.parts, 0)) + 1, np.uint16)
+        for number, part in scene.parts.items():
+            table[number] = self.part_ids[f"{part.category}/{part.name}"]
+        return table[picture.parts]

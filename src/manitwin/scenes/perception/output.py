@@ -1,0 +1,77 @@
+"""The folder that a data set for perception is written into: whole, or not at all."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from manitwin.errors import UsageError
+from manitwin.formats.label_picture import label_picture
+from manitwin.twin.store import canonical_json
+
+JPEG_QUALITY = 95
+
+
+class Output:
+    """Files below a folder, written by name; ``written`` counts them."""
+
+    def __init__(self, folder: Path):
+        self._folder, self.written = folder, 0
+
+    def write_bytes(self, name: str, content: bytes) -> None:
+        """Write a file and the folders that it lies in."""
+        path = self._folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+        self.written += 1
+
+    def write_json(self, name: str, content: Any) -> None:
+        """Write JSON, the same bytes for equal values."""
+        self.write_bytes(name, canonical_json(content).encode())
+
+    def write_picture(self, name: str, picture: Image.Image, form: str) -> None:
+        """Write a picture as PNG, or as JPEG without thinning its colours."""
+        stream = io.BytesIO()
+        options = {"quality": JPEG_QUALITY, "subsampling": 0} if form == "JPEG" else {}
+        picture.save(stream, form, **options)
+        self.write_bytes(name, stream.getvalue())
+
+    def write_labels(self, name: str, numbers: np.ndarray) -> None:
+        """Write whole numbers ``(H, W)`` as a PNG of 8 or 16 bits."""
+        self.write_bytes(name, label_picture(numbers))
+
+    def write_arrays(self, name: str, arrays: dict[str, np.ndarray]) -> None:
+        """Write arrays as a compressed .npz."""
+        stream = io.BytesIO()
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes names for its own flags
+        self.write_bytes(name, stream.getvalue())
+
+
+@contextmanager
+def whole_folder(out: Path) -> Iterator[Output]:
+    """Give a folder to write into, which becomes ``out`` at the end; of a failure nothing stays.
+
+    Raises UsageError where ``out`` is there and has something in it.
+    """
+    if out.exists() and any(out.iterdir()):
+        raise UsageError(f"{out}: is there and not empty; give a new folder")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    fresh = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
+    try:
+        fresh.chmod(0o755)
+        yield Output(fresh)
+        if out.exists():
+            out.rmdir()
+        os.rename(fresh, out)
+    except BaseException:
+        shutil.rmtree(fresh, ignore_errors=True)
+        raise

@@ -1,0 +1,102 @@
+"""Segmentation data sets of a run's scenes, in the formats that training codes read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from manitwin.errors import UsageError, choose_from
+from manitwin.scenes.perception.bop import write_bop
+from manitwin.scenes.perception.cityscapes import write_cityscapes
+from manitwin.scenes.perception.classes import Classes
+from manitwin.scenes.perception.coco import write_coco, write_panoptic
+from manitwin.scenes.perception.output import Output, whole_folder
+from manitwin.scenes.perception.point_clouds import POINTS, write_point_clouds
+from manitwin.scenes.perception.scene_truth import SceneTruth, read_scene_truth
+from manitwin.scenes.scene_files import dataset_of, scene_files
+from manitwin.twin.loaded_twin import TwinSource
+
+VALIDATION_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class Segmented:
+    """The counts of an export."""
+
+    scenes: int
+    pictures: int
+    categories: int
+    part_kinds: int
+    files: int
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """What an export is asked for."""
+
+    validation_share: float
+    points: int
+    twin_folder: Callable[[str], Path]
+
+
+_Write = Callable[[Iterable[SceneTruth], Classes, Output, _Asked], None]
+
+FORMATS: Mapping[str, _Write] = {
+    "coco": lambda scenes, classes, out, asked: write_coco(
+        scenes, classes, out, validation_share=asked.validation_share
+    ),
+    "coco-panoptic": lambda scenes, classes, out, asked: write_panoptic(
+        scenes, classes, out, validation_share=asked.validation_share
+    ),
+    "cityscapes": lambda scenes, classes, out, asked: write_cityscapes(
+        scenes, classes, out, validation_share=asked.validation_share
+    ),
+    "bop": lambda scenes, classes, out, asked: write_bop(scenes, classes, out, twin_folder=asked.twin_folder),
+    "pointcloud": lambda scenes, classes, out, asked: write_point_clouds(
+        scenes, classes, out, validation_share=asked.validation_share, points=asked.points
+    ),
+}
+"""The formats by name."""
+
+
+def write_segmentation(
+    scenes: str | Path,
+    out: str | Path,
+    form: str,
+    *,
+    dataset: str | Path | None = None,
+    validation_share: float = VALIDATION_SHARE,
+    points: int = POINTS,
+) -> Segmented:
+    """Write the segmentation data set of drawn scenes in one format, whole or not at all.
+
+    ``scenes`` is what ``manitwin layout --pictures`` wrote, or one scene of it; ``dataset`` is where its twins are, by default
+    where it says. ``validation_share`` of the scenes, chosen by their ids, go into the split ``val``. ``points`` are those of
+    a scene's cloud. Raises UsageError for an unknown format, scenes that were not drawn, or an ``out`` that is not empty.
+    """
+    if form not in FORMATS:
+        raise UsageError(choose_from("format", form, FORMATS))
+    if not 0 <= validation_share <= 1:
+        raise UsageError(f"a validation share of {validation_share:g}; give 0 to 1")
+    files = scene_files(Path(scenes))
+    if not files:
+        raise UsageError(f"{scenes}: no scene there; `manitwin layout DATASET -o {scenes} --pictures` makes some")
+    read = _Scenes(files)
+    classes = Classes.of(read)
+    source = TwinSource(dataset if dataset is not None else dataset_of(files[0]))
+    with whole_folder(Path(out)) as written:
+        FORMATS[form](read, classes, written, _Asked(validation_share, points, source.folder))
+        count = written.written
+    pictures = sum(len(scene.pictures) for scene in read)
+    return Segmented(len(files), pictures, len(classes.categories), len(classes.parts), count)
+
+
+@dataclass(frozen=True)
+class _Scenes:
+    """The truth of scenes, read anew each time that they are gone through: the pictures of one at a time are in memory."""
+
+    files: Sequence[Path]
+
+    def __iter__(self) -> Iterator[SceneTruth]:
+        return map(read_scene_truth, self.files)
