@@ -105,7 +105,7 @@ def test_bodies_without_a_role_are_left_out() -> None:
         sphere.attach(physx.PhysxCollisionShapeSphere(0.01, physx.get_default_material()))
         entity = sapien.Entity()
         entity.add_component(sphere)
-        entity.pose = sapien.Pose([0.5, 0.1, 0.06 + 0.04 + 0.0099])  # on the cube
+        entity.pose = sapien.Pose([0.5, 0.1, 0.12 + 0.04 + 0.0099])  # on the cube
         world.add_strangers([entity])
         world.step(30)
         contacts = world.contacts.read()
@@ -115,7 +115,7 @@ def test_bodies_without_a_role_are_left_out() -> None:
 
 
 def test_fixtures_stand_on_the_table_and_work_where_they_say() -> None:
-    for made, level_m in ((peg_stand(SPOT, 0.7), 0.28), (block(SPOT, 0.7), 0.06), (panel(SPOT, 0.7), 0.046)):
+    for made, level_m in ((peg_stand(SPOT, 0.7), 0.28), (block(SPOT, 0.7), 0.12), (panel(SPOT, 0.7), 0.046)):
         assert made.frame_to_world[:3, 3] == pytest.approx(SPOT + np.array([0, 0, level_m]))
         lowest = min(b.box_to_world[2, 3] - np.abs(b.box_to_world[2, :3]) @ b.half_extents_m for b in made.boxes)
         assert lowest == pytest.approx(0.0, abs=1e-9)

@@ -113,6 +113,8 @@ SKILLS = Choices(
         "upright",
         "hang",
         "pour",
+        "press",
+        "strike",
     ),
 )
 SURFACES = Choices("surface", _of("table", "shelf", "tray"))

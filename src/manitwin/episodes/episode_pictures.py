@@ -38,12 +38,15 @@ from manitwin.episodes.video import EpisodesVideo
 from manitwin.errors import EpisodesError, Rejected
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.printable import printable_line
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.geometry.rigid_body import StaticBox
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.furniture_pictures import lighting_of
-from manitwin.scenes.scene import Furniture, Light, Number
+from manitwin.scenes.scene import Furniture, Light, Name, Number
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
+from manitwin.twin.record_values import Quaternion
 from manitwin.twin.store import digests_below, sha256_of_json
 
 PICTURES_RECORD = "pictures.json"
@@ -69,14 +72,43 @@ class BatchDrawing(Payload):
         return cls(fields["text"] if "text" in fields else fields["batch_id"])
 
 
+class _Box(BaseModel):
+    model_config = ConfigDict(frozen=True)
+
+    name: Name
+    half_extents_m: tuple[Number, Number, Number]
+    position_m: tuple[Number, Number, Number]
+    quaternion_wxyz: Quaternion
+
+
+class _Fixture(BaseModel):
+    model_config = ConfigDict(frozen=True)
+
+    boxes: tuple[_Box, ...]
+
+
 class _Room(BaseModel):
-    """What the facts of an episode say of its furniture and its light."""
+    """What the facts of an episode say of its furniture, its light, and its fixtures, if any."""
 
     model_config = ConfigDict(frozen=True)
 
     furniture: Furniture
     ambient: tuple[Number, Number, Number]
     lights: tuple[Light, ...]
+    fixtures: tuple[_Fixture, ...] = ()
+
+    @property
+    def fixture_boxes(self) -> list[StaticBox]:
+        """The boxes of all fixtures."""
+        return [
+            StaticBox(
+                box.name,
+                np.array(box.half_extents_m),
+                transform(rotation_from_quaternion_wxyz(np.array(box.quaternion_wxyz)), np.array(box.position_m)),
+            )
+            for fixture in self.fixtures
+            for box in fixture.boxes
+        ]
 
 
 class PicturesRecord(FolderRecord):
@@ -133,6 +165,7 @@ class EpisodeFilmsStage:
             self._robot,
             [twin_drawable(self._source.folder(thing.twin_id)) for thing in episode.objects],
             furniture=room.furniture,
+            fixtures=room.fixture_boxes,
             lighting=lighting_of(room.ambient, room.lights),
             seed=episode.attempt.seed % 2**31,
         ) as replay:

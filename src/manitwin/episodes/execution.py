@@ -117,6 +117,15 @@ class Execution:
             if steady > STEADY_FRAMES:
                 break
 
+    def close_empty(self) -> None:
+        """Close the hand on nothing, at the closing speed; it does not press."""
+        closing, opening_m = self._closing, self._opening_target_m
+        while opening_m > 0:
+            opening_m = max(0.0, opening_m - 2 * closing.close_speed_m_s * closing.frame_s)
+            self._tell_opening(opening_m)
+            self.wait(Phase.CLOSE, closing.steps_per_frame)
+        self.wait(Phase.CLOSE, self._steps(OPENING_S))
+
     def open(self) -> None:
         """Open the hand at the closing speed."""
         self._presses = False
@@ -137,12 +146,12 @@ class Execution:
         """Return the hand where the joints are told to be, in the object's frame: what the arm sags by counts as in the hand."""
         return inverse(self.target_to_world()) @ self._tip_pose(self.commanded_rad)
 
-    def rest(self, max_steps: int) -> list[list[np.ndarray]]:
-        """Stay until nothing has moved for a quarter of a second; returns the poses ``(4, 4)`` of all objects at the last rows.
+    def rest(self, max_steps: int, still_rows: int = STILL_ROWS) -> list[list[np.ndarray]]:
+        """Stay until nothing has moved for some rows; returns the poses ``(4, 4)`` of all objects at the last rows.
 
         ``pressing`` then has the pairs of names of what pressed on each other at any of them.
         """
-        watch, poses = self._world.rest_watch(STILL_ROWS), deque([self._poses()], maxlen=REST_ROWS)
+        watch, poses = self._world.rest_watch(still_rows), deque([self._poses()], maxlen=REST_ROWS)
         pressing = deque([self._world.contacts.pressing(self._world.contacts.read())], maxlen=STILL_ROWS)
         for _ in range(max_steps // self._steps_per_row):
             self.wait(Phase.REST, self._steps_per_row - self.steps % self._steps_per_row)

@@ -16,7 +16,10 @@ from manitwin.geometry.rigid_body import StaticBox
 PEG_RISES_RAD = np.radians(10)  # towards its tip, as coat hooks do: what hangs slides to the post
 PEG_RADIUS_M, PEG_LENGTH_M, PEG_HEIGHT_M = 0.004, 0.09, 0.28
 POST_HALF_M, FOOT_HALF_M, FOOT_HALF_HEIGHT_M = 0.012, 0.05, 0.006
-BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M = 0.05, 0.03
+BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M = (
+    0.025,
+    0.06,
+)  # slim and tall: the hand beside a short head has room, the arm above the table
 PANEL_HALF_M, PANEL_HALF_HEIGHT_M = (0.07, 0.05), 0.02
 BUTTON_HALF_M, BUTTON_HALF_HEIGHT_M = 0.010, 0.003
 
@@ -76,7 +79,7 @@ def peg_stand(position_m: np.ndarray, yaw_rad: float, *, height_m: float = PEG_H
 
 
 def block(position_m: np.ndarray, yaw_rad: float, *, name: str = "block") -> Fixture:
-    """Return a block 10 x 10 x 6 cm that stands on the table at ``position_m (3,)``; it works at its top."""
+    """Return a block 5 x 5 x 12 cm that stands on the table at ``position_m (3,)``; it works at its top."""
     upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
     half_m = np.array([BLOCK_HALF_M, BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M])
     middle = upright @ transform(translation=np.array([0.0, 0.0, BLOCK_HALF_HEIGHT_M]))

@@ -8,12 +8,14 @@ import numpy as np
 
 from manitwin.episodes.courses.course import Start
 from manitwin.episodes.episode_facts import EpisodeFacts
-from manitwin.episodes.execution import Execution
+from manitwin.episodes.execution import REST_ROWS, Execution
 from manitwin.episodes.goals.evaluation import evaluate
 from manitwin.episodes.goals.world_state import Event, Granules, ObjectState, WorldState
 from manitwin.episodes.outcome import is_at_rest, is_disturbed, moved_m, placement_errors, placement_outcome
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
+
+SWINGS_S = 8.0  # what hangs swings for longer than what stands rocks, and stands still at each turn
 
 
 def is_reached_already(start: Start, world: RobotWorld) -> bool:
@@ -56,7 +58,10 @@ def judge(
 ) -> None:
     """Wait until all is at rest, and take down the outcome."""
     settings, target = start.settings, start.objects[world.target]
-    last = execution.rest(round(settings.max_rest_s / settings.timestep_s))
+    if start.skill_goal is not None and start.skill_goal.is_of_a_path:
+        last = execution.rest(round(max(settings.max_rest_s, SWINGS_S) / settings.timestep_s), REST_ROWS)
+    else:
+        last = execution.rest(round(settings.max_rest_s / settings.timestep_s))
     errors = placement_errors(execution.target_to_world(), goal_object_to_world, target.body.center_of_mass_m)
     at_rest = [
         is_at_rest([row[number] for row in last], placed.body.center_of_mass_m, settings)

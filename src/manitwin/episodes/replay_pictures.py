@@ -17,16 +17,19 @@ from manitwin.episodes.recording import Recording
 from manitwin.errors import UsageError
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.geometry.rigid_body import StaticBox
 from manitwin.render.drawable import Drawable, drawable
+from manitwin.render.procedural_textures import procedural_texture, textured_box
 from manitwin.render.scene_lighting import STUDIO, Lighting
 from manitwin.render.scene_renderer import SceneFrame, SceneRenderer
 from manitwin.robots.links import links_of_urdf, poses_at
 from manitwin.robots.robot import Robot
 from manitwin.robots.urdf import UrdfTree
-from manitwin.scenes.furniture_pictures import add_furniture
+from manitwin.scenes.furniture_pictures import TEXTURE_VARIANTS, add_furniture
 from manitwin.scenes.scene import Furniture, SurfaceBox
 
 TOLERANCE_M = 0.0004  # of simplified surfaces: a third of a pixel's width at 1 m in a picture of 640 pixels
+FIXTURE_MATERIAL = "metal"
 TABLE = Furniture(
     kind="table",
     support_height_m=0.0,
@@ -84,6 +87,7 @@ class EpisodeReplay:
         objects: Sequence[Drawable | Sequence[trimesh.Trimesh]],
         *,
         furniture: Furniture = TABLE,
+        fixtures: Sequence[StaticBox] = (),
         lighting: Lighting = STUDIO,
         seed: int = 0,
     ) -> None:
@@ -99,6 +103,10 @@ class EpisodeReplay:
         for link, visual in links.items():
             self._renderer.add(f"{robot.name}/{link}", visual)
         add_furniture(self._renderer, furniture, seed=seed)
+        for number, box in enumerate(fixtures):
+            texture = procedural_texture(FIXTURE_MATERIAL, number % TEXTURE_VARIANTS)
+            looks = [textured_box(np.asarray(box.half_extents_m, float), texture)]
+            self._renderer.add(box.name, looks, box.box_to_world)
 
     def __enter__(self) -> EpisodeReplay:
         return self
@@ -114,7 +122,7 @@ class EpisodeReplay:
 
     @property
     def ids(self) -> dict[str, int]:
-        """The ids in the pictures: objects first, then ``robot/link``, then furniture."""
+        """The ids in the pictures: objects first, then ``robot/link``, then furniture, then the boxes of fixtures."""
         return self._renderer.ids
 
     def frames(

@@ -50,6 +50,25 @@ def tag() -> tuple[RigidBody, tuple[TwinFrame, ...], tuple[Grasp, ...]]:
     return body, (frame,), grasps
 
 
+def mallet() -> tuple[RigidBody, tuple[TwinFrame, ...], tuple[Grasp, ...]]:
+    """A mallet that lies: a handle 20 cm long along Y, a head 9 x 4 x 4 cm along X whose +X end strikes; held near the head."""
+    pieces = [([-0.012, -0.12, 0.008], [0.012, 0.08, 0.032]), ([-0.045, 0.08, 0], [0.045, 0.12, 0.04])]
+    body = replace(
+        box([0.05, 0.2, 0.03], 0.3, center_m=(0, 0.06, 0.02)), hulls=tuple(block(low, high) for low, high in pieces)
+    )
+    frame = TwinFrame("striking face", "face", transform(X_TO_Z, np.array([0.045, 0.1, 0.02])), 0.0226, True)
+    grasps = tuple(Grasp(f"g{i}", above([0, 0.03 - 0.01 * i, 0.02]), 0.024) for i in range(3))
+    return body, (frame,), grasps
+
+
+def remote() -> tuple[RigidBody, tuple[TwinFrame, ...]]:
+    """A flat box 5 x 16 x 3 cm with a button on its top, 3 cm from the middle."""
+    body = replace(
+        box([0.05, 0.16, 0.03], 0.2, center_m=(0, 0, 0.015)), hulls=(block([-0.025, -0.08, 0], [0.025, 0.08, 0.03]),)
+    )
+    return body, (TwinFrame("button", "button", transform(None, np.array([0, 0.03, 0.03])), 0.005, True),)
+
+
 def around(body: RigidBody, frames: tuple[TwinFrame, ...], x_m: float, y_m: float) -> Surroundings:
     """One thing on the test's table."""
     twin = PoolTwin(twin_id(0), "0", "thing", (StandingPose(0, np.eye(4), 1.0, 0.1, True),), False, frames)

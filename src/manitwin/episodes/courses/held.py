@@ -89,7 +89,7 @@ class HeldCourse(Course):
     def execute(self, execution: Execution) -> None:
         """Grasp and lift (or close the hand), carry, follow the path, and end as the task says."""
         if self.task.empty:
-            execution.close()
+            execution.close_empty()
             execution.follow(self._reach)
             self._grasp_now = np.eye(4)
         else:

@@ -7,15 +7,18 @@ from scipy.spatial import ConvexHull
 
 from manitwin.episodes.goals.goal import Literal
 from manitwin.episodes.goals.spatial import Judgement, judged
-from manitwin.episodes.goals.world_state import ROBOT, Event, Granules, ObjectState, WorldState
+from manitwin.episodes.goals.world_state import ROBOT, Event, Granules, Hole, ObjectState, Peg, WorldState
 from manitwin.geometry.cavity import Opening
+from manitwin.geometry.hull_holes import enclosed_share
 from manitwin.geometry.poses import inverse, transform_points
 
 MOST_SPILT = 0.05
 PRESS_RADIUS_M, PRESS_RAD = 0.012, np.radians(30)
 STRIKE_RAD = np.radians(15)
+CORNER_OF_SQUARE = np.sqrt(np.pi / 2)  # 1.25: half a square's diagonal by the radius of the circle with its area
 HANG_SLACK_M = 0.006
 BELLY = 1.5  # rim radii
+OBLONG, CLOSED_SHARE, LEAST_SLOPE = 4.5, 0.9, 0.3  # as holes are taken for holes (geometry.frames.hole)
 
 
 def granules_in(vessel: ObjectState, granules: Granules) -> np.ndarray:
@@ -84,7 +87,11 @@ def pressed(state: WorldState, literal: Literal) -> Judgement:
 
 
 def struck(state: WorldState, literal: Literal) -> Judgement:
-    """Judge the first touch of an object's face with another: inside the face, within 15 degrees, as fast as the value."""
+    """Judge the first touch of an object's face with another: on the face, within 15 degrees, as fast as the value.
+
+    A face that comes down level touches by its rim first, and the corners of a square are that far outside of the circle
+    with its area.
+    """
     assert literal.value is not None
     found = _events(state, "struck", literal)
     if not found:
@@ -92,7 +99,7 @@ def struck(state: WorldState, literal: Literal) -> Judgement:
     first = found[0]
     return judged(
         {
-            "wrong_face": first.values["off_m"] <= first.values["face_radius_m"],
+            "wrong_face": first.values["off_m"] <= CORNER_OF_SQUARE * first.values["face_radius_m"],
             "askew": first.values["angle_rad"] <= STRIKE_RAD,
             "slow": first.values["speed_m_s"] >= literal.value,
         },
@@ -101,7 +108,10 @@ def struck(state: WorldState, literal: Literal) -> Judgement:
 
 
 def hung(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an object hangs by its hole on a peg: the peg passes through the hole, and nothing else bears it."""
+    """Judge that an object hangs by its hole on a peg: the peg passes through the hole, and nothing else bears it.
+
+    Through a hole: near its middle, or at a place farther out that the object encloses (a scissors' ring is oblong).
+    """
     assert literal.second is not None
     thing, peg = state.of(literal.subject), state.peg(literal.second)
     if thing.hole is None:
@@ -111,7 +121,8 @@ def hung(state: WorldState, literal: Literal) -> Judgement:
     off_m = float(np.linalg.norm(center - along_m * peg.direction))
     return judged(
         {
-            "beside_it": 0 < along_m < peg.length_m and off_m <= thing.hole.radius_m + HANG_SLACK_M,
+            "beside_it": 0 < along_m < peg.length_m
+            and (off_m <= thing.hole.radius_m + HANG_SLACK_M or _encloses(thing, thing.hole, peg)),
             "not_touching": state.touch(literal.subject, literal.second),
             "on_furniture": not state.neighbours(literal.subject) & state.furniture,
             "not_released": not state.touch(literal.subject, ROBOT),
@@ -119,6 +130,20 @@ def hung(state: WorldState, literal: Literal) -> Judgement:
         },
         {"along_m": along_m, "off_m": off_m},
     )
+
+
+def _encloses(thing: ObjectState, hole: Hole, peg: Peg) -> bool:
+    """Tell whether the peg crosses the plane of an object's hole at a place that its hulls enclose."""
+    to_object = inverse(thing.object_to_world)
+    foot_m, along = transform_points(to_object, peg.foot_m[None])[0], to_object[:3, :3] @ peg.direction
+    slope = float(along @ hole.axis)
+    if abs(slope) < LEAST_SLOPE:
+        return False
+    way_m = float((hole.center_m - foot_m) @ hole.axis) / slope
+    crossing = foot_m + way_m * along
+    if not 0 < way_m < peg.length_m or np.linalg.norm(crossing - hole.center_m) > OBLONG * hole.radius_m:
+        return False
+    return enclosed_share(thing.body.hulls, crossing, hole.axis, 2 * OBLONG * hole.radius_m) >= CLOSED_SHARE
 
 
 def _events(state: WorldState, kind: str, literal: Literal) -> list[Event]:

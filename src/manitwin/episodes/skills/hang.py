@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -9,20 +11,26 @@ from manitwin.episodes.fixtures import PEG_HEIGHT_M, PEG_LENGTH_M, PEG_RADIUS_M,
 from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.planning.held_path import HeldPath
 from manitwin.episodes.planning.problem import Grasp
-from manitwin.episodes.skills.held_skill import HeldSkill, frames_of, hole_frame_of
+from manitwin.episodes.skills.held_skill import HeldSkill, hole_frame_of
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.skill import Surroundings
 from manitwin.geometry.frames.feature import rotation_of
+from manitwin.geometry.hull_holes import free_way_m, rod_passes
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
 LEAST_RADIUS_M = 1.8 * PEG_RADIUS_M  # the peg is square: its corners, and a millimetre or two of room
+PEG_REACH_M = np.sqrt(2) * PEG_RADIUS_M + 0.0005
+HALF_DEPTH_M = (
+    0.012  # of the hole, that is looked at: what is farther along is beside it, as a mug is beside its handle
+)
 PEG = "peg"
 FINGERS_CLEAR_M = 0.03
 RADII_M, TURN_RAD, FACING_RAD = (0.45, 0.60), (0.6, 0.9), 0.6
 BEFORE_TIP_M, HUNG_SHARE = 0.06, 0.45  # where the hole is before it goes on, and how far along the peg it is let down
-SLIDING_KNOTS, LEANS_RAD = 8, np.radians([0.0, 15, -15, 30, -30])
+SLIDING_KNOTS, LEANS_RAD = 8, np.radians([0.0, 12, -12])
+ROUNDS = 4
 LET_DOWN = 1.2  # peg radii that the hole's upper edge stays above the peg's middle
 
 
@@ -32,8 +40,12 @@ class Hang(HeldSkill):
     name, predicate = "hang", "hung"
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept a thing with a hole that the peg passes."""
-        return any(frame.size_m >= LEAST_RADIUS_M for frame in frames_of(target, "hole"))
+        """Accept a thing whose widest hole is wider than the peg, also between its hulls: some fill holes."""
+        frame = hole_frame_of(target.frames)
+        if frame is None or frame.size_m < LEAST_RADIUS_M:
+            return False
+        center, axis = frame.frame_to_object[:3, 3], frame.frame_to_object[:3, 2]
+        return rod_passes(pool.body(target.twin_id).body.hulls, center, axis, PEG_REACH_M, HALF_DEPTH_M)
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
         """Return: hung on the peg."""
@@ -54,14 +66,15 @@ class Hang(HeldSkill):
         frame = hole_frame_of(scene.frames[scene.target.name])
         assert frame is not None, "only things with holes are hung"
         hole = frame.frame_to_object[:3, 3]
-        up = hole - scene.target.body.center_of_mass_m  # what hangs has its centre of mass below the hole
+        body, axis = scene.target.body, frame.frame_to_object[:3, 2]
+        up, room_m = _hanging(body.hulls, hole, axis, body.center_of_mass_m)
         (stand,) = scene.fixtures
         paths = []
         for lean in LEANS_RAD:  # the upright first: what is let go as it hangs does not swing
             for sign in scene.rng.permutation([1.0, -1.0]):
-                hole_to_object = transform(rotation_of(sign * frame.frame_to_object[:3, 2], up), hole)
+                hole_to_object = transform(rotation_of(sign * axis, up), hole)
                 turned = stand.frame_to_world @ transform(Rotation.from_euler("z", lean).as_matrix())
-                poses = _onto(turned, frame.size_m) @ inverse(hole_to_object)
+                poses = _onto(turned, room_m) @ inverse(hole_to_object)
                 paths.append(HeldPath(poses, frozenset({PEG}), meant_from=SLIDING_KNOTS))
 
         def rank(grasp: Grasp) -> float | None:
@@ -72,11 +85,28 @@ class Hang(HeldSkill):
         return HeldTask(tuple(paths), rank, as_hulls=True, duration_s=3.0)
 
 
-def _onto(stand: np.ndarray, radius_m: float) -> np.ndarray:
+def _hanging(
+    hulls: Sequence[np.ndarray], hole_m: np.ndarray, axis: np.ndarray, center_of_mass_m: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Return what is up ``(3,)`` when a thing hangs at rest, and how far from the hole's middle its edge is there (m).
+
+    The edge that rests on the peg is straight above the centre of mass: found by going from one to the other.
+    """
+    up, room_m = hole_m - center_of_mass_m, 0.0
+    for _ in range(ROUNDS):
+        up = up - (up @ axis) * axis
+        up = up / np.linalg.norm(up)
+        room_m = free_way_m(hulls, hole_m, up)
+        room_m = room_m if np.isfinite(room_m) else 0.0
+        up = hole_m + room_m * up - center_of_mass_m
+    return up, room_m
+
+
+def _onto(stand: np.ndarray, room_m: float) -> np.ndarray:
     """Return poses ``(K, 4, 4)`` of the hole's frame: along the peg from before its tip, then down until the hole rests on it."""
     along_m = np.linspace(PEG_LENGTH_M + BEFORE_TIP_M, HUNG_SHARE * PEG_LENGTH_M, SLIDING_KNOTS)
     steps = [stand @ transform(translation=np.array([0.0, 0, each])) for each in along_m]
-    down_m = max(radius_m - LET_DOWN * PEG_RADIUS_M, 0.0)
+    down_m = max(room_m - LET_DOWN * PEG_RADIUS_M, 0.0)
     for share in (0.5, 1.0):
         lowered = steps[SLIDING_KNOTS - 1].copy()
         lowered[2, 3] -= share * down_m

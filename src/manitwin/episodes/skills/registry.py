@@ -9,7 +9,9 @@ from manitwin.episodes.skills.hang import Hang
 from manitwin.episodes.skills.place_in import PlaceIn
 from manitwin.episodes.skills.place_on import PLACE_ON, STACK
 from manitwin.episodes.skills.pour import Pour
+from manitwin.episodes.skills.press import Press
 from manitwin.episodes.skills.skill import Skill
+from manitwin.episodes.skills.strike import Strike
 from manitwin.episodes.skills.upright import Upright
 from manitwin.errors import UsageError, choose_from
 
@@ -23,6 +25,8 @@ _SKILLS: tuple[Skill, ...] = (
     *SIDE_SKILLS,
     Upright(),
     Hang(),
+    Press(),
+    Strike(),
     Pour(),
 )
 

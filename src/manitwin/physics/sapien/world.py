@@ -57,7 +57,7 @@ class RobotWorld:
         ``solver_iterations_held`` are those while something is held; a contact counts as unplanned beyond
         ``max_contact_force_n``.
         """
-        self._timestep_s, self._contact_offset_m = timestep_s, contact_offset_m
+        self.timestep_s, self._contact_offset_m = timestep_s, contact_offset_m
         self._iterations, self._iterations_held = solver_iterations, solver_iterations_held
         self.placed = sorted((target, *others), key=lambda placed: placed.name)
         self.target = self.placed.index(target)
@@ -97,7 +97,7 @@ class RobotWorld:
         number = [placed.name for placed in self.placed].index(fill.name)
         self.granules = Granules(fill, self.object_to_world(number))
         self.add_strangers(self.granules.entities)
-        self.step(round(FALL_S / self._timestep_s))
+        self.step(round(FALL_S / self.timestep_s))
 
     def step(self, count: int = 1) -> None:
         """Let ``count`` timesteps pass."""
@@ -117,7 +117,7 @@ class RobotWorld:
 
     def settle(self, seconds: float) -> Rest:
         """Let the objects come to rest; the robot stays where it is told to be."""
-        return settle(self._system, self.bodies, timestep_s=self._timestep_s, seconds=seconds, limits=RESTS)
+        return settle(self._system, self.bodies, timestep_s=self.timestep_s, seconds=seconds, limits=RESTS)
 
     def rest_watch(self, looks: int) -> RestWatch:
         """Return a watch for the rest of all objects over so many looks, for a caller that steps the world itself."""

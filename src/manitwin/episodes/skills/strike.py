@@ -1,0 +1,87 @@
+"""``strike``: hit a block with a tool's striking face, the face level, fastest as it touches."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from manitwin.episodes.events import StrikeWatch
+from manitwin.episodes.fixtures import Fixture, block
+from manitwin.episodes.goals.goal import Goal, Literal
+from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.skills.held_skill import HeldSkill
+from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask
+from manitwin.episodes.skills.skill import Surroundings
+from manitwin.geometry.frames.words import is_end
+from manitwin.geometry.poses import inverse, transform, transform_points
+from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.physics.sapien.world import RobotWorld
+from manitwin.scenes.layouts.pool import Pool, PoolTwin
+from manitwin.scenes.layouts.twin_frames import TwinFrame
+
+BLOCK = "block"
+ABOVE_M, BELOW_M, FREE_KNOTS = 0.12, 0.03, 6  # the blow begins so far above, and would end so far below the top
+ROLLS = 8
+FINGERS_BEHIND_M = 0.012  # half a finger's width and a little: fingers farther out would touch before the face does
+LEVER_STEP_M = 0.03  # grasps whose levers differ by less count as equal: heavy heads turn in a hand far from them
+BLOW = Guard(first=0, stop_n=1e-3, duration_s=0.5, beyond=1.7)
+SLOWEST_S = 1.7  # of the whole way at the joints' limits: a slower one is no blow
+
+
+class Strike(HeldSkill):
+    """Bring the face down on the top of a block, about whose upright it may be turned as it likes."""
+
+    name, predicate = "strike", "struck"
+
+    def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
+        """Accept a tool with a face that is called a striking one."""
+        return striking_face(target.frames) is not None
+
+    def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
+        """Return: the block was struck."""
+        return Goal((Literal("struck", target.name, BLOCK),))
+
+    def fixture(self, around: Surroundings, target: int, rng: np.random.Generator) -> Fixture | None:
+        """Draw a block in reach."""
+        place = around.area.draw(block(np.zeros(3), 0.0).footprint_m, [], rng)
+        if place is None:
+            return None
+        position_m = place[:3, 3] + [0.0, 0, around.area.support.height_m]
+        return block(position_m, float(np.arctan2(place[1, 0], place[0, 0])), name=BLOCK)
+
+    def task(self, scene: HeldScene) -> HeldTask:
+        """Return the blows, turned about the upright by eighths."""
+        target, (anvil,) = scene.target, scene.fixtures
+        face = striking_face(scene.frames[target.name])
+        assert face is not None, "only tools with a striking face strike"
+        heights_m = np.array([*np.linspace(ABOVE_M, 0.012, FREE_KNOTS), 0.0, -BELOW_M / 2, -BELOW_M])
+        first_rad, paths = scene.rng.uniform(-np.pi, np.pi), []
+        for turn in range(ROLLS):
+            down = Rotation.from_euler("z", first_rad + turn * 2 * np.pi / ROLLS).as_matrix() @ np.diag([1.0, -1, -1])
+            poses = [transform(down, anvil.frame_to_world[:3, 3] + [0.0, 0, each]) for each in heights_m]
+            paths.append(HeldPath(np.array(poses) @ inverse(face.frame_to_object), frozenset({BLOCK}), FREE_KNOTS))
+
+        def rank(grasp: Grasp) -> float | None:
+            tips = transform_points(grasp.gripper_to_object, np.array([[0.0, 0, scene.tip_depth_m]]))[0]
+            if transform_points(inverse(face.frame_to_object), tips[None])[0, 2] > -FINGERS_BEHIND_M:
+                return None
+            lever_m = float(np.linalg.norm(tips - target.body.center_of_mass_m))
+            return round(lever_m / LEVER_STEP_M)
+
+        def watch(world: RobotWorld) -> StrikeWatch:
+            return StrikeWatch(
+                target.name,
+                BLOCK,
+                lambda: world.object_to_world(world.target) @ face.frame_to_object,
+                face.size_m,
+                world.timestep_s,
+            )
+
+        return HeldTask(tuple(paths), rank, longest_s=SLOWEST_S, ending="keep", guard=BLOW, watch=watch)
+
+
+def striking_face(frames: tuple[TwinFrame, ...]) -> TwinFrame | None:
+    """Return the first face whose label says that it strikes."""
+    faces = (frame for frame in frames if frame.kind == "face" and is_end(frame.label))
+    return next(faces, None)

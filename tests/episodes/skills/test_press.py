@@ -1,0 +1,56 @@
+"""Pressing: the closed fingertips push a button until it pushes back; 3 cm beside it is not pressed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from brick_episodes import panda
+from held_skills import around, attempt, beside, goal_of, remote
+
+from manitwin.episodes.planning.closed_hand import fingertip_corners, first_corner
+from manitwin.episodes.planning.problem import Phase
+from manitwin.episodes.skills.registry import SKILLS
+from manitwin.geometry.poses import transform
+
+BODY, FRAMES = remote()
+SPOT = around(BODY, FRAMES, 0.5, 0.1)
+
+
+def test_a_button_is_pressed_with_the_force_and_nothing_else() -> None:
+    facts, recording = attempt(SPOT, goal_of("press", SPOT), ())
+    assert facts.outcome == "kept", (facts.evaluation, facts.unplanned)
+    best = max(facts.events, key=lambda event: event.values["force_n"])
+    assert best.values["off_m"] < 0.003
+    assert 5 <= best.values["force_n"] < 20
+    assert recording is not None
+    assert [int(p) for p in dict.fromkeys(recording.phase.tolist())] == [
+        Phase.CLOSE, Phase.REACH, Phase.ACT, Phase.HOLD, Phase.RETURN, Phase.REST,
+    ]  # fmt: skip
+
+
+def test_3_cm_beside_the_button_is_off() -> None:
+    facts, _ = attempt(SPOT, goal_of("press", SPOT), (), off=beside(0.0, -0.03))
+    assert facts.outcome == "goal_missed"
+    assert facts.evaluation is not None
+    assert facts.evaluation.literals[0].failure == "off"
+
+
+def test_a_button_on_the_underside_is_not_pressed() -> None:
+    under = around(
+        BODY, (replace(FRAMES[0], frame_to_object=transform(np.diag([1.0, -1, -1]), np.zeros(3))),), 0.5, 0.1
+    )
+    assert SKILLS["press"].suits(SPOT.pool, SPOT.twin(0), None)
+    assert not SKILLS["press"].suits(under.pool, under.twin(0), None)
+
+
+def test_the_first_corner_of_a_tilted_hand_leads() -> None:
+    corners = fingertip_corners(panda()[1].closed)
+    assert np.ptp(corners, axis=0)[:2] == pytest.approx(
+        [0.0304, 0.0175], abs=2e-4
+    )  # of the Panda: measured on its meshes
+    down = np.array([0.0, 0, -1])
+    level = np.diag([1.0, -1, -1])
+    _, lead_m = first_corner(corners, level, down)
+    assert lead_m < 1e-6  # level: all of them at once
