@@ -134,3 +134,21 @@ def test_size_that_no_unit_makes_plausible_is_kept_for_the_gate_to_refuse() -> N
 def test_finding_names_the_unit_that_was_taken() -> None:
     finding = decide_unit(240.121).finding
     assert finding is not None and "millimetres" in finding and "0.24 m" in finding
+
+
+@pytest.mark.parametrize("turn_deg", [(90, 0, 0), (0, 90, 0), (0, -90, 0)])
+def test_bottle_that_lies_as_its_format_says_is_stood_on_its_base(turn_deg: tuple[float, float, float]) -> None:
+    lying = _turned(_bottle(), turn_deg)
+    choice = choose_up(lying, file_up="z", stands=True)
+    stood = _stood(lying, choice)
+    assert stood.extents == pytest.approx(_bottle().extents, abs=1e-3)
+    assert stood.center_mass[2] - stood.bounds[0, 2] < stood.extents[2] / 2  # base down
+    assert "stands" in choice.reason
+    assert choose_up(lying, file_up="z", stands=None).turned_deg < 5  # of a thing that may lie the format decides
+
+
+def test_what_lies_and_is_not_round_stays_as_its_format_says() -> None:
+    body = trimesh.creation.cylinder(0.12, 0.05)
+    handle = trimesh.creation.box([0.2, 0.03, 0.02], transform=trimesh.transformations.translation_matrix([0.21, 0, 0]))
+    pan = trimesh.boolean.union([body, handle], engine="manifold")
+    assert choose_up(pan, file_up="z", stands=True).turned_deg < 10

@@ -30,6 +30,8 @@ _LEAST_PROBABILITY = 0.01  # an upright bottle has 0.04, a fork on its tines les
 _SAME_SIDE_DEG = 20.0  # a round or facetted thing that rolls a little lies on the same side
 _NEARLY_AS_LIKELY = 0.6
 _ELONGATED = 1.5
+_LONGER = 1.2
+_LEANING_DEG = 45.0
 _ROUND = 0.1  # relative difference of the two moments across the axis
 
 PLAUSIBLE_M = (0.005, 1.0)
@@ -68,7 +70,8 @@ def choose_up(
 
     ``file_up`` is the up axis that the format declares (None: no rule; Z is tried before Y). ``stands``: whether such a
     thing is put down upright (None: unknown). In order: the user's axis; for things that lie, their likeliest side, the
-    file's if nearly as likely; an opening upward; the file's axis; the likeliest side. All but an unstable user's axis
+    file's if nearly as likely; an opening upward; for round, long things that stand, their long axis; the file's axis; the
+    likeliest side. All but an unstable user's axis
     are snapped onto the support facet.
     """
     poses = stable_poses(solid.vertices, _center_of_mass(solid))
@@ -84,6 +87,12 @@ def choose_up(
         if pose_up is not None:
             return _turned(pose_up, axis, "its opening points up")
     axes = [axis] if file_up else _undeclared_axes(solid, stands)
+    if stands:
+        pose_up = _stood_up(solid, poses, _axis(axes[0]))
+        if pose_up is not None:
+            return _turned(
+                pose_up, axes[0], f"it lies with {axes[0]} up, but such a thing stands, and it is round and long"
+            )
     for candidate in axes:
         near = _nearest(poses, _axis(candidate), _NEAR_DEG)
         if near is not None:
@@ -111,6 +120,24 @@ def _as_told(poses: list[StablePose], axis: str) -> UpChoice:
     return UpChoice(
         _FORMAT_TO_Z_UP[axis], axis, 0.0, 0.0, f"{axis} is up as the user says, although it does not rest so"
     )
+
+
+def _stood_up(solid: trimesh.Trimesh, poses: list[StablePose], up: np.ndarray) -> StablePose | None:
+    """Return the likelier end on which a lying round, long thing stands; None where it stands with ``up`` upward already.
+
+    Its long axis is that of the least moment of inertia of its hull, round where the other two are nearly equal: a can, a
+    bottle, a carton of square section, and no pan with its handle.
+    """
+    hull = solid.convex_hull
+    moments, directions = np.linalg.eigh(np.asarray(hull.moment_inertia))
+    along = directions[:, 0]
+    reach = np.ptp(hull.vertices @ directions, axis=0)
+    if moments[2] - moments[1] > _ROUND * moments[2] or reach[0] < _LONGER * reach[1:].max():
+        return None
+    if abs(float(along @ up)) > np.cos(np.radians(_LEANING_DEG)):
+        return None
+    ends = [_nearest(poses, end, _NEAR_DEG) for end in (along, -along)]
+    return max((pose for pose in ends if pose is not None), key=lambda pose: pose.probability, default=None)
 
 
 def _undeclared_axes(solid: trimesh.Trimesh, stands: bool | None) -> list[str]:

@@ -77,3 +77,26 @@ def test_all_categories_give_whole_sentences() -> None:
         assert len(captions) >= 4
         sentences = [caption for caption in captions if not caption.startswith("an orange")]
         assert all(caption[0].isupper() and caption.endswith(".") for caption in sentences), text
+
+
+@pytest.mark.parametrize(
+    ("name", "category"),
+    [
+        ("coffee mugs", "mug"), ("rubber mallet", "rubber mallet"), ("red sneakers", "sneaker"),
+        ("torx screwdriver", "screwdriver"),
+    ],
+)  # fmt: skip
+def test_the_users_word_is_the_category_where_it_is_another_thing(name: str, category: str) -> None:
+    assert described(cylinder(0.03, 0.1), name).category == category
+
+
+def test_captions_tell_different_facts() -> None:
+    facts = {
+        "color": "turquoise", "material": "made of ceramic", "numbers": "10 x 5 x 3 cm", "size": "palm-sized",
+        "shape": "cylindrical with a side handle", "use": "holding hot drinks", "name": "mug",
+    }  # fmt: skip
+    prior = load_priors()["mug"]
+    captions = write_captions("mug", prior, "ceramic", "turquoise", facts["shape"], "10 x 5 x 3 cm, palm-sized")
+    told = [frozenset(fact for fact, words in facts.items() if words in caption) for caption in captions]
+    assert len(captions) == len(set(told)) == 8, told
+    assert set().union(*told) == set(facts)

@@ -249,7 +249,13 @@ def named(name: str) -> Prior | None:
 
 
 def lookup(name: str | None) -> Prior | None:
-    """Find the prior of what a person calls a thing; None where the table has no such thing.
+    """Find the prior of what a person calls a thing; None where the table has no such thing (``found_by``)."""
+    found = found_by(name)
+    return None if found is None else found[0]
+
+
+def found_by(name: str | None) -> tuple[Prior, str] | None:
+    """Find the prior of what a person calls a thing, and the words, in the singular, by which it is found.
 
     Tried in order: the whole name, or an alias of it; the part before 'of', 'with', 'for', 'in' or 'from'; the whole
     again: each as it is, in the singular, and with words dropped from the front ('red coffee mugs' are coffee mugs,
@@ -265,5 +271,5 @@ def lookup(name: str | None) -> Prior | None:
     for part in tries:
         for candidate in _singulars(" ".join(part)):
             if candidate in index and index[candidate].category != "unknown":
-                return index[candidate]
+                return index[candidate], candidate
     return None

@@ -6,7 +6,7 @@ import numpy as np
 
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.parts.overall_shape import overall_shape
-from manitwin.models.annotators.priors import Prior, normalised
+from manitwin.models.annotators.priors import Prior, found_by, normalised
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.surface_color import UNTEXTURED, ColorShare, measure_colors
 from manitwin.twin.record import Language
@@ -62,9 +62,12 @@ def describe(subject: Subject, prior: Prior | None, material: str, extents_m: np
 
 
 def _category(subject: Subject, prior: Prior | None) -> str:
-    if prior is not None:
-        return prior.category
-    return normalised(subject.name) or "unknown" if subject.name else "unknown"
+    """Return what the user calls it: a 'coffee mug' is a mug, but a 'mallet' is none of the hammers that it is weighed as."""
+    found = found_by(subject.name)
+    if prior is None or found is None:
+        return normalised(subject.name) or "unknown" if subject.name else "unknown"
+    said = found[1]
+    return prior.category if said.split()[-1] == normalised(prior.category).split()[-1] else said
 
 
 def _color(colors: list[ColorShare]) -> str:
@@ -90,13 +93,15 @@ def _shape(subject: Subject, prior: Prior | None, rng: np.random.Generator) -> s
 
 
 def write_captions(category: str, prior: Prior | None, material: str, color: str, shape: str, size: str) -> list[str]:
-    """Return captions of differing length and style, the full sentence first; ``color`` may be empty: unknown."""
+    """Return captions of differing length, style and content, the full sentence first; ``color`` may be empty: unknown.
+
+    No two of them tell the same facts: of colour, material, numbers, size word, shape and use each tells another choice.
+    """
     noun = "object" if category == "unknown" else category
     if prior is not None and prior.counter:
         noun = f"{prior.counter} {noun}"
     colored = f"{color} {noun}".strip()
-    size_word = size.split(", ")[1]
-    numbers = size.split(", ")[0]
+    numbers, size_word = size.split(", ")
     edible = prior is not None and prior.surface == "food skin"
     made_of = "" if edible or material.startswith("unknown") else f" made of {material}"
     use = f", used for {prior.function}" if prior is not None else ""
@@ -104,10 +109,14 @@ def write_captions(category: str, prior: Prior | None, material: str, color: str
         f"{article(colored).capitalize()} {colored}{made_of}, about {numbers} in size{use}.",
         f"{article(colored)} {colored}",
         f"{article(size_word).capitalize()} {size_word} {noun} ({shape}).",
-        f"Pick up the {colored}.",
-        f"This {noun}{' is' + made_of + ' and' if made_of else ''} measures {numbers}. Its shape: {shape}."
-        + (f" Its color: {color}." if color else ""),
+        f"It measures {numbers}.",
+        f"Pick up the {noun}{made_of}." if made_of else f"Pick up the {size_word} {noun}.",
     ]
+    if color:
+        captions.append(f"Its shape: {shape}. Its color: {color}.")
     if prior is not None:
-        captions.append(f"Something for {prior.function}: {article(colored)} {colored}.")
+        captions.append(f"I need something for {prior.function}.")
+        captions.append(
+            f"Something {size_word} for {prior.function}{',' + made_of if made_of else ''}: {article(noun)} {noun}."
+        )
     return captions
