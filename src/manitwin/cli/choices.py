@@ -115,6 +115,7 @@ SKILLS = Choices(
         "pour",
         "press",
         "strike",
+        "push",
     ),
 )
 SURFACES = Choices("surface", _of("table", "shelf", "tray"))

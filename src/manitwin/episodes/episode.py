@@ -9,6 +9,7 @@ import numpy as np
 from manitwin.episodes.courses.course import Course, Ended, Planner, Start
 from manitwin.episodes.courses.held import HeldCourse
 from manitwin.episodes.courses.pick_place import PickPlaceCourse
+from manitwin.episodes.courses.push import PushCourse
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import FRAME_S, Execution
 from manitwin.episodes.goals.world_state import Granules
@@ -81,6 +82,8 @@ def world_of(problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings,
 
 
 def _course(start: Start, facts: EpisodeFacts) -> Course:
+    if start.skill_goal is not None and start.skill_goal.pushes:
+        return PushCourse(start, facts)
     held = start.skill_goal is not None and start.skill_goal.is_of_a_path
     return HeldCourse(start, facts) if held else PickPlaceCourse(start, facts)
 

@@ -57,6 +57,10 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "pour what is in {a} into {b}", "empty {a} into {b}", "pour from {a} into {b}", "tip {a} out into {b}",
         "pick up {a}, pour it out into {b} and put {it} back", "please fill {b} with what is in {a}",
     ),
+    "pushed_to": (
+        "push {a} to the mark", "slide {a} over to the mark", "push {a} along until {it} is at the mark",
+        "without lifting {it}, move {a} to the mark", "shove {a} over to the mark", "please push {a} to the marked place",
+    ),
     "pressed": (
         "press {a}", "push down on {a} with your fingertips", "press down on {a}", "give {a} a push from above",
         "close your hand and press {a}", "please press {a} once",

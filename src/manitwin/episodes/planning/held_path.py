@@ -105,18 +105,33 @@ class HeldPathPlanner:
         return None, PlanReport(None, tally.count_tried, tally.reasons)
 
     def plan_empty(
-        self, problem: PickPlaceProblem, paths: Sequence[HeldPath], *, longest_s: float
+        self,
+        problem: PickPlaceProblem,
+        paths: Sequence[HeldPath],
+        *,
+        longest_s: float,
+        start_rad: np.ndarray | None = None,
+        moved_to: np.ndarray | None = None,
     ) -> tuple[Motion, HeldPath, CubicSpline] | Sequence[PlanFailure]:
-        """Plan to reach the first path that the empty hand can follow, from home: reach, path and its joints; or why not."""
-        world = self.parts.world_of(problem, problem.target.object_to_world)
+        """Plan to reach the first path that the empty hand can follow: reach, path and its joints; or why not.
+
+        From home, or from where the arm is (``start_rad``). ``moved_to (4, 4)``: the path pushes the target there, and goes
+        where the target stood.
+        """
+        pushed = problem
+        if moved_to is not None:
+            pushed = replace(problem, target=replace(problem.target, object_to_world=moved_to))
+        start = self.parts.arm.home if start_rad is None else np.asarray(start_rad, float)
         rng, failures = np.random.default_rng(problem.seed), list[PlanFailure]()
         for path in paths:
-            joints = self._follow(world, path, np.eye(4), self.parts.arm.home)
+            world = self.parts.world_of(pushed, pushed.target.object_to_world)
+            joints = self._follow(world, path, np.eye(4), start)
             if isinstance(joints, CubicSpline):
                 if self._shortest_s(joints) > longest_s:
                     failures.append("path_slow")
                     continue
-                reach = self.parts.motions.free(world.arm, Phase.REACH, self.parts.arm.home, joints(0.0), rng)
+                world = self.parts.world_of(problem, problem.target.object_to_world)
+                reach = self.parts.motions.free(world.arm, Phase.REACH, start, joints(0.0), rng)
                 if isinstance(reach, Motion):
                     return reach, path, joints
                 failures.append(reach)

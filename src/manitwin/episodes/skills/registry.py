@@ -10,6 +10,7 @@ from manitwin.episodes.skills.place_in import PlaceIn
 from manitwin.episodes.skills.place_on import PLACE_ON, STACK
 from manitwin.episodes.skills.pour import Pour
 from manitwin.episodes.skills.press import Press
+from manitwin.episodes.skills.push import Push
 from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.skills.strike import Strike
 from manitwin.episodes.skills.upright import Upright
@@ -28,6 +29,7 @@ _SKILLS: tuple[Skill, ...] = (
     Press(),
     Strike(),
     Pour(),
+    Push(),
 )
 
 SKILLS: Mapping[str, Skill] = {skill.name: skill for skill in _SKILLS}

@@ -57,7 +57,7 @@ class SkillGoal:
     ``partner`` is the object that the goal is about beside the target. ``openings``, ``holes`` and ``frames`` are those of the
     objects, by name. Of a skill that moves the target along a held path there is the ``path`` that is made once all has come to
     rest, and its ``fixtures``; the one pose is then that of the beginning. ``granules`` lie in one of the objects;
-    ``places_m`` are marked places ``(3,)`` in the world.
+    ``places_m`` are marked places ``(3,)`` in the world. ``pushes``: the closed hand pushes the target to one of them.
     """
 
     goal: Goal
@@ -70,11 +70,12 @@ class SkillGoal:
     path: Callable[[HeldScene], HeldTask] | None = None
     granules: GranuleFill | None = None
     places_m: Mapping[str, np.ndarray] = field(default_factory=dict)
+    pushes: bool = False
 
     @property
     def is_of_a_path(self) -> bool:
         """True where the goal is reached on the way and not by where the target is let go."""
-        return self.path is not None
+        return self.path is not None or self.pushes
 
 
 class Skill(ABC):

@@ -1,0 +1,87 @@
+"""Pushing: a box is slid to the mark; to a place 15 cm beside it, or carried there, it is not pushed to the mark."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from brick_episodes import panda
+from granular_things import two_things
+from held_skills import around
+
+from manitwin.episodes.courses import push as push_course
+from manitwin.episodes.episode import run_episode
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
+from manitwin.episodes.settings import EpisodeSettings
+from manitwin.episodes.skills.push import MARK, strokes
+from manitwin.episodes.skills.registry import SKILLS
+from manitwin.episodes.skills.skill import SkillGoal, Surroundings
+from manitwin.geometry.poses import transform, transform_points
+from rigid_boxes import above, box
+
+BESIDE = np.array([0.0, 0.15, 0.0])
+UP = np.array([0.0, 0.0, 0.02])
+BOX = replace(box([0.07, 0.1, 0.04], 0.2), hulls=tuple(h + UP for h in box([0.07, 0.1, 0.04], 0.2).hulls))
+SPOT = around(replace(BOX, center_of_mass_m=np.array([0.0, 0.01, 0.02])), (), 0.5, 0.05)
+
+
+def goal_of(surroundings: Surroundings, seed: int) -> SkillGoal:
+    goal = SKILLS["push"].set_goal(surroundings, 0, None, np.random.default_rng(seed))
+    assert goal is not None
+    return goal
+
+
+def attempt(goal: SkillGoal, grasps: tuple[Grasp, ...] = ()) -> EpisodeFacts:
+    robot, planner = panda()
+    problem = PickPlaceProblem(SPOT.objects[0], goal.poses[0], grasps, (), SPOT.boxes, seed=3)
+    return run_episode(problem, planner, robot, EpisodeSettings(), goal)[0]
+
+
+def test_a_box_is_slid_to_the_mark() -> None:
+    facts = attempt(goal_of(SPOT, 0))
+    assert facts.outcome == "kept", (facts.evaluation, facts.unplanned, facts.plan_failures)
+    assert facts.evaluation is not None
+    assert facts.evaluation.literals[0].measured["rise_m"] < 0.002
+
+
+@pytest.mark.slow
+def test_pushed_15_cm_beside_the_mark_it_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    def beside(moved: object, place_m: np.ndarray, tips_m: np.ndarray, level_m: float) -> Sequence[object]:
+        return strokes(moved, place_m + BESIDE, tips_m, level_m)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(push_course, "strokes", beside)
+    facts = attempt(goal_of(SPOT, 0))
+    assert facts.outcome in ("goal_missed", "replan_failed")
+    assert facts.evaluation is None or facts.evaluation.literals[0].failure == "beside_it"
+
+
+def test_what_is_carried_to_the_mark_is_not_pushed_there() -> None:
+    goal = goal_of(SPOT, 0)
+    way = goal.places_m[MARK] - transform_points(goal.poses[0], SPOT.objects[0].body.center_of_mass_m[None])[0]
+    there = transform(None, np.array([*way[:2], 0.001])) @ goal.poses[0]
+    facts = attempt(replace(goal, pushes=False, poses=(there,)), (Grasp("g0", above([0, 0, 0.02]), 0.07),))
+    assert facts.evaluation is not None
+    assert facts.evaluation.literals[0].failure == "not_touched"
+
+
+def test_marks_are_in_reach_and_the_way_is_free() -> None:
+    crowded = two_things((BOX, ()), (BOX, ()), ((0.5, 0.0), (0.5, 0.16)), vessels=(False, False))
+    for seed in range(12):
+        place = goal_of(crowded, seed).places_m[MARK]
+        assert 0.07 < np.linalg.norm(place[:2] - [0.5, 0.0]) < 0.21
+        assert np.linalg.norm(place[:2] - [0.5, 0.16]) > 0.08
+
+
+def test_only_what_a_fingertip_can_push_without_tipping_it_is_pushed() -> None:
+    def suits(extents_m: list[float]) -> bool:
+        body = box(extents_m, 0.2)
+        spot = around(body, (), 0.5, 0.0)
+        return SKILLS["push"].suits(spot.pool, spot.twin(0), None)
+
+    assert suits([0.07, 0.1, 0.04])
+    assert not suits([0.07, 0.1, 0.01])
+    assert not suits([0.02, 0.1, 0.04])
+    assert not suits([0.04, 0.04, 0.2])
