@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 import trimesh
 
-from manitwin.geometry.boxes import footprint, oriented_bounding_box, separation_m, smallest_enclosing_circle
+from manitwin.geometry.boxes import (
+    footprint,
+    oriented_bounding_box,
+    separation_m,
+    smallest_enclosing_circle,
+    upright_extents,
+)
 from manitwin.geometry.poses import inverse, transform_points
 
 
@@ -32,6 +38,22 @@ def test_box_keeps_the_names_of_the_axes_it_is_aligned_with() -> None:
 def test_box_is_never_larger_than_the_axis_aligned_one() -> None:
     points = np.random.default_rng(3).normal(size=(200, 3)) * [1, 2, 3]
     assert np.prod(oriented_bounding_box(points)[0]) <= np.prod(np.ptp(points, axis=0)) + 1e-12
+
+
+def test_length_is_that_of_what_stands_whatever_its_turn_about_z() -> None:
+    box = trimesh.creation.box((0.23, 0.05, 0.11)).vertices
+    for angle in (0.0, 0.4, 1.3, 3.0):
+        turn = trimesh.transformations.rotation_matrix(angle, [0, 0, 1])
+        assert upright_extents(transform_points(turn, box)) == pytest.approx([0.23, 0.05, 0.11])
+
+
+def test_length_is_no_diagonal_where_the_smallest_box_leans() -> None:
+    # A thin sheet along the diagonal of a square of 0.2 m, upright: its smallest box lies along it, 0.2 * sqrt(2) m long.
+    sheet = trimesh.creation.box((0.2 * np.sqrt(2), 0.01, 0.01))
+    sheet.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 4, [0, 1, 0]))
+    leaning = 0.2 + 0.01 / np.sqrt(2)
+    assert oriented_bounding_box(sheet.vertices)[0].max() == pytest.approx(0.2 * np.sqrt(2))
+    assert upright_extents(sheet.vertices) == pytest.approx([leaning, 0.01, leaning])
 
 
 def test_circle_of_a_rectangle_has_half_its_diagonal() -> None:

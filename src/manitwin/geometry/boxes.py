@@ -49,6 +49,19 @@ def oriented_bounding_box(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return high - low, transform(axes.T, axes.T @ ((low + high) / 2))
 
 
+def upright_extents(points: np.ndarray) -> np.ndarray:
+    """Return length, width, and height ``(3,)`` of an object that stands on Z: the smallest rectangle seen from above, and Z.
+
+    What people measure: a box of least volume may lean, so that its longest side is a diagonal that no ruler shows. A turn
+    about Z changes nothing.
+    """
+    points = np.asarray(points, dtype=float)
+    _, along = _smallest_rectangle(points[:, :2])
+    across = np.array([-along[1], along[0]])
+    sides = sorted((float(np.ptp(points[:, :2] @ along)), float(np.ptp(points[:, :2] @ across))), reverse=True)
+    return np.array([*sides, np.ptp(points[:, 2])])
+
+
 def smallest_enclosing_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the smallest circle ``(center (2,), radius)`` that holds points ``(N, 2)``.
 

@@ -13,7 +13,7 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply, Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import bake_transform
-from manitwin.geometry.boxes import oriented_bounding_box
+from manitwin.geometry.boxes import oriented_bounding_box, upright_extents
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
 from manitwin.models.annotators.priors import Interval, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
@@ -54,7 +54,7 @@ class PhysicalStage:
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Write ``visual.glb`` and ``solid.npz`` in true metres; return ``physical``, what speaks against it, and ``size``.
 
-        ``size`` is the Estimate that gave the scale, of the longest axis in metres; None where the mesh had it. ``called`` is
+        ``size`` is the Estimate that gave the scale, of the longest extent in metres; None where the mesh had it. ``called`` is
         what an annotator that looks took the object for.
 
         Raises Rejected where size, mass or density are beyond what a thing of this name has, BadReply where the
@@ -64,11 +64,12 @@ class PhysicalStage:
         subject = read_subject(draft, solid="canonical.npz", visual="canonical.glb", metric=metric)
         estimates = self._annotator.estimate_physical(subject)
         obb_extents, obb_to_object = oriented_bounding_box(subject.solid.vertices)
-        scale = size_scale(subject, estimates, float(obb_extents.max()))
+        longest = float(upright_extents(subject.solid.vertices).max())
+        scale = size_scale(subject, estimates, longest)
         obb_extents, obb_to_object[:3, 3] = obb_extents * scale, obb_to_object[:3, 3] * scale
         solid = trimesh.Trimesh(subject.solid.vertices * scale, subject.solid.faces, process=False)
         mass = mass_estimate(estimates, float(solid.volume))
-        self._check_size(object_name(draft), float(obb_extents.max()), estimates.longest_axis_m)
+        self._check_size(object_name(draft), scale * longest, estimates.longest_axis_m)
         self._check_mass(object_name(draft), mass, float(solid.volume))
         parts = [bake_transform(part, np.diag([scale, scale, scale, 1.0])) for part in subject.parts]
         _write_meshes(draft, folder, solid, parts, scale, self.settings.max_texture_size)
@@ -141,7 +142,11 @@ class PhysicalStage:
 
 
 def size_scale(subject: Subject, estimates: PhysicalEstimates, longest: float) -> float:
-    """Return the factor to true size by the ``longest`` axis of the oriented box (paper); 1 for a metric mesh."""
+    """Return the factor to true size by the ``longest`` extent of the object as it stands; 1 for a metric mesh.
+
+    The paper scales by the longest axis of the oriented box, which of a teapot is the diagonal from its spout to its foot: by
+    a length of 0.24 m the pot would become 0.32 m long.
+    """
     if subject.metric or estimates.longest_axis_m is None:
         return 1.0
     return estimates.longest_axis_m.value / longest

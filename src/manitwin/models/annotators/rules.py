@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 
 from manitwin.config import Resource
-from manitwin.geometry.boxes import oriented_bounding_box
+from manitwin.geometry.boxes import upright_extents
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.annotators.point_rules import select_points
@@ -71,7 +71,7 @@ class RulesAnnotator:
 def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimates:
     """Return what the prior and the mesh say; ``prior`` is None where nobody has said what the thing is."""
     prior = prior or unknown_prior()
-    extents, _ = oriented_bounding_box(subject.solid.vertices)
+    extents = upright_extents(subject.solid.vertices)
     scale = 1.0 if subject.metric else prior.longest_axis_m.typical / float(extents.max())
     longest_m, volume_m3 = scale * float(extents.max()), scale**3 * float(subject.solid.volume)
     return PhysicalEstimates(

@@ -9,7 +9,7 @@ import numpy as np
 
 from manitwin.config import PhysicalConfig
 from manitwin.errors import Rejected
-from manitwin.geometry.boxes import oriented_bounding_box
+from manitwin.geometry.boxes import upright_extents
 from manitwin.models.annotators.priors import HEAVIEST_CONTENTS_KG_M3, Interval, load_materials, lookup
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.rules import is_outer_skin, median_thickness
@@ -45,7 +45,7 @@ class PhysicalFinding:
 
 @dataclass(frozen=True)
 class MeasuredMesh:
-    """The mesh in its own unit, metres where ``metric``: box ``(3,)`` the longest side first, area, volume, thickness."""
+    """The mesh in its own unit, metres where ``metric``: sides ``(3,)`` as it stands, longest first; area, volume, thickness."""
 
     sides: np.ndarray
     area: float
@@ -54,7 +54,7 @@ class MeasuredMesh:
     metric: bool
 
     def scale(self, answer: PhysicalAnswer) -> float:
-        """Return the factor from the mesh's unit to metres, by the longest axis of the box (paper)."""
+        """Return the factor from the mesh's unit to metres, by its longest extent."""
         return 1.0 if self.metric else answer.sides_m[0].typical / float(self.sides[0])
 
     def is_outer_skin(self, answer: PhysicalAnswer) -> bool:
@@ -64,9 +64,8 @@ class MeasuredMesh:
 
 def measure(subject: Subject) -> MeasuredMesh:
     """Measure the subject's solid."""
-    extents, _ = oriented_bounding_box(subject.solid.vertices)
     return MeasuredMesh(
-        sides=np.sort(extents)[::-1],
+        sides=np.sort(upright_extents(subject.solid.vertices))[::-1],
         area=float(subject.solid.area),
         volume=float(subject.solid.volume),
         thickness=median_thickness(subject.solid, subject.seed),
@@ -174,7 +173,7 @@ def _proportions(answer: PhysicalAnswer, mesh: MeasuredMesh) -> list[PhysicalFin
     proportions = ["1 : " + " : ".join(f"{share:.2f}" for share in sides[1:]) for sides in (said, real)]
     return [
         PhysicalFinding(
-            f"length, width and height are said to be as {proportions[0]}, but the object's smallest box has"
+            f"length, width and height are said to be as {proportions[0]}, but the object, as it stands, has"
             f" {proportions[1]}"
         )
     ]
