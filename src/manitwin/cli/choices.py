@@ -116,6 +116,7 @@ SKILLS = Choices(
         "press",
         "strike",
         "push",
+        "stir",
     ),
 )
 SURFACES = Choices("surface", _of("table", "shelf", "tray"))

@@ -52,6 +52,7 @@ class HeldCourse(Course):
             rng=np.random.default_rng((self.problem.seed, 3)),
         )
         self.task: HeldTask = goal.path(scene)
+        self.problem = replace(self.problem, entered=self.task.enters)
         self._planner = HeldPathPlanner(planner.closed if self.task.empty else planner.parts, empty=self.task.empty)
         self._watch: EventWatch | None = None
 

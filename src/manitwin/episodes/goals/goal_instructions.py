@@ -61,6 +61,10 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "push {a} to the mark", "slide {a} over to the mark", "push {a} along until {it} is at the mark",
         "without lifting {it}, move {a} to the mark", "shove {a} over to the mark", "please push {a} to the marked place",
     ),
+    "stirred": (
+        "stir what is in {b} with {a}", "use {a} to stir {b}", "give {b} a stir with {a}", "stir {b} once around with {a}",
+        "pick up {a} and stir what is in {b}", "please mix what {b} holds with {a}",
+    ),
     "pressed": (
         "press {a}", "push down on {a} with your fingertips", "press down on {a}", "give {a} a push from above",
         "close your hand and press {a}", "please press {a} once",

@@ -65,7 +65,7 @@ def obstacle_shapes(
     for obstacle in problem.obstacles:
         shapes, pose = store(obstacle.body), pose_of(obstacle.object_to_world)
         gap = min(_gap_m(shapes, pose, target, start), _gap_m(shapes, pose, target, goal))
-        merged = gap > HAND_REACH_M or (gap > margin_m and shapes.is_solid)
+        merged = obstacle.name not in problem.entered and (gap > HAND_REACH_M or (gap > margin_m and shapes.is_solid))
         placed += [(obstacle.name, shape, pose) for shape in ((shapes.whole,) if merged else shapes.hulls)]
     at_start = [signed_distance_m(target.whole, start, shape, pose) for _, shape, pose in placed]
     at_goal = [signed_distance_m(target.whole, goal, shape, pose) for _, shape, pose in placed]

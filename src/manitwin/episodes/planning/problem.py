@@ -51,6 +51,7 @@ class PickPlaceProblem:
     """Move ``target`` to ``goal_object_to_world``, upright as it stands, with the first of ``grasps`` that can be planned.
 
     ``static_boxes`` are the furniture, ``fixtures`` the boxes that a skill works with; nothing of either moves.
+    ``entered`` are the names of obstacles that what is held goes into.
     """
 
     target: PlacedObject
@@ -60,6 +61,7 @@ class PickPlaceProblem:
     static_boxes: tuple[StaticBox, ...] = ()
     seed: int = 0
     fixtures: tuple[StaticBox, ...] = ()
+    entered: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)

@@ -60,9 +60,9 @@ class Guard:
 class HeldTask:
     """One skill's work: ``paths`` are alternatives, of which the first that can be planned is taken.
 
-    ``rank`` orders grasps, the least first; None: its fingers block the function. ``empty``: the
-    closed hand itself moves, and nothing is grasped. ``as_hulls``: the target is carried as its hulls. The path takes
-    ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
+    ``rank`` orders grasps, the least first; None: its fingers block the function. ``empty``: the closed hand itself moves, and
+    nothing is grasped. ``as_hulls``: the target is carried as its hulls, and may go into the objects that it ``enters``. The
+    path takes ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
     ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or
     put back where it was. ``watch`` makes what latches events, and what a guard asks for the force.
     """
@@ -71,6 +71,7 @@ class HeldTask:
     rank: Callable[[Grasp], float | None] = lambda _: 0.0
     empty: bool = False
     as_hulls: bool = False
+    enters: frozenset[str] = frozenset()
     duration_s: float = 3.0
     longest_s: float = 6.0
     measured: int = MEASURED_TIMES

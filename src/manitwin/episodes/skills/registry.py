@@ -12,6 +12,7 @@ from manitwin.episodes.skills.pour import Pour
 from manitwin.episodes.skills.press import Press
 from manitwin.episodes.skills.push import Push
 from manitwin.episodes.skills.skill import Skill
+from manitwin.episodes.skills.stir import Stir
 from manitwin.episodes.skills.strike import Strike
 from manitwin.episodes.skills.upright import Upright
 from manitwin.errors import UsageError, choose_from
@@ -30,6 +31,7 @@ _SKILLS: tuple[Skill, ...] = (
     Strike(),
     Pour(),
     Push(),
+    Stir(),
 )
 
 SKILLS: Mapping[str, Skill] = {skill.name: skill for skill in _SKILLS}

@@ -1,0 +1,171 @@
+"""``stir``: a spoon's end goes round in a vessel with granules, and the spoon is laid back."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.skills.held_skill import HeldSkill
+from manitwin.episodes.skills.held_task import HeldScene, HeldTask
+from manitwin.episodes.skills.skill import SkillGoal, Surroundings
+from manitwin.episodes.tool_watches import StirWatch
+from manitwin.geometry.cavity import Opening
+from manitwin.geometry.frames.feature import UP, rotation_of
+from manitwin.geometry.poses import inverse, transform, transform_points
+from manitwin.physics.sapien.granules import fill
+from manitwin.physics.sapien.world import RobotWorld
+from manitwin.scenes.layouts.pool import Pool, PoolTwin
+from manitwin.scenes.layouts.stacking import open_poses
+from manitwin.scenes.layouts.twin_frames import TwinFrame
+
+SLENDER = 4.0  # length by width of what stirs
+LEAST_LENGTH_M, LEAST_DEPTH_M, LEAST_RIM_M = 0.12, 0.03, 0.03
+CIRCLE_SHARE, ASIDE_SHARE = (
+    0.4,
+    0.15,
+)  # of the rim's radius; from the middle to where the end points: the rim is in the way
+FLOOR_M, HEAD_M = 0.006, 0.012  # the lowest corner above the floor, half of what a head is wide
+TURN_RAD, KNOTS = np.radians(1120), 44  # three times around and a little more, nearer and nearer to the middle
+INNER = 0.4  # of the first circle, at the end
+ABOVE_M = 0.03  # the end above the rim, before and after
+LEANS_RAD = np.radians([45.0, 55, 35])
+AZIMUTHS = 8
+FREE_END = 0.45  # of the length from the end: no fingers there
+STIRS_S, LONGEST_S = 6.0, 12.0
+
+
+class Stir(HeldSkill):
+    """Stir with the target, a slender thing, in its partner, a vessel."""
+
+    name, predicate, has_partner = "stir", "stirred", True
+
+    def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
+        """Accept what is slender and 12 cm long, and a vessel that opens upward, deep and wide enough to go round in."""
+        if partner is None or not partner.vessel or not open_poses(partner, pool.body(partner.twin_id)):
+            return False
+        opening = pool.body(partner.twin_id).opening
+        if opening is None or opening.depth_m < LEAST_DEPTH_M or opening.rim_radius_m < LEAST_RIM_M:
+            return False
+        points = pool.body(target.twin_id).parts.whole
+        extents = np.sort(np.ptp(points @ np.linalg.eigh(np.cov(points.T))[1], axis=0))
+        narrow = extents[1] < (1 - CIRCLE_SHARE) * 2 * opening.rim_radius_m
+        return bool(extents[2] >= max(LEAST_LENGTH_M, SLENDER * extents[1]) and narrow)
+
+    def set_goal(
+        self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
+    ) -> SkillGoal | None:
+        """Return the goal with granules in the vessel; None where it has no room for them."""
+        assert partner is not None
+        found, body = super().set_goal(around, target, partner, rng), around.body(partner)
+        granules = None
+        if body.opening is not None:
+            granules = fill(around.objects[partner].name, body.opening, body.body.hulls, rng)
+        return None if found is None or granules is None else replace(found, granules=granules)
+
+    def task(self, scene: HeldScene) -> HeldTask:
+        """Return rounds with the working end down, leaning away from the robot and to the sides."""
+        vessel = scene.partner
+        assert vessel is not None
+        target, opening = scene.target, scene.openings[vessel.name]
+        up = target.object_to_world[2, :3]
+        stick = stick_frame(np.concatenate(target.body.hulls), scene.frames[target.name], up)
+        points = transform_points(inverse(stick), np.concatenate(target.body.hulls))
+        length_m = float(-points[:, 2].min())
+        center = transform_points(vessel.object_to_world, opening.center_m[None])[0]
+        floor_m = center[2] + floor_below_rim(
+            vessel.body.hulls, opening, (CIRCLE_SHARE + ASIDE_SHARE) * opening.rim_radius_m + HEAD_M
+        )
+        paths = []
+        for lean in LEANS_RAD:
+            for azimuth in scene.rng.uniform(-np.pi, np.pi) + np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
+                side = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+                down = np.sin(lean) * side - np.array([0.0, 0.0, np.cos(lean)])
+                turn = rotation_of(down, UP)  # the side that was up, where the hand is, stays up
+                low_m = float((points @ turn.T)[:, 2].min())
+                at_m = floor_m + FLOOR_M - low_m
+                paths.append(HeldPath(_round(turn, center, opening.rim_radius_m, at_m, side) @ inverse(stick)))
+
+        def rank(grasp: Grasp) -> float | None:
+            tips = transform_points(grasp.gripper_to_object, np.array([[0.0, 0, scene.tip_depth_m]]))
+            from_end_m = float(-transform_points(inverse(stick), tips)[0, 2])
+            return None if from_end_m < FREE_END * length_m else -round(from_end_m / length_m, 1)
+
+        def watch(world: RobotWorld) -> StirWatch:
+            number = [placed.name for placed in world.placed].index(vessel.name)
+            granules = world.granules
+            return StirWatch(
+                target.name,
+                vessel.name,
+                lambda: (world.object_to_world(world.target) @ stick)[:3, 3],
+                lambda: world.object_to_world(number),
+                opening,
+                (lambda: np.zeros((1, 3))) if granules is None else granules.positions_m,
+                0.0 if granules is None else granules.radius_m,
+            )
+
+        return HeldTask(
+            tuple(paths),
+            rank,
+            as_hulls=True,
+            enters=frozenset({vessel.name}),
+            duration_s=STIRS_S,
+            longest_s=LONGEST_S,
+            ending="put_back",
+            watch=watch,
+        )
+
+
+def stick_frame(points_m: np.ndarray, frames: tuple[TwinFrame, ...], up: np.ndarray) -> np.ndarray:
+    """Return the frame ``(4, 4)`` of the working end: Z along the length, out at the outermost place; X near ``up (3,)``.
+
+    The end is that away from the handle where a frame tells it (an axis named so), else the broader one.
+    """
+    middle = points_m.mean(0)
+    axis = np.linalg.eigh(np.cov(points_m.T))[1][:, 2]
+    along, across = (points_m - middle) @ axis, np.linalg.norm(np.cross(points_m - middle, axis), axis=1)
+    handle = next((f for f in frames if f.kind == "axis" and "handle" in f.label), None)
+    if handle is not None:
+        outward = -float((handle.frame_to_object[:3, 3] - middle) @ axis)
+    else:
+        outward = float(across[along > 0].max(initial=0.0) - across[along < 0].max(initial=0.0))
+    axis = axis if outward >= 0 else -axis
+    along = (points_m - middle) @ axis
+    return transform(rotation_of(axis, up), points_m[int(along.argmax())])
+
+
+def floor_below_rim(hulls: Sequence[np.ndarray], opening: Opening, radius_m: float) -> float:
+    """Return the height (negative, m) from the rim's middle of the highest floor in a vessel within a radius of its axis."""
+    basis = rotation_of(opening.axis)
+    angles = np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
+    ring = radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
+    starts = opening.center_m + np.vstack([ring, ring / 2, np.zeros((1, 2))]) @ basis[:, :2].T
+    highest = -opening.depth_m
+    for hull in hulls:
+        planes = ConvexHull(hull).equations
+        slope, offset = planes[:, :3] @ opening.axis, starts @ planes[:, :3].T + planes[:, 3]
+        with np.errstate(divide="ignore"):
+            at = -offset / slope
+        top = np.where(slope > 1e-9, at, np.inf).min(1)
+        bottom = np.where(slope < -1e-9, at, -np.inf).max(1)
+        beside = (np.abs(slope) <= 1e-9) & (offset > 0)
+        met = (bottom < top) & ~beside.any(1) & (top < 0)
+        highest = max(highest, float(top[met].max(initial=-np.inf)))
+    return highest
+
+
+def _round(turn: np.ndarray, center: np.ndarray, rim_radius_m: float, low_m: float, side: np.ndarray) -> np.ndarray:
+    """Return poses of the end: into the vessel from above its middle, around, and out again."""
+    middle = np.array([*center[:2], low_m]) + ASIDE_SHARE * rim_radius_m * side
+    above = np.array([*middle[:2], center[2] + ABOVE_M])
+    start = float(np.arctan2(side[1], side[0]))
+    poses = [transform(turn, above), transform(turn, (above + middle) / 2)]
+    for share in np.linspace(0, 1, KNOTS):
+        angle, out_m = start + share * TURN_RAD, CIRCLE_SHARE * rim_radius_m * min(1.0, 12 * share, 8 * (1 - share))
+        out_m *= 1 - (1 - INNER) * share
+        poses.append(transform(turn, middle + out_m * np.array([np.cos(angle), np.sin(angle), 0.0])))
+    return np.array([*poses, poses[1], poses[0]])
