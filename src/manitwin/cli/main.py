@@ -19,6 +19,7 @@ from typer.completion import completion_init, get_completion_script
 from manitwin.cli import options
 from manitwin.cli.arguments import CheckedCommand, register
 from manitwin.cli.choices import SHELLS
+from manitwin.cli.commands.affordances import affordances
 from manitwin.cli.commands.audit import audit
 from manitwin.cli.commands.build import build, run
 from manitwin.cli.commands.carve import carve
@@ -88,7 +89,7 @@ def _manitwin(
 for watched in (build, layout, trajectories, render):
     register(app, reported(watched, own_log=True))
 register(app, reported(run, own_log=True), "run", hidden=True)
-for making in (index, stats, publish, export, segmentation):
+for making in (index, stats, publish, export, segmentation, affordances):
     register(app, reported(making))
 register(app, reported(import_), "import")
 for other in (status, retry, check, query, doctor, models, fake, prompts, audit, carve, evaluate):

@@ -1,10 +1,13 @@
-"""A folder to write into: asked before any work whether it can be made and written."""
+"""A folder to write into: asked before any work whether it can be made and written, and written whole or not at all."""
 
 from __future__ import annotations
 
 import errno
 import os
+import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from manitwin.errors import UsageError
@@ -30,6 +33,27 @@ def require_writable_folder(folder: Path, what: str = "") -> None:
         raise UsageError(f"{folder}: cannot be written ({error.strerror or error}); {remedy}") from error
     except ValueError as error:  # a NUL in it
         raise UsageError(f"{folder}: no path ({error}); {remedy}") from error
+
+
+@contextmanager
+def new_folder(out: Path) -> Iterator[Path]:
+    """Give a folder to write into, which becomes ``out`` at the end; of a failure nothing stays.
+
+    Raises UsageError where ``out`` is there and has something in it.
+    """
+    if out.exists() and any(out.iterdir()):
+        raise UsageError(f"{out}: is there and not empty; give a new folder")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    fresh = Path(tempfile.mkdtemp(prefix=".manitwin-", dir=out.parent))
+    try:
+        fresh.chmod(0o755)
+        yield fresh
+        if out.exists():
+            out.rmdir()
+        os.rename(fresh, out)
+    except BaseException:
+        shutil.rmtree(fresh, ignore_errors=True)
+        raise
 
 
 def _require_names(folder: Path, there: Path) -> None:

@@ -1,20 +1,14 @@
-"""The folder that a data set for perception is written into: whole, or not at all."""
+"""The files of a data set for perception."""
 
 from __future__ import annotations
 
 import io
-import os
-import shutil
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from PIL import Image
 
-from manitwin.errors import UsageError
 from manitwin.formats.label_picture import label_picture
 from manitwin.twin.store import canonical_json
 
@@ -54,24 +48,3 @@ class Output:
         stream = io.BytesIO()
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]  # numpy's stub takes names for its own flags
         self.write_bytes(name, stream.getvalue())
-
-
-@contextmanager
-def whole_folder(out: Path) -> Iterator[Output]:
-    """Give a folder to write into, which becomes ``out`` at the end; of a failure nothing stays.
-
-    Raises UsageError where ``out`` is there and has something in it.
-    """
-    if out.exists() and any(out.iterdir()):
-        raise UsageError(f"{out}: is there and not empty; give a new folder")
-    out.parent.mkdir(parents=True, exist_ok=True)
-    fresh = Path(tempfile.mkdtemp(prefix=f".{out.name}.", dir=out.parent))
-    try:
-        fresh.chmod(0o755)
-        yield Output(fresh)
-        if out.exists():
-            out.rmdir()
-        os.rename(fresh, out)
-    except BaseException:
-        shutil.rmtree(fresh, ignore_errors=True)
-        raise

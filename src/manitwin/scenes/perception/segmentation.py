@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from manitwin.errors import UsageError, choose_from
+from manitwin.formats.output_folder import new_folder
 from manitwin.scenes.perception.bop import write_bop
 from manitwin.scenes.perception.cityscapes import write_cityscapes
 from manitwin.scenes.perception.classes import Classes
 from manitwin.scenes.perception.coco import write_coco, write_panoptic
-from manitwin.scenes.perception.output import Output, whole_folder
+from manitwin.scenes.perception.output import Output
 from manitwin.scenes.perception.point_clouds import POINTS, write_point_clouds
 from manitwin.scenes.perception.scene_truth import SceneTruth, read_scene_truth
 from manitwin.scenes.scene_files import dataset_of, scene_files
@@ -85,7 +86,8 @@ def write_segmentation(
     read = _Scenes(files)
     classes = Classes.of(read)
     source = TwinSource(dataset if dataset is not None else dataset_of(files[0]))
-    with whole_folder(Path(out)) as written:
+    with new_folder(Path(out)) as folder:
+        written = Output(folder)
         FORMATS[form](read, classes, written, _Asked(validation_share, points, source.folder))
         count = written.written
     pictures = sum(len(scene.pictures) for scene in read)

@@ -1,0 +1,46 @@
+"""``manitwin affordances``: maps of holding and of use on the twins' surfaces, and their parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import out_console
+
+if TYPE_CHECKING:
+    from manitwin.dataset.affordances.maps import SurfaceMaps
+
+
+def affordances(
+    dataset: Annotated[
+        str, options.existing("A data set, or a folder of twins.", "DATASET", "a data set, or a folder of twins")
+    ],
+    out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
+    points: Annotated[
+        int, typer.Option(help="Points of a twin's surface.", callback=choices.count_of("--points", 100_000))
+    ] = 2048,
+    trials: Annotated[
+        int, typer.Option(help="Grasps to try for the map of grasping.", callback=choices.count_of("--trials", 10_000))
+    ] = 200,
+    seed: Annotated[int, typer.Option(help="The seed of everything random.", min=0, max=2**63 - 1)] = 0,
+) -> None:
+    """Write where twins can be held, are held for a use, and are used, on points of their surfaces."""
+    from manitwin.dataset.affordances.write import write_affordances
+
+    done = write_affordances(dataset, out, points=points, trials=trials, seed=seed, on_twin=_say)
+    for reason in done.left_out.values():
+        out_console.print(f"left out: {reason}")
+    line = (
+        f"{done.twins:,} twins in {out}: {done.with_grasp_map:,} with a map of grasping, {done.with_parts:,} with parts"
+    )
+    if done.median_similarity is not None and done.median_area_under_curve is not None:
+        agreement = f"SIM {done.median_similarity:.2f}, AUC {done.median_area_under_curve:.2f}"
+        line += f"; two halves of the contacts agree, in the median, with {agreement}"
+    out_console.print(line)
+
+
+def _say(maps: SurfaceMaps) -> None:
+    out_console.print(f"{maps.twin.record.twin_id} {maps.twin.record.name}: {maps.held} of {maps.tried} grasps held")

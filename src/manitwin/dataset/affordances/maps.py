@@ -1,0 +1,124 @@
+"""All that is known of a twin's surface at some points: parts, and maps of holding and of use."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+
+from manitwin.dataset.affordances.heat_maps import (
+    area_under_curve,
+    contact_density,
+    contact_points,
+    contact_spread_m,
+    function_map,
+    similarity,
+    surface_distances,
+)
+from manitwin.dataset.affordances.sampled_grasps import sample_grasps
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
+from manitwin.models.graspers.protocol import GraspProposals
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.part_records import NO_PART
+
+POOL = 4
+"""So many samples a point that is kept: the kept ones then lie evenly."""
+LEAST_CONTACTS = 8
+"""Fewer make no map."""
+
+
+@dataclass(frozen=True)
+class SurfaceMaps:
+    """A twin's surface at points: ``points_m (N, 3)``, ``normals (N, 3)``, the face and the part of each (255: none).
+
+    ``maps`` are by name, ``(N,)`` in [0, 1]: ``grasp``, ``task_grasp:<scenario's point>``, ``function:<point> <label>``.
+    ``agreement``: of ``grasp``, how far two halves of the contacts agree, as SIM and AUC; None without enough.
+    """
+
+    twin: Twin
+    points_m: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    parts: np.ndarray
+    maps: dict[str, np.ndarray]
+    tried: int
+    held: int
+    agreement: tuple[float, float] | None
+
+
+def surface_maps(twin: Twin, *, points: int, trials: int, seed: int) -> SurfaceMaps:
+    """Compute the maps of a twin; without enough contacts there is no map ``grasp``. The same arguments give the same maps.
+
+    Raises TwinError for a twin that was rejected, UsageError for one of a gripper without parallel jaws.
+    """
+    rng = np.random.default_rng([seed, zlib.crc32(twin.record.twin_id.encode())])
+    vertices, faces = trimesh.util.append_faces(
+        [part.vertices for part in twin.visual], [part.faces for part in twin.visual]
+    )
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    pool, normals, face = sample_surface(mesh, POOL * points, rng)
+    kept = farthest_point_sampling(pool, points)
+    pool, normals, face = pool[kept], normals[kept], face[kept]
+    caster, spread_m = RayCaster(mesh), contact_spread_m(mesh.extents)
+    solid = mesh.copy()
+    solid.merge_vertices(merge_tex=True, merge_norm=True)
+    sampled = sample_grasps(twin, solid, trials, rng)
+    maps: dict[str, np.ndarray] = {}
+    contacts, of_grasp = _contacts(caster, sampled.grasps.take(np.flatnonzero(sampled.held)))
+    agreement = None
+    if len(contacts) >= 2 * LEAST_CONTACTS:
+        maps["grasp"] = contact_density(pool, contacts, spread_m)
+        half = rng.permutation(int(of_grasp.max()) + 1) % 2 == 0
+        agreement = _agreement(pool, contacts[half[of_grasp]], contacts[~half[of_grasp]], spread_m)
+    maps |= _task_grasps(twin, caster, pool, spread_m)
+    maps |= _functions(twin, pool, normals, mesh.extents)
+    return SurfaceMaps(
+        twin, pool, normals, face, twin.face_parts()[face], maps, len(sampled.held), int(sampled.held.sum()), agreement
+    )
+
+
+def _contacts(caster: RayCaster, grasps: GraspProposals) -> tuple[np.ndarray, np.ndarray]:
+    return contact_points(caster, grasps.gripper_to_object, grasps.width_m, grasps.depth_m)
+
+
+def _agreement(points_m: np.ndarray, one: np.ndarray, other: np.ndarray, spread_m: float) -> tuple[float, float]:
+    """Return SIM of the maps of two halves of contacts, and the AUC of the first for the points that the second touches."""
+    first = contact_density(points_m, one, spread_m)
+    touched = np.zeros(len(points_m), bool)
+    touched[cKDTree(points_m).query(other)[1]] = True
+    return similarity(first, contact_density(points_m, other, spread_m)), area_under_curve(first, touched)
+
+
+def _task_grasps(twin: Twin, caster: RayCaster, points_m: np.ndarray, spread_m: float) -> dict[str, np.ndarray]:
+    """Return a map for each functional point that verified grasps serve, of their contacts."""
+    grasps = twin.grasps()
+    serves = np.array(grasps.columns["functional_point_id"], object)
+    maps = {}
+    for point in twin.record.points.functional if twin.record.points else ():
+        at = np.flatnonzero(serves == point.id)
+        contacts, _ = contact_points(caster, grasps.gripper_to_object[at], grasps.width_m[at], grasps.depth_m[at])
+        if len(contacts) >= LEAST_CONTACTS:
+            maps[f"task_grasp:{point.id} {point.label}"] = contact_density(points_m, contacts, spread_m)
+    return maps
+
+
+def _functions(twin: Twin, points_m: np.ndarray, normals: np.ndarray, extents_m: np.ndarray) -> dict[str, np.ndarray]:
+    """Return a map for each functional point: how near it is along the surface."""
+    functional = twin.record.points.functional if twin.record.points else ()
+    if not functional:
+        return {}
+    seeds = cKDTree(points_m).query(np.array([point.position_m for point in functional]))[1]
+    distances_m = surface_distances(points_m, normals, seeds)
+    return {
+        f"function:{point.id} {point.label}": function_map(distance_m, extents_m)
+        for point, distance_m in zip(functional, distances_m, strict=True)
+    }
+
+
+def has_parts(maps: SurfaceMaps) -> bool:
+    """Tell whether any point is of a part that is known."""
+    return bool((maps.parts != NO_PART).any())

@@ -1,0 +1,66 @@
+"""Grasps sampled anywhere on a twin and tried in its own trial, none chosen among them: what its surface affords."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import trimesh
+
+from manitwin.config import VerifyConfig
+from manitwin.errors import UsageError
+from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
+from manitwin.models.graspers.screens import PadScreen
+from manitwin.models.graspers.surface_sampling import AntipodalGrasper
+from manitwin.pipeline.verify import trial_settings
+from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.twin.loaded_twin import Twin
+
+PROPOSALS_A_ROUND, ROUNDS = 6000, 6
+
+
+@dataclass(frozen=True)
+class SampledGrasps:
+    """Grasps that were tried, of which ``held (N,) bool`` did."""
+
+    grasps: GraspProposals
+    held: np.ndarray
+
+
+def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.random.Generator) -> SampledGrasps:
+    """Sample antipodal grasps all over a twin's surface and try ``trials`` of them as its own grasps were tried.
+
+    They lie no denser at its grasp points, and nothing chooses among them; what a trial could only fail, as the open fingers
+    overlap the object, is left out before. Raises UsageError for a twin whose gripper has no
+    parallel jaws or is not one that is shipped.
+    """
+    from manitwin.physics.sapien.trial import SapienTrial  # the engine loads where it is needed
+
+    summary = twin.record.grasps
+    assert summary is not None
+    gripper = load_gripper(summary.gripper)
+    if not isinstance(gripper, ParallelGripper):
+        raise UsageError(f"{twin.folder}: {summary.gripper} has no parallel jaws, of which alone contacts are known")
+    body = twin.rigid_body()
+    request = GraspRequest(
+        solid=solid,
+        hulls=body.hulls,
+        mass_kg=body.mass_kg,
+        center_of_mass_m=body.center_of_mass_m,
+        object_friction=body.friction_static,
+        gripper=gripper,
+        focus_points_m=np.empty((0, 3)),
+        max_proposals=PROPOSALS_A_ROUND,
+        seed=0,
+    )
+    screen, grasper, found = PadScreen(request), AntipodalGrasper(), list[GraspProposals]()
+    while sum(map(len, found)) < trials and len(found) < ROUNDS:
+        raw = grasper.propose(replace(request, seed=int(rng.integers(1 << 31))))
+        found.append(screen(raw).proposals)
+    proposed = GraspProposals.joined(found)
+    chosen = proposed.take(np.sort(rng.permutation(len(proposed))[:trials]))
+    known = summary.trial.model_dump()
+    asked = VerifyConfig(**{name: known[name] for name in VerifyConfig.model_fields if name in known})
+    results = SapienTrial().run(body, gripper, chosen.gripper_to_object, trial_settings(asked, gripper))
+    return SampledGrasps(chosen, np.array([result.outcome == "held" for result in results], bool))

@@ -1,0 +1,176 @@
+"""Write maps and parts of a data set's twins as training codes read them."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from manitwin.dataset.affordances.maps import SurfaceMaps, has_parts, surface_maps
+from manitwin.errors import TwinError, UsageError
+from manitwin.formats.output_folder import new_folder
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.part_records import NO_PART
+from manitwin.twin.store import canonical_json
+
+POINTS, TRIALS = 2048, 200
+SPLITS = (("train", 0.8), ("val", 0.1), ("test", 0.1))
+
+
+@dataclass(frozen=True)
+class Affordances:
+    """What was written: twins with maps, those with parts, those left out with the reason, and how well maps repeat."""
+
+    twins: int
+    with_grasp_map: int
+    with_parts: int
+    left_out: dict[str, str]
+    median_similarity: float | None
+    median_area_under_curve: float | None
+
+
+def split_of(twin_id: str) -> str:
+    """Return the split of a twin by the digest of its id: the same whatever else is in the data set."""
+    place = int.from_bytes(hashlib.sha256(twin_id.encode()).digest()[:8], "big") / 2**64
+    for name, share in SPLITS:
+        if place < share:
+            return name
+        place -= share
+    return SPLITS[-1][0]
+
+
+def write_affordances(
+    dataset: str | Path,
+    out: str | Path,
+    *,
+    points: int = POINTS,
+    trials: int = TRIALS,
+    seed: int = 0,
+    on_twin: Callable[[SurfaceMaps], None] = lambda maps: None,
+) -> Affordances:
+    """Write the maps of all accepted twins of a local data set below ``out``, whole or not at all.
+
+    ``maps/<twin>.npz`` has 3D AffordanceNet's fields; ``parts/`` is laid out as ShapeNetPart, of the twins whose parts are
+    known; ``affordances.json`` lists all. Raises UsageError for a data set without twins and an ``out`` that is not empty.
+    """
+    root = DatasetRoot(dataset)
+    if root.local is None:
+        raise UsageError(f"{dataset}: is at a URL; copy the data set here, its twins are read whole")
+    twins = [
+        twin
+        for each in root.twin_ids()
+        if (twin := Twin(root.local / root.twin_name(each))).record.status == "accepted"
+    ]
+    if not twins:
+        raise UsageError(f"{dataset}: has no accepted twin; build some, or give another data set")
+    kinds = sorted({f"{_category(twin)}/{part.name}" for twin in twins for part in twin.record.parts})
+    part_ids = {name: number for number, name in enumerate(kinds)}
+    rows: list[dict[str, object]] = []
+    left_out: dict[str, str] = {}
+    in_splits: dict[str, list[str]] = defaultdict(list)
+    with new_folder(Path(out)) as folder:
+        for twin in twins:
+            try:
+                maps = surface_maps(twin, points=points, trials=trials, seed=seed)
+            except (TwinError, UsageError) as error:
+                left_out[twin.record.twin_id] = str(error)
+                continue
+            on_twin(maps)
+            _write(folder / "maps" / f"{twin.record.twin_id}.npz", maps_file(maps))
+            if has_parts(maps):
+                category, name = _category(twin).replace(" ", "_"), twin.record.twin_id
+                _write(folder / "parts" / category / f"{name}.txt", parts_file(maps, part_ids))
+                in_splits[split_of(name)].append(f"shape_data/{category}/{name}")
+            rows.append(_row(maps))
+        _write_part_lists(folder / "parts", sorted({_category(twin).replace(" ", "_") for twin in twins}), in_splits)
+        listed = {
+            "points": points,
+            "trials": trials,
+            "seed": seed,
+            "parts": part_ids,
+            "twins": rows,
+            "left_out": left_out,
+        }
+        _write(folder / "affordances.json", canonical_json(listed).encode())
+    agreements = [row["agreement"] for row in rows if row["agreement"] is not None]
+    sim, auc = np.median(np.array(agreements, float), axis=0) if agreements else (None, None)
+    return Affordances(
+        twins=len(rows),
+        with_grasp_map=sum("grasp" in row["maps"] for row in rows),  # type: ignore[operator]
+        with_parts=sum(map(len, in_splits.values())),
+        left_out=left_out,
+        median_similarity=None if sim is None else float(sim),
+        median_area_under_curve=None if auc is None else float(auc),
+    )
+
+
+def maps_file(maps: SurfaceMaps) -> bytes:
+    """Return the content of a twin's .npz: 3D AffordanceNet's fields, and what undoes its unit sphere.
+
+    ``coordinate (N, 3)`` is centred on the points' mean and scaled to the unit sphere: m = coordinate * scale_m + center_m.
+    """
+    center = maps.points_m.mean(0)
+    scale = float(np.linalg.norm(maps.points_m - center, axis=1).max())
+    arrays = {
+        "shape_id": np.array(maps.twin.record.twin_id),
+        "semantic_class": np.array(_category(maps.twin)),
+        "affordance": np.array(list(maps.maps), str),
+        "coordinate": ((maps.points_m - center) / scale).astype(np.float32),
+        "label": np.stack(list(maps.maps.values()), 1).astype(np.float32)
+        if maps.maps
+        else np.zeros((len(maps.points_m), 0)),
+        "center_m": center,
+        "scale_m": np.array(scale),
+        "normal": maps.normals.astype(np.float32),
+        "part": maps.parts,
+        "face": maps.faces.astype(np.int32),
+    }
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **arrays)
+    return stream.getvalue()
+
+
+def parts_file(maps: SurfaceMaps, part_ids: dict[str, int]) -> bytes:
+    """Return ShapeNetPart's rows ``x y z nx ny nz part`` of the points whose part is known, metres, object frame."""
+    kinds = [part_ids[f"{_category(maps.twin)}/{part.name}"] for part in maps.twin.record.parts]
+    known = np.flatnonzero(maps.parts != NO_PART)
+    rows = [
+        " ".join(f"{value:.6f}" for value in (*maps.points_m[i], *maps.normals[i])) + f" {kinds[maps.parts[i]]}"
+        for i in known
+    ]
+    return ("\n".join(rows) + "\n").encode()
+
+
+def _write_part_lists(folder: Path, categories: list[str], in_splits: dict[str, list[str]]) -> None:
+    _write(folder / "synsetoffset2category.txt", "".join(f"{name}\t{name}\n" for name in categories).encode())
+    for split, _ in SPLITS:
+        file = folder / "train_test_split" / f"shuffled_{split}_file_list.json"
+        _write(file, json.dumps(sorted(in_splits.get(split, []))).encode())
+
+
+def _row(maps: SurfaceMaps) -> dict[str, object]:
+    return {
+        "twin_id": maps.twin.record.twin_id,
+        "category": _category(maps.twin),
+        "split": split_of(maps.twin.record.twin_id),
+        "maps": list(maps.maps),
+        "tried": maps.tried,
+        "held": maps.held,
+        "agreement": None if maps.agreement is None else [round(value, 4) for value in maps.agreement],
+    }
+
+
+def _category(twin: Twin) -> str:
+    return twin.record.language.category if twin.record.language else "object"
+
+
+def _write(path: Path, content: bytes) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)

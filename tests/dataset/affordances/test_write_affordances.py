@@ -1,0 +1,124 @@
+"""Maps and parts of a small data set: what is written, read as training codes read it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from drawn_scenes import add_parts
+from manitwin.config import VerifyConfig
+from manitwin.dataset.affordances.write import split_of, write_affordances
+from manitwin.errors import UsageError
+from manitwin.physics.sapien.trial import SapienTrial
+from manitwin.pipeline.verify import describe, trial_settings
+from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.store import RECORD, seal
+from scene_twins import can, slab, write_thing
+from twin_folders import twin_id
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    root = tmp_path_factory.mktemp("set")
+    tried_as_built(root / twin_name(write_thing(root, 0, can())))
+    tried_as_built(root / twin_name(write_thing(root, 1, slab("box", 0.05, 0.04, 0.08, 0.2))))
+    add_parts(root / twin_name(twin_id(0)), ("base", "lid"))
+    return root
+
+
+def tried_as_built(folder: Path) -> None:
+    """Let a twin say the trial that a build would have put its grasps through."""
+    record = json.loads((folder / RECORD).read_bytes())
+    settings = trial_settings(VerifyConfig(), load_gripper("panda"))
+    record["grasps"]["trial"] = describe(SapienTrial(), settings, 0.5).model_dump(mode="json")
+    del record["revision"], record["files"]
+    seal(folder, record)
+
+
+@pytest.fixture(scope="module")
+def written(dataset: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("out") / "affordances"
+    done = write_affordances(dataset, out, points=400, trials=12)
+    assert (done.twins, done.with_grasp_map, done.with_parts, done.left_out) == (2, 2, 1, {})
+    assert done.median_similarity is not None and done.median_similarity > 0.3
+    return out
+
+
+def of(dataset: Path, written: Path, category: str) -> tuple[Twin, dict[str, np.ndarray]]:
+    rows = json.loads((written / "affordances.json").read_text())["twins"]
+    (row,) = (row for row in rows if row["category"] == category)
+    with np.load(written / "maps" / f"{row['twin_id']}.npz", allow_pickle=False) as arrays:
+        return Twin(dataset / twin_name(row["twin_id"])), dict(arrays)
+
+
+@pytest.mark.parametrize("category", ["can", "box"])
+def test_maps_lie_on_the_surface_and_are_in_affordance_nets_fields(dataset: Path, written: Path, category: str) -> None:
+    twin, arrays = of(dataset, written, category)
+    assert str(arrays["semantic_class"]) == category and str(arrays["shape_id"]) == twin.record.twin_id
+    assert np.linalg.norm(arrays["coordinate"], axis=1).max() == pytest.approx(1, abs=1e-6)
+    points_m = arrays["coordinate"] * arrays["scale_m"] + arrays["center_m"]
+    (mesh,) = twin.visual
+    assert trimesh.proximity.closest_point_naive(mesh, points_m)[1].max() < 1e-6
+    assert arrays["label"].shape == (400, len(arrays["affordance"]))
+    assert arrays["label"].min() >= 0 and (arrays["label"].max(0) > 0.99).all()
+    assert (arrays["part"] == twin.face_parts()[arrays["face"]]).all()
+
+
+def test_a_functional_map_is_largest_at_its_point(dataset: Path, written: Path) -> None:
+    twin, arrays = of(dataset, written, "can")
+    points_m = arrays["coordinate"] * arrays["scale_m"] + arrays["center_m"]
+    assert twin.record.points is not None
+    for point in twin.record.points.functional:
+        label = arrays["label"][:, arrays["affordance"].tolist().index(f"function:{point.id} {point.label}")]
+        nearest_m = np.linalg.norm(points_m - point.position_m, axis=1)
+        assert nearest_m[label.argmax()] == nearest_m.min()
+
+
+def test_fingers_of_80_mm_hold_a_slab_by_the_sides_that_they_span(dataset: Path, written: Path) -> None:
+    _, arrays = of(dataset, written, "box")
+    grasp = arrays["label"][:, arrays["affordance"].tolist().index("grasp")]
+    by_side = {axis: grasp[np.abs(arrays["normal"][:, axis]) > 0.9].max() for axis in range(3)}
+    assert max(by_side[0], by_side[1]) == 1 and by_side[2] < 0.95
+
+
+def test_parts_are_rows_of_shapenetpart(dataset: Path, written: Path) -> None:
+    twin, arrays = of(dataset, written, "can")
+    parts = json.loads((written / "affordances.json").read_text())["parts"]
+    rows = np.loadtxt(written / "parts" / "can" / f"{twin.record.twin_id}.txt")
+    assert rows.shape == ((arrays["part"] != 255).sum(), 7) and parts == {"can/base": 0, "can/lid": 1}
+    assert (rows[rows[:, 5] < -0.99][:, 6] == parts["can/base"]).all()
+    assert (rows[rows[:, 5] > 0.99][:, 6] == parts["can/lid"]).all()
+    lists = {
+        path.stem: json.loads(path.read_text()) for path in (written / "parts" / "train_test_split").glob("*.json")
+    }
+    assert set(lists) == {f"shuffled_{split}_file_list" for split in ("train", "val", "test")}
+    assert lists[f"shuffled_{split_of(twin.record.twin_id)}_file_list"] == [f"shape_data/can/{twin.record.twin_id}"]
+
+
+def test_same_arguments_give_the_same_bytes(dataset: Path, tmp_path: Path) -> None:
+    for name in ("one", "other"):
+        write_affordances(dataset, tmp_path / name, points=60, trials=3, seed=4)
+    for path in sorted(path for path in (tmp_path / "one").rglob("*") if path.is_file()):
+        assert path.read_bytes() == (tmp_path / "other" / path.relative_to(tmp_path / "one")).read_bytes(), path.name
+
+
+def test_splits_have_their_shares() -> None:
+    found = [split_of(f"{number:016x}") for number in range(2000)]
+    assert found.count("train") == pytest.approx(1600, abs=80) and found.count("test") == pytest.approx(200, abs=50)
+
+
+def test_what_cannot_be_written_leaves_nothing(dataset: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(UsageError, match="no accepted twin"):
+        write_affordances(tmp_path / "empty", tmp_path / "out")
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine").write_text("x")
+    with pytest.raises(UsageError, match="not empty"):
+        write_affordances(dataset, tmp_path / "full", points=64, trials=2)
+    assert not (tmp_path / "out").exists() and [p.name for p in (tmp_path / "full").iterdir()] == ["mine"]
