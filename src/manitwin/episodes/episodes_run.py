@@ -23,11 +23,13 @@ from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.settings import TrajectoriesConfig
+from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.registry import load_skill
+from manitwin.episodes.skills.skill import Skill
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import pool_of
+from manitwin.scenes.layouts.pool import Pool, pool_of
 from manitwin.scenes.run_settings import check_settings
 from manitwin.scenes.scene_files import SCENES, read_scene, scene_ids, scene_name
 from manitwin.twin.dataset_root import DatasetRoot
@@ -166,7 +168,7 @@ def make_episodes(
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
-    load_skill(config.skill)
+    skill = load_skill(config.skill)
     robot, source, root = load_robot(config.robot), EpisodesSource.of(place, twins), DatasetRoot(out)
     _check_out(root, source)
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
@@ -174,7 +176,7 @@ def make_episodes(
     there = _batches_there(root)
     try:
         if source.scenes is None:
-            twin_ids = [twin.twin_id for twin in pool_of(source.dataset).twins]
+            twin_ids = _twins_for(skill, pool_of(source.dataset))
             deal = batches(robot.name, count, config.batch, twin_ids=twin_ids, there=there)
         else:
             deal = batches(robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)), there=there)
@@ -190,6 +192,18 @@ def make_episodes(
     elif before:
         report.remarks.append(f"{before} of {count} episodes were there already")
     return report
+
+
+def _twins_for(skill: Skill | None, pool: Pool) -> list[str]:
+    """Return the ids of the twins that episodes are of: all, but of a skill that uses a thing alone those it can be used with."""
+    if not isinstance(skill, HeldSkill) or skill.has_partner:
+        return [twin.twin_id for twin in pool.twins]
+    found = [twin.twin_id for twin in pool.twins if skill.suits(pool, twin, None)]
+    if not found:
+        raise UsageError(
+            f"none of {len(pool.twins)} twins can be used to {skill.name}; docs/skills.md says what it takes"
+        )
+    return found
 
 
 def _batches_there(root: DatasetRoot) -> list[Batch]:

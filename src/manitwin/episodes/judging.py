@@ -58,7 +58,8 @@ def judge(
 ) -> None:
     """Wait until all is at rest, and take down the outcome."""
     settings, target = start.settings, start.objects[world.target]
-    if start.skill_goal is not None and start.skill_goal.is_of_a_path:
+    let_go = max(execution.touches.finger_forces_n) == 0
+    if start.skill_goal is not None and start.skill_goal.is_of_a_path and let_go:
         last = execution.rest(round(max(settings.max_rest_s, SWINGS_S) / settings.timestep_s), REST_ROWS)
     else:
         last = execution.rest(round(settings.max_rest_s / settings.timestep_s))

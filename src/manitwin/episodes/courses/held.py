@@ -17,6 +17,7 @@ from manitwin.episodes.planning.closed_hand import fingertip_corners
 from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner, HeldPlan, joint_spline
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, Phase
+from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask
 from manitwin.physics.sapien.contacts import MeantContacts
 from manitwin.physics.sapien.world import RobotWorld
@@ -184,7 +185,7 @@ class HeldCourse(Course):
         """Open the hand and withdraw it as far as there is room."""
         execution.meant = MeantContacts()
         execution.open()
-        away = self._planner.withdraw(self.problem, execution.target_to_world(), execution.commanded_rad)
+        away = plan_withdrawal(self._own.parts, self.problem, execution.target_to_world(), execution.commanded_rad)
         self.facts.replans["withdrawn" if away is not None else "not_withdrawn"] += 1
         if away is not None:
             execution.follow(away)

@@ -35,7 +35,6 @@ LARGEST_KNOT_RAD, FROM_WHERE_IT_IS_RAD = 0.6, 0.9  # a larger change between kno
 ITERATIONS = 30
 MOST_PAIRS = 400  # of a grasp and a path, 1 to 5 ms each
 SAME_RAD = 0.05
-WITHDRAWN_M = (0.10, 0.05, 0.025)
 
 
 @dataclass(frozen=True)
@@ -188,21 +187,6 @@ class HeldPathPlanner:
         parts = self.parts
         positions, velocities = time_quintic(joints, parts.motions.limits, duration_s, parts.timestep_s, beyond)
         return Motion(phase, positions, velocities)
-
-    def withdraw(self, problem: PickPlaceProblem, object_to_world: np.ndarray, joints_rad: np.ndarray) -> Motion | None:
-        """Plan the open hand's way back along its approach from an object that stands (or hangs) where it is now.
-
-        10 cm, less where that is blocked, None where nothing is free.
-        """
-        world = self.parts.world_of(problem, object_to_world, as_hulls=True)
-        here = self.parts.arm.gripper_pose(np.asarray(joints_rad, float))
-        for way_m in WITHDRAWN_M:
-            end = here.copy()
-            end[:3, 3] -= way_m * here[:3, 2]
-            line = self.parts.motions.line(world.arm, Phase.RETREAT, np.asarray(joints_rad, float), end)
-            if line is not None:
-                return self.parts.motions.timed(Phase.RETREAT, line)
-        return None
 
     def _plan_pair(
         self,

@@ -1,0 +1,36 @@
+"""The open hand's way back from what it has let go of in the air: on a peg, in a holder."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.episodes.planning.arm_planning import ArmPlanning
+from manitwin.episodes.planning.problem import Motion, Phase, PickPlaceProblem
+from manitwin.episodes.planning.straight_lines import straight_line
+from manitwin.geometry.poses import transform
+
+WAYS_M = (0.10, 0.05, 0.025)
+BLIND_M = 0.05
+
+
+def plan_withdrawal(
+    parts: ArmPlanning, problem: PickPlaceProblem, object_to_world: np.ndarray, joints_rad: np.ndarray
+) -> Motion | None:
+    """Plan straight back along the approach, from an object that is at ``object_to_world (4, 4)`` now.
+
+    10 cm, less where that is blocked; 5 cm whatever is around where all is: a hand that stays holds on to what it has let
+    go of. None where the arm cannot.
+    """
+    world = parts.world_of(problem, object_to_world, as_hulls=True)
+    start = np.asarray(joints_rad, float)
+    here = parts.arm.gripper_pose(start)
+
+    def back(way_m: float) -> np.ndarray:
+        return here @ transform(translation=np.array([0.0, 0, -way_m]))
+
+    for way_m in WAYS_M:
+        line = parts.motions.line(world.arm, Phase.RETREAT, start, back(way_m))
+        if line is not None:
+            return parts.motions.timed(Phase.RETREAT, line)
+    line = straight_line(parts.arm, start, back(BLIND_M))
+    return None if line is None else parts.motions.timed(Phase.RETREAT, line)
