@@ -13,8 +13,12 @@ import pyarrow.parquet as pq
 import trimesh
 
 from handmade import visual
+from manitwin.config import VerifyConfig
 from manitwin.formats.glb import write_glb
+from manitwin.physics.sapien.trial import SapienTrial
 from manitwin.pipeline.stage_order import STAGE_ORDER
+from manitwin.pipeline.verify import describe, trial_settings
+from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.grasp_table import SCHEMA
 from manitwin.twin.store import seal
@@ -33,6 +37,12 @@ def box(x_m: float = 0.04, y_m: float = 0.06, z_m: float = 0.1) -> trimesh.Trime
     mesh = trimesh.creation.box([x_m, y_m, z_m])
     mesh.apply_translation([0, 0, z_m / 2])
     return mesh
+
+
+def tried_as_built() -> dict[str, Any]:
+    """What a record says of the trial that a build would have put its grasps through."""
+    settings = trial_settings(VerifyConfig(), load_gripper("panda"))
+    return describe(SapienTrial(), settings, 0.5).model_dump(mode="json")
 
 
 def write_accepted(

@@ -79,6 +79,7 @@ PAGES: dict[str, Arrangement] = {
         not_run={r"^make test": "it is what runs this"} | WHEEL,
         slow=(r"^make",),
     ),
+    "docs/affordances.md": Arrangement(slow=(r"manitwin affordances",)),
     "docs/audit.md": Arrangement(
         exits={r"PATH\.\.\.": 1, "--fix": 1}
     ),  # the mug there is wrong: its collision shape fills it

@@ -10,33 +10,27 @@ import pytest
 import trimesh
 
 from drawn_scenes import add_parts
-from manitwin.config import VerifyConfig
 from manitwin.dataset.affordances.write import split_of, write_affordances
 from manitwin.errors import UsageError
-from manitwin.physics.sapien.trial import SapienTrial
-from manitwin.pipeline.verify import describe, trial_settings
-from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD, seal
 from scene_twins import can, slab, write_thing
-from twin_folders import twin_id
+from twin_folders import tried_as_built, twin_id
 
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     root = tmp_path_factory.mktemp("set")
-    tried_as_built(root / twin_name(write_thing(root, 0, can())))
-    tried_as_built(root / twin_name(write_thing(root, 1, slab("box", 0.05, 0.04, 0.08, 0.2))))
+    for number, thing in enumerate((can(), slab("box", 0.05, 0.04, 0.08, 0.2))):
+        _tried(root / twin_name(write_thing(root, number, thing)))
     add_parts(root / twin_name(twin_id(0)), ("base", "lid"))
     return root
 
 
-def tried_as_built(folder: Path) -> None:
-    """Let a twin say the trial that a build would have put its grasps through."""
+def _tried(folder: Path) -> None:
     record = json.loads((folder / RECORD).read_bytes())
-    settings = trial_settings(VerifyConfig(), load_gripper("panda"))
-    record["grasps"]["trial"] = describe(SapienTrial(), settings, 0.5).model_dump(mode="json")
+    record["grasps"]["trial"] = tried_as_built()
     del record["revision"], record["files"]
     seal(folder, record)
 
@@ -122,3 +116,10 @@ def test_what_cannot_be_written_leaves_nothing(dataset: Path, tmp_path: Path) ->
     with pytest.raises(UsageError, match="not empty"):
         write_affordances(dataset, tmp_path / "full", points=64, trials=2)
     assert not (tmp_path / "out").exists() and [p.name for p in (tmp_path / "full").iterdir()] == ["mine"]
+
+
+def test_a_twin_whose_trial_cannot_be_repeated_is_left_out_with_the_reason(tmp_path: Path) -> None:
+    identity = write_thing(tmp_path / "set", 0, can())  # its record is made, and says a trial of no force
+    done = write_affordances(tmp_path / "set", tmp_path / "out", points=60, trials=3)
+    assert done.twins == 0 and "grasps.trial.force_n" in done.left_out[identity]
+    assert "\n" not in done.left_out[identity]

@@ -40,6 +40,7 @@ def affordances(
         agreement = f"SIM {done.median_similarity:.2f}, AUC {done.median_area_under_curve:.2f}"
         line += f"; two halves of the contacts agree, in the median, with {agreement}"
     out_console.print(line)
+    raise typer.Exit(3 if done.left_out else 0)
 
 
 def _say(maps: SurfaceMaps) -> None:

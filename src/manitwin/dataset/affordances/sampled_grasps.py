@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
+from pydantic import ValidationError
 
 from manitwin.config import VerifyConfig
 from manitwin.errors import UsageError
@@ -15,6 +16,7 @@ from manitwin.models.graspers.surface_sampling import AntipodalGrasper
 from manitwin.pipeline.verify import trial_settings
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.twin.grasp_summary import Trial
 from manitwin.twin.loaded_twin import Twin
 
 PROPOSALS_A_ROUND, ROUNDS = 6000, 6
@@ -33,7 +35,7 @@ def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.rando
 
     They lie no denser at its grasp points, and nothing chooses among them; what a trial could only fail, as the open fingers
     overlap the object, is left out before. Raises UsageError for a twin whose gripper has no
-    parallel jaws or is not one that is shipped.
+    parallel jaws or is not one that is shipped, or whose record tells no trial that can be run.
     """
     from manitwin.physics.sapien.trial import SapienTrial  # the engine loads where it is needed
 
@@ -60,7 +62,19 @@ def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.rando
         found.append(screen(raw).proposals)
     proposed = GraspProposals.joined(found)
     chosen = proposed.take(np.sort(rng.permutation(len(proposed))[:trials]))
-    known = summary.trial.model_dump()
-    asked = VerifyConfig(**{name: known[name] for name in VerifyConfig.model_fields if name in known})
+    asked = _trial_of(twin, summary.trial)
     results = SapienTrial().run(body, gripper, chosen.gripper_to_object, trial_settings(asked, gripper))
     return SampledGrasps(chosen, np.array([result.outcome == "held" for result in results], bool))
+
+
+def _trial_of(twin: Twin, trial: Trial) -> VerifyConfig:
+    known = trial.model_dump()
+    try:
+        return VerifyConfig(**{name: known[name] for name in VerifyConfig.model_fields if name in known})
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise UsageError(
+            f"{twin.folder}: its grasps were tried in no way that can be repeated (grasps.trial.{where}: {first['msg']});"
+            " build it again"
+        ) from error
