@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from manitwin.api import (
         EpisodesReport,
+        TasksReport,
         build,
         export_scene,
         export_twin,
@@ -19,8 +20,10 @@ if TYPE_CHECKING:
         import_assets,
         load,
         load_scene,
+        make_env,
         make_episodes,
         make_layouts,
+        make_tasks,
         render_episodes,
         schema,
         statistics_connection,
@@ -40,7 +43,7 @@ if TYPE_CHECKING:
     from manitwin.episodes.hdf5_file import EpisodeFile
     from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
     from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
-    from manitwin.episodes.settings import PicturesConfig, TrajectoriesConfig
+    from manitwin.episodes.settings import PicturesConfig, TasksConfig, TrajectoriesConfig
     from manitwin.errors import (
         AssetError,
         BackendError,
@@ -89,6 +92,8 @@ __all__ = [
     "Robot",
     "SapienRobot",
     "Scene",
+    "TasksConfig",
+    "TasksReport",
     "TrajectoriesConfig",
     "Twin",
     "TwinError",
@@ -106,8 +111,10 @@ __all__ = [
     "load_config",
     "load_robot",
     "load_scene",
+    "make_env",
     "make_episodes",
     "make_layouts",
+    "make_tasks",
     "near_duplicates",
     "publish_dataset",
     "publish_episodes",
@@ -125,6 +132,7 @@ logging.getLogger("manitwin").addHandler(logging.NullHandler())  # else Python p
 _DEFINED_IN = {
     "manitwin.api": (
         "EpisodesReport",
+        "TasksReport",
         "build",
         "export_scene",
         "export_twin",
@@ -132,8 +140,10 @@ _DEFINED_IN = {
         "import_assets",
         "load",
         "load_scene",
+        "make_env",
         "make_episodes",
         "make_layouts",
+        "make_tasks",
         "render_episodes",
         "schema",
         "statistics_connection",
@@ -170,6 +180,7 @@ _DEFINED_IN = {
     ),
     "manitwin.episodes.settings": (
         "PicturesConfig",
+        "TasksConfig",
         "TrajectoriesConfig",
     ),
     "manitwin.errors": (

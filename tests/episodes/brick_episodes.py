@@ -60,7 +60,7 @@ def run(
 
 def digest(recording: Recording) -> str:
     """A digest of all that was recorded."""
-    arrays = b"".join(np.ascontiguousarray(values).tobytes() for values in astuple(recording))
+    arrays = b"".join(np.ascontiguousarray(values).tobytes() for values in astuple(recording) if values is not None)
     return hashlib.sha256(arrays).hexdigest()
 
 

@@ -12,7 +12,7 @@ import typer
 from manitwin.cli.console import out_console, write_json
 
 if TYPE_CHECKING:
-    from manitwin.api import EpisodesReport
+    from manitwin.api import EpisodesReport, TasksReport
     from manitwin.cli.causes import Cause
     from manitwin.cli.dry_run import Plan
     from manitwin.dataset.evaluation.annotations import AnnotationReport
@@ -131,6 +131,15 @@ def trajectories_document(report: EpisodesReport, place: str, causes: list[Cause
         "attempts": None if report.totals is None else asdict(report.totals),
         "failing_grasps": [{**asdict(each), "failed": each.failed} for each in report.retired],
         "retired_now": report.newly_retired,
+    }
+
+
+def tasks_document(report: TasksReport, place: str, causes: list[Cause]) -> Document:
+    """Return how many tasks there are of which kind, and what became of the candidates; no totals where a scene is missing."""
+    return {
+        **run_document(report.run, place, causes),
+        "tasks": None if report.totals is None else asdict(report.totals),
+        "bddl": None if report.bddl is None else {"written": report.bddl[0], "left_out": report.bddl[1]},
     }
 
 

@@ -38,6 +38,7 @@ from manitwin.cli.commands.render import render
 from manitwin.cli.commands.segmentation import segmentation
 from manitwin.cli.commands.stats import stats
 from manitwin.cli.commands.status import status
+from manitwin.cli.commands.tasks import tasks
 from manitwin.cli.commands.trajectories import trajectories
 from manitwin.cli.console import error_console, out_console, write_text
 from manitwin.cli.documents import CommandLineError, Json, asked_for_json, print_document, print_failure
@@ -86,7 +87,7 @@ def _manitwin(
         out_console.print(context.get_help(), paragraph=True)
 
 
-for watched in (build, layout, trajectories, render):
+for watched in (build, layout, tasks, trajectories, render):
     register(app, reported(watched, own_log=True))
 register(app, reported(run, own_log=True), "run", hidden=True)
 for making in (index, stats, publish, export, segmentation, affordances):

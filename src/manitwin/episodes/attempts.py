@@ -54,6 +54,7 @@ SCHEMA = pa.schema(
         ("goal", _TEXT),
         ("failure", _TEXT),
         ("measured", _TEXT),
+        ("task_id", _TEXT),
     ]
 )
 """The columns of a batch: the fields of Attempt."""
@@ -69,7 +70,7 @@ class Attempt:
     """One row; errors are of the released object at rest against the goal that was asked for. None: never got there.
 
     ``plan_failures`` is JSON: how many candidate grasps failed of what. ``goal`` is the skill's goal in words (pick_place: None),
-    ``failure`` the first literal of it that is not true, ``measured`` JSON: every literal with what was measured.
+    ``failure`` the first literal of it that is not true, ``measured`` JSON: every literal with what was measured. ``task_id`` is that of a task, None for episodes that were drawn.
     """
 
     episode_id: str
@@ -95,6 +96,7 @@ class Attempt:
     goal: str | None = None
     failure: str | None = None
     measured: str | None = None
+    task_id: str | None = None
 
     @property
     def planned(self) -> bool:

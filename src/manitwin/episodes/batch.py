@@ -26,7 +26,7 @@ REMEDY_OF_REPEATS = "an older version made these in steps; make the episodes aga
 
 @dataclass(frozen=True)
 class Batch(Payload):
-    """Some episodes of a twin on a table, or of a scene, by their numbers in the whole: ``count`` from ``first`` in steps."""
+    """Some episodes of a twin, a scene or a task, by their numbers in the whole: ``count`` from ``first`` in steps."""
 
     robot: str
     first: int
@@ -34,6 +34,7 @@ class Batch(Payload):
     twin_id: str | None = None
     scene_id: str | None = None
     step: int = 1
+    task_id: str | None = None
 
     @property
     def numbers(self) -> range:
@@ -42,8 +43,8 @@ class Batch(Payload):
 
     @property
     def of(self) -> str:
-        """The id of its twin, or of its scene."""
-        return self.twin_id or self.scene_id or ""
+        """The id of its twin, of its scene, or of its task."""
+        return self.twin_id or self.scene_id or self.task_id or ""
 
     @property
     def batch_id(self) -> str:
@@ -61,9 +62,11 @@ class Batch(Payload):
         return cls(**(json.loads(fields["text"]) if "text" in fields else fields))
 
     def to_json(self) -> dict[str, Any]:
-        """Return its fields; ``step`` only where it is not 1, so that batches of older versions keep their ids."""
-        fields = super().to_json()
-        return fields if self.step != 1 else {name: value for name, value in fields.items() if name != "step"}
+        """Return its fields; ``step`` only where it is not 1, ``task_id`` where there is one: ids of older versions stay."""
+        left_out = {
+            name for name, told in (("step", self.step != 1), ("task_id", self.task_id is not None)) if not told
+        }
+        return {name: value for name, value in super().to_json().items() if name not in left_out}
 
 
 def batches(
@@ -73,15 +76,18 @@ def batches(
     *,
     twin_ids: Sequence[str] = (),
     scene_ids: Sequence[str] = (),
+    task_ids: Sequence[str] = (),
     there: Iterable[Batch] = (),
 ) -> list[Batch]:
     """Return the batches that are missing to ``episodes``: each number goes to what has the fewest episodes until then.
 
-    So a number has the same twin or scene, and the same seed, whether episodes are made in one go or in steps. ``there`` are
-    the batches that there are; none of their numbers comes again. Raises UsageError where two of them have a number in common.
+    So a number has the same twin, scene or task, and the same seed, whether episodes are made in one go or in steps. ``there``
+    are the batches that there are; none of their numbers comes again. Raises UsageError where two of them have a number in common.
     Batches go round, so that a run that is stopped has some of every twin.
     """
-    kind, ids = ("twin_id", twin_ids) if twin_ids else ("scene_id", scene_ids)
+    kind, ids = next(
+        (each for each in (("twin_id", twin_ids), ("task_id", task_ids)) if each[1]), ("scene_id", scene_ids)
+    )
     counts, taken = dict.fromkeys(ids, 0), set[int]()
     for batch in there:
         if not taken.isdisjoint(batch.numbers):

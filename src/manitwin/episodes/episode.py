@@ -7,9 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from manitwin.episodes.courses.course import Course, Ended, Planner, Start
-from manitwin.episodes.courses.held import HeldCourse
-from manitwin.episodes.courses.pick_place import PickPlaceCourse
-from manitwin.episodes.courses.push import PushCourse
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import FRAME_S, Execution
 from manitwin.episodes.goals.world_state import Granules
@@ -18,6 +15,7 @@ from manitwin.episodes.judging import is_reached_already, judge
 from manitwin.episodes.outcome import moved_m, turned_rad
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.recording import Recording
+from manitwin.episodes.sequence import GoalSequence, course_of, next_course
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.skill import SkillGoal
 from manitwin.physics.sapien.world import RobotWorld
@@ -31,31 +29,40 @@ def run_episode(
     robot: Robot,
     settings: EpisodeSettings,
     skill_goal: SkillGoal | None = None,
+    sequence: GoalSequence | None = None,
 ) -> tuple[EpisodeFacts, Recording | None]:
     """Run one episode and return what became of it, and its recording where it was executed.
 
     The objects settle first, and the plan is made from where they came to rest. Without a ``skill_goal`` the target's pose is
     judged against that of the problem; with one its goal is judged: of a placing skill the first of the poses that can be
-    planned is taken, of a held path the first grasp and path. The same arguments give the same bytes.
+    planned is taken, of a held path the first grasp and path. A ``sequence`` has goals of several literals: ``skill_goal`` is
+    then all of it, the problem that of the first step, and the grasp is not told. The same arguments give the same bytes.
     """
-    facts, recording, closing = EpisodeFacts(), None, _closing(robot, settings)
+    facts, recording, closing = EpisodeFacts(), None, closing_of(robot, settings)
     with world_of(problem, robot, settings, closing.force_n) as world:
-        start = _settled(problem, planner, settings, skill_goal, world)
+        start = settled(problem, planner, settings, skill_goal, world)
         if start is None:
             facts.outcome = "unsettled"
         elif is_reached_already(start, world):
             facts.outcome = "reached_already"
-        elif (course := _course(start, facts)).plan():
+        elif (course := _first_course(start, facts, sequence)).plan():
             execution = Execution(world, robot, closing, planner.tip_pose)
             execution.watches = list(course.watches(world))
+            execution.literal = None if sequence is None else 0
             try:
                 course.execute(execution)
+                for number in range(1, len(sequence.steps) if sequence is not None else 0):
+                    course = next_course(sequence, number, start, world, execution, facts)
+                    execution.watches += course.watches(world)
+                    course.execute(execution)
                 judge(start, course.goal_object_to_world, facts, world, execution)
             except Ended as end:
                 facts.outcome = str(end)
             facts.length_s = execution.length_s
             facts.unplanned = tuple(sorted(execution.unplanned))
             facts.events = execution.events
+            if sequence is not None:
+                facts.grasp = None
             recording = execution.recording()
             if world.granules is not None and skill_goal is not None:
                 recording = with_granule_counts(recording, start.objects, skill_goal.openings, world.granules.radius_m)
@@ -81,14 +88,14 @@ def world_of(problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings,
     )
 
 
-def _course(start: Start, facts: EpisodeFacts) -> Course:
-    if start.skill_goal is not None and start.skill_goal.pushes:
-        return PushCourse(start, facts)
-    held = start.skill_goal is not None and start.skill_goal.is_of_a_path
-    return HeldCourse(start, facts) if held else PickPlaceCourse(start, facts)
+def _first_course(start: Start, facts: EpisodeFacts, sequence: GoalSequence | None) -> Course:
+    if sequence is None:
+        return course_of(start, facts)
+    start.moved, start.partners = sequence.moved, sequence.partners
+    return course_of(replace(start, skill_goal=sequence.steps[0].goal), facts)
 
 
-def _settled(
+def settled(
     problem: PickPlaceProblem,
     planner: Planner,
     settings: EpisodeSettings,
@@ -119,7 +126,7 @@ def _settled(
     return start
 
 
-def _closing(robot: Robot, settings: EpisodeSettings) -> TrialSettings:
+def closing_of(robot: Robot, settings: EpisodeSettings) -> TrialSettings:
     gripper = robot.gripper
     force_n = gripper.force_n if settings.closing_force_n is None else settings.closing_force_n
     return TrialSettings(

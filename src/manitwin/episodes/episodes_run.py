@@ -26,6 +26,7 @@ from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.skills.skill import Skill
+from manitwin.episodes.tasks.task_files import TASKS, read_tasks
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.robots.load import load_robot
@@ -37,12 +38,12 @@ from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import RUN, canonical_json, digests_below, sha256_of_json, write_bytes_atomically
 
 KIND = "trajectories"
-DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "run", "batch", "retire_failed_share"))
+DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "tasks", "run", "batch", "retire_failed_share"))
 
 
 @dataclass(frozen=True)
 class EpisodesRecipe(FolderRecipe[BatchRecord]):
-    """Batches of episodes. ``dataset`` and ``scenes`` are where twins and scenes are read from (no scenes: None)."""
+    """Batches of episodes; ``dataset``, ``scenes`` and ``tasks`` are where these are read from (no scenes, no tasks: None)."""
 
     payload = Batch
     record = BATCH_RECORD
@@ -52,6 +53,7 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
     config: TrajectoriesConfig
     dataset: str
     scenes: str | None = None
+    tasks: str | None = None
 
     @cached_property
     def sha256(self) -> str:
@@ -75,7 +77,7 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
 
     def stages(self, kind: str) -> list[Stage]:
         """Return the one stage."""
-        return [EpisodesStage(self.config, self.dataset, self.scenes)]
+        return [EpisodesStage(self.config, self.dataset, self.scenes, self.tasks)]
 
     def write(
         self, draft: Draft, kind: str, costs: dict[str, StageCost], rejected: Rejected | None, stage: str, fresh: Path
@@ -102,10 +104,11 @@ class EpisodesRecipe(FolderRecipe[BatchRecord]):
 
 @dataclass(frozen=True)
 class EpisodesSource:
-    """The source of episodes: a data set of twins, and scenes of them or none."""
+    """The source of episodes: a data set of twins, and scenes of them or none; tasks in these scenes or none."""
 
     dataset: str
     scenes: str | None
+    tasks: str | None = None
 
     @classmethod
     def of(cls, place: str | Path, twins: str | Path | None = None) -> EpisodesSource:
@@ -115,6 +118,8 @@ class EpisodesSource:
         """
         root = DatasetRoot(place)
         path = root.absolute()
+        if root.exists(TASKS) and root.exists(CONFIG):
+            return cls._of_tasks(root, path, twins)
         if root.exists(SCENES) and root.exists(CONFIG):
             said = root.read_json(CONFIG, UsageError, remedy="make the layouts again")
             if not isinstance(said.get("dataset"), str):
@@ -127,6 +132,16 @@ class EpisodesSource:
         if twins is not None:
             raise UsageError(f"{place}: holds no scenes, whose twins could be elsewhere; leave --twins out")
         return cls(path, None)
+
+    @classmethod
+    def _of_tasks(cls, root: DatasetRoot, path: str, twins: str | Path | None) -> EpisodesSource:
+        said = root.read_json(CONFIG, UsageError, remedy="make the tasks again")
+        dataset = said.get("dataset") if twins is None else DatasetRoot(twins).absolute()
+        scenes = said.get("scenes")
+        if not isinstance(dataset, str) or not isinstance(scenes, str):
+            raise UsageError(f"{root.url}/{CONFIG}: does not say of which scenes its tasks are; make the tasks again")
+        _check_twins(dataset, Path(scenes))
+        return cls(dataset, scenes, path)
 
 
 def _check_twins(dataset: str, scenes: Path) -> None:
@@ -143,10 +158,12 @@ def _check_out(out: DatasetRoot, source: EpisodesSource) -> None:
     if not out.exists(CONFIG):
         return
     said = out.read_json(CONFIG, UsageError, remedy="give another folder")
-    if "scenes" in said and (said["scenes"] is None) != (source.scenes is None):
+    of = said.get("tasks") or said.get("scenes") or said.get("dataset")
+    differs = (said.get("scenes") is None, said.get("tasks")) != (source.scenes is None, source.tasks)
+    if "scenes" in said and differs:
         raise UsageError(
-            f"{out.url}: its episodes are of {said['scenes'] or said['dataset']}; give another folder for those of"
-            f" {source.scenes or source.dataset}"
+            f"{out.url}: its episodes are of {of}; give another folder for those of"
+            f" {source.tasks or source.scenes or source.dataset}"
         )
 
 
@@ -172,10 +189,15 @@ def make_episodes(
     robot, source, root = load_robot(config.robot), EpisodesSource.of(place, twins), DatasetRoot(out)
     _check_out(root, source)
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
+    if source.tasks is not None:
+        configuration["tasks"] = source.tasks
     check_settings(root, configuration, free=DECIDE_NO_EPISODE, made="batches of episodes")
     there = _batches_there(root)
     try:
-        if source.scenes is None:
+        if source.tasks is not None:
+            ids = [task.task_id for task in read_tasks(source.tasks)]
+            deal = batches(robot.name, count, config.batch, task_ids=ids, there=there)
+        elif source.scenes is None:
             twin_ids = _twins_for(skill, pool_of(source.dataset))
             deal = batches(robot.name, count, config.batch, twin_ids=twin_ids, there=there)
         else:
@@ -183,7 +205,7 @@ def make_episodes(
     except UsageError as error:
         raise UsageError(f"{root.url}: {error}") from error
     report = drive(
-        EpisodesRecipe(config, source.dataset, source.scenes), deal, root, config.run,
+        EpisodesRecipe(config, source.dataset, source.scenes, source.tasks), deal, root, config.run,
         configuration=configuration, **run,
     )  # fmt: skip
     before = sum(batch.count for batch in there)

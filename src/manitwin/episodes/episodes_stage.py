@@ -29,6 +29,10 @@ from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode, recorded_robot
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
+from manitwin.episodes.tasks.task_files import read_tasks
+from manitwin.episodes.tasks.task_record import TaskRecord
+from manitwin.episodes.tasks.task_setting import TaskSetting, task_setting
+from manitwin.errors import UsageError
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
@@ -44,15 +48,15 @@ class EpisodesStage:
     """Make the episodes of a batch. Each draws from a generator of its own, by the run's seed and its number in the whole."""
 
     name = "episodes"
-    version = "2"
+    version = "3"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (EPISODES, ATTEMPTS, "batch")
     needs: Resource = "cpu"
     backend = "sapien"
 
-    def __init__(self, settings: TrajectoriesConfig, dataset: str, scenes: str | None):
-        """Take the configuration, and where twins and scenes are read from."""
-        self.settings, self.dataset, self.scenes = settings, dataset, scenes
+    def __init__(self, settings: TrajectoriesConfig, dataset: str, scenes: str | None, tasks: str | None = None):
+        """Take the configuration, and where twins, scenes and tasks are read from."""
+        self.settings, self.dataset, self.scenes, self.tasks = settings, dataset, scenes, tasks
         self._placeable = lru_cache(KEPT_TWINS)(self._read_placeable)
         self._twin = lru_cache(KEPT_TWINS)(self._read_twin)
         self._grasps = lru_cache(KEPT_TWINS)(self._read_grasps)
@@ -108,14 +112,36 @@ class EpisodesStage:
         """Yield those that are kept, one at a time; all attempts are added to ``attempts``."""
         for number in batch.numbers:
             words = np.random.SeedSequence([draft.seed, number]).generate_state(2)
-            setting = self._setting(batch, np.random.default_rng(words))
-            stored = self._attempt(batch, number, int(words[0]), setting)
+            seed, task = int(words[0]), self._task_setting(batch, int(words[0]))
+            if batch.task_id is not None:
+                setting = None if task is None else task.as_setting
+            else:
+                setting = self._setting(batch, np.random.default_rng(words))
+            stored = self._attempt(batch, number, seed, setting, task)
             attempts.append(stored.attempt if isinstance(stored, StoredEpisode) else stored)
             tell_part(len(attempts), batch.count, "episodes")
             if setting is not None:
                 twins.update({o.twin_id: self._twin(o.twin_id).record.revision for o in setting.task.objects})
             if isinstance(stored, StoredEpisode):
                 yield stored
+
+    @cached_property
+    def _tasks(self) -> dict[str, TaskRecord]:
+        return {} if self.tasks is None else {task.task_id: task for task in read_tasks(self.tasks)}
+
+    def _task_setting(self, batch: Batch, seed: int) -> TaskSetting | None:
+        """Set a batch's task up, if it is of one; None where the robot has no way to begin."""
+        if batch.task_id is None:
+            return None
+        if batch.task_id not in self._tasks:
+            raise UsageError(
+                f"{self.tasks}: no task {batch.task_id} there any more; make the episodes in another folder"
+            )
+        assert self.scenes is not None
+        return task_setting(
+            self._tasks[batch.task_id], self.scenes, self.dataset, self._pool, self._robot,
+            lambda twin_id: tuple(self._grasps(twin_id).values()), seed=seed,
+        )  # fmt: skip
 
     def _setting(self, batch: Batch, rng: np.random.Generator) -> Setting | None:
         workspace, skill = self._robot.workspace, load_skill(self.settings.skill)
@@ -132,19 +158,23 @@ class EpisodesStage:
     def _is_graspable(self, twin_id: str) -> bool:
         return self._twin(twin_id).record.grasps is not None
 
-    def _attempt(self, batch: Batch, number: int, seed: int, setting: Setting | None) -> Attempt | StoredEpisode:
+    def _attempt(
+        self, batch: Batch, number: int, seed: int, setting: Setting | None, task_set: TaskSetting | None
+    ) -> Attempt | StoredEpisode:
+        skill = self._skill_of(batch)
         episode_id = f"{batch.batch_id}-{number:08d}"
         if setting is None:
             return _attempt(
                 episode_id,
                 self._robot,
-                self.settings.skill,
+                skill,
                 batch.twin_id or "",
                 "",
                 batch.scene_id,
                 seed,
                 0,
                 EpisodeFacts("no_room"),
+                task_id=batch.task_id,
             )
         task = setting.task
         target = task.objects[task.target]
@@ -160,11 +190,15 @@ class EpisodesStage:
             seed=seed,
             fixtures=tuple(box for fixture in setting.fixtures for box in fixture.boxes),
         )
-        facts, recording = run_episode(problem, self._planner, self._robot, self.settings.episode, setting.skill_goal)
-        spoken = self._instructions(setting, seed)
+        facts, recording = run_episode(
+            problem, self._planner, self._robot, self.settings.episode, setting.skill_goal,
+            None if task_set is None else task_set.several,
+        )  # fmt: skip
+        spoken = self._instructions(setting, seed) if task_set is None else task_set.task.instructions
         attempt = _attempt(
-            episode_id, self._robot, self.settings.skill, target.twin_id, twin.record.language.category, setting.scene_id, seed,
+            episode_id, self._robot, skill, target.twin_id, twin.record.language.category, setting.scene_id, seed,
             len(problem.obstacles), facts, grasps.get(facts.grasp.grasp_id) if facts.grasp else None, spoken,
+            batch.task_id,
         )  # fmt: skip
         if attempt.outcome != "kept" or recording is None:
             return attempt
@@ -176,6 +210,8 @@ class EpisodesStage:
             "lights": [light.model_dump(mode="json") for light in setting.lights],
             "twin_revision": twin.record.revision,
         }
+        if task_set is not None:
+            said["task"] = {"task_id": task_set.task.task_id, "goal": task_set.task.goal}
         if setting.fixtures:
             said["fixtures"] = [to_json(fixture) for fixture in setting.fixtures]
         if setting.skill_goal is not None and setting.skill_goal.granules is not None:
@@ -183,6 +219,12 @@ class EpisodesStage:
         if facts.events:
             said["events"] = [asdict(event) for event in facts.events]
         return StoredEpisode(attempt, recording, recorded_robot(self._robot), objects, said)
+
+    def _skill_of(self, batch: Batch) -> str:
+        """Return the skill's name, of a task those of its steps: ``place_in+near``."""
+        if batch.task_id is None:
+            return self.settings.skill
+        return "+".join(step.skill for step in self._tasks[batch.task_id].steps)
 
     def _instructions(self, setting: Setting, seed: int) -> tuple[str, ...]:
         task = setting.task
@@ -214,6 +256,7 @@ def _attempt(
     facts: EpisodeFacts,
     grasp: TargetGrasp | None = None,
     instructions: tuple[str, ...] = (),
+    task_id: str | None = None,
 ) -> Attempt:
     errors, judged = facts.errors, facts.evaluation
     return Attempt(
@@ -240,4 +283,5 @@ def _attempt(
         goal=str(judged.goal) if judged else None,
         failure=judged.failure if judged else None,
         measured=json.dumps(judged.to_json()) if judged else None,
+        task_id=task_id,
     )

@@ -53,6 +53,7 @@ class Execution:
         self._presses = False
         self.meant: MeantContacts = NONE_MEANT
         self.watches: list[EventWatch] = []
+        self.literal: int | None = None
         self.steps = 0
         self.unplanned: set[tuple[str, str]] = set()
         self.pressing: frozenset[frozenset[str]] = frozenset()
@@ -210,5 +211,6 @@ class Execution:
             velocities,
             self.touches,
             unplanned=self._unplanned_since_row,
+            literal=self.literal,
         )
         self._unplanned_since_row = False

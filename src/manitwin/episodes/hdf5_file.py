@@ -47,11 +47,17 @@ _NAME = r"^[0-9A-Za-z_-][0-9A-Za-z_. -]*$"
 
 _KINDS: dict[str, type] = {
     "phase": np.uint8, "target_on_support": bool, "unplanned_contact": bool, "granules_in_objects": np.int16,
+    "active_literal": np.uint8,
 }  # fmt: skip
 """All other arrays are float32."""
 
 _GRANULES = ("granule_positions_m", "granules_in_objects")
 """Only of episodes that have granules."""
+
+_LITERAL = "active_literal"
+"""Only of goals of several literals."""
+
+_OF_ACTIONS = ("phase", _LITERAL)
 
 _COMPRESSED_BYTES = 512
 """Smaller arrays are stored as they are: they would not get smaller."""
@@ -195,7 +201,11 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
         f"{EXTRA}/action_tip_pose": np.hstack([recording.action_tip_position_m, recording.action_tip_quaternion_wxyz]),
         f"{EXTRA}/action_joint_delta": joint_delta(recording),
         f"{EXTRA}/action_tip_delta": tip_delta(recording),
-        **{f"{EXTRA}/{name}": found for name in _GRANULES if (found := getattr(recording, name)) is not None},
+        **{
+            f"{EXTRA}/{name}": found
+            for name in (*_GRANULES, _LITERAL)
+            if (found := getattr(recording, name)) is not None
+        },
     }
     for name, array in arrays.items():
         packing = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "chunks": array.shape}
@@ -229,6 +239,8 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
         middles, held = (extra[name].shape for name in _GRANULES)
         if len(middles) != 3 or middles[::2] != (len(states), 3) or held != states.shape[:2]:
             raise EpisodesError(f"{where}: granules have the shapes {middles} and {held}; {_REMEDY}")
+    if content.has(f"{group}/{EXTRA}/{_LITERAL}"):
+        extra[_LITERAL] = array(f"{EXTRA}/{_LITERAL}")
     recording = Recording(
         target=said["target"],
         joint_positions_rad=positions[:, :arm],
@@ -269,10 +281,10 @@ def checked(episode: StoredEpisode) -> Recording:
     for entry in fields(Recording):
         if entry.name == "target":
             continue
-        if entry.name in _GRANULES and getattr(recording, entry.name) is None:
+        if entry.name in (*_GRANULES, _LITERAL) and getattr(recording, entry.name) is None:
             continue
         array = np.asarray(getattr(recording, entry.name))
-        rows = steps if entry.name.startswith("action_") or entry.name == "phase" else steps + 1
+        rows = steps if entry.name.startswith("action_") or entry.name in _OF_ACTIONS else steps + 1
         shape = (rows, *_widths(arm, things, recording).get(entry.name, ()))
         if array.shape != shape:
             raise EpisodesError(

@@ -19,12 +19,12 @@ SWINGS_S = 8.0  # what hangs swings for longer than what stands rocks, and stand
 
 
 def is_reached_already(start: Start, world: RobotWorld) -> bool:
-    """Tell whether a goal is true of the start."""
+    """Tell whether a goal, or one of its literals, is true of the start."""
     if start.skill_goal is None:
         return False
     touching = frozenset(world.contacts.pressing(world.contacts.read()))
     state = state_of(start, world, [each.object_to_world for each in start.objects], touching)
-    return evaluate(state, start.skill_goal.goal).reached
+    return bool(evaluate(state, start.skill_goal.goal).true_already)
 
 
 def state_of(
@@ -80,7 +80,7 @@ def judge(
     if failure is None and any(
         _is_disturbed(start, placed, last[-1][number])
         for number, placed in enumerate(start.objects)
-        if number != world.target
+        if number != world.target and placed.name not in start.moved
     ):
         failure = "disturbed"
     if failure in (None, "disturbed") and execution.unplanned:
@@ -91,6 +91,7 @@ def judge(
 def _is_disturbed(start: Start, placed: PlacedObject, after: np.ndarray) -> bool:
     """Tell whether an object that was to stay moved; a partner that something is put on or into may move a little more."""
     settings, center = start.settings, placed.body.center_of_mass_m
-    if start.skill_goal is not None and placed.name == start.skill_goal.partner:
+    goal = start.skill_goal
+    if goal is not None and (placed.name == goal.partner or placed.name in start.partners):
         return moved_m(placed.object_to_world, after, center) > settings.max_partner_moved_m
     return is_disturbed(placed.object_to_world, after, center, settings)

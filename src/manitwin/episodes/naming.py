@@ -71,6 +71,12 @@ def names_of(language: Language, others: Sequence[Language] = ()) -> list[Name]:
     return [name for name in names if len(name.uses) == most]
 
 
+def tells_apart(language: Language, others: Sequence[Language]) -> bool:
+    """Tell whether an object has a name that fits none of the others."""
+    told, beside = _told(language), [_told(other) for other in others]
+    return any(not any(_fits(name, told, other) for other in beside) for name in _names(told))
+
+
 def _names(told: _Told) -> list[Name]:
     ways: list[tuple[str | None, tuple[str, ...]]] = [
         (told.noun, ()),

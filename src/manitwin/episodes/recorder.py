@@ -30,6 +30,7 @@ class _Action(NamedTuple):
     joint_positions_rad: np.ndarray
     gripper_opening_m: float
     phase: Phase
+    active_literal: int | None
 
 
 class Recorder:
@@ -50,9 +51,10 @@ class Recorder:
         touches: Touches,
         *,
         unplanned: bool,
+        literal: int | None = None,
     ) -> None:
         """Add what the controllers were told, and the state that it led to: the world's as it is, and the arm's speeds."""
-        self._actions.append(_Action(joint_positions_rad, gripper_opening_m, phase))
+        self._actions.append(_Action(joint_positions_rad, gripper_opening_m, phase, literal))
         self._states.append(self._state(joint_velocities_rad_s))
         self._touches.append(touches)
         self._unplanned.append(unplanned)
@@ -84,6 +86,7 @@ class Recorder:
             action_tip_quaternion_wxyz=told_quaternions[1:].astype(np.float32),
             phase=np.array(told["phase"], np.uint8),
             granule_positions_m=None if granules_m[0] is None else np.array(granules_m, np.float32),
+            active_literal=None if None in told["active_literal"] else np.array(told["active_literal"], np.uint8),
         )
 
     def _state(self, joint_velocities_rad_s: np.ndarray) -> _State:

@@ -19,7 +19,8 @@ class Recording:
     closing). ``phase (T,)`` holds numbers of ``planning.problem.Phase``. ``finger_forces_n`` press on the target;
     ``unplanned_contact`` says that the robot touched with more than 0.5 N what it should not, since the state before.
     Where there are granules, ``granule_positions_m (T + 1, N, 3)`` are their middles and ``granules_in_objects (T + 1, O)``
-    says how many each object holds.
+    says how many each object holds. Of a goal of several literals ``active_literal (T,)`` is the number of the one that is
+    worked on; the target, and what presses on it, are those of the last one.
     """
 
     target: int
@@ -42,6 +43,7 @@ class Recording:
     phase: np.ndarray
     granule_positions_m: np.ndarray | None = None
     granules_in_objects: np.ndarray | None = None
+    active_literal: np.ndarray | None = None
 
     @property
     def steps(self) -> int:

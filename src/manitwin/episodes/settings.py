@@ -61,6 +61,26 @@ class TrajectoriesConfig(Section):
     run: RunConfig = Field(default_factory=application_run)
 
 
+class TasksConfig(Section):
+    """Settings of tasks that are drawn in scenes.
+
+    ``per_scene`` tasks of a scene, ``two_literal_share`` of them of two literals, at most ``most_of_kind`` of one kind;
+    after ``tries_of_kind`` candidates of a kind that could not be planned, the rest of it is left. ``vlm`` proposes up to
+    ``proposals`` tasks a scene: ``openai:MODEL@URL``, ``anthropic:MODEL``, ``replay:FILE``, or ``none``.
+    """
+
+    seed: Seed = 0
+    robot: str = "panda"
+    per_scene: int = Field(default=20, ge=1, le=1000)
+    two_literal_share: float = Field(default=0.25, ge=0, le=1)
+    most_of_kind: float = Field(default=0.3, gt=0, le=1)
+    tries_of_kind: int = Field(default=12, ge=1)
+    vlm: str = "none"
+    proposals: int = Field(default=8, ge=1, le=100)
+    episode: EpisodeSettings = EpisodeSettings()
+    run: RunConfig = Field(default_factory=application_run)
+
+
 class PicturesConfig(Section):
     """Settings of the pictures of episodes. ``vp9`` plays in browsers; ``mpeg4`` does not, and takes a hundredth of the time."""
 

@@ -22,9 +22,9 @@ def trajectories(
     source: Annotated[
         str,
         options.existing(
-            "A data set, a folder of twins, or scenes of `manitwin layout`.",
-            "DATASET|SCENES",
-            "a data set, a folder of twins, or what manitwin layout wrote",
+            "A data set, a folder of twins, scenes of `manitwin layout`, or tasks of `manitwin tasks`.",
+            "DATASET|SCENES|TASKS",
+            "a data set, a folder of twins, or what manitwin layout or manitwin tasks wrote",
         ),
     ],
     out: Annotated[Path, options.output_folder("The folder to write episodes into.")],

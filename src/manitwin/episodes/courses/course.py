@@ -50,7 +50,8 @@ class Planner(Protocol):
 class Start:
     """What an episode starts from: the problem and all ``objects`` (in the world's order) where they have come to rest.
 
-    ``granules_in`` says how many granules each of them holds.
+    ``granules_in`` says how many granules each of them holds. Of a goal of several literals, ``moved`` are the names of all
+    that are taken, ``partners`` of all that it is about beside those.
     """
 
     problem: PickPlaceProblem
@@ -59,6 +60,8 @@ class Start:
     settings: EpisodeSettings
     skill_goal: SkillGoal | None
     granules_in: Mapping[str, int] = field(default_factory=dict)
+    moved: frozenset[str] = frozenset()
+    partners: frozenset[str] = frozenset()
 
 
 class Course(ABC):
@@ -77,6 +80,11 @@ class Course(ABC):
     @abstractmethod
     def execute(self, execution: Execution) -> None:
         """Carry the plan out; raises Ended where it cannot go on."""
+
+    @property
+    def ends_at(self) -> np.ndarray | None:
+        """Where the plan leaves the target ``(4, 4)``; None: in the hand."""
+        return self.goal_object_to_world
 
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
         """Return what is to be watched for events."""

@@ -57,6 +57,14 @@ class HeldCourse(Course):
         self._planner = HeldPathPlanner(planner.closed if self.task.empty else planner.parts, empty=self.task.empty)
         self._watch: EventWatch | None = None
 
+    @property
+    def ends_at(self) -> np.ndarray | None:
+        """Where the plan leaves the target: at the path's end, or where it was; None: in the hand."""
+        if self.task.ending == "keep" and not self.task.empty:
+            return None
+        let_go = self.task.ending == "let_go" and not self.task.empty
+        return self._held.poses[-1] if let_go else self.problem.target.object_to_world
+
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
         """Return the task's watch."""
         self._watch = None if self.task.watch is None else self.task.watch(world)

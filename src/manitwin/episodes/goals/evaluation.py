@@ -47,6 +47,11 @@ class Evaluation:
         return all(each.holds for each in (*self.literals, *self.stays))
 
     @property
+    def true_already(self) -> tuple[Literal, ...]:
+        """The literals that are to come true and hold: at a beginning there should be none."""
+        return tuple(literal for literal, judged in zip(self.goal.literals, self.literals, strict=True) if judged.holds)
+
+    @property
     def failure(self) -> str | None:
         """The first literal that does not hold, and why: ``in(object_00, object_01): on_the_rim``."""
         for literal, judgement in zip(

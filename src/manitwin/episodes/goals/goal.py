@@ -91,7 +91,7 @@ class Literal:
 
 @dataclass(frozen=True)
 class Goal:
-    """What is to come true, all of it, and what must not cease to be true on the way."""
+    """What is to come true, all of it, none of it true at the beginning; and what stays true, judged at the end as well."""
 
     literals: tuple[Literal, ...]
     stays: tuple[Literal, ...] = ()
@@ -105,7 +105,7 @@ class Goal:
             raise UsageError(f"a goal that says a thing twice: {self}")
 
     def __str__(self) -> str:
-        stays = f", with {' and '.join(map(str, self.stays))} throughout" if self.stays else ""
+        stays = f", with {' and '.join(map(str, self.stays))}" if self.stays else ""
         return " and ".join(map(str, self.literals)) + stays
 
     def to_json(self) -> dict[str, Any]:

@@ -73,9 +73,11 @@ class RobotWorld:
         ]
         self.robot = SapienRobot(self._scene, robot, finger_force_n=closing_force_n, contact_offset_m=contact_offset_m)
         self.expect_load(False)
-        self.contacts = ContactReader(
-            self._system, self._roles(robot, standing, surfaces, bearing), max_contact_force_n
-        )
+        self._fixed = [
+            (surface, box.name, role) for surface, box, role in zip(surfaces, standing, bearing, strict=True)
+        ]
+        self._max_contact_force_n = max_contact_force_n
+        self.contacts = ContactReader(self._system, self._roles(robot), max_contact_force_n)
 
     def __enter__(self) -> RobotWorld:
         return self
@@ -83,7 +85,7 @@ class RobotWorld:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        del self.contacts, self.robot, self.bodies, self.granules, self._scene, self._system
+        del self.contacts, self.robot, self.bodies, self._fixed, self.granules, self._scene, self._system
         self._loan.__exit__(kind, error, trace)
 
     def add_strangers(self, entities: Sequence[sapien.Entity]) -> None:
@@ -110,6 +112,14 @@ class RobotWorld:
         iterations = self._iterations_held if held else self._iterations
         self.robot.articulation.set_solver_position_iterations(iterations)
         self.bodies[self.target].solver_position_iterations = iterations
+
+    def take(self, number: int) -> None:
+        """Make another object the target."""
+        self.expect_load(False)
+        self.target = number
+        strangers = self.contacts.has_strangers
+        self.contacts = ContactReader(self._system, self._roles(self.robot.robot), self._max_contact_force_n)
+        self.contacts.has_strangers = strangers
 
     def object_to_world(self, number: int) -> np.ndarray:
         """Return the pose ``(4, 4)`` of an object's frame."""
@@ -143,15 +153,9 @@ class RobotWorld:
         self._scene.add_entity(entity_at(component, sapien.Pose(placed.object_to_world)))
         return component
 
-    def _roles(
-        self,
-        robot: Robot,
-        boxes: Sequence[StaticBox],
-        surfaces: Sequence[physx.PhysxRigidStaticComponent],
-        bearing: Sequence[Role],
-    ) -> list[tuple[physx.PhysxBaseComponent, str, Role]]:
+    def _roles(self, robot: Robot) -> list[tuple[physx.PhysxBaseComponent, str, Role]]:
         """Give every body its name and role; the robot's base does not move and touches nothing by accident."""
-        roles = [(surface, box.name, role) for surface, box, role in zip(surfaces, boxes, bearing, strict=True)]
+        roles: list[tuple[physx.PhysxBaseComponent, str, Role]] = list(self._fixed)
         for number, (body, placed) in enumerate(zip(self.bodies, self.placed, strict=True)):
             roles.append((body, placed.name, Role.TARGET if number == self.target else Role.OTHER))
         fingers = dict(zip(robot.finger_links, (Role.PLUS_FINGER, Role.MINUS_FINGER), strict=True))

@@ -1,0 +1,244 @@
+"""The Gymnasium environment of a task: the physics of episodes, 20 actions a second, success by the evaluator of episodes."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from typing import Any, ClassVar, Protocol
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+
+from manitwin.episodes.courses.course import Start
+from manitwin.episodes.courses.held import HeldCourse
+from manitwin.episodes.episode import closing_of, settled, world_of
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.events import EventWatch
+from manitwin.episodes.execution import REST_ROWS, STILL_ROWS, WATCH_S
+from manitwin.episodes.goals.evaluation import Evaluation, evaluate
+from manitwin.episodes.judging import state_of
+from manitwin.episodes.outcome import is_at_rest
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.recording import RATE_HZ
+from manitwin.episodes.sequence import problem_of
+from manitwin.episodes.settings import EpisodeSettings
+from manitwin.episodes.tasks.task_setting import TaskSetting
+from manitwin.errors import UsageError
+from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.physics.sapien.world import RobotWorld
+
+MOST_METRES, MOST_SPEED = 10.0, 100.0
+HELD_M = 1e-3  # a hand that is told to open less far than this below its widest holds something, or is about to
+
+
+class Painter(Protocol):
+    """The protocol of what draws an environment's state: ``(size, size, 3) uint8`` of each camera."""
+
+    def paint(self, world: RobotWorld) -> dict[str, np.ndarray]:
+        """Return the pictures by camera."""
+        ...
+
+    def close(self) -> None:
+        """Give back what the driver holds."""
+        ...
+
+
+class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
+    """A task in physics: the arm's joint targets and the fingers' target opening in, states out, 1 for success.
+
+    ``action (n + 1,) float32``: what the arm's n joints are to be at the end of the step, rad, in the order of
+    ``robot.arm_joints``, and the distance between the pads, m; what is beyond the joints' limits is clipped. Within a step
+    targets move evenly from where they were. A hand that closes on something presses the harder the smaller its target is
+    (``FINGER_STIFFNESS_N_M``). ``observation``: see docs/policies.md. ``info``: ``success``, ``failure`` (the first literal
+    that is not true, and why), ``literals`` (each with whether it holds).
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": RATE_HZ}
+
+    def __init__(
+        self,
+        setting: TaskSetting,
+        planner: PickPlacePlanner,
+        settings: EpisodeSettings,
+        *,
+        max_steps: int,
+        painter: Painter | None = None,
+        cameras: Sequence[str] = (),
+        picture_px: int = 128,
+    ):
+        """Take a task that is set up; nothing is simulated before ``reset``."""
+        self.task, self.instructions = setting.task, setting.task.instructions
+        self.render_mode = "rgb_array" if painter is not None else None
+        self._setting, self._planner, self._settings, self._painter = setting, planner, settings, painter
+        self._robot, self._max_steps = planner.robot, max_steps
+        self._closing = closing_of(self._robot, settings)
+        self._substeps = round(1 / RATE_HZ / settings.timestep_s)
+        self._per_look = max(1, int(WATCH_S / settings.timestep_s + 1e-9))
+        self._world: RobotWorld | None = None
+        arm, things = planner.arm, len(setting.scene.objects)
+        opening_m = np.float32(self._robot.gripper.opening_m)
+        self.action_space = spaces.Box(
+            np.append(arm.lower, -opening_m).astype(np.float32), np.append(arm.upper, opening_m).astype(np.float32)
+        )
+        seen: dict[str, spaces.Space[Any]] = {
+            "joint_positions_rad": _box(2 * np.pi, arm.joints),
+            "joint_velocities_rad_s": _box(MOST_SPEED, arm.joints),
+            "gripper_opening_m": _box(1.0, 1),
+            "tip_pose": _box(MOST_METRES, 7),
+            "object_poses": _box(MOST_METRES, things, 7),
+        }
+        if cameras:
+            picture = spaces.Box(0, 255, (picture_px, picture_px, 3), np.uint8)
+            seen["pictures"] = spaces.Dict(dict.fromkeys(cameras, picture))
+        self.observation_space = spaces.Dict(seen)
+
+    @property
+    def object_names(self) -> tuple[str, ...]:
+        """The names of the objects in the order of ``object_poses``."""
+        return self._setting.scene.names
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Put everything where the scene has it, let it come to rest, and return the first observation.
+
+        A task begins in one way: ``seed`` draws nothing but what ``np_random`` gives. Raises UsageError where the scene does
+        not stay.
+        """
+        super().reset(seed=seed)
+        self._leave()
+        goal = self._setting.goal
+        self._world = world = world_of(self._setting.problem, self._robot, self._settings, self._closing.force_n)
+        start = settled(self._setting.problem, self._planner, self._settings, goal, world)
+        if start is None:
+            raise UsageError(f"task {self.task.task_id}: its scene does not stay where it is; make the layouts again")
+        start.moved, start.partners = self._setting.sequence.moved, self._setting.sequence.partners
+        self._start, self._steps = start, 0
+        self._target_rad = np.array(self._robot.home_rad, float)
+        self._opening_target_m = float(self._robot.gripper.opening_m)
+        self._velocities = np.zeros(len(self._target_rad))
+        self._watches = self._event_watches(start, world)
+        self._poses = deque([self._object_poses()], maxlen=REST_ROWS)
+        self._pressing = deque([self._pairs()], maxlen=STILL_ROWS)
+        return self._observation(), self._info(self._evaluation())
+
+    def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
+        """Carry out an action for 1/20 s; the episode ends with success, or is cut off after the most steps."""
+        world = self._world
+        if world is None:
+            raise UsageError("step before reset; call reset first")
+        low, high = self.action_space.low, self.action_space.high  # type: ignore[attr-defined]
+        told = np.clip(np.asarray(action, float), low, high)
+        self._move(world, told[:-1], float(told[-1]))
+        self._steps += 1
+        self._poses.append(self._object_poses())
+        self._pressing.append(self._pairs())
+        evaluation = self._evaluation()
+        success = len(self._poses) == REST_ROWS and evaluation.reached
+        truncated = self._steps >= self._max_steps and not success
+        return self._observation(), float(success), success, truncated, self._info(evaluation, success)
+
+    def render(self) -> np.ndarray | None:  # type: ignore[override]
+        """Return the first camera's picture ``(size, size, 3) uint8``; None without cameras."""
+        if self._painter is None or self._world is None:
+            return None
+        return next(iter(self._painter.paint(self._world).values()))
+
+    def close(self) -> None:
+        """Leave the simulation."""
+        self._leave()
+        if self._painter is not None:
+            self._painter.close()
+            self._painter = None
+
+    def _leave(self) -> None:
+        if self._world is not None:
+            self._watches = []
+            world, self._world = self._world, None
+            world.__exit__(None, None, None)
+
+    def _move(self, world: RobotWorld, joints_rad: np.ndarray, opening_m: float) -> None:
+        dt, count = self._settings.timestep_s, self._substeps
+        before_rad, before_m = self._target_rad, self._opening_target_m
+        velocities = (joints_rad - before_rad) / (count * dt)
+        world.expect_load(min(opening_m, before_m) < self._robot.gripper.opening_m - HELD_M)
+        for number in range(1, count + 1):
+            share = number / count
+            at = before_rad + share * (joints_rad - before_rad)
+            # as episodes do: the drives pull to where the arm is to be in the middle of the step
+            world.robot.set_targets(at - velocities * (dt / 2), velocities)
+            world.robot.set_opening_target(before_m + share * (opening_m - before_m))
+            last = world.robot.joint_positions() if number == count else None
+            world.step()
+            if self._watches and number % self._per_look == 0:
+                contacts = world.contacts.read()
+                for watch in self._watches:
+                    watch.look(world.contacts, contacts, self._steps / RATE_HZ + number * dt)
+            if last is not None:
+                self._velocities = (world.robot.joint_positions() - last) / dt
+        self._target_rad, self._opening_target_m = joints_rad, opening_m
+
+    def _event_watches(self, start: Start, world: RobotWorld) -> list[EventWatch]:
+        """Return what latches the events of every step's goal, as its course in an episode would."""
+        watches: list[EventWatch] = []
+        for step in self._setting.sequence.steps:
+            if not step.goal.is_of_a_path:
+                continue
+            number = [each.name for each in start.objects].index(step.target)
+            problem = problem_of(start.problem, start.objects, number, step.grasps)
+            own = Start(problem, start.objects, self._planner, self._settings, step.goal, start.granules_in)
+            watches += HeldCourse(own, EpisodeFacts()).watches(world)
+        return watches
+
+    def _object_poses(self) -> list[np.ndarray]:
+        assert self._world is not None
+        return [self._world.object_to_world(number) for number in range(len(self._world.placed))]
+
+    def _pairs(self) -> frozenset[frozenset[str]]:
+        assert self._world is not None
+        return frozenset(self._world.contacts.pressing(self._world.contacts.read()))
+
+    def _evaluation(self) -> Evaluation:
+        assert self._world is not None
+        rows = list(self._poses)
+        at_rest = [
+            is_at_rest([row[number] for row in rows], placed.body.center_of_mass_m, self._settings)
+            for number, placed in enumerate(self._world.placed)
+        ]
+        events = tuple(event for watch in self._watches for event in watch.events)
+        pressing = frozenset().union(*self._pressing)
+        return evaluate(state_of(self._start, self._world, rows[-1], pressing, at_rest, events), self.task.parsed_goal)
+
+    def _info(self, evaluation: Evaluation, success: bool = False) -> dict[str, Any]:
+        holds = {str(literal): judged.holds for literal, judged in zip(
+            (*evaluation.goal.literals, *evaluation.goal.stays), (*evaluation.literals, *evaluation.stays), strict=True
+        )}  # fmt: skip
+        return {"success": success, "failure": None if success else evaluation.failure, "literals": holds}
+
+    def _observation(self) -> dict[str, np.ndarray]:
+        world = self._world
+        assert world is not None
+        joints = world.robot.joint_positions()
+        seen: dict[str, Any] = {
+            "joint_positions_rad": joints,
+            "joint_velocities_rad_s": self._velocities,
+            "gripper_opening_m": np.array([world.robot.opening_m()]),
+            "tip_pose": _pose(world.robot.gripper_pose()),
+            "object_poses": np.array([_pose(pose) for pose in self._poses[-1]]),
+        }
+        space = self.observation_space.spaces  # type: ignore[attr-defined]
+        found = {
+            name: np.clip(value, space[name].low, space[name].high).astype(np.float32) for name, value in seen.items()
+        }
+        if self._painter is not None:
+            found["pictures"] = self._painter.paint(world)  # type: ignore[assignment]
+        return found
+
+
+def _box(most: float, *shape: int) -> spaces.Box:
+    return spaces.Box(-most, most, shape, np.float32)
+
+
+def _pose(frame_to_world: np.ndarray) -> np.ndarray:
+    return np.concatenate([frame_to_world[:3, 3], quaternion_wxyz(frame_to_world[:3, :3])])

@@ -1,0 +1,62 @@
+"""Making the environment of a task from a file of tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from manitwin.engine.ledger.location import CONFIG
+from manitwin.episodes.environment.environment import TaskEnvironment
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.settings import EpisodeSettings
+from manitwin.episodes.target_grasps import TargetGrasp, usable_grasps
+from manitwin.episodes.tasks.task_files import one_task
+from manitwin.episodes.tasks.task_setting import task_setting
+from manitwin.errors import UsageError
+from manitwin.formats.json_file import read_json_object
+from manitwin.robots.load import load_robot
+from manitwin.scenes.layouts.pool import pool_of
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.loaded_twin import TwinSource
+
+_REMEDY = "give a folder that manitwin tasks wrote, or a file in it"
+
+
+def make_env(
+    tasks: str | Path,
+    task_id: str | None = None,
+    *,
+    twins: str | Path | None = None,
+    robot: str | None = None,
+    cameras: Sequence[str] = (),
+    picture_px: int = 128,
+    max_steps: int = 1200,
+) -> TaskEnvironment:
+    """Return a task's environment, as ``manitwin.make_env`` says; raises UsageError for what is not there."""
+    if not 1 <= max_steps:
+        raise UsageError(f"max_steps is {max_steps}; give 1 or more")
+    task = one_task(tasks, task_id)
+    folder = Path(tasks) if Path(tasks).is_dir() else Path(tasks).parent
+    said = read_json_object(folder / CONFIG, UsageError, inside=folder, name=str(folder / CONFIG), remedy=_REMEDY)
+    if not isinstance(said.get("dataset"), str) or not isinstance(said.get("scenes"), str):
+        raise UsageError(f"{folder / CONFIG}: does not say of which scenes its tasks are; {_REMEDY}")
+    dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
+    settings, chosen = EpisodeSettings(), load_robot(task.robot if robot is None else robot)
+    source, planner = TwinSource(dataset), PickPlacePlanner(chosen, timestep_s=settings.timestep_s)
+
+    @lru_cache(maxsize=64)
+    def grasps(twin_id: str) -> tuple[TargetGrasp, ...]:
+        return usable_grasps(source.twin(twin_id), chosen.gripper)
+
+    setting = task_setting(task, said["scenes"], dataset, pool_of(dataset), chosen, grasps, seed=task.seed)
+    if setting is None:
+        raise UsageError(f"task {task.task_id}: cannot begin with the robot {chosen.name}; give the one it was made for")
+    painter = None
+    if cameras:
+        from manitwin.episodes.environment.painter import WorldPainter
+
+        painter = WorldPainter(setting, source, chosen, cameras, picture_px)
+    return TaskEnvironment(
+        setting, planner, settings, max_steps=max_steps, painter=painter, cameras=cameras, picture_px=picture_px
+    )

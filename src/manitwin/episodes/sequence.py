@@ -1,0 +1,148 @@
+"""Goals of several literals: skills one after the other, each planned from where the one before has left things."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manitwin.episodes.courses.course import Course, Ended, Planner, Start
+from manitwin.episodes.courses.held import HeldCourse
+from manitwin.episodes.courses.pick_place import PickPlaceCourse
+from manitwin.episodes.courses.push import PushCourse
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.execution import Execution
+from manitwin.episodes.goals.goal import Goal
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.problem import Grasp, Motion, Phase, PickPlaceProblem
+from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
+from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.physics.sapien.contacts import NONE_MEANT
+from manitwin.physics.sapien.world import RobotWorld
+
+
+@dataclass(frozen=True)
+class Step:
+    """One literal: the skill that makes it true, of which object (by name), with which partner, held by which grasps.
+
+    ``goal`` is set beforehand, from where everything is expected to be by then: its fixtures stand in the world from the
+    beginning, its poses are drawn anew when its turn comes.
+    """
+
+    skill: Skill
+    target: str
+    partner: str | None
+    grasps: tuple[Grasp, ...]
+    goal: SkillGoal
+
+
+@dataclass(frozen=True)
+class GoalSequence:
+    """The steps of a goal in their order, and the surroundings of their objects at the beginning."""
+
+    steps: tuple[Step, ...]
+    around: tuple[Surroundings, ...]
+
+    @property
+    def goal(self) -> SkillGoal:
+        """All of it: what the end is judged by."""
+        return merged([step.goal for step in self.steps])
+
+    @property
+    def moved(self) -> frozenset[str]:
+        """The names of the objects that are taken."""
+        return frozenset(step.target for step in self.steps)
+
+    @property
+    def partners(self) -> frozenset[str]:
+        """The names of the objects that the goal is about beside those."""
+        return frozenset(step.partner for step in self.steps if step.partner is not None)
+
+
+def merged(goals: Sequence[SkillGoal]) -> SkillGoal:
+    """Return the conjunction of goals: literals in their order, what stays (said once), and all that they are measured by."""
+    literals = tuple(literal for each in goals for literal in each.goal.literals)
+    stays = tuple(dict.fromkeys(stay for each in goals for stay in each.goal.stays))
+    first = goals[0]
+    return replace(
+        first,
+        goal=Goal(literals, stays),
+        openings={name: found for each in goals for name, found in each.openings.items()},
+        holes={name: found for each in goals for name, found in each.holes.items()},
+        frames={name: found for each in goals for name, found in each.frames.items()},
+        fixtures=tuple(fixture for each in goals for fixture in each.fixtures),
+        path=next((each.path for each in goals if each.path is not None), None),
+        granules=next((each.granules for each in goals if each.granules is not None), None),
+        places_m={name: place for each in goals for name, place in each.places_m.items()},
+    )
+
+
+def course_of(start: Start, facts: EpisodeFacts) -> Course:
+    """Return the course of a start's goal."""
+    if start.skill_goal is not None and start.skill_goal.pushes:
+        return PushCourse(start, facts)
+    held = start.skill_goal is not None and start.skill_goal.is_of_a_path
+    return HeldCourse(start, facts) if held else PickPlaceCourse(start, facts)
+
+
+def next_course(
+    sequence: GoalSequence, number: int, start: Start, world: RobotWorld, execution: Execution, facts: EpisodeFacts
+) -> Course:
+    """Let all come to rest, bring the arm home, and plan a later step from what is there; raises Ended where there is no way."""
+    settings, planner, step, around = start.settings, start.planner, sequence.steps[number], sequence.around[number]
+    execution.rest(round(settings.max_rest_s / settings.timestep_s))
+    objects = tuple(
+        replace(placed, object_to_world=world.object_to_world(place)) for place, placed in enumerate(world.placed)
+    )
+    target = [each.name for each in objects].index(step.target)
+    problem = problem_of(start.problem, objects, target, step.grasps)
+    execution.meant = NONE_MEANT
+    execution.open()
+    home = _way_home(planner, problem, execution.commanded_rad)
+    if home is None:
+        raise Ended("replan_failed")
+    execution.follow(home)
+    world.take(target)
+    execution.literal = number
+    goal = _goal_now(step, replace(around, objects=objects), target, problem.seed)
+    if goal is None:
+        raise Ended("replan_failed")
+    later = Start(problem, objects, planner, settings, goal, start.granules_in)
+    course = course_of(later, facts)
+    if not course.plan():
+        raise Ended("replan_failed")
+    return course
+
+
+def problem_of(
+    before: PickPlaceProblem, objects: Sequence[PlacedObject], target: int, grasps: tuple[Grasp, ...]
+) -> PickPlaceProblem:
+    """Return a problem with another target, and everything where it is now."""
+    return replace(
+        before,
+        target=objects[target],
+        goal_object_to_world=objects[target].object_to_world,
+        grasps=grasps,
+        obstacles=tuple(each for number, each in enumerate(objects) if number != target),
+    )
+
+
+def _goal_now(step: Step, around: Surroundings, target: int, seed: int) -> SkillGoal | None:
+    """Return the step's goal with poses from where things are; one of a path is made from there anyway."""
+    if step.goal.is_of_a_path:
+        return replace(step.goal, poses=(around.objects[target].object_to_world,))
+    names = [each.name for each in around.objects]
+    partner = None if step.partner is None else names.index(step.partner)
+    found = step.skill.set_goal(around, target, partner, np.random.default_rng((seed, 4)))
+    return None if found is None else replace(found, goal=step.goal.goal)
+
+
+def _way_home(planner: Planner, problem: PickPlaceProblem, joints_rad: np.ndarray) -> Motion | None:
+    """Return the motion of the open hand, which has let go of everything, to where every plan begins."""
+    assert isinstance(planner, PickPlacePlanner), "sequences are planned with the models of this planner"
+    parts = planner.parts
+    world = parts.world_of(problem, problem.goal_object_to_world)
+    rng = np.random.default_rng((problem.seed, 5))
+    found = parts.motions.free(world.arm, Phase.REACH, joints_rad, parts.arm.home, rng)
+    return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None

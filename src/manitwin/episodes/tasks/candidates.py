@@ -1,0 +1,107 @@
+"""Candidates: what skills could do in a scene, by annotations, sizes, openings and reach; and why the rest could not."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from manitwin.episodes.goals.evaluation import evaluate
+from manitwin.episodes.goals.goal import Goal, Literal
+from manitwin.episodes.naming import tells_apart
+from manitwin.episodes.skills.registry import SKILLS
+from manitwin.episodes.tasks.task_record import kind_of
+from manitwin.episodes.tasks.task_scene import TaskScene
+
+
+@dataclass(frozen=True)
+class Action:
+    """A skill of a target and its partner, by their numbers in the scene, and the goal that it reaches."""
+
+    skill: str
+    target: int
+    partner: int | None
+    goal: Goal
+
+    @property
+    def kind(self) -> str:
+        """The goal's predicate."""
+        return kind_of(self.goal)
+
+    @property
+    def literal(self) -> Literal:
+        """What comes true."""
+        return self.goal.literals[0]
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One action, or several in their order."""
+
+    actions: tuple[Action, ...]
+
+    @property
+    def kind(self) -> str:
+        """The predicates of all."""
+        return "+".join(sorted(action.kind for action in self.actions))
+
+
+def single_actions(scene: TaskScene, dropped: Counter[str]) -> list[Action]:
+    """Return every action that sizes, openings, reach and words allow, each literal once; counts what was ``dropped`` of what."""
+    found: dict[str, Action] = {}
+    able = []
+    for number in range(len(scene.objects)):
+        why = scene.why_not_taken(number)
+        if why is None:
+            able.append(number)
+        else:
+            dropped[why] += 1
+    twins = [scene.pool.twin(each.twin_id) for each in scene.objects]
+    unnamed = {number for number in range(len(scene.objects)) if not _is_named(scene, number)}
+    for skill in SKILLS.values():
+        for target in able:
+            partners = [each for each in range(len(twins)) if each != target] if skill.has_partner else [None]
+            for partner in partners:
+                if not skill.suits(scene.pool, twins[target], None if partner is None else twins[partner]):
+                    dropped["does_not_fit"] += 1
+                    continue
+                second = None if partner is None else scene.objects[partner]
+                goal = skill.goal(scene.objects[target], second)
+                key = str(goal.literals[0])
+                if key in found:
+                    continue  # the same goal by another skill
+                if {target, partner} & unnamed:
+                    dropped["ambiguous_name"] += 1
+                elif _is_true_already(scene, goal):
+                    dropped["true_already"] += 1
+                else:
+                    found[key] = Action(skill.name, target, partner, goal)
+    return list(found.values())
+
+
+def pairs_of(actions: list[Action]) -> Iterator[Candidate]:
+    """Yield two actions in an order in which the second does not take away what the first was about."""
+    for first in actions:
+        for second in actions:
+            if first is not second and not undoes(first, second):
+                yield Candidate((first, second))
+
+
+def undoes(first: Action, second: Action) -> bool:
+    """Tell whether the second action moves what the first was about, or is of the same object by the same predicate."""
+    if second.target == first.partner or (first.target, first.kind) == (second.target, second.kind):
+        return True
+    return first.target == second.target and first.partner == second.partner is not None
+
+
+def _is_named(scene: TaskScene, number: int) -> bool:
+    """Tell whether some name of an object fits no other one of the scene."""
+    name = scene.names[number]
+    others = [language for other, language in scene.words.items() if other != name]
+    return name in scene.words and tells_apart(scene.words[name], others)
+
+
+def _is_true_already(scene: TaskScene, goal: Goal) -> bool:
+    """Tell whether a literal is true at the beginning, as far as poses tell; one about more than objects is not."""
+    spatial = all(literal.second is None or literal.second in scene.names for literal in goal.literals)
+    return spatial and bool(evaluate(scene.state, Goal(goal.literals)).true_already)

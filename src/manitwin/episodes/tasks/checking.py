@@ -1,0 +1,129 @@
+"""Checking a candidate by planning it: with the same courses as episodes, the second action from the first one's end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manitwin.episodes.courses.course import Start
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.goals.evaluation import judge
+from manitwin.episodes.goals.goal import Goal, Literal
+from manitwin.episodes.pick_place_tasks import MIN_GAP_M
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.sequence import GoalSequence, Step, course_of, merged, problem_of
+from manitwin.episodes.settings import EpisodeSettings
+from manitwin.episodes.skills.registry import SKILLS
+from manitwin.episodes.skills.skill import SkillGoal
+from manitwin.episodes.tasks.candidates import Action, Candidate
+from manitwin.episodes.tasks.task_scene import TaskScene
+from manitwin.geometry.boxes import separation_m
+from manitwin.geometry.rigid_body import PlacedObject, StaticBox
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A candidate that can be planned: its steps, the goal of all, and how many grasps were tried."""
+
+    candidate: Candidate
+    sequence: GoalSequence
+    goal: Goal
+    grasps_tried: int
+
+
+class NoTask(Exception):
+    """There is no task of a candidate; the message is the reason."""
+
+
+def check(
+    scene: TaskScene, candidate: Candidate, planner: PickPlacePlanner, settings: EpisodeSettings, seed: int
+) -> Planned:
+    """Plan a candidate; raises NoTask with the reason."""
+    sequence = sequence_of(scene, candidate.actions, seed)
+    goal = whole_goal(scene, sequence)
+    objects, tried = scene.objects, 0
+    problem = replace(scene.problem, seed=seed, fixtures=_boxes(sequence))
+    for number, (step, action) in enumerate(zip(sequence.steps, candidate.actions, strict=True)):
+        here = problem_of(problem, objects, action.target, step.grasps)
+        found = _goal_there(scene, step, action, objects, number, seed)
+        facts = EpisodeFacts()
+        course = course_of(Start(here, objects, planner, settings, found), facts)
+        if not course.plan():
+            failure = facts.plan_failures.most_common(1)
+            raise NoTask(f"no_plan_{failure[0][0]}" if failure else "no_plan")
+        tried += facts.grasps_tried
+        last = number == len(sequence.steps) - 1
+        end = course.ends_at
+        if end is None and not last:
+            raise NoTask("keeps_it_in_hand")
+        if end is not None:
+            objects = tuple(
+                replace(each, object_to_world=end) if place == action.target else each
+                for place, each in enumerate(objects)
+            )
+    _check_still_true(scene, candidate, [each.object_to_world for each in objects])
+    return Planned(candidate, sequence, goal, tried)
+
+
+def sequence_of(scene: TaskScene, actions: Sequence[Action], seed: int) -> GoalSequence:
+    """Return the steps of actions with their goals as set beforehand; raises NoTask where one has none."""
+    steps = []
+    for number, action in enumerate(actions):
+        step = scene.step(SKILLS[action.skill], action.target, action.partner, seed, number)
+        if step is None:
+            raise NoTask("no_place")
+        steps.append(step)
+    fixtures = [fixture for step in steps for fixture in step.goal.fixtures]
+    if len({fixture.name for fixture in fixtures}) < len(fixtures) or any(
+        separation_m(first.footprint_m, second.footprint_m) < MIN_GAP_M
+        for place, first in enumerate(fixtures)
+        for second in fixtures[:place]
+    ):
+        raise NoTask("fixtures_meet")
+    filled = [(place, step.goal.granules.name) for place, step in enumerate(steps) if step.goal.granules is not None]
+    if len(filled) > 1 or any(name in {step.target for step in steps[:place]} for place, name in filled):
+        raise NoTask("content_would_move")
+    return GoalSequence(tuple(steps), tuple(scene.around(action.target) for action in actions))
+
+
+def whole_goal(scene: TaskScene, sequence: GoalSequence) -> Goal:
+    """Return all literals, what their skills ask to stay, and that all objects that take no part stay where they are."""
+    said = sequence.goal.goal
+    taking_part = sequence.moved | sequence.partners
+    apart = tuple(Literal("undisturbed", name) for name in scene.names if name not in taking_part)
+    kept = tuple(each for each in said.stays if each.subject not in sequence.moved or len(sequence.steps) == 1)
+    return Goal(said.literals, tuple(dict.fromkeys((*kept, *apart))))
+
+
+def skill_goal_of(scene: TaskScene, sequence: GoalSequence) -> SkillGoal:
+    """Return all that an episode's end is judged by."""
+    return replace(merged([step.goal for step in sequence.steps]), goal=whole_goal(scene, sequence))
+
+
+def _goal_there(
+    scene: TaskScene, step: Step, action: Action, objects: tuple[PlacedObject, ...], number: int, seed: int
+) -> SkillGoal:
+    if number == 0:
+        return step.goal
+    if step.goal.is_of_a_path:
+        return replace(step.goal, poses=(objects[action.target].object_to_world,))
+    around = replace(scene.around(action.target), objects=objects)
+    found = step.skill.set_goal(around, action.target, action.partner, np.random.default_rng((seed, 4)))
+    if found is None:
+        raise NoTask("no_place")
+    return found
+
+
+def _check_still_true(scene: TaskScene, candidate: Candidate, object_to_world: Sequence[np.ndarray]) -> None:
+    """Raise NoTask where an object that is moved twice is not where the first action put it."""
+    moved = [action.target for action in candidate.actions]
+    state = scene.state_of(object_to_world)
+    for place, action in enumerate(candidate.actions):
+        if action.target in moved[place + 1 :] and not judge(state, action.literal).holds:
+            raise NoTask("undoes_first")
+
+
+def _boxes(sequence: GoalSequence) -> tuple[StaticBox, ...]:
+    return tuple(box for step in sequence.steps for fixture in step.goal.fixtures for box in fixture.boxes)

@@ -1,0 +1,37 @@
+"""Instructions of a task: those of its literals, joined in their order; some templates and joints are held out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from manitwin.episodes.goals.goal import Goal, Literal
+from manitwin.episodes.goals.goal_instructions import goal_instructions
+from manitwin.twin.record import Language
+
+COUNT, HELD_OUT = 6, 2
+JOINTS = ("{first}, then {second}", "first {first}, and then {second}", "{first}, and after that {second}")
+HELD_OUT_JOINTS = ("{first}; once that is done, {second}",)
+
+
+def task_instructions(
+    goal: Goal, words: Mapping[str, Language], *, seed: int
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return instructions and held-out ones, which share no template; raises UsageError for a predicate without words."""
+    told = [_of(literal, words, seed + place, COUNT, held_out=False) for place, literal in enumerate(goal.literals)]
+    held = [_of(literal, words, seed + place, HELD_OUT, held_out=True) for place, literal in enumerate(goal.literals)]
+    return _joined(told, JOINTS), _joined(held, HELD_OUT_JOINTS)
+
+
+def _of(literal: Literal, words: Mapping[str, Language], seed: int, count: int, *, held_out: bool) -> tuple[str, ...]:
+    return goal_instructions(literal, words, seed=seed, count=count, held_out=held_out)
+
+
+def _joined(each: Sequence[Sequence[str]], joints: Sequence[str]) -> tuple[str, ...]:
+    """Return as many sentences as the part with the most has, its parts joined from the left."""
+    said: dict[str, None] = {}
+    for place in range(max(len(part) for part in each)):
+        sentence = each[0][place % len(each[0])]
+        for part in each[1:]:
+            sentence = joints[place % len(joints)].format(first=sentence, second=part[place % len(part)])
+        said[sentence] = None
+    return tuple(said)

@@ -1,0 +1,118 @@
+"""A scene as tasks see it: who can be taken, the surroundings of each object, words and grasps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from manitwin.episodes.goals.world_state import ObjectState, WorldState
+from manitwin.episodes.pick_place_tasks import PlacingArea
+from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
+from manitwin.episodes.sequence import Step
+from manitwin.episodes.skills.held_skill import HeldSkill
+from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, openings_of
+from manitwin.episodes.target_grasps import TargetGrasp, shuffled
+from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.robots.robot import Robot
+from manitwin.scenes.layouts.pool import Pool
+from manitwin.scenes.loaded_scene import Scene, furniture_boxes
+from manitwin.twin.record import Language
+
+
+@dataclass(frozen=True)
+class TaskScene:
+    """A scene before a robot; ``grasps`` returns those of a twin that the robot's gripper may use, by its id."""
+
+    scene: Scene
+    pool: Pool
+    robot: Robot
+    grasps: Callable[[str], Sequence[TargetGrasp]]
+
+    @cached_property
+    def objects(self) -> tuple[PlacedObject, ...]:
+        """The objects in the order of their names, which is that of an episode's world."""
+        return tuple(sorted(self.scene.placed_objects(), key=lambda each: each.name))
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The objects' names."""
+        return tuple(each.name for each in self.objects)
+
+    @cached_property
+    def words(self) -> dict[str, Language]:
+        """The words of the objects, by name; of what nobody has described there are none."""
+        said = {each.name: self.scene.twin(each.twin_id).record.language for each in self.objects}
+        return {name: language for name, language in said.items() if language is not None}
+
+    @cached_property
+    def problem(self) -> PickPlaceProblem:
+        """A problem of everything where it is; the target is the first object and nothing is to be done."""
+        first, *others = self.objects
+        boxes = tuple(furniture_boxes(self.scene.record.furniture))
+        return PickPlaceProblem(first, first.object_to_world, (), tuple(others), boxes)
+
+    @cached_property
+    def state(self) -> WorldState:
+        """The state at the beginning, as far as poses tell."""
+        return self.state_of([each.object_to_world for each in self.objects])
+
+    def state_of(self, object_to_world: Sequence[np.ndarray]) -> WorldState:
+        """Return the state with the objects at poses, at rest and touching nothing."""
+        objects = {
+            each.name: ObjectState(each.body, pose, each.object_to_world, True, self.pool.body(each.twin_id).opening)
+            for each, pose in zip(self.objects, object_to_world, strict=True)
+        }
+        return WorldState(objects, frozenset())
+
+    def why_not_taken(self, number: int) -> str | None:
+        """Return why an object cannot be taken: ``carries_another``, ``out_of_reach``, ``no_grasp``; None where it can."""
+        placed = next(each for each in self.scene.record.objects if each.name == self.names[number])
+        workspace = self.robot.workspace
+        radius_m = float(np.hypot(*placed.position_m[:2]))
+        angle_rad = abs(float(np.arctan2(placed.position_m[1], placed.position_m[0])))
+        if placed.name in {each.supported_by for each in self.scene.record.objects}:
+            return "carries_another"
+        if not (workspace.min_radius_m <= radius_m <= workspace.max_radius_m and angle_rad <= workspace.half_angle_rad):
+            return "out_of_reach"
+        return None if self.grasps(placed.twin_id) else "no_grasp"
+
+    def around(self, number: int) -> Surroundings:
+        """Return the surroundings for one object to be moved: it stays on its support."""
+        record = self.scene.record
+        surface = next(each.surface for each in record.objects if each.name == self.names[number])
+        support = next(each for each in record.furniture.supports if each.name == surface)
+        return Surroundings(
+            self.objects,
+            self.pool,
+            PlacingArea(self.robot.workspace, support),
+            tuple(furniture_boxes(record.furniture)),
+        )
+
+    def grasps_of(self, number: int, seed: int) -> tuple[Grasp, ...]:
+        """Return an object's grasps in the order in which they are tried."""
+        found = self.grasps(self.objects[number].twin_id)
+        return tuple(each.grasp for each in shuffled(found, np.random.default_rng([seed, 1])))
+
+    def beforehand(self, skill: Skill, target: int, partner: int | None, seed: int, number: int) -> SkillGoal | None:
+        """Return a skill's goal as it is set before anything has moved; of a later step without poses, which are drawn then.
+
+        ``number`` is the step's. None where there is no room for its fixtures or no goal.
+        """
+        around, rng = self.around(target), np.random.default_rng((seed, 2, number))
+        if number == 0 or isinstance(skill, HeldSkill):
+            return skill.set_goal(around, target, partner, rng)
+        second = None if partner is None else self.objects[partner]
+        numbers = (target, *([] if partner is None else [partner]))
+        goal = skill.goal(self.objects[target], second)
+        return SkillGoal(goal, (), None if second is None else second.name, openings_of(around, numbers))
+
+    def step(self, skill: Skill, target: int, partner: int | None, seed: int, number: int) -> Step | None:
+        """Return a step with its goal as set beforehand; None where there is none."""
+        goal = self.beforehand(skill, target, partner, seed, number)
+        if goal is None:
+            return None
+        second = None if partner is None else self.names[partner]
+        return Step(skill, self.names[target], second, self.grasps_of(target, seed), goal)
