@@ -29,16 +29,16 @@ class Arrangement:
 
 
 SLOW = (
-    r"\bmanitwin (build|layout|trajectories|render|stats|publish|prompts)\b",
+    r"\bmanitwin (build|layout|tasks|trajectories|render|stats|publish|prompts)\b",
     r"\bmanitwin\.(build|make_layouts|make_episodes|write_statistics)\(",
-    r"\b(twins|SCENES|EPISODES)\b",
+    r"\b(twins|SCENES|EPISODES|TASKS|DONE)\b",
 )
 """Steps that take many seconds, or want a folder that does."""
 
 EVERYWHERE: dict[str, str] = {
     # smaller, and in one process
     r"(manitwin build\b)(?!.*--config)": r"\1 --config small.toml",
-    r"(manitwin (?:build|layout|trajectories|render)\b)(?!.*--jobs)(?!.*--executor ray)": r"\1 --jobs 1",
+    r"(manitwin (?:build|layout|tasks|trajectories|render)\b)(?!.*--jobs)(?!.*--executor ray)": r"\1 --jobs 1",
     r"(manitwin (?:layout|trajectories)\b.*) -n \d+": r"\1 -n 2",
     r"(?<!>)> my\.toml": "> my.toml; cat small.toml >> my.toml",
     # a port may be taken

@@ -70,7 +70,8 @@ class Attempt:
     """One row; errors are of the released object at rest against the goal that was asked for. None: never got there.
 
     ``plan_failures`` is JSON: how many candidate grasps failed of what. ``goal`` is the skill's goal in words (pick_place: None),
-    ``failure`` the first literal of it that is not true, ``measured`` JSON: every literal with what was measured. ``task_id`` is that of a task, None for episodes that were drawn.
+    ``failure`` the first literal of it that is not true, ``measured`` JSON: every literal with what was measured.
+    ``task_id`` is that of a task, None for episodes that were drawn.
     """
 
     episode_id: str

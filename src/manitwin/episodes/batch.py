@@ -82,7 +82,7 @@ def batches(
     """Return the batches that are missing to ``episodes``: each number goes to what has the fewest episodes until then.
 
     So a number has the same twin, scene or task, and the same seed, whether episodes are made in one go or in steps. ``there``
-    are the batches that there are; none of their numbers comes again. Raises UsageError where two of them have a number in common.
+    are the batches that there are; none of their numbers comes again. Raises UsageError where two have a number in common.
     Batches go round, so that a run that is stopped has some of every twin.
     """
     kind, ids = next(

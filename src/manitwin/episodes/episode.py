@@ -15,7 +15,7 @@ from manitwin.episodes.judging import is_reached_already, judge
 from manitwin.episodes.outcome import moved_m, turned_rad
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.recording import Recording
-from manitwin.episodes.sequence import GoalSequence, course_of, next_course
+from manitwin.episodes.sequence import GoalSequence, course_of, later_courses
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.skill import SkillGoal
 from manitwin.physics.sapien.world import RobotWorld
@@ -51,8 +51,7 @@ def run_episode(
             execution.literal = None if sequence is None else 0
             try:
                 course.execute(execution)
-                for number in range(1, len(sequence.steps) if sequence is not None else 0):
-                    course = next_course(sequence, number, start, world, execution, facts)
+                for course in () if sequence is None else later_courses(sequence, start, world, execution, facts):
                     execution.watches += course.watches(world)
                     course.execute(execution)
                 judge(start, course.goal_object_to_world, facts, world, execution)

@@ -149,12 +149,33 @@ class EpisodeReplay:
             placed = [camera.placed(hand, width_px, height_px) for camera in cameras]
             yield self._renderer.render(placed, geometry=geometry)
 
+    def picture(
+        self,
+        object_to_world: Sequence[np.ndarray],
+        joint_positions_rad: np.ndarray,
+        gripper_opening_m: float,
+        cameras: Sequence[NamedCamera],
+        *,
+        size_px: int,
+    ) -> list[np.ndarray]:
+        """Return pictures ``(size, size, 3) uint8`` of a state that is not recorded; poses ``(4, 4)`` in the objects' order."""
+        hand = self._place(object_to_world, joint_positions_rad, gripper_opening_m)
+        placed = [camera.placed(hand, size_px, size_px) for camera in cameras]
+        return [frame.rgb for frame in self._renderer.render(placed)]
+
     def _show(self, recording: Recording, state: int) -> np.ndarray:
         """Move everything to where it is at a state; returns the hand's ``gripper_to_world (4, 4)``."""
         rotations = rotation_from_quaternion_wxyz(recording.object_quaternions_wxyz[state])
-        for name, rotation, position in zip(self._objects, rotations, recording.object_positions_m[state], strict=True):
-            self._renderer.set_pose(name, transform(rotation, position))
-        poses = link_poses(self._robot, recording.joint_positions_rad[state], float(recording.gripper_opening_m[state]))
+        positions = recording.object_positions_m[state]
+        objects = [transform(rotation, position) for rotation, position in zip(rotations, positions, strict=True)]
+        return self._place(objects, recording.joint_positions_rad[state], float(recording.gripper_opening_m[state]))
+
+    def _place(
+        self, object_to_world: Sequence[np.ndarray], joint_positions_rad: np.ndarray, gripper_opening_m: float
+    ) -> np.ndarray:
+        for name, pose in zip(self._objects, object_to_world, strict=True):
+            self._renderer.set_pose(name, pose)
+        poses = link_poses(self._robot, joint_positions_rad, gripper_opening_m)
         for link in self._links:
             self._renderer.set_pose(f"{self._robot.name}/{link}", poses[link])
         return poses[self._robot.tip_link] @ self._robot.gripper_to_tip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,7 +86,15 @@ def course_of(start: Start, facts: EpisodeFacts) -> Course:
     return HeldCourse(start, facts) if held else PickPlaceCourse(start, facts)
 
 
-def next_course(
+def later_courses(
+    sequence: GoalSequence, start: Start, world: RobotWorld, execution: Execution, facts: EpisodeFacts
+) -> Iterator[Course]:
+    """Yield the courses of the steps after the first, each planned once the one before has been carried out."""
+    for number in range(1, len(sequence.steps)):
+        yield _next_course(sequence, number, start, world, execution, facts)
+
+
+def _next_course(
     sequence: GoalSequence, number: int, start: Start, world: RobotWorld, execution: Execution, facts: EpisodeFacts
 ) -> Course:
     """Let all come to rest, bring the arm home, and plan a later step from what is there; raises Ended where there is no way."""

@@ -18,7 +18,7 @@ from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, Phase
 from manitwin.episodes.skills.push import MARK, arc_to, strokes
 from manitwin.episodes.tool_watches import PushWatch
-from manitwin.geometry.poses import transform_points
+from manitwin.geometry.poses import transform, transform_points
 from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
 from manitwin.physics.sapien.world import RobotWorld
 
@@ -46,6 +46,13 @@ class PushCourse(Course):
         target = self.problem.target
         corners = transform_points(target.object_to_world, np.concatenate(target.body.hulls))
         self._level_m = float(corners[:, 2].min())
+
+    @property
+    def ends_at(self) -> np.ndarray | None:
+        """Where the plan leaves the target: over the place, turned as it is."""
+        target = self.problem.target
+        way = self._place_m - transform_points(target.object_to_world, target.body.center_of_mass_m[None])[0]
+        return transform(translation=np.array([*way[:2], 0.0])) @ target.object_to_world
 
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
         """Return the watch of what the hand touches."""

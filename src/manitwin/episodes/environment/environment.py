@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from typing import Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
 from manitwin.episodes.courses.course import Start
-from manitwin.episodes.courses.held import HeldCourse
 from manitwin.episodes.episode import closing_of, settled, world_of
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
@@ -21,7 +20,7 @@ from manitwin.episodes.judging import state_of
 from manitwin.episodes.outcome import is_at_rest
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.recording import RATE_HZ
-from manitwin.episodes.sequence import problem_of
+from manitwin.episodes.sequence import course_of, problem_of
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.tasks.task_setting import TaskSetting
 from manitwin.errors import UsageError
@@ -44,7 +43,7 @@ class Painter(Protocol):
         ...
 
 
-class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
+class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     """A task in physics: the arm's joint targets and the fingers' target opening in, states out, 1 for success.
 
     ``action (n + 1,) float32``: what the arm's n joints are to be at the end of the step, rad, in the order of
@@ -54,7 +53,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
     that is not true, and why), ``literals`` (each with whether it holds).
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array"], "render_fps": RATE_HZ}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": RATE_HZ}  # noqa: RUF012 (Gymnasium declares it so)
 
     def __init__(
         self,
@@ -78,9 +77,9 @@ class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         self._world: RobotWorld | None = None
         arm, things = planner.arm, len(setting.scene.objects)
         opening_m = np.float32(self._robot.gripper.opening_m)
-        self.action_space = spaces.Box(
-            np.append(arm.lower, -opening_m).astype(np.float32), np.append(arm.upper, opening_m).astype(np.float32)
-        )
+        self._lowest = np.append(arm.lower, -opening_m).astype(np.float32)
+        self._highest = np.append(arm.upper, opening_m).astype(np.float32)
+        self.action_space = spaces.Box(self._lowest, self._highest)
         seen: dict[str, spaces.Space[Any]] = {
             "joint_positions_rad": _box(2 * np.pi, arm.joints),
             "joint_velocities_rad_s": _box(MOST_SPEED, arm.joints),
@@ -91,6 +90,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         if cameras:
             picture = spaces.Box(0, 255, (picture_px, picture_px, 3), np.uint8)
             seen["pictures"] = spaces.Dict(dict.fromkeys(cameras, picture))
+        self._seen = seen
         self.observation_space = spaces.Dict(seen)
 
     @property
@@ -100,7 +100,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Put everything where the scene has it, let it come to rest, and return the first observation.
 
         A task begins in one way: ``seed`` draws nothing but what ``np_random`` gives. Raises UsageError where the scene does
@@ -123,13 +123,12 @@ class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         self._pressing = deque([self._pairs()], maxlen=STILL_ROWS)
         return self._observation(), self._info(self._evaluation())
 
-    def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
+    def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Carry out an action for 1/20 s; the episode ends with success, or is cut off after the most steps."""
         world = self._world
         if world is None:
             raise UsageError("step before reset; call reset first")
-        low, high = self.action_space.low, self.action_space.high  # type: ignore[attr-defined]
-        told = np.clip(np.asarray(action, float), low, high)
+        told = np.clip(np.asarray(action, float), self._lowest, self._highest)
         self._move(world, told[:-1], float(told[-1]))
         self._steps += 1
         self._poses.append(self._object_poses())
@@ -139,7 +138,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         truncated = self._steps >= self._max_steps and not success
         return self._observation(), float(success), success, truncated, self._info(evaluation, success)
 
-    def render(self) -> np.ndarray | None:  # type: ignore[override]
+    def render(self) -> np.ndarray | None:
         """Return the first camera's picture ``(size, size, 3) uint8``; None without cameras."""
         if self._painter is None or self._world is None:
             return None
@@ -188,7 +187,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
             number = [each.name for each in start.objects].index(step.target)
             problem = problem_of(start.problem, start.objects, number, step.grasps)
             own = Start(problem, start.objects, self._planner, self._settings, step.goal, start.granules_in)
-            watches += HeldCourse(own, EpisodeFacts()).watches(world)
+            watches += course_of(own, EpisodeFacts()).watches(world)
         return watches
 
     def _object_poses(self) -> list[np.ndarray]:
@@ -216,7 +215,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
         )}  # fmt: skip
         return {"success": success, "failure": None if success else evaluation.failure, "literals": holds}
 
-    def _observation(self) -> dict[str, np.ndarray]:
+    def _observation(self) -> dict[str, Any]:
         world = self._world
         assert world is not None
         joints = world.robot.joint_positions()
@@ -227,12 +226,13 @@ class TaskEnvironment(gymnasium.Env[dict[str, np.ndarray], np.ndarray]):
             "tip_pose": _pose(world.robot.gripper_pose()),
             "object_poses": np.array([_pose(pose) for pose in self._poses[-1]]),
         }
-        space = self.observation_space.spaces  # type: ignore[attr-defined]
-        found = {
-            name: np.clip(value, space[name].low, space[name].high).astype(np.float32) for name, value in seen.items()
-        }
+        found: dict[str, Any] = {}
+        for name, value in seen.items():
+            space = self._seen[name]
+            assert isinstance(space, spaces.Box)
+            found[name] = np.clip(value, space.low, space.high).astype(np.float32)
         if self._painter is not None:
-            found["pictures"] = self._painter.paint(world)  # type: ignore[assignment]
+            found["pictures"] = self._painter.paint(world)
         return found
 
 

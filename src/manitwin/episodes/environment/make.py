@@ -34,7 +34,7 @@ def make_env(
     max_steps: int = 1200,
 ) -> TaskEnvironment:
     """Return a task's environment, as ``manitwin.make_env`` says; raises UsageError for what is not there."""
-    if not 1 <= max_steps:
+    if not max_steps >= 1:
         raise UsageError(f"max_steps is {max_steps}; give 1 or more")
     task = one_task(tasks, task_id)
     folder = Path(tasks) if Path(tasks).is_dir() else Path(tasks).parent
@@ -51,7 +51,9 @@ def make_env(
 
     setting = task_setting(task, said["scenes"], dataset, pool_of(dataset), chosen, grasps, seed=task.seed)
     if setting is None:
-        raise UsageError(f"task {task.task_id}: cannot begin with the robot {chosen.name}; give the one it was made for")
+        raise UsageError(
+            f"task {task.task_id}: cannot begin with the robot {chosen.name}; give the one it was made for"
+        )
     painter = None
     if cameras:
         from manitwin.episodes.environment.painter import WorldPainter

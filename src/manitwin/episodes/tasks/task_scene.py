@@ -12,7 +12,6 @@ from manitwin.episodes.goals.world_state import ObjectState, WorldState
 from manitwin.episodes.pick_place_tasks import PlacingArea
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.sequence import Step
-from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, openings_of
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled
 from manitwin.geometry.rigid_body import PlacedObject
@@ -102,7 +101,7 @@ class TaskScene:
         ``number`` is the step's. None where there is no room for its fixtures or no goal.
         """
         around, rng = self.around(target), np.random.default_rng((seed, 2, number))
-        if number == 0 or isinstance(skill, HeldSkill):
+        if number == 0 or type(skill).set_goal is not Skill.set_goal:
             return skill.set_goal(around, target, partner, rng)
         second = None if partner is None else self.objects[partner]
         numbers = (target, *([] if partner is None else [partner]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from hashlib import sha256
@@ -28,7 +27,7 @@ from manitwin.episodes.tasks.drawing import Tally, draw_tasks
 from manitwin.episodes.tasks.phrasings import task_instructions
 from manitwin.episodes.tasks.proposals import chat_of, propose
 from manitwin.episodes.tasks.task_files import TASKS, tasks_bytes
-from manitwin.episodes.tasks.task_record import TASK_SCHEMA_VERSION, TaskRecord, TaskStep, kind_of, task_id_of
+from manitwin.episodes.tasks.task_record import TaskRecord, TaskStep, kind_of, task_id_of
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.errors import Rejected, UsageError
 from manitwin.robots.load import load_robot
@@ -128,7 +127,7 @@ class TasksStage:
             tally.dropped["no_words"] += 1
             return None
         return TaskRecord(
-            schema_version=TASK_SCHEMA_VERSION,
+            schema_version=1,
             task_id=task_id_of(scene_sha256, self.settings.robot, seed, steps, planned.goal),
             scene_id=scene.scene.record.scene_id,
             scene_sha256=scene_sha256,
@@ -178,7 +177,7 @@ class TasksRecipe(FolderRecipe[SceneTasksRecord]):
         """Return the scene's id."""
         return Identity(payload.scene_id, "scene")
 
-    def stages(self, kind: str) -> Sequence[Stage]:
+    def stages(self, kind: str) -> list[Stage]:
         """Return the one stage."""
         return [TasksStage(self.config, self.dataset, self.scenes)]
 

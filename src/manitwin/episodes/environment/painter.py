@@ -1,0 +1,45 @@
+"""Pictures of an environment's state, drawn as recorded episodes are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from manitwin.episodes.cameras import named_cameras
+from manitwin.episodes.replay_pictures import EpisodeReplay, twin_drawable
+from manitwin.episodes.tasks.task_setting import TaskSetting
+from manitwin.physics.sapien.world import RobotWorld
+from manitwin.render.device import require_renderer
+from manitwin.robots.robot import Robot
+from manitwin.scenes.furniture_pictures import lighting_of
+from manitwin.twin.loaded_twin import TwinSource
+
+
+class WorldPainter:
+    """Draws a world of a task from named cameras. Raises RendererMissing, and UsageError for an unknown camera."""
+
+    def __init__(self, setting: TaskSetting, source: TwinSource, robot: Robot, cameras: Sequence[str], size_px: int):
+        """Upload the scene's looks."""
+        self._cameras, self._size_px = named_cameras(cameras, robot), size_px
+        require_renderer()
+        record = setting.scene.scene.record
+        self._replay = EpisodeReplay(
+            robot,
+            [twin_drawable(source.folder(each.twin_id)) for each in setting.scene.objects],
+            furniture=record.furniture,
+            fixtures=setting.problem.fixtures,
+            lighting=lighting_of(record.ambient, record.lights),
+        )
+
+    def paint(self, world: RobotWorld) -> dict[str, np.ndarray]:
+        """Return ``(size, size, 3) uint8`` of each camera."""
+        poses = [world.object_to_world(number) for number in range(len(world.placed))]
+        pictures = self._replay.picture(
+            poses, world.robot.joint_positions(), world.robot.opening_m(), self._cameras, size_px=self._size_px
+        )
+        return {camera.name: picture for camera, picture in zip(self._cameras, pictures, strict=True)}
+
+    def close(self) -> None:
+        """Give back what the driver holds."""
+        self._replay.close()
