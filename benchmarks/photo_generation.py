@@ -41,6 +41,7 @@ LAST_STAGE = "physical"
 OWN_STAGES = ("mesh", "views", "gate", "physical")  # what comes after the shape: not counted in its CPU-s
 # in steps of three through the list of templates: 42 of 127, of all groups
 DEFAULT_EVERY = 3
+POOR_IOU = 0.6
 PAGE = Path(__file__).parent.parent / "docs" / "photo_benchmark.md"
 
 
@@ -187,7 +188,13 @@ def page(results: Sequence[Result], command: str) -> str:
         primitive=table(sorted(families(results), key=lambda r: r.primitive), "primitive"),
         category=table(sorted(results, key=lambda r: r.category), "category"),
         reasons="\n".join(f"- {count}: {reason}" for reason, count in reasons) or "- none",
+        poor=", ".join(poor(results)) or "none",
     )
+
+
+def poor(results: Sequence[Result]) -> list[str]:
+    """Return the categories with a photo that was accepted although its shape is poor, by IoU."""
+    return sorted({r.category for r in results if r.filled_iou is not None and r.filled_iou < POOR_IOU})
 
 
 def families(results: Sequence[Result]) -> list[Result]:
@@ -216,6 +223,13 @@ elevations of the camera, and built from the photo. The seeds are none that anyt
 - Figures are medians over what was accepted. Identical meshes measure 0.90 to 0.99 (IoU) and 0.80 to 0.97 (IoU solid).
 
 Written by {command}.
+
+## What came out
+
+![Made photos and what was built of each, from the front and the side](photo_sheet.png)
+
+One photo a thing, the first that was accepted; `python docs/make_photo_sheet.py OUT` draws it. Red: less than 0.6 of the volume
+is shared. Things with a photo that was accepted and came out that poor: {poor}.
 
 ## By the camera's elevation
 

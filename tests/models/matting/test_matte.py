@@ -88,6 +88,24 @@ def test_two_things_are_several_objects() -> None:
     assert caught.value.reason == "several_objects" and "2" in caught.value.detail
 
 
+def test_second_thing_of_a_tenth_is_no_speck() -> None:
+    scene = _scene()
+    scene[_blob((150, 150), (80, 60))] = (40, 90, 160)
+    scene[_blob((330, 150), (25, 18))] = (150, 40, 60)
+    with pytest.raises(Rejected, match="falls apart") as caught:
+        matte_photo(_photo(scene), "and.png")
+    assert caught.value.reason == "low_confidence_matte"
+
+
+def test_grey_thing_in_a_soft_photo_is_cut_out() -> None:
+    """Its edges are as wide as a hard shadow's, and so are all of the photo's."""
+    scene, truth = np.full((*SIZE, 3), 232.0), _blob((200, 150), (80, 50))
+    scene[truth] = 150
+    noise = np.random.default_rng(0).normal(0, 1.0, scene.shape)
+    photo = np.clip(cv2.GaussianBlur(scene, (0, 0), 1.5) + noise, 0, 255).astype(np.uint8)
+    assert _overlap(matte_photo(photo, "x.png").rgba, truth) > 0.97
+
+
 def test_clutter_is_low_confidence() -> None:
     rng = np.random.default_rng(3)
     scene = cv2.resize(rng.uniform(0, 255, (30, 40, 3)), (SIZE[1], SIZE[0]), interpolation=cv2.INTER_NEAREST)
@@ -159,7 +177,7 @@ def test_real_photos_are_accepted_where_two_opinions_agree(shared_data: Path) ->
         except Rejected as rejection:
             reasons[path.stem], details[path.stem] = rejection.reason, rejection.detail
     assert len(accepted) + len(reasons) == 28
-    assert len(accepted) >= 16
+    assert len(accepted) >= 14
     # a kitchen behind it, white on white in a reflection, cut by the frame
     assert {"whisk_ai", "cup_and_saucer_ai", "yogurt_carton_box"} <= set(reasons)
     assert set(reasons.values()) == {"low_confidence_matte"}

@@ -133,21 +133,16 @@ def _overshadowed(segmentation: Segmentation, outline: np.ndarray) -> float:
     """Return the share of the outline that has an edge beyond it, in the shade beside it, at least 0.7 times as sharp.
 
     A shadow's own edge is softer than the outline of what casts it, so a sharp one is the rim of a grey or clear part. A
-    shadow with a visible edge was judged by more than that, and does not count. What the ground has as often farther out, where
-    no part of the object is, is its texture.
+    shadow with a visible edge was judged by more than that, and does not count.
     """
     mask, gradient = segmentation.mask, segmentation.gradient
     distance, nearest = ndimage.distance_transform_edt(~mask, return_indices=True)
     shade = (segmentation.shadow | segmentation.background.shade) & ~dilated(segmentation.hard, 6)
-    reach = 0.1 * max(mask.shape)
-    outline_edge = cv2.dilate(gradient, disk(3))
-    shares = []
-    for near, far in ((5, reach), (reach, 2 * reach - 5)):
-        beside = shade & (distance > near) & (distance < far)
-        beyond = np.zeros(mask.shape, np.float32)
-        np.maximum.at(beyond, (nearest[0][beside], nearest[1][beside]), gradient[beside])
-        shares.append(float((cv2.dilate(beyond, disk(3)) > 0.7 * outline_edge)[outline].mean()))
-    return max(0.0, shares[0] - shares[1])
+    beside = shade & (distance > 5) & (distance < 0.1 * max(mask.shape))
+    beyond = np.zeros(mask.shape, np.float32)
+    np.maximum.at(beyond, (nearest[0][beside], nearest[1][beside]), gradient[beside])
+    sharper = cv2.dilate(beyond, disk(3)) > 0.7 * cv2.dilate(gradient, disk(3))
+    return float(sharper[outline].mean())
 
 
 def _softly_bounded(segmentation: Segmentation, outline: np.ndarray) -> float:
