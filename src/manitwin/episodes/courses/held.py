@@ -14,7 +14,8 @@ from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.planning.closed_hand import fingertip_corners
-from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner, HeldPlan, joint_spline
+from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner, HeldPlan
+from manitwin.episodes.planning.path_timing import joint_spline
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, Phase
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
@@ -54,7 +55,11 @@ class HeldCourse(Course):
         )
         self.task: HeldTask = goal.path(scene)
         self.problem = replace(self.problem, entered=self.task.enters)
-        self._planner = HeldPathPlanner(planner.closed if self.task.empty else planner.parts, empty=self.task.empty)
+        self._planner = HeldPathPlanner(
+            planner.closed if self.task.empty else planner.parts,
+            empty=self.task.empty,
+            lets_go=self.task.ending == "let_go",
+        )
         self._watch: EventWatch | None = None
 
     @property

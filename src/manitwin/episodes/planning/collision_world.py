@@ -69,7 +69,7 @@ class CollisionWorld:
             self._geometry.geometryObjects[index].placement = stands_at
         active, margins = self._pairs.of(phase, margin_m, self._obstacles)
         if meant:
-            active = active & ~self._pairs.meant(meant)
+            active = active & ~self._pairs.meant(meant, empty=phase is Phase.REACH)
         self._collision.setActiveCollisionPairs(self._geometry, active, True)
         self._collision.setSecurityMargins(self._geometry, margins, True, True)
 
@@ -136,14 +136,13 @@ class _Pairs:
         """Return the pairs that any phase tests."""
         return np.logical_or.reduce(list(self._of_phase.values()))
 
-    def meant(self, names: frozenset[str]) -> np.ndarray:
-        """Return the pairs of what is held, and of the fingers, with things by their names."""
+    def meant(self, names: frozenset[str], *, empty: bool) -> np.ndarray:
+        """Return the pairs of what is held with things by their names, of the fingers where the hand is ``empty``."""
         things = [index for index, name in zip(self._statics, self._names, strict=True) if name in names]
         pairs = np.zeros_like(self._own)
         pairs[np.ix_(things, self._held)] = True
-        pairs[np.ix_(self._fingers, things)] = True
-        if STANDING in names:
-            pairs[np.ix_(self._fingers, self._standing)] = True
+        if empty:
+            pairs[np.ix_(self._fingers, things + (self._standing if STANDING in names else []))] = True
         return pairs
 
     def of(self, phase: Phase, margin_m: float, obstacles: ObstacleShapes) -> tuple[np.ndarray, np.ndarray]:

@@ -1,10 +1,9 @@
 """Held paths: an object in the hand, or the closed hand itself, goes through poses one after another.
 
-How to use it: a skill gives ``HeldPath``s, ``object_to_world`` poses from its frames (one path for each choice of what is
-free: an azimuth, a sign, a roll), and ranks the grasps. ``plan`` finds the first grasp and path that can be reached, lifted
-and followed; after the lift ``again`` plans carry and path from the pose that was measured in the hand; ``onward`` plans the
-rest of the poses from wherever the arm is; ``timed`` makes a motion of a path. What cannot be planned anew is no reason to
-give up: the path from before still serves. Inverse kinematics by continuation: each knot from where the last two lead.
+A skill gives ``HeldPath``s, ``object_to_world`` poses from its frames (one for each choice of what is free), and ranks grasps.
+``plan`` finds the first grasp and path that can be reached, lifted and followed; after the lift ``again`` plans carry and path
+from what was measured in the hand; ``onward`` the rest from wherever the arm is; ``timed`` makes a motion. What cannot be
+planned anew is no reason to give up: the path from before serves. Each knot is sought where the last two lead.
 """
 
 from __future__ import annotations
@@ -18,21 +17,14 @@ from scipy.interpolate import CubicSpline
 from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.collision_world import STANDING, ProblemWorld
 from manitwin.episodes.planning.grasp_tally import GraspTally
-from manitwin.episodes.planning.joint_paths import path_lengths
-from manitwin.episodes.planning.path_timing import time_quintic
-from manitwin.episodes.planning.problem import (
-    Grasp,
-    Motion,
-    Phase,
-    PickPlaceProblem,
-    PlanFailure,
-    PlanReport,
-    later,
-)
+from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
+from manitwin.episodes.planning.problem import Grasp, Motion, Phase, PickPlaceProblem, PlanFailure, PlanReport, later
+from manitwin.geometry.poses import transform
 
 STARTS = 4  # known configurations from which the first pose is looked for
 LARGEST_KNOT_RAD, FROM_WHERE_IT_IS_RAD = 0.6, 0.9  # a larger change between knots is a jump to another branch
 ITERATIONS = 30
+WITHDRAWN_M = 0.05
 MOST_PAIRS = 400  # of a grasp and a path, 1 to 5 ms each
 SAME_RAD = 0.05
 
@@ -74,9 +66,12 @@ class HeldPathPlanner:
     that takes longer at the joints' limits is not taken (near singularities some take 20 s).
     """
 
-    def __init__(self, parts: ArmPlanning, *, empty: bool = False):
-        """Take the models and single motions of an arm; ``empty``: its hand holds nothing, and must not touch the target."""
-        self.parts, self._phase = parts, Phase.REACH if empty else Phase.CARRY
+    def __init__(self, parts: ArmPlanning, *, empty: bool = False, lets_go: bool = False):
+        """Take the models and single motions of an arm; ``empty``: its hand holds nothing, and must not touch the target.
+
+        ``lets_go``: what is held is let go at the path's end, where the hand must have room to go back.
+        """
+        self.parts, self._lets_go, self._phase = parts, lets_go, Phase.REACH if empty else Phase.CARRY
 
     def plan(
         self, problem: PickPlaceProblem, paths: Sequence[HeldPath], *, as_hulls: bool, longest_s: float
@@ -158,7 +153,7 @@ class HeldPathPlanner:
         rng = np.random.default_rng((problem.seed, 2))
         for path in paths:
             joints = self._follow(world, path, gripper_to_object, near_rad)
-            if not isinstance(joints, CubicSpline) or self._shortest_s(joints) > longest_s:
+            if not isinstance(joints, CubicSpline) or self._drawback(world, joints, longest_s):
                 continue
             carry = self.parts.motions.free(world.arm, Phase.CARRY, np.asarray(joints_rad, float), joints(0.0), rng)
             if isinstance(carry, Motion):
@@ -203,8 +198,9 @@ class HeldPathPlanner:
         joints = self._follow(world, path, gripper_to_object, parts.arm.home)
         if not isinstance(joints, CubicSpline):
             return joints
-        if self._shortest_s(joints) > longest_s:
-            return "path_slow"
+        drawback = self._drawback(world, joints, longest_s)
+        if drawback is not None:
+            return drawback
         grasped = world.problem.target.object_to_world @ gripper_to_object
         solutions, converged = parts.solutions.of(world.arm, Phase.APPROACH, grasped, joints(0.0))
         failure: PlanFailure = "approach_blocked" if converged else "no_inverse_kinematics"
@@ -291,11 +287,15 @@ class HeldPathPlanner:
             meant = meant | {STANDING}
         world.arm.enter(self._phase, self.parts.settings.clearance_m, meant)
 
+    def _drawback(self, world: ProblemWorld, joints: CubicSpline, longest_s: float) -> PlanFailure | None:
+        """Return why a path is not taken that could be followed: too slow, or no room for the hand's way back from its end."""
+        if self._shortest_s(joints) > longest_s:
+            return "path_slow"
+        if not self._lets_go:
+            return None
+        motions, end = self.parts.motions, joints(1.0)
+        back = self.parts.arm.gripper_pose(end) @ transform(translation=np.array([0.0, 0, -WITHDRAWN_M]))
+        return "retreat_blocked" if motions.line(world.arm, Phase.RETREAT, end, back) is None else None
+
     def _shortest_s(self, joints: CubicSpline) -> float:
         return len(self.timed(joints, 1.0, Phase.ACT).positions_rad) * self.parts.timestep_s
-
-
-def joint_spline(knots: np.ndarray) -> CubicSpline:
-    """Return the path through knots ``(K, n)`` over [0, 1] by chord length: by number it would stall and rush."""
-    lengths = path_lengths(knots) + 1e-6 * np.arange(len(knots))
-    return CubicSpline(lengths / lengths[-1], knots)

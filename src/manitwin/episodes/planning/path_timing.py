@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
-from manitwin.episodes.planning.joint_paths import JointPath
+from manitwin.episodes.planning.joint_paths import JointPath, path_lengths
 
 STRETCHED = 1.02  # longer by this than the limits ask for
 
@@ -38,3 +39,9 @@ def time_quintic(
         duration_s *= max(fastest, hardest) * STRETCHED
     end = int(np.searchsorted(places, 1.0 - 1e-12)) + 1
     return positions[:end], velocities[:end]
+
+
+def joint_spline(knots: np.ndarray) -> CubicSpline:
+    """Return the path through knots ``(K, n)`` over [0, 1] by chord length: by number it would stall and rush."""
+    lengths = path_lengths(knots) + 1e-6 * np.arange(len(knots))
+    return CubicSpline(lengths / lengths[-1], knots)
