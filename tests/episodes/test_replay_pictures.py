@@ -161,3 +161,16 @@ def test_pictures_are_the_same_when_they_are_drawn_again(robot: Robot, recording
             drawn = made.frames(recording, named_cameras(["front"], robot), width_px=64, height_px=64, every=4)
             runs.append(b"".join(frame[0].rgb.tobytes() for frame in drawn))
     assert runs[0] == runs[1]
+
+
+def test_granules_are_drawn_where_they_were(robot: Robot, recording: Recording) -> None:
+    middles = np.zeros((STEPS + 1, 2, 3), np.float32)
+    middles[:, 0], middles[:, 1] = [0.55, 0.0, 0.03], [0.55, 0.1, 0.03]
+    poured = replace(recording, granule_positions_m=middles)
+    with EpisodeReplay(robot, cubes(), granules=(2, 0.03)) as made:
+        (frame,) = next(
+            made.frames(poured, named_cameras(["top"], robot), width_px=SIZE, height_px=SIZE, geometry=True)
+        )
+        ids = [made.ids[f"granule_{number:03d}"] for number in range(2)]
+    places = [np.argwhere(frame.ids == each).mean(0) for each in ids]
+    assert np.linalg.norm(places[1] - places[0]) > 5

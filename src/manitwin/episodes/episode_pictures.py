@@ -166,6 +166,7 @@ class EpisodeFilmsStage:
             [twin_drawable(self._source.folder(thing.twin_id)) for thing in episode.objects],
             furniture=room.furniture,
             fixtures=room.fixture_boxes,
+            granules=_granules(episode),
             lighting=lighting_of(room.ambient, room.lights),
             seed=episode.attempt.seed % 2**31,
         ) as replay:
@@ -292,3 +293,13 @@ def _said(out: Path) -> dict[str, str]:
     if not os.path.lexists(out / CONFIG):
         raise EpisodesError(f"{out}/{CONFIG}: no episodes there; `manitwin trajectories` makes some")
     return read_configuration(out)
+
+
+def _granules(episode: StoredEpisode) -> tuple[int, float] | None:
+    """Return the number and radius of an episode's granules, if it has any."""
+    positions, radius_m = episode.recording.granule_positions_m, episode.facts.get("granule_radius_m")
+    if positions is None:
+        return None
+    if not isinstance(radius_m, float) or not 0 < radius_m < 1:
+        raise EpisodesError(f"episode {episode.attempt.episode_id}: no radius of its granules; make it again")
+    return positions.shape[1], radius_m

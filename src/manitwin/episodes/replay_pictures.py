@@ -30,6 +30,7 @@ from manitwin.scenes.scene import Furniture, SurfaceBox
 
 TOLERANCE_M = 0.0004  # of simplified surfaces: a third of a pixel's width at 1 m in a picture of 640 pixels
 FIXTURE_MATERIAL = "metal"
+GRANULE_RGBA = (205, 150, 60, 255)  # grains, more or less
 TABLE = Furniture(
     kind="table",
     support_height_m=0.0,
@@ -78,7 +79,7 @@ class EpisodeReplay:
     """A robot, objects and furniture, uploaded once, that recordings are shown with. Close it, or use a ``with`` statement.
 
     ``objects`` are those of the recording, in its order: ready to be drawn (``twin_drawable``), or their visual parts in
-    their own frames.
+    their own frames. ``granules`` are their number and radius, m.
     """
 
     def __init__(
@@ -88,6 +89,7 @@ class EpisodeReplay:
         *,
         furniture: Furniture = TABLE,
         fixtures: Sequence[StaticBox] = (),
+        granules: tuple[int, float] | None = None,
         lighting: Lighting = STUDIO,
         seed: int = 0,
     ) -> None:
@@ -107,6 +109,12 @@ class EpisodeReplay:
             texture = procedural_texture(FIXTURE_MATERIAL, number % TEXTURE_VARIANTS)
             looks = [textured_box(np.asarray(box.half_extents_m, float), texture)]
             self._renderer.add(box.name, looks, box.box_to_world)
+        self._granules: list[str] = []
+        if granules is not None:
+            sphere = _sphere(granules[1])
+            self._granules = [f"granule_{number:03d}" for number in range(granules[0])]
+            for name in self._granules:
+                self._renderer.add(name, sphere)
 
     def __enter__(self) -> EpisodeReplay:
         return self
@@ -122,7 +130,7 @@ class EpisodeReplay:
 
     @property
     def ids(self) -> dict[str, int]:
-        """The ids in the pictures: objects first, then ``robot/link``, then furniture, then the boxes of fixtures."""
+        """The ids in the pictures: objects first, then ``robot/link``, then furniture, the boxes of fixtures, granules."""
         return self._renderer.ids
 
     def frames(
@@ -168,6 +176,9 @@ class EpisodeReplay:
         rotations = rotation_from_quaternion_wxyz(recording.object_quaternions_wxyz[state])
         positions = recording.object_positions_m[state]
         objects = [transform(rotation, position) for rotation, position in zip(rotations, positions, strict=True)]
+        if recording.granule_positions_m is not None:
+            for name, position in zip(self._granules, recording.granule_positions_m[state], strict=True):
+                self._renderer.set_pose(name, transform(None, position))
         return self._place(objects, recording.joint_positions_rad[state], float(recording.gripper_opening_m[state]))
 
     def _place(
@@ -179,3 +190,13 @@ class EpisodeReplay:
         for link in self._links:
             self._renderer.set_pose(f"{self._robot.name}/{link}", poses[link])
         return poses[self._robot.tip_link] @ self._robot.gripper_to_tip
+
+
+@lru_cache(maxsize=4)
+def _sphere(radius_m: float) -> Drawable:
+    sphere = trimesh.creation.icosphere(subdivisions=2, radius=radius_m)
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorFactor=GRANULE_RGBA, roughnessFactor=0.8, metallicFactor=0.0
+    )
+    sphere.visual = trimesh.visual.TextureVisuals(material=material)
+    return drawable([sphere])
