@@ -82,6 +82,9 @@ def sequence_of(scene: TaskScene, actions: Sequence[Action], seed: int) -> GoalS
         for second in fixtures[:place]
     ):
         raise NoTask("fixtures_meet")
+    marks = [name for step in steps for name in step.goal.places_m]
+    if len(set(marks)) < len(marks):
+        raise NoTask("fixtures_meet")
     filled = [(place, step.goal.granules.name) for place, step in enumerate(steps) if step.goal.granules is not None]
     if len(filled) > 1 or any(name in {step.target for step in steps[:place]} for place, name in filled):
         raise NoTask("content_would_move")
@@ -121,7 +124,10 @@ def _check_still_true(scene: TaskScene, candidate: Candidate, object_to_world: S
     moved = [action.target for action in candidate.actions]
     state = scene.state_of(object_to_world)
     for place, action in enumerate(candidate.actions):
-        if action.target in moved[place + 1 :] and not judge(state, action.literal).holds:
+        if action.target not in moved[place + 1 :]:
+            continue
+        second = action.literal.second  # on a peg or at a mark it is no more, once it has been taken again
+        if (second is not None and second not in scene.names) or not judge(state, action.literal).holds:
             raise NoTask("undoes_first")
 
 
