@@ -112,6 +112,15 @@ def install_packages() -> None:
     STAMP.write_text(digest)
 
 
+def compile_sources() -> None:
+    """Write the bytecode of this package where it is missing or old.
+
+    A program begins half a second sooner then. Python does so by itself, but not where PYTHONDONTWRITEBYTECODE is set, as it
+    often is in containers and on servers that run tests.
+    """
+    subprocess.run([str(VENV / "bin" / "python"), "-m", "compileall", "-q", "-j", "0", str(ROOT / "src")], check=False)
+
+
 def install_libraries() -> None:
     """Install the shared libraries of the system that the installed wheels want, as the loader tells.
 
@@ -208,6 +217,7 @@ def main() -> None:
         )
     make_environment()
     install_packages()
+    compile_sources()
     install_libraries()
     install_renderer()
 

@@ -85,3 +85,15 @@ def test_libraries_are_asked_for_again_only_after_a_change(
     (tmp_path / "stamp").write_text("of other packages")
     setup.install_libraries()
     assert len(asked) > first
+
+
+def test_bytecode_is_written_also_where_python_is_told_not_to(
+    setup: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "src" / "thing").mkdir(parents=True)
+    (tmp_path / "src" / "thing" / "module.py").write_text("VALUE = 1\n")
+    (tmp_path / "src" / "thing" / "broken.py").write_text("def\n")
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    monkeypatch.setattr(setup, "ROOT", tmp_path)
+    setup.compile_sources()
+    assert len(list(tmp_path.glob("src/thing/__pycache__/module.*.pyc"))) == 1, "and one that is broken stops nothing"
