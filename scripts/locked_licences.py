@@ -118,7 +118,10 @@ ELSEWHERE = {
     "pywin32": "PSF-2.0",
     "tzdata": "Apache-2.0",
 }
-"""Packages that are locked for other systems (macOS, Windows, browsers) and not installed on Linux, by their wheels at PyPI."""
+"""Packages that are locked for other systems (macOS, Windows, browsers), by their wheels at PyPI.
+
+The set-up does not install them on Linux, and where another tool did, the answer is the same.
+"""
 
 CARRIED = {
     "docutils": "the text of the GPL, in its licences; the file under it is not in the wheel",
@@ -194,10 +197,13 @@ def stated(package: Distribution) -> str | None:
 def licences(lock: str) -> Iterator[Licence]:
     """Yield the licence of each locked package."""
     for name, version in locked(lock):
+        if name in ELSEWHERE:
+            yield Licence(name, version, ELSEWHERE[name], "PyPI; not of this system")
+            continue
         try:
             package = distribution(name)
         except PackageNotFoundError:
-            yield Licence(name, version, ELSEWHERE.get(name), "PyPI; not of this system")
+            yield Licence(name, version, None, "not installed")
             continue
         if name in READ:
             expression, source = READ[name]

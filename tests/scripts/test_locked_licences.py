@@ -115,3 +115,13 @@ def test_the_command_prints_a_line_a_package_and_fails_for_one_without_a_licence
     done = subprocess.run([sys.executable, SCRIPTS / "locked_licences.py", lock], capture_output=True, text=True)
     assert done.returncode == 1
     assert "not allowed: no-such-package: unknown" in done.stderr
+
+
+def test_a_package_for_another_system_is_known_though_it_is_installed_here(
+    script: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(script, "ELSEWHERE", {"numpy": "BSD-3-Clause"})
+    monkeypatch.setattr(script, "stated", lambda package: None)
+    assert [licence.expression for licence in script.licences("numpy==1.0 ; sys_platform == 'win32'\n")] == [
+        "BSD-3-Clause"
+    ]
