@@ -39,8 +39,9 @@ PARTS_OF: dict[str, tuple[str, ...]] = {
     "working end": ("outlet",), "ear cup": ("cups",), "headband": ("band",), "core": ("core",), "outside": ("body",),
     "inner side": ("bore", "hole"), "barrel": ("barrel",), "lens": ("lens", "glass"), "switch": ("switch",),
     "cap end": ("eraser", "button", "ferrule", "cap", "clip"), "nozzle": ("nozzle", "spout", "head"),
-    "tissue": ("tissue",), "end flap": ("top",), "bow": ("bow", "hole"), "cup": ("cup", "inside"), "bulb": ("bulb",),
+    "tissue": ("tissue",), "flap": ("top",), "bow": ("bow", "hole"), "cup": ("cup", "inside"), "bulb": ("bulb",),
     "screw base": ("base",), "roller": ("roller",), "positive end": ("pole",), "body": _BODIES, "shaft": _BODIES,
+    "bowl": ("bowl", "inside"), "finger holes": ("handle",), "blades": ("blade", "blades"),
 }  # fmt: skip
 """Which parts of templates a label speaks of."""
 
@@ -207,8 +208,11 @@ REGIONS: dict[str, Region] = {
     "base": _underside, "foot": _underside, "top": _upper_side, "controls": _upper_side, "upper side": _upper_side,
     "opening": _known_opening, "lid": _upper_side, "cap": _upper_side, "nozzle": _upper_side, "surface": _front,
     "side": _sides, "outside": _sides, "edge": _narrow_edge, "front": _front, "back": _back,
-    "far end": _far_end, "handle end": _far_end, "seam": _far_end, "inner side": _hole, "outer side": _rim_of_the_band,
+    "far end": _far_end, "shaft end": _far_end, "body end": _far_end,
+    "handle end": _far_end, "seam": _far_end, "inner side": _hole, "outer side": _rim_of_the_band,
     "jaws": _nearer_spring, "handles": _away_from_jaws, "end": _either_end, "tip": _working_end,
     "front edge": _working_end, "cup edge": _underside, "inside": _upper_side, "rim": _outermost, "wick": _upper_side,
+    "bowl tip": _working_end, "blade tip": _working_end, "blade tips": _working_end, "wiping face": _front,
+    "back face": _back,
 }  # fmt: skip
 """Where a label is that names no part of a thing, by what is true of such a place."""

@@ -59,6 +59,11 @@ def test_everything_is_right_of_a_twin_that_is_as_its_label_says(place: Path, tm
     assert report.shares()["physical"] == (3, 3)
 
 
+def test_a_part_that_only_a_grasp_column_names_is_a_part(place: Path, tmp_path: Path) -> None:
+    label = {"functional_parts": "spout=pour", "bad_grasp_regions": "handle;rim"}
+    assert scored(place, tmp_path, **label).shares()["functional"] == scored(place, tmp_path).shares()["functional"]
+
+
 @pytest.mark.parametrize(
     ("column", "value", "wrong"),
     [

@@ -111,3 +111,16 @@ def test_a_flat_end_across_the_boxs_corners_is_thin() -> None:
     shape = measure_shape(tube, tube.center_mass, "thin", False, np.random.default_rng(0))
     assert shape.axis.direction[0] > 0.9, "the thin end comes first"
     assert shape.axis.thickness_m[0] < 0.01
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]])])
+def test_an_arch_has_its_apex_and_its_ends_whichever_way_it_lies(turn: np.ndarray) -> None:
+    cups = [cylinder(0.035, 0.04).apply_translation([side * 0.08, 0, 0]) for side in (-1, 1)]
+    posts = [trimesh.creation.box([0.008, 0.02, 0.17]).apply_translation([side * 0.08, 0, 0.105]) for side in (-1, 1)]
+    band = trimesh.creation.box([0.168, 0.02, 0.008]).apply_translation([0, 0, 0.188])
+    mesh = trimesh.boolean.union([*cups, *posts, band])
+    lying = mesh.copy().apply_transform(np.block([[turn, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]]))
+    apex, end = best("apex", lying, stands=False) @ turn, best("arch_end", lying, stands=False) @ turn
+    assert apex[2] > 0.17 and abs(apex[0]) < 0.085
+    assert end[2] < 0.05 and abs(end[0]) > 0.07
+    assert measured(trimesh.creation.box([0.1, 0.05, 0.2]))[0].arch is None

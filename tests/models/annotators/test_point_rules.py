@@ -106,3 +106,10 @@ def test_without_a_name_the_rule_is_less_sure() -> None:
 
 def test_the_same_request_gives_the_same_points() -> None:
     assert select(hammer(), "hammer") == select(hammer(), "hammer")
+
+
+def test_what_is_too_thick_for_fingertips_is_no_pinch() -> None:
+    thick = trimesh.creation.box([0.2, 0.06, 0.05]).apply_translation([0, 0, 0.025])
+    thin = trimesh.creation.box([0.2, 0.02, 0.02]).apply_translation([0, 0, 0.01])
+    assert "pinch" not in {point.type for point in select(thick, "box of pasta").grasp + select(thick, "remote").grasp}
+    assert "pinch" in {point.type for point in select(thin, "chopstick").grasp}

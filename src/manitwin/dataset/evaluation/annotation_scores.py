@@ -49,7 +49,7 @@ def scores_of(record: TwinRecord, label: Label) -> Iterator[Score]:
         if truth:
             yield score("language", question, _names_one(said, truth), said, truth)
     for point in points.functional if label.parts else ():
-        yield score("functional", point.id, _is_one_of(point.label, label.parts), point.label, label.parts)
+        yield score("functional", point.id, _is_one_of(point.label, label.named_parts), point.label, label.named_parts)
     if label.mass_kg is not None:
         yield from _of_mass(record.twin_id, physical.mass_kg, label.mass_kg)
     if label.longest_side_m is not None:

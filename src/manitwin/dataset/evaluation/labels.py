@@ -50,6 +50,11 @@ class Label:
     mass_kg: Interval | None
     longest_side_m: Interval | None
 
+    @property
+    def named_parts(self) -> tuple[str, ...]:
+        """All parts that the label names: those with a use, and those by which it is held or is not."""
+        return tuple(dict.fromkeys((*self.parts, *self.good_regions, *self.bad_regions)))
+
 
 def read_labels(path: Path) -> list[Label]:
     """Read a file of labels; raises UsageError naming the line where a column is unknown or a number is none."""

@@ -6,6 +6,7 @@ Every score is in [0, 1]; a place that the shape does not have has no score (Non
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoin
 Feature = Literal[
     "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
     "top", "base", "side", "center", "front", "back", "end", "ring", "mouth", "bristles", "muzzle", "grip", "housing",
+    "apex", "arch_end",
 ]  # fmt: skip
 """A place on an object that geometry can point out."""
 
@@ -229,14 +231,6 @@ def _center(shape: Shape, points: SurfacePoints) -> np.ndarray:
     return _near(distance, 0.3 * shape.size_m)
 
 
-def _front(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    return _large_face(shape, points, 1)
-
-
-def _back(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    return _large_face(shape, points, -1)
-
-
 def _large_face(shape: Shape, points: SurfacePoints, side: int) -> np.ndarray:
     """The face across the box's shortest axis: the upper one first, or the one towards -y of a thing that stands."""
     axis = shape.obb_to_object[:3, int(shape.obb_extents_m.argmin())]
@@ -248,9 +242,11 @@ def _large_face(shape: Shape, points: SurfacePoints, side: int) -> np.ndarray:
 
 
 def _end(shape: Shape, points: SurfacePoints) -> np.ndarray:
-    """Either end of the long axis; of a thing that stands, the upper one first."""
+    """Either end of the long axis, in its middle; of a thing that stands, the upper one first."""
     along = shape.axis.along(points.positions_m)
-    return _near(0.5 - np.abs(along - 0.5), 0.08) * (0.8 + 0.2 * _share_of_height(shape, points))
+    middle = _near(shape.axis.off_axis_m(points.positions_m), 0.3 * float(np.sort(shape.obb_extents_m)[1]))
+    height = _share_of_height(shape, points)
+    return _near(0.5 - np.abs(along - 0.5), 0.08) * (0.8 + 0.2 * height) * (0.7 + 0.3 * middle)
 
 
 def _ring(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
@@ -286,9 +282,19 @@ def _housing(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     return _near(along - 0.65, 0.2) * _near(np.maximum(np.abs(down - 0.4) - 0.4, 0), 0.1)
 
 
+def _apex(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    return _top(shape, points) if shape.arch is None else shape.arch.near_apex(points.positions_m)
+
+
+def _arch_end(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    return _side(shape, points) if shape.arch is None else shape.arch.near_ends(points.positions_m)
+
+
 _SCORERS: dict[str, Callable[[Shape, SurfacePoints], np.ndarray | None]] = {
     "opening": _opening, "rim": _rim, "inside": _inside, "handle": _handle, "handle_end": _handle_end, "head": _head,
     "face": _face, "tip": _tip, "edge": _edge, "middle": _middle, "neck": _neck, "spout": _spout, "top": _top,
-    "base": _base, "side": _side, "center": _center, "front": _front, "back": _back, "end": _end, "ring": _ring,
+    "base": _base, "side": _side, "center": _center, "front": partial(_large_face, side=1),
+    "back": partial(_large_face, side=-1), "end": _end, "ring": _ring,
     "mouth": _mouth, "bristles": _bristles, "muzzle": _muzzle, "grip": _grip, "housing": _housing,
+    "apex": _apex, "arch_end": _arch_end,
 }  # fmt: skip

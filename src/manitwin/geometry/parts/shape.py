@@ -11,6 +11,7 @@ import trimesh
 
 from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.cavity import Opening, find_opening
+from manitwin.geometry.parts.arch import Arch, find_arch
 from manitwin.geometry.parts.pistol import Pistol, find_pistol
 from manitwin.geometry.parts.protrusions import Protrusion, RoundBody, round_body
 from manitwin.geometry.ray_caster import local_thickness
@@ -173,6 +174,11 @@ class Shape:
     def pistol(self) -> Pistol | None:
         """The barrel and grip, where it has the outline of a pistol."""
         return find_pistol(self.surface_m, self.obb_extents_m, self.obb_to_object)
+
+    @cached_property
+    def arch(self) -> Arch | None:
+        """The arch with heavy ends that it may be."""
+        return find_arch(self.surface_m, self.obb_extents_m, self.obb_to_object, self.center_of_mass_m)
 
     @property
     def has_ends(self) -> bool:

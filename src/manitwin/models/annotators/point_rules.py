@@ -15,7 +15,7 @@ from manitwin.geometry.parts.features import Feature, feature_scores
 from manitwin.geometry.parts.shape import Shape, SurfacePoints, measure_shape, surface_points
 from manitwin.models.annotators.priors import FunctionalPart, GraspPart, Prior, unknown_prior
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
-from manitwin.twin.point_records import FunctionalPoint, GraspPoint
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint, GraspType
 
 MOST_FUNCTIONAL, MOST_GRASPS, LEAST = 4, 3, 2  # the paper: 2-4 functional and 2-3 grasp points
 MOST_SPARES = 3
@@ -23,6 +23,7 @@ MOST_SPARES = 3
 _WEAK = 0.2  # a place that no candidate reaches better than this is not there
 _LEVER_M = 0.08  # from the centre of mass: half as good; grasps held at 80 mm slip half of the time, measured in SAPIEN
 _FINGER_CLEARANCE_M = 0.004  # of the opening: the pads need some play on both sides
+_PINCH_M = 0.03  # matter between two fingertips: what is thicker is taken between the pads, with both fingers along it
 _UNSEEN = 0.3  # a candidate in no view can be chosen only where no seen one is near as good
 _TAKEN = 0.35  # a candidate that already stands for another part
 
@@ -175,11 +176,16 @@ class PointSelection:
         return GraspPoint(
             id=f"g{number}",
             **self.request.place(i),
-            type=part.type,
+            type=self._type(part, i),
             scenario=part.scenario,
             confidence=self._confidence(choice.score * float(self._fit()[i])),
             rationale=self._rationale(part.feature, i) + self._width_remark(i),
         )
+
+    def _type(self, part: GraspPart, i: int) -> GraspType:
+        """Return how a place is held: a pinch of what is too thick for fingertips is a parallel grasp."""
+        thick = self.points.thickness_m[i] > _PINCH_M
+        return "parallel_jaw" if part.type == "pinch" and thick else part.type
 
     def _confidence(self, score: float) -> float:
         """Return a confidence: a rule is never sure, so at most 0.9, and 0.5 where nobody said what the thing is."""
@@ -235,6 +241,8 @@ _PLACES: dict[str, str] = {
     "muzzle": "working end, away from the grip",
     "grip": "grip",
     "housing": "barrel behind the working end",
+    "apex": "highest place of the arch",
+    "arch_end": "end of the arch",
 }
 
 
