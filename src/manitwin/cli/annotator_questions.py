@@ -31,8 +31,10 @@ from manitwin.render.raycast import merged, seen_tolerance_m, visible_points
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
 from manitwin.twin.loaded_twin import Twin
 
-LIMITS = Limits(seconds=120.0, memory_bytes=8 << 30)
-"""Of reading a twin and drawing its pictures: 5 s and 1 GB for a photo twin; the renderer maps 4 GiB of address space."""
+LIMITS = Limits(seconds=1200.0, memory_bytes=8 << 30)
+"""Of reading a twin and drawing its pictures: 5 s and 1 GB for a photo twin on an idle machine, and far longer on a busy one,
+where the clock of the wall runs on; the renderer maps 4 GiB of address space.
+"""
 
 
 class SilentModel:

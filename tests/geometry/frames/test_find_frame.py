@@ -9,6 +9,10 @@ from manitwin.geometry.frames.find import find_frame
 from manitwin.geometry.frames.on_feature import ON_FEATURE_M, off_feature_m
 from manitwin.geometry.frames.words import fits, kinds_for
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
+from manitwin.models.generators.templates.catalog import load_templates
+from manitwin.models.generators.templates.made import make
+from manitwin.models.generators.templates.text import read_text
 
 TURN = rotation_from_quaternion_wxyz(np.array([0.9, 0.1, -0.3, 0.3]) / np.linalg.norm([0.9, 0.1, -0.3, 0.3]))
 
@@ -118,3 +122,25 @@ def test_words_choose_the_kind() -> None:
     assert kinds_for("Mouth")[0] == "opening" and kinds_for("cutting edge") == ("edge",)
     assert kinds_for("pouring spout") == ("tip",) and kinds_for("base")[0] == "face"
     assert fits("handle", "hole") and fits("thing", "edge") and not fits("blade", "opening")
+
+
+def test_bristles_that_stand_out_of_the_side_near_an_end_have_no_frame() -> None:
+    handle = trimesh.creation.box((0.16, 0.012, 0.006)).apply_translation([-0.08, 0, 0])
+    tuft = trimesh.creation.box((0.02, 0.012, 0.018)).apply_translation([-0.012, 0, 0.011])
+    brush = framed(handle.union(tuft))
+    nothing = find_frame(brush, np.array([-0.004, 0, 0.02]), np.array([0, 0, 1.0]), "bristles")
+    assert isinstance(nothing, Unclear) and "different ways" in nothing.reason
+
+
+def test_tip_of_what_ends_in_two_directions_is_not_clear() -> None:
+    """A hammer's claw bends away from the handle: beside its root the tool's own end is as near as the claw's."""
+    templates = load_templates()
+    made = make(templates["hammer"], read_text("hammer", templates), np.random.default_rng(0))
+    hammer = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
+    points, normals, faces = sample_surface(hammer, 8000, np.random.default_rng(0))
+    claw = next(known for known in made.points if known.label == "claw")
+    chosen = farthest_point_sampling(points, 42, 0)
+    on_claw = chosen[made.mesh.part[faces[chosen]] == made.mesh.names.index(claw.part)]
+    nearest = on_claw[np.linalg.norm(points[on_claw] - claw.position_m, axis=1).argmin()]
+    nothing = find_frame(framed(hammer), points[nearest], normals[nearest], "claw")
+    assert isinstance(nothing, Unclear) and "several directions" in nothing.reason

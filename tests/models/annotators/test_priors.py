@@ -7,7 +7,7 @@ from pydantic import ValidationError
 
 from manitwin.errors import ManiTwinError
 from manitwin.models.annotators import priors
-from manitwin.models.annotators.priors import Interval, load_materials, load_priors, lookup
+from manitwin.models.annotators.priors import Interval, load_materials, load_priors, lookup, named
 
 # Calli et al. 2015, "The YCB Object and Model Set", and its list of object masses: kg.
 YCB = {
@@ -136,3 +136,30 @@ def test_what_is_only_about_as_large_is_a_thing_of_its_own(said: str, category: 
         assert prior.sources == (f"as a {like}",) and not prior.measured
         assert prior.source == f"prior:{like}", "an estimate names whose number it is"
         assert f" {like}" not in prior.functional[0].description
+
+
+def test_no_alias_is_another_things_name_in_the_singular_or_plural() -> None:
+    for prior in load_priors().values():
+        for name in (prior.category, *prior.aliases):
+            others = [each for form in (name, f"{name}s") if (each := named(form)) is not None and each is not prior]
+            assert not others, f"{name!r} of {prior.category!r} is {others[0].category!r} too"
+
+
+@pytest.mark.parametrize(
+    ("said", "category"),
+    [
+        ("pincers", "pliers"), ("swim goggles", "goggles"), ("a wooden mallet", "mallet"), ("plastic spoon", "plastic spoon"),
+        ("highlighter", "highlighter"), ("steel ball", "steel ball"), ("teddy bear", "stuffed toy"), ("creamer", "milk pourer"),
+    ],
+)  # fmt: skip
+def test_what_is_used_or_made_otherwise_is_no_alias(said: str, category: str) -> None:
+    found = lookup(said)
+    assert found is not None and found.category == category
+
+
+def test_form_of_an_alias_is_that_of_its_head_noun() -> None:
+    """A plastic spoon is told apart as a spoon, and a thermometer gun held as a pistol."""
+    plastic, spoon, gun = lookup("plastic spoon"), lookup("spoon"), lookup("thermometer gun")
+    assert plastic is not None and spoon is not None and gun is not None
+    assert [part.label for part in plastic.functional] == [part.label for part in spoon.functional]
+    assert gun.parts == "pistol"

@@ -21,7 +21,12 @@ _END_ON = 1.1  # matter behind an end by the end's width
 _BUTTON_SEARCH = 0.05  # of the longest side
 _FACING_COSINE = 0.85  # of a button's top and the point: a bevel beside it is not pressed
 _ON_BUTTON = 0.012  # of the longest side: how far the point may be from the patch
-_BUTTON_SHARE = 0.3  # of the longest side: a larger radius is a face
+_BUTTON_SHARE = (
+    0.1  # of the longest side: a larger radius is a face (0.057 at most among the templates of the tuning half)
+)
+_BUTTON_ROUGH = (
+    0.05  # RMS distance from the plane by the radius: what is rounder is a bump whose middle is not known (0.005)
+)
 
 
 def face_frame(
@@ -142,7 +147,7 @@ def _rough(patch: Patch) -> float:
 
 def _is_button(surface: FramedMesh, patch: Patch) -> bool:
     small = _LEAST_RADIUS_SHARE / 3 * surface.size_m < _radius(patch) < _BUTTON_SHARE * surface.size_m
-    return small and _rough(patch) < _ROUGH_SHARE and _stands_out(surface, patch)
+    return small and _rough(patch) < _BUTTON_ROUGH and _stands_out(surface, patch)
 
 
 def _recess_share(surface: FramedMesh, patch: Patch, towards: np.ndarray) -> float:

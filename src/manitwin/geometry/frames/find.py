@@ -11,7 +11,7 @@ from manitwin.geometry.frames.feature import FeatureFrame, Found, FramedMesh, Ki
 from manitwin.geometry.frames.hole import hole_frame
 from manitwin.geometry.frames.opening import opening_frame
 from manitwin.geometry.frames.tip import tip_frame
-from manitwin.geometry.frames.words import direction_for, is_end, kinds_for, pours
+from manitwin.geometry.frames.words import ahead_or_aside, direction_for, is_end, kinds_for, pours
 
 
 def find_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label: str) -> Found:
@@ -24,9 +24,19 @@ def find_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, lab
     for kind in kinds_for(label):
         found = _of_kind(surface, point_m, normal, label, kind)
         if isinstance(found, FeatureFrame):
+            if kind == "tip" and ahead_or_aside(label) and _flat_aside(surface, point_m, normal, found):
+                return Unclear("tip: the end and the flat place beside it look different ways")
             return found
         reasons.append(f"{kind}: {found.reason}")
     return Unclear("; ".join(reasons[:2]))
+
+
+_SAME_WAY = np.cos(np.radians(25.0))
+
+
+def _flat_aside(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, tip: FeatureFrame) -> bool:
+    face = face_frame(surface, point_m, normal)
+    return isinstance(face, FeatureFrame) and float(face.z @ tip.z) < _SAME_WAY
 
 
 def _of_kind(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, label: str, kind: Kind) -> Found:

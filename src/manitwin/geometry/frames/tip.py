@@ -11,6 +11,11 @@ _REACH_SHARES = (0.12, 0.2, 0.35)  # of the longest side: how much of the thing 
 _LONG = 1.5  # longest by second spread (variances) of what has a direction
 _END_SHARE = 0.012  # of the longest side: what is that near to the outermost place is the end
 _FAR_SHARE = 0.25  # of the longest side: an end farther away is not what the point means
+_RIVAL = (
+    1.5,
+    0.02,
+)  # times the best score, plus of the longest side: an end that looks elsewhere and is as near as that is a rival
+_SAME_WAY = np.cos(np.radians(25.0))  # of the directions of two ends that are one
 _BLUNT = 0.75  # radius of the end by that of what is behind it within a tenth of the longest side, for short stubs
 
 
@@ -23,19 +28,20 @@ def tip_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, pour
     lip = _lip(surface, point_m) if pours else None
     if lip is not None:
         return lip
-    best: tuple[float, FeatureFrame] | None = None
+    ends = []
     for direction, share in _directions(surface, point_m):
         frame = _end(surface, point_m, direction, share)
-        if frame is None:
-            continue
-        away = float(np.linalg.norm(frame.position_m - point_m))
-        beyond = float((surface.mesh.vertices @ frame.z).max() - frame.position_m @ frame.z)
-        score = away + 0.5 * beyond
-        if best is None or score < best[0] - 1e-9:
-            best = (score, frame)
-    if best is not None:
-        return best[1]
-    return Unclear("nothing around the point ends in a tip")
+        if frame is not None:
+            away = float(np.linalg.norm(frame.position_m - point_m))
+            beyond = float((surface.mesh.vertices @ frame.z).max() - frame.position_m @ frame.z)
+            ends.append((away + 0.5 * beyond, frame))
+    if not ends:
+        return Unclear("nothing around the point ends in a tip")
+    score, best = min(ends, key=lambda end: end[0])
+    near = _RIVAL[0] * score + _RIVAL[1] * surface.size_m
+    if any(frame.z @ best.z < _SAME_WAY for other, frame in ends if other < near):
+        return Unclear("what is around the point ends in several directions")
+    return best
 
 
 def _directions(surface: FramedMesh, point_m: np.ndarray) -> list[tuple[np.ndarray, float]]:

@@ -40,6 +40,7 @@ _WHOLE = re.compile(
     r"bristles|jaws?\b|wires|\bend\b|base\b|bottom|underside|\bfoot\b|sole|front|back\b|\btop\b|upper|surface|flap|\blid\b|\bcap\b",
     re.IGNORECASE,
 )
+_AHEAD_OR_ASIDE = re.compile(r"bristles", re.IGNORECASE)
 _INSIDE = re.compile(r"inside|interior|cavity|hollow|basin|bowl|scoop|cooking", re.IGNORECASE)
 _END_ON = re.compile(r"striking|strike|hit|pound", re.IGNORECASE)
 _UPWARD = re.compile(r"\btop\b|upper", re.IGNORECASE)
@@ -78,6 +79,11 @@ def means_place(label: str, kind: Kind) -> bool:
     if kind in ("surface", "axis") or _INSIDE.search(label):
         return False
     return kinds_for(label)[0] == kind and _WHOLE.search(label) is None
+
+
+def ahead_or_aside(label: str) -> bool:
+    """Tell whether a part of that name is the end of a thing or stands out of its side, as bristles do."""
+    return _AHEAD_OR_ASIDE.search(label) is not None
 
 
 def pours(label: str) -> bool:

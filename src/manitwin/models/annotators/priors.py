@@ -225,7 +225,7 @@ def normalised(name: str) -> str:
 def _singulars(phrase: str) -> Iterator[str]:
     """Yield the phrase, and what its last word may be the plural of."""
     yield phrase
-    for plural, singular in (("ives", "ife"), ("aves", "af"), ("ies", "y"), ("oes", "o"), ("es", ""), ("s", "")):
+    for plural, singular in (("ives", "ife"), ("aves", "af"), ("ies", "y"), ("oes", "o"), ("s", ""), ("es", "")):
         if phrase.endswith(plural) and len(phrase) > len(plural) + 1:
             yield phrase.removesuffix(plural) + singular
 
