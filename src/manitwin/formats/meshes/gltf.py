@@ -188,7 +188,8 @@ class _Primitives:
         material = self._materials.material(primitive.get("material"))
         uv = self._rows(attributes, f"TEXCOORD_{info.get('texCoord', 0)}", 2, count)
         if uv is not None:
-            uv = transformed_uv(uv[used].astype(np.float64), info)
+            with np.errstate(invalid="ignore"):  # signalling NaNs, which make_part takes for 0
+                uv = transformed_uv(uv[used].astype(np.float64), info)
             uv = np.column_stack([uv[:, 0], 1.0 - uv[:, 1]])  # to the origin at the lower left
         normals = self._rows(attributes, "NORMAL", 3, count)
         normals = None if normals is None else normals[used]

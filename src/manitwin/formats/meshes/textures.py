@@ -114,9 +114,9 @@ def make_part(
     ``normals`` (V, 3) or None; normals that are not unit vectors are dropped, texture coordinates that are no numbers or far
     out become 0.
     """
-    part = trimesh.Trimesh(
-        vertices=np.asarray(vertices, dtype=np.float64), faces=np.asarray(faces, dtype=np.int64), process=False
-    )
+    with np.errstate(invalid="ignore"):  # signalling NaNs, which the caller's checks of vertices find
+        vertices = np.asarray(vertices, dtype=np.float64)
+    part = trimesh.Trimesh(vertices=vertices, faces=np.asarray(faces, dtype=np.int64), process=False)
     if normals is not None and len(normals) == len(vertices) and (np.abs(normals) <= _MAX_NORMAL).all():
         lengths = np.linalg.norm(normals, axis=1)
         if len(lengths) and lengths.min() > 0.5:
