@@ -29,8 +29,14 @@ class LinkShapes:
         self._colors = {each.get("name"): color for each in materials if (color := _rgba(each)) is not None}
 
     def visual(self, link: etree._Element, link_to_asset: np.ndarray) -> Iterator[trimesh.Trimesh]:
-        """Yield a link's visual parts in the asset's axes."""
+        """Yield a link's visual parts in the asset's axes; what is written twice at one place is shown once."""
+        seen: set[bytes] = set()
         for index, element in enumerate(link.findall("visual")):
+            written = etree.tostring(element, method="c14n")
+            if written in seen:
+                self._files.remark(f"link {link.get('name')!r}: visuals that repeat another one were left out")
+                continue
+            seen.add(written)
             to_asset = link_to_asset @ origin_of(element) @ _scale(element)
             for part in self._parts(element, f"link {link.get('name')!r} visual {index}", self._color(element)):
                 part.metadata["name"] = str(part.metadata["name"])

@@ -152,10 +152,9 @@ def _uv(mesh: UsdGeom.Mesh, indices: np.ndarray, points: int, polygons: int) -> 
         p for p in api.GetPrimvarsWithValues() if str(p.GetTypeName()) in ("texCoord2f[]", "texCoord2d[]", "float2[]")
     ]
     for primvar in [p for p in named if p and p.HasValue()] + typed:
-        values = primvar.ComputeFlattened(Usd.TimeCode.EarliestTime())
-        if values is None:
+        uv = _rows(primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()), 2)
+        if uv is None:
             continue
-        uv = np.asarray(values, np.float64).reshape(-1, 2)
         if primvar.GetInterpolation() == UsdGeom.Tokens.faceVarying and len(uv) == len(indices):
             return uv
         if primvar.GetInterpolation() in (UsdGeom.Tokens.vertex, UsdGeom.Tokens.varying) and len(uv) == points:
@@ -166,10 +165,10 @@ def _uv(mesh: UsdGeom.Mesh, indices: np.ndarray, points: int, polygons: int) -> 
 def _display_colors(mesh: UsdGeom.Mesh, indices: np.ndarray, sizes: np.ndarray) -> np.ndarray | None:
     """Return displayColor by corner ``(C, 3) uint8`` sRGB, or None."""
     primvar = mesh.GetDisplayColorPrimvar()
-    values = primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()) if primvar and primvar.HasValue() else None
-    if values is None or len(values) == 0:
+    given = primvar.ComputeFlattened(Usd.TimeCode.EarliestTime()) if primvar and primvar.HasValue() else None
+    linear = _rows(given, 3)
+    if linear is None or len(linear) == 0:
         return None
-    linear = np.asarray(values, np.float64).reshape(-1, 3)
     colors = np.round(np.asarray(PreviewSurfaces.to_srgb(np.nan_to_num(linear))) * 255).astype(np.uint8)
     if len(colors) == 1:
         return np.repeat(colors, len(indices), axis=0)
@@ -178,6 +177,14 @@ def _display_colors(mesh: UsdGeom.Mesh, indices: np.ndarray, sizes: np.ndarray) 
     if len(colors) == len(sizes) and primvar.GetInterpolation() == UsdGeom.Tokens.uniform:
         return np.repeat(colors, sizes, axis=0)
     return colors[indices] if len(colors) > indices.max() else None
+
+
+def _rows(values: Any, columns: int) -> np.ndarray | None:
+    """Return values of a primvar as ``(N, columns)``, None where there are none or its type is none that USD knows."""
+    try:
+        return None if values is None else np.asarray(values, np.float64).reshape(-1, columns)
+    except (TypeError, ValueError):  # a type that nothing registered comes as it is written
+        return None
 
 
 def _value(attribute: Usd.Attribute) -> Any:
