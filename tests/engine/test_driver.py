@@ -100,6 +100,33 @@ def test_the_rejection_of_what_stood_in_an_inputs_place_goes_when_the_input_is_c
     assert len(folders(tmp_path / "d")) == 1 and set(indexed_twins(second.root)) == folders(tmp_path / "d")
 
 
+def test_inputs_that_were_alike_for_a_while_are_told_apart_once_they_are_changed(
+    tmp_path: Path, recipe: RehearsalRecipe
+) -> None:
+    inputs = tmp_path / "inputs"
+    inputs.mkdir()
+
+    class OfBytes(RehearsalRecipe):
+        """Tells its items by the bytes of a file each."""
+
+        def identify(self, payload: Item) -> Identity:
+            said = (inputs / str(payload.text)).read_text()
+            refused = Rejected("degenerate", said, "gate") if said == "cut" else None
+            return Identity(f"{sum(said.encode()):016x}", "text", refused)
+
+    recipe = OfBytes(log=tmp_path / "log")
+    for name in ("one", "two"):
+        (inputs / name).write_text("cut")
+    first = rehearse(tmp_path / "d", ["one", "two"], recipe=recipe)
+    assert sorted(first.states.values()) == ["duplicate", "rejected"]
+    for name in ("one", "two"):
+        (inputs / name).write_text(f"box {name}")
+    with closing(Ledger(tmp_path / "d" / "ledger.sqlite")) as ledger:
+        assert ledger.reopen([1, 2]) == 2
+    second = rehearse(tmp_path / "d", recipe=recipe)
+    assert set(second.states.values()) == {"accepted"} and second.wrong == []
+
+
 def test_what_fails_is_tried_three_times_and_quarantined_with_its_error(
     tmp_path: Path, recipe: RehearsalRecipe
 ) -> None:

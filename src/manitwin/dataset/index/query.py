@@ -143,6 +143,8 @@ class Index:
             if not isinstance(error, _OF_THE_CONDITION):
                 require_files(self.root, read_part_list(self.root) or PartList())
             raise UsageError(_explained(error, table)) from error
+        except UnicodeDecodeError as error:  # names in a damaged file that are no text, in DuckDB's own message
+            raise self._damaged(error) from error
         except RuntimeError as error:
             if "interrupt" in str(error).lower():  # DuckDB's words for what a signal's handler raised
                 raise KeyboardInterrupt from error

@@ -248,7 +248,12 @@ class Ledger:
         """Open ended items again, their attempts forgotten; returns how many."""
         count = 0
         for number in numbers:
-            self.connection.execute("UPDATE items SET state = 'open' WHERE number = ?", (number,))
+            # a duplicate has the twin of another item, until its own bytes are read again
+            self.connection.execute(
+                "UPDATE items SET twin_id = CASE state WHEN 'duplicate' THEN NULL ELSE twin_id END, state = 'open'"
+                " WHERE number = ?",
+                (number,),
+            )
             self.connection.execute("DELETE FROM stages WHERE number = ? AND state <> 'done'", (number,))
             count += 1
         self.commit()

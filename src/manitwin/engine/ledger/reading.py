@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from manitwin.engine.ledger.lock import is_written
-from manitwin.engine.ledger.soundness import check_tables, require_regular, sound
+from manitwin.engine.ledger.soundness import check_whole, require_regular, sound
 from manitwin.errors import UsageError
 
 
@@ -31,7 +31,7 @@ def read_ledger(path: Path) -> Iterator[sqlite3.Connection]:
     try:
         with sound(path):
             connection.execute("PRAGMA trusted_schema = OFF")
-            check_tables(connection, path)
+            check_whole(connection, path)
             yield connection
     finally:
         connection.close()
