@@ -30,6 +30,10 @@ status: 0 no errors, 1 errors, 2 wrong use.
   or looks wrong and may be meant. **note**: worth knowing.
 - Rules are chosen by code or by the beginning of one; the longer beginning wins, so `--select INE001 --ignore INE` leaves INE001.
   What cannot be read or measured (FIL001, FIL005, FIL006) is said whatever is selected.
+- What an asset names (meshes, textures, includes) is read from beside it and from above it up to its **root**: the folder that
+  you gave; of a single file the repository (`.git`) that it lies in, or its package or model (`package.xml`, `model.config`), or
+  its own folder. FIL007 notes what was read from above. Descriptions without a shape, which others include, are no assets.
+- What most assets of a folder have in common (LIC001, LIC002) is said once, with the count; JSON and SARIF have each.
 - One cause is one finding: of an object in millimetres the size is wrong, and its mass, inertia and grasps are not held
   against it.
 - `--fix` writes what follows from the asset's own words, each file whole, with the old one beside it as `<name>.orig`. It never

@@ -141,3 +141,23 @@ def test_entities_are_refused(tmp_path: Path) -> None:
     path.write_text('<!DOCTYPE mujoco [<!ENTITY a "b">]><mujoco model="&a;"/>')
     with pytest.raises(AssetError, match="document type"):
         read_asset(path, "mjcf")
+
+
+def test_what_programs_mend_before_mujoco_sees_it_is_read_and_said(tmp_path: Path) -> None:
+    wedge().export(tmp_path / "wedge.stl")
+    mesh = '<mesh name="w" file="wedge.stl" scale="0.01 0.01 0.01"/>'
+    body = (
+        '<body><joint damping="1e11"/><geom type="mesh" mesh="w" material="nowhere"/>'
+        "<body><freejoint/><site/></body></body>".replace("<freejoint/>", '<joint type="slide"/>')
+    )
+    asset = read_asset(mjcf(tmp_path, body, f"<asset>{mesh}{mesh}</asset>"))
+    assert len(asset.visual) == 1
+    said = " ".join(asset.remarks)
+    for words in ("written twice", "'nowhere' is nowhere written", "moves and has no mass"):
+        assert words in said
+
+
+def test_an_object_whose_meshes_are_not_there_lacks_files_and_is_no_broken_one(tmp_path: Path) -> None:
+    body = '<body><freejoint/><geom type="mesh" mesh="w"/></body>'
+    asset = read_asset(mjcf(tmp_path, body, '<asset><mesh name="w" file="gone.stl"/></asset>'))
+    assert asset.missing_files == ("gone.stl",) and asset.visual == () and asset.inertial.mass_kg is None

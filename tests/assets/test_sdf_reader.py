@@ -97,13 +97,36 @@ def test_every_solid_is_read_and_what_is_none_is_named(tmp_path: Path) -> None:
     shapes = (
         "<sphere><radius>0.1</radius></sphere>", "<cylinder><radius>0.1</radius><length>0.4</length></cylinder>",
         "<capsule><radius>0.1</radius><length>0.4</length></capsule>", "<ellipsoid><radii>0.1 0.2 0.3</radii></ellipsoid>",
-        "<plane><normal>0 0 1</normal></plane>", "<empty/>",
+        "<plane><normal>1 0 0</normal><size>0.4 0.3</size></plane>", "<empty/>",
+        "<polyline><point>0 0</point><point>1 0</point><point>0 1</point><height>0.7</height></polyline>",
+        "<heightmap><uri>hills.png</uri></heightmap>",
     )  # fmt: skip
     inside = "".join(f'<visual name="v{i}"><geometry>{s}</geometry></visual>' for i, s in enumerate(shapes))
     asset = read(tmp_path, link("base", inside))
     heights = [part.extents[2] for part in asset.visual]
-    assert np.allclose(heights, [0.2, 0.4, 0.6, 0.6], atol=2e-3)
-    assert asset.remarks == ("'v4' is <plane>, not read as a shape, and was left out",)
+    assert np.allclose(heights, [0.2, 0.4, 0.6, 0.6, 0.4, 0.7], atol=2e-3)
+    assert np.isclose(asset.visual[-1].volume, 0.35) and np.isclose(asset.visual[-2].extents[0], 1e-3)
+    assert asset.remarks == ("'v7' is <heightmap>, not read as a shape, and was left out",)
+
+
+@pytest.mark.parametrize(
+    ("shape", "said"),
+    [
+        ("<plane><normal>0 0 0</normal></plane>", "length 0"),
+        ("<plane><size>1 0</size></plane>", "not above zero"),
+        ("<polyline><point>0 0</point><point>1 1</point><height>1</height></polyline>", "encloses no area"),
+        ("<polyline><point>0 0</point><point>1 1</point><point>2 2</point><height>1</height></polyline>", "no area"),
+    ],
+)
+def test_planes_and_polylines_that_are_none_are_refused(tmp_path: Path, shape: str, said: str) -> None:
+    with pytest.raises(AssetError, match=said):
+        read(tmp_path, link("base", f'<visual name="v"><geometry>{shape}</geometry></visual>'))
+
+
+def test_a_joint_may_have_the_name_of_a_link(tmp_path: Path) -> None:
+    inside = f'<visual name="v">{BOX}</visual>'
+    joint = '<joint name="base" type="fixed"><parent>world</parent><child>base</child></joint>'
+    assert len(read(tmp_path, link("base", inside) + joint).visual) == 1
 
 
 def test_friction_and_restitution_are_those_of_the_collisions(tmp_path: Path) -> None:

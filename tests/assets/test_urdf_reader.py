@@ -105,6 +105,7 @@ def test_body_that_floats_in_an_empty_world_is_the_object(tmp_path: Path) -> Non
     [
         ('<link name="l"><contact><lateral_friction value="0.7"/></contact>{}</link>', 0.7, 0.7),
         ('<link name="l">{}</link><gazebo reference="l"><mu1>0.4</mu1><mu2>0.3</mu2></gazebo>', 0.4, None),
+        ('<link name="l">{}</link><gazebo reference="l"><mu1></mu1><mu2></mu2></gazebo>', None, None),
         ('<link name="l">{}</link><gazebo reference="other"><mu1>0.4</mu1></gazebo>', None, None),
     ],
 )

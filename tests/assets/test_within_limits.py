@@ -18,7 +18,7 @@ from manitwin.formats.isolated import Limits
 READER = """
 import os, sys, types
 
-def read(path):
+def read(path, root):
     text = open(path).read()
     if "hang" in text:
         while True:
@@ -35,24 +35,29 @@ reader.read = read
 sys.modules[reader.__name__] = reader
 """
 """Found by every interpreter that is started with the folder in its path, before anything else."""
-SAID = {"abort": "process which read it ended", "hang": "takes longer than 5 s", "swell": "GiB of memory|more memory"}
+SAID = {"abort": "process which read it ended", "swell": "GiB of memory|more memory", "zebra": "an ordinary refusal"}
+HANGS = {"hang": "takes longer than 3 s"}
 
 
-@pytest.fixture
-def assets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+@pytest.fixture(params=["ends", "hangs"])
+def assets(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> Iterator[tuple[Path, dict[str, str]]]:
+    """A folder of assets and what is said of each; only where one hangs is the limit of time one that is reached."""
+    said, seconds = (SAID, 600.0) if request.param == "ends" else (HANGS, 3.0)
     (tmp_path / "path").mkdir()
     (tmp_path / "path/sitecustomize.py").write_text(READER)
     monkeypatch.syspath_prepend(tmp_path / "path")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "path"), prepend=":")
-    limits = Limits(seconds=5.0, memory_bytes=8 << 30)
+    limits = Limits(seconds=seconds, memory_bytes=8 << 30)
     monkeypatch.setattr(within_limits, "LIMITS", limits)
     monkeypatch.setattr(run, "LIMITS", limits)
     folder = tmp_path / "assets"
     folder.mkdir()
-    for name in (*SAID, "zebra"):
-        (folder / f"{name}.sdf").write_text(f"<sdf version='1.7'><!-- {name} --></sdf>")
+    for name in said:
+        (folder / f"{name}.sdf").write_text(f"<sdf version='1.7'><visual/><!-- {name} --></sdf>")
     end_processes()
-    yield folder
+    yield folder, said
     end_processes()
 
 
@@ -63,17 +68,23 @@ def end_processes() -> None:
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_an_asset_that_hangs_swells_or_crashes_is_a_finding_of_its_own(assets: Path, jobs: int) -> None:
-    audited = audit_assets([assets], jobs=jobs)
-    assert [Path(each.asset).stem for each in audited] == [*SAID, "zebra"]
-    for each, said in zip(audited, [*SAID.values(), "an ordinary refusal"], strict=True):
+def test_an_asset_that_hangs_swells_or_crashes_is_a_finding_of_its_own(
+    assets: tuple[Path, dict[str, str]], jobs: int
+) -> None:
+    folder, expected = assets
+    audited = audit_assets([folder], jobs=jobs)
+    assert [Path(each.asset).stem for each in audited] == list(expected)
+    for each, said in zip(audited, expected.values(), strict=True):
         (finding,) = each.findings
         assert finding.code == "FIL001" and "\n" not in finding.message
         assert re.search(said, finding.message), finding.message
 
 
-def test_an_asset_that_hangs_swells_or_crashes_is_not_imported_and_the_others_are(assets: Path, tmp_path: Path) -> None:
-    imported = list(import_assets([assets], tmp_path / "out"))
+def test_an_asset_that_hangs_swells_or_crashes_is_not_imported_and_the_others_are(
+    assets: tuple[Path, dict[str, str]], tmp_path: Path
+) -> None:
+    folder, expected = assets
+    imported = list(import_assets([folder], tmp_path / "out"))
     assert all(each.record is None for each in imported)
-    for each, said in zip(imported, [*SAID.values(), "an ordinary refusal"], strict=True):
+    for each, said in zip(imported, expected.values(), strict=True):
         assert each.error is not None and re.search(said, each.error), each.error

@@ -86,3 +86,28 @@ def test_document_has_its_comments_first_and_none_that_ends_early() -> None:
     )
     with pytest.raises(ExportError, match="no number"):
         number_text(float("nan"))
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        b'<?xml version="0.0"?>', b'\n<?xml version="1.0" encoding="utf-8"?>', b"<!-- a -- --><?xml version='1.1'?>",
+        b'\xef\xbb\xbf \n<?xml version="1.0"?>', b'<!-- a -->\r\n<!-- <b> --><?xml version="1.0" standalone="yes"?>',
+    ],
+)  # fmt: skip
+def test_a_declaration_of_another_version_or_below_comments_is_read(head: bytes) -> None:
+    assert parse_xml(head.replace(b"a -- -", b"a -") + "<a b='ä'/>".encode(), "a", "x").get("b") == "ä"
+
+
+@pytest.mark.parametrize(
+    "data", [b"<a/><?xml version='1.0'?>", b"<!-- <?xml version='1.0'?>", b"text <?xml version='0'?><a/>"]
+)
+def test_a_declaration_elsewhere_is_broken(data: bytes) -> None:
+    with pytest.raises(AssetError, match="broken"):
+        parse_xml(data, "a", "x")
+
+
+def test_the_encoding_that_a_late_declaration_says_is_kept() -> None:
+    assert (
+        parse_xml("\n<?xml version='1.0' encoding='iso-8859-1'?><a b='ä'/>".encode("latin-1"), "a", "x").get("b") == "ä"
+    )

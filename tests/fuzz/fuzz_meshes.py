@@ -215,6 +215,17 @@ target("obj", obj, read, files=("*.obj",), shared=("bad/*.obj",))
 target("mtl", obj, lambda case: read_mesh(case.folder / "box.obj"), files=("*.mtl", "*.png"))
 target("ply", ply, read, files=("*.ply",))
 target("stl", stl, read, shared=("bad/*.stl",))
+
+
+def msh(folder: Path) -> None:
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.05)
+    count = len(ball.vertices)
+    header = np.array([count, count, 0, len(ball.faces)], "<i4").tobytes()
+    vertices, normals = (np.asarray(rows, "<f4").tobytes() for rows in (ball.vertices, ball.vertex_normals))
+    (folder / "ball.msh").write_bytes(header + vertices + normals + np.asarray(ball.faces, "<i4").tobytes())
+
+
+target("msh", msh, read)
 target("dae", dae, read, files=("*.dae",), weight=0.5)
 target("usdz", usdz, read, weight=0.3)
 target("survey", meshes, survey, named=True, files=("*.gltf", "*.glb", "*.obj", "*.mtl", "*.ply", "*.dae"))

@@ -86,7 +86,8 @@ class Asset:
 
     ``up`` is the axis that stands up by the format's rule or the file's word; ``unit_m`` the length of a file's unit, None
     where it declares none. ``missing_files`` are named and not there; ``remarks`` are what the reader had to note, one line each.
-    ``rests`` are declared resting poses, asset to plane ``(4, 4)``.
+    ``rests`` are declared resting poses, asset to plane ``(4, 4)``. ``static``: it is said to stand fast, as buildings do, and is
+    no object that moves.
     """
 
     format: Format
@@ -103,6 +104,7 @@ class Asset:
     frames: tuple[AnnotatedFrame, ...] = ()
     grasps: tuple[AnnotatedGrasps, ...] = ()
     rests: tuple[np.ndarray, ...] = ()
+    static: bool = False
     license: str | None = None
     attribution: str | None = None
     files: tuple[Path, ...] = ()

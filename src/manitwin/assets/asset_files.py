@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
+from manitwin.assets.root import upward
 from manitwin.errors import AssetError, InputError
 from manitwin.formats.meshes.read import MeshFile, read_mesh
 from manitwin.formats.meshes.source import MeshLimits
-from manitwin.formats.source_files import side_files
 
 MESH_LIMITS = MeshLimits(max_bytes=1 << 29, max_faces=2_000_000)
 MAX_SHAPES = 4096
@@ -25,10 +25,12 @@ _NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' is not there")
 class AssetFiles:
     """The files that an asset names, looked up below ``root`` and nowhere else, links resolved.
 
-    ``used`` are the files that were found, ``missing`` the names that were not, ``remarks`` one line each.
+    ``own`` is the folder of the asset itself; what is read from above it is remarked. ``used`` are the files that were found,
+    ``missing`` the names that were not, ``remarks`` one line each.
     """
 
     root: Path
+    own: Path | None = None
     used: set[Path] = field(default_factory=set)
     missing: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
@@ -56,6 +58,7 @@ class AssetFiles:
             except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
                 continue
             if found:
+                self._note_above(resolved)
                 self.used.add(resolved)
                 return resolved
             outside = outside or not inside
@@ -64,14 +67,20 @@ class AssetFiles:
             self.remark(f"{_short(name)} lies outside the asset's folder and was not read")
         return None
 
+    def _note_above(self, file: Path) -> None:
+        if self.own is not None and not file.is_relative_to(self.own.resolve()):
+            self.remark(f"files were read from above its own folder, below the root {self.root.resolve().name!r}")
+
     def mesh(self, path: Path) -> MeshFile:
         """Read a mesh that ``find`` returned; raises AssetError naming it where it cannot be read, or the asset is too large."""
         if path not in self._meshes:
             try:
-                mesh = read_mesh(path, limits=MESH_LIMITS)
+                mesh = read_mesh(path, limits=MESH_LIMITS, root=self.root, texture_folders=self._texture_folders(path))
             except InputError as error:
                 raise AssetError(error.detail) from error
-            self.used.update(side_files(path))
+            self.used.update(mesh.files)
+            for file in mesh.files:
+                self._note_above(file)
             for sentence in mesh.findings:
                 absent = _NOT_THERE.match(sentence)
                 if absent:
@@ -81,6 +90,11 @@ class AssetFiles:
             self._meshes[path] = mesh
         self.count(sum(len(part.faces) for part in self._meshes[path].parts))
         return self._meshes[path]
+
+    def _texture_folders(self, mesh: Path) -> tuple[Path, ...]:
+        """Return where Gazebo keeps the pictures of a model: ``materials/textures`` in a folder above the mesh."""
+        folders = (folder / "materials" / "textures" for folder in upward(mesh.parent, self.root))
+        return tuple(folder for folder in folders if folder.is_dir())
 
     def count(self, faces: int) -> None:
         """Count a shape of so many faces; raises AssetError where the asset asks for more than is read."""

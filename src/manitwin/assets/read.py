@@ -18,8 +18,11 @@ if TYPE_CHECKING:
 USD_SUFFIXES = frozenset({".usd", ".usda", ".usdc", ".usdz"})
 SCAN_METADATA = "metadata.pbtxt"
 """Which Google Scanned Objects have, and other models of Gazebo have not."""
-_HEAD_BYTES = 1 << 16
+_HEAD_BYTES, _FRAGMENT_BYTES = 1 << 16, 1 << 23
 _FIRST_TAG = re.compile(rb"<([A-Za-z][\w.:-]*)[\s/>]")
+_SHAPES = (b"<geom", b"<visual", b"<collision", b"<include", b"<replicate", b"<composite", b"<flexcomp", b"<attach")
+"""What shapes are, or come from, in MJCF, URDF and SDF."""
+_ENDS = (b"</mujoco>", b"</robot>", b"</sdf>")
 _MARKS = re.compile(rb"<extra_info[\s/>]|<custom_data[\s/>]")
 _ROBOTWIN_DATA = re.compile(r"model_data\d*\.json")
 
@@ -28,6 +31,8 @@ VALID_ASSETS = (
     " .xml and USD files; a plain mesh goes to `manitwin build`"
 )
 """What a person is told who gave something else."""
+_NAME_FILES = ("urdf", "mjcf", "sdf", "gso", "embodiedgen")
+"""Descriptions that name meshes of other folders."""
 FORMATS: tuple[Format, ...] = ("twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
 
 
@@ -117,40 +122,55 @@ def _xml_format(file: Path) -> Format | None:
     return None
 
 
+def _is_fragment(file: Path) -> bool:
+    """Tell whether an XML description holds no shape, and is there for others to include: it is no asset by itself."""
+    if file.suffix.lower() not in (".urdf", ".xml", ".mjcf", ".sdf"):
+        return False
+    with open_regular(file, AssetError) as stream:
+        content = stream.read(_FRAGMENT_BYTES)
+    if len(content) == _FRAGMENT_BYTES:
+        return False
+    content = _without_comments(content)
+    ends = any(content.rstrip().endswith(end) for end in _ENDS)  # what is cut short is a broken asset, not a fragment
+    return ends and (not any(tag in content for tag in _SHAPES) or b"<xacro:macro" in content)
+
+
 def _without_comments(xml: bytes) -> bytes:
-    kept = []
-    while (at := xml.find(b"<!--")) >= 0:
-        kept.append(xml[:at])
-        end = xml.find(b"-->", at)
-        xml = xml[end + 3 :] if end >= 0 else b""
-    return b"".join([*kept, xml])
+    kept, after = [], 0
+    while (begin := xml.find(b"<!--", after)) >= 0:
+        kept.append(xml[after:begin])
+        end = xml.find(b"-->", begin)
+        after = end + 3 if end >= 0 else len(xml)
+    return b"".join([*kept, xml[after:]])
 
 
-def read_asset(path: Path, format: Format | Literal["auto"] = "auto") -> Asset:
+def read_asset(path: Path, format: Format | Literal["auto"] = "auto", *, root: Path | None = None) -> Asset:
     """Read the asset at a path, ``auto``: of the format that ``detect`` tells; raises AssetError.
 
-    A format's reader, and the engine that it may need, are loaded only when they are used.
+    ``root``: the folder above which no file is read for a description that names some (``root_of`` the path by default). A
+    format's reader, and the engine that it may need, are loaded only when they are used.
     """
     if format != "auto" and format not in FORMATS:
         raise AssetError(choose_from("format", format, ("auto", *FORMATS)))
     _require_there(path)
     chosen = detect(path) if format == "auto" else format
     reader = import_module(f"manitwin.assets.readers.{chosen}")
-    asset: Asset = reader.read(path)
+    asset: Asset = reader.read(path, root) if chosen in _NAME_FILES else reader.read(path)
     return asset
 
 
-def find_assets(path: Path) -> Iterator[Path]:
+def find_assets(path: Path, fragments: list[Path] | None = None) -> Iterator[Path]:
     """Yield every asset at or below a path, in the order of their names; hidden folders are left out.
 
     A folder that is one asset as a whole is not looked into; links to folders, and to files out of the folder, are not
-    followed. A RoboTwin folder gives its model_data files. Raises AssetError where the path is not there.
+    followed. A RoboTwin folder gives its model_data files. Descriptions without a shape, which others include, are no assets and
+    go to ``fragments``. Raises AssetError where the path is not there.
     """
     _require_there(path)
     if not path.is_dir():
         yield path
         return
-    yield from _assets_below(path, path)
+    yield from _assets_below(path, path, [] if fragments is None else fragments)
 
 
 def is_file_below(file: Path, folder: Path) -> bool:
@@ -168,7 +188,7 @@ def _require_there(path: Path) -> None:
         raise AssetError(f"{path}: is no regular file, and only such are read; give a file or a folder")
 
 
-def _assets_below(path: Path, root: Path) -> Iterator[Path]:
+def _assets_below(path: Path, root: Path, fragments: list[Path]) -> Iterator[Path]:
     form = folder_format(path)
     if form == "robotwin":
         yield from robotwin_data(path)
@@ -180,8 +200,12 @@ def _assets_below(path: Path, root: Path) -> Iterator[Path]:
         entries = sorted((entry for entry in scanned if not entry.name.startswith(".")), key=lambda e: e.name)
     for entry in entries:
         file = Path(entry.path)
-        if is_file_below(file, root) and file_format(file) is not None:
+        if not is_file_below(file, root) or file_format(file) is None:
+            continue
+        if _is_fragment(file):
+            fragments.append(file)
+        else:
             yield file
     for entry in entries:
         if entry.is_dir(follow_symlinks=False):
-            yield from _assets_below(Path(entry.path), root)
+            yield from _assets_below(Path(entry.path), root, fragments)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import struct
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -15,9 +16,10 @@ from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json
 from manitwin.formats.printable import printable_line
 
 IMAGE_FORMATS = ("png", "jpeg", "gif", "webp", "tiff", "bmp", "avif")
-MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz")
+MESH_FORMATS = ("glb", "gltf", "obj", "ply", "stl", "dae", "usdz", "msh")
 
 _HEAD_BYTES = 65536
+MSH_HEADER_BYTES = 16
 _NAME_CHARACTERS = 200
 _OBJ_KEYWORDS = frozenset(
     {"v", "vt", "vn", "vp", "f", "l", "p", "o", "g", "s", "mg", "usemtl", "mtllib", "usemap", "maplib", "cstype", "deg"}
@@ -114,6 +116,8 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
     # a binary STL has no magic: 80 free bytes, a count, 50 bytes a triangle; its free bytes may even begin with "solid"
     if size >= 84 and size == 84 + 50 * int.from_bytes(head[80:84], "little"):
         return "stl"
+    if msh_bytes(head) == size:  # as little magic: counts that make up the file's size
+        return "msh"
     text = _text(head)
     if text is None:
         # a binary STL that was cut short still has the zero padding or "STL" in its 80 free bytes
@@ -126,6 +130,20 @@ def _mesh_format(head: bytes, size: int, suffix: str, stream: BinaryIO) -> str |
     if start.startswith("{") and _is_gltf(start, size, stream):
         return "gltf"
     return "obj" if _is_obj(start, complete=size <= _HEAD_BYTES) else None
+
+
+def msh_bytes(head: bytes) -> int | None:
+    """Return how many bytes a file of MuJoCo's binary meshes with this head has to have, None where it is the head of none.
+
+    It begins with four 32-bit integers: positions, normals and texture coordinates, each of the latter two one a position or
+    none, and triangles. Source: the XML reference of MuJoCo, ``mesh``, "MSH file format".
+    """
+    if len(head) < MSH_HEADER_BYTES:
+        return None
+    vertices, normals, coordinates, faces = struct.unpack_from("<4i", head)
+    if vertices < 3 or faces < 1 or normals not in (0, vertices) or coordinates not in (0, vertices):
+        return None
+    return MSH_HEADER_BYTES + 4 * (3 * vertices + 3 * normals + 2 * coordinates + 3 * faces)
 
 
 def _is_usdz(head: bytes) -> bool:

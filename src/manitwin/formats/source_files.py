@@ -18,7 +18,7 @@ from xml.sax.saxutils import unescape
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.json_file import parse_json
 
-MESH_SUFFIXES = frozenset({".glb", ".gltf", ".obj", ".ply", ".stl", ".dae", ".usdz"})
+MESH_SUFFIXES = frozenset({".glb", ".gltf", ".obj", ".ply", ".stl", ".dae", ".usdz", ".msh"})
 IMAGE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".webp", ".gif", ".bmp", ".tif", ".tiff", ".avif"})
 MAX_TEXT_BYTES = 512 * 1024 * 1024
 _MAP_KEYWORDS = frozenset({"bump", "norm", "disp", "decal", "refl"})
@@ -67,16 +67,17 @@ def spellings(name: str) -> list[str]:
     return [clean] if unquote(clean) == clean else [clean, unquote(clean)]
 
 
-def inside_folder(folder: Path, name: str) -> Path | None:
-    """Return the path that a name means below a folder, links resolved; None where it leads out of it."""
+def inside_folder(folder: Path, name: str, *, root: Path | None = None) -> Path | None:
+    """Return the path that a name means from a folder, links resolved; None where it leads out of it, or of ``root``."""
     # a drive letter and a scheme both have a colon; neither is a file beside this one
     if not name or "\0" in name or name.startswith(("/", "~")) or re.match(r"[A-Za-z][A-Za-z0-9+.-]*:", name):
         return None
     if len(name) > _LONGEST_PATH or any(len(part) > _LONGEST_NAME for part in name.split("/")):
         return None
     try:
-        root = folder.resolve()
-        target = (root / name).resolve()
+        here = folder.resolve()
+        target = (here / name).resolve()
+        root = here if root is None else root.resolve()
     except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
         return None
     return target if target.is_relative_to(root) else None

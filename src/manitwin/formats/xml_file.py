@@ -7,6 +7,7 @@ All XML of the package is parsed here.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from xml.parsers import expat
@@ -19,6 +20,7 @@ from manitwin.formats.bounded_file import Refusal, read_bytes
 from manitwin.formats.markdown import one_line
 
 MAX_XML_BYTES = 64 << 20
+_HEAD_BYTES, _DECLARATION_BYTES = 1 << 16, 1 << 10
 MAX_NUMBER = 1e9  # no length, mass or moment of an object that a gripper meets comes near
 
 
@@ -58,6 +60,7 @@ def parse_xml(
     data = data.encode() if isinstance(data, str) else data
     if max_bytes is not None and len(data) > max_bytes:
         raise refusal(f"{name}: more than {max_bytes >> 20} MiB of XML; it is no single object")
+    data = _declared_first(data)
     declares_type = _declares_document_type(data)
     if declares_type:
         raise refusal(f"{name}: its XML declares a document type, which is not read; remove it")
@@ -77,6 +80,30 @@ def parse_xml(
     if etree.QName(root).localname != tag:
         raise refusal(f"{name}: its XML is <{str(root.tag)[:40]}>, not <{tag}>; give a file of that kind")
     return root
+
+
+def _declared_first(data: bytes) -> bytes:
+    """Return a document whose XML declaration stands first and says version 1.0.
+
+    Blank lines and comments above it, and versions such as 0.0, are common in robot descriptions, and read by PyBullet,
+    MuJoCo and Gazebo.
+    """
+    start = data.find(b"<?xml", 0, _HEAD_BYTES)
+    end = data.find(b"?>", start, start + _DECLARATION_BYTES)
+    if start < 0 or end < 0:
+        return data
+    above, declaration, below = data[:start], data[start:end], data[end + 2 :]
+    if declaration.startswith((b'<?xml version="1.0"', b"<?xml version='1.0'")) and above in (b"", b"\xef\xbb\xbf"):
+        return data
+    blank = above.removeprefix(b"\xef\xbb\xbf")
+    while (comment := blank.find(b"<!--")) >= 0:
+        closed = blank.find(b"-->", comment)
+        blank = blank[:comment] + (blank[closed + 3 :] if closed >= 0 else b"<")
+    if blank.strip():
+        return data
+    encoding = re.search(rb"""encoding\s*=\s*["']([A-Za-z][\w.-]{0,40})""", declaration)
+    said = encoding.group(1) if encoding else b"utf-8"
+    return b'<?xml version="1.0" encoding="' + said + b'"?>' + above.removeprefix(b"\xef\xbb\xbf") + below
 
 
 class _Found(Exception):

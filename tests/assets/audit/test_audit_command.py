@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -24,6 +25,7 @@ from manitwin.assets.audit.run import audit_assets
 from manitwin.assets.audit.selection import rule_of, select_rules
 from manitwin.assets.read import read_asset
 from manitwin.cli.commands.audit import audit as audit_command
+from manitwin.cli.main import app
 from manitwin.errors import UsageError
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.hulls.reduction import hull_mesh
@@ -223,6 +225,19 @@ def test_fix_turns_nearly_right_axes_into_a_rotation_and_leaves_mirrored_ones(tm
     np.testing.assert_allclose(frames[0], turn, atol=0.01)
     np.testing.assert_array_equal(frames[1], mirrored)
     assert json.loads((tmp_path / "039_mug" / "model_data0.json.orig").read_text())["scale"] == [1, 1, 1]
+
+
+def test_what_most_assets_have_in_common_is_said_once_with_its_count(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        write_urdf(tmp_path / name)
+        file = next((tmp_path / name).glob("*.urdf"))
+        file.write_text(re.sub(r"<!--.*?-->", "", file.read_text(), flags=re.DOTALL))
+    (tmp_path / "materials.xml").write_text("<mujoco><asset><material name='m'/></asset></mujoco>")
+    done = CliRunner().invoke(app, ["audit", str(tmp_path), "--select", "LIC"])
+    assert done.stdout.count("LIC001") == 1 and "LIC001 warning  2 of 2 assets: no licence is stated" in done.stdout
+    assert "1 descriptions without a shape" in done.stderr
+    alone = CliRunner().invoke(app, ["audit", str(tmp_path / "one"), "--select", "LIC"])
+    assert "  LIC001 warning  no licence is stated" in alone.stdout
 
 
 def test_page_of_the_rules_is_that_of_the_code() -> None:

@@ -289,3 +289,29 @@ def test_twin_whose_frames_are_beside_their_feature_or_of_another_kind(tmp_path:
         record["points"]["functional"] = [point | {"label": label, "frame": frame}]
         seal(folder, record)
         assert {code for code in codes(audit_path(folder, RULES).findings) if code in ("TWN004", "TWN005")} == found
+
+
+def test_a_mass_alone_is_one_finding() -> None:
+    found = audit_asset(with_inertial(inertia_kg_m2=None, center_of_mass_m=None)(clean()), RULES)
+    assert [finding.code for finding in found] == ["INE001"] and "no centre of mass" in found[0].message
+
+
+def test_the_corners_of_hulls_are_counted_and_not_those_of_meshes() -> None:
+    asset = clean()
+    shape = asset.collision[0]
+    extra = shape.vertices.mean(0) + 1e-4 * np.random.default_rng(0).normal(size=(1000, 3))
+    dense = replace(shape, vertices=np.concatenate([shape.vertices, extra]))
+    found = audit_asset(replace(asset, collision=(dense, *asset.collision[1:])), RULES)
+    assert "COL007" not in {finding.code for finding in found}
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.02)
+    round_one = replace(
+        shape, vertices=np.asarray(ball.vertices) + shape.vertices.mean(0), faces=np.asarray(ball.faces)
+    )
+    found = audit_asset(replace(asset, collision=(*asset.collision, round_one)), RULES)
+    assert "COL007" in {finding.code for finding in found}
+
+
+def test_what_stands_fast_is_asked_for_no_mass_and_judged_by_no_hand() -> None:
+    static = replace(scaled(clean(), 100), static=True, inertial=Inertial())
+    codes = {finding.code for finding in audit_asset(static, RULES)}
+    assert not codes & {"MAS001", "SCL001", "COL003", "COL004"}

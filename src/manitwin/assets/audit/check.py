@@ -26,16 +26,19 @@ def audit_asset(asset: Asset, rules: Sequence[Rule]) -> list[Finding]:
     return [_finding(rule, asset.path, complaint) for rule in rules for complaint in measured.complaints(rule.check)]
 
 
-def audit_path(path: Path, rules: Sequence[Rule], fix: bool = False) -> Audited:
-    """Read an asset and hold rules against it; with ``fix``, mend what is safe first. Never raises for an asset's sake."""
+def audit_path(path: Path, rules: Sequence[Rule], fix: bool = False, root: Path | None = None) -> Audited:
+    """Read an asset below a ``root`` and hold rules against it; with ``fix``, mend what is safe first.
+
+    Never raises for an asset's sake.
+    """
     try:
-        asset = read_asset(path)
+        asset = read_asset(path, root=root)
         findings = audit_asset(asset, rules)
         done: list[str] = []
         if fix:
             done = _mend(asset, findings)
             if done:
-                asset = read_asset(path)
+                asset = read_asset(path, root=root)
                 findings = audit_asset(asset, rules)
     except AssetError as error:
         return _unread(path, str(error), rules)
@@ -72,6 +75,6 @@ def _finding(rule: Rule, path: Path, complaint: Complaint) -> Finding:
     return Finding(rule.code, rule.severity, str(path), complaint.message, complaint.file, complaint.values)
 
 
-def audit_by_codes(path: Path, codes: Sequence[str], fix: bool) -> Audited:
+def audit_by_codes(path: Path, codes: Sequence[str], fix: bool, root: Path | None = None) -> Audited:
     """Audit an asset in a process with limits, to which rules go by their codes."""
-    return audit_path(path, [RULES_BY_CODE[code] for code in codes], fix)
+    return audit_path(path, [RULES_BY_CODE[code] for code in codes], fix, root)

@@ -25,7 +25,8 @@ class UniformSolid:
 class ConvexShapes:
     """Convex hulls of vertices: ``planes (P, 4)`` outward, those of hull ``i`` from ``starts[i]`` on; ``boxes (H, 2, 3)``.
 
-    ``flat`` are the indices of the given shapes that have no volume, and are left out; ``kept`` those of the others.
+    ``flat`` are the indices of the given shapes that have no volume, and are left out; ``kept`` those of the others, and
+    ``corners`` how many vertices their hulls have.
     """
 
     planes: np.ndarray
@@ -36,12 +37,13 @@ class ConvexShapes:
     boxes: np.ndarray
     flat: tuple[int, ...]
     kept: tuple[int, ...]
+    corners: tuple[int, ...] = ()
 
     @classmethod
     def of(cls, shapes: Sequence[np.ndarray]) -> ConvexShapes:
         """Take the hulls of shapes, each ``(V, 3)`` m."""
         planes, triangles, volumes, interior, boxes = [], [], [], [], []
-        flat, kept = [], []
+        flat, kept, corners = [], [], []
         for index, vertices in enumerate(shapes):
             try:
                 hull = ConvexHull(vertices)
@@ -49,6 +51,7 @@ class ConvexShapes:
                 flat.append(index)
                 continue
             kept.append(index)
+            corners.append(len(hull.vertices))
             planes.append(hull.equations)
             boxes.append([hull.min_bound, hull.max_bound])
             triangles.append(vertices[hull.simplices])
@@ -64,6 +67,7 @@ class ConvexShapes:
             boxes=np.array(boxes).reshape(-1, 2, 3),
             flat=tuple(flat),
             kept=tuple(kept),
+            corners=tuple(corners),
         )
 
     def __len__(self) -> int:

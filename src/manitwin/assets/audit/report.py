@@ -6,7 +6,8 @@ import json
 import math
 import os
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -26,13 +27,30 @@ def count_by_severity(audited: Sequence[Audited]) -> dict[str, int]:
     return {"error": counts["error"], "warning": counts["warning"], "note": counts["note"]}
 
 
-def text_of(each: Audited) -> str:
-    """Return the lines of one asset, empty where nothing was found and nothing fixed."""
+SAID_ONCE = ("LIC001", "LIC002")
+"""Rules of which most assets of a set have the same fault: of several assets they are said once with their count."""
+
+
+def text_of(each: Audited, *, leave: Collection[str] = ()) -> str:
+    """Return the lines of one asset without rules to ``leave``, empty where nothing else was found and nothing fixed."""
+    each = replace(each, findings=tuple(finding for finding in each.findings if finding.code not in leave))
     if not each.findings and not each.fixed:
         return ""
     lines = [f"{printable_line(each.asset)}{f' ({each.format})' if each.format else ''}"]
     lines += [f"  fixed           {printable_line(said)}" for said in each.fixed]
     lines += [f"  {finding.code} {finding.severity:<8} {one_line(finding.message)}" for finding in each.findings]
+    return "\n".join(lines)
+
+
+def shared_text(audited: Sequence[Audited], codes: Collection[str] = SAID_ONCE) -> str:
+    """Return a line for each of these rules: of how many assets it was found, and what is said of the first."""
+    lines = []
+    for code in codes:
+        found = [finding for each in audited for finding in each.findings if finding.code == code]
+        if found:
+            first = one_line(found[0].message)
+            count = len({finding.asset for finding in found})
+            lines.append(f"{code} {found[0].severity:<8} {count} of {len(audited)} assets: {first}")
     return "\n".join(lines)
 
 

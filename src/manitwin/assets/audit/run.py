@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from manitwin.assets.audit.finding import Audited, Finding, RuleText
 from manitwin.assets.read import find_assets
+from manitwin.assets.root import root_of
 from manitwin.assets.within_limits import LIMITS, why_ended
 from manitwin.errors import UsageError
 from manitwin.formats.isolated import ProcessCrashed, called, limit_address_space, run_isolated
@@ -27,13 +28,16 @@ AUDIT = "manitwin.assets.audit.check:audit_by_codes"
 SELECT = "manitwin.assets.audit.selection:selected_texts"
 
 
-def find_all(paths: Iterable[Path]) -> list[Path]:
-    """Return every asset at or below the paths, each once; raises UsageError for a path that is not there."""
+def find_all(paths: Iterable[Path], fragments: list[Path] | None = None) -> list[Path]:
+    """Return every asset at or below the paths, each once; raises UsageError for a path that is not there.
+
+    ``fragments`` gets the descriptions without a shape, which are no assets.
+    """
     found: dict[Path, None] = {}
     for path in paths:
         if not os.path.exists(path):
             raise UsageError(f"{path}: no such file or folder")
-        found.update(dict.fromkeys(find_assets(path)))
+        found.update(dict.fromkeys(find_assets(path, fragments)))
     return list(found)
 
 
@@ -45,25 +49,31 @@ def rules_selected(select: Iterable[str] = (), ignore: Iterable[str] = ()) -> tu
 
 
 def audit_all(
-    paths: Sequence[Path], rules: Sequence[RuleText], *, jobs: int = 1, fix: bool = False
+    paths: Sequence[Path],
+    rules: Sequence[RuleText],
+    *,
+    jobs: int = 1,
+    fix: bool = False,
+    named: Sequence[Path] = (),
 ) -> Iterator[Audited]:
     """Audit assets in ``jobs`` processes and yield what was found in the order of the paths.
 
+    ``named`` are the folders that the user gave: what an asset names is read below them (``root_of``).
     One that brings its process down, hangs or takes too much memory costs itself alone: it is a finding of it.
     """
     if jobs > 1 and len(paths) > 1:
         with _one_thread_each():
-            yield from _in_processes(paths, rules, jobs, fix)
+            yield from _in_processes(paths, rules, jobs, fix, named)
         return
     for path in paths:
         with _one_thread_each():  # another process is started after a crash
-            audited = _audited(path, rules, fix)
+            audited = _audited(path, rules, fix, root_of(path, named))
         yield audited
 
 
-def _audited(path: Path, rules: Sequence[RuleText], fix: bool) -> Audited:
+def _audited(path: Path, rules: Sequence[RuleText], fix: bool, root: Path) -> Audited:
     try:
-        found: Audited = run_isolated(AUDIT, path, tuple(rule.code for rule in rules), fix, limits=LIMITS)
+        found: Audited = run_isolated(AUDIT, path, tuple(rule.code for rule in rules), fix, root, limits=LIMITS)
     except (ProcessCrashed, MemoryError) as error:
         return _unread(path, why_ended(error), rules)
     return found
@@ -90,7 +100,9 @@ def _one_thread_each() -> Iterator[None]:
             os.environ.pop(name, None)
 
 
-def _in_processes(paths: Sequence[Path], rules: Sequence[RuleText], jobs: int, fix: bool) -> Iterator[Audited]:
+def _in_processes(
+    paths: Sequence[Path], rules: Sequence[RuleText], jobs: int, fix: bool, named: Sequence[Path]
+) -> Iterator[Audited]:
     from pebble import ProcessPool
 
     from manitwin.engine.worker_processes import WorkerContext, hidden_main_module
@@ -103,7 +115,7 @@ def _in_processes(paths: Sequence[Path], rules: Sequence[RuleText], jobs: int, f
             initargs=(LIMITS.memory_bytes,),
         )
         try:
-            yield from _from_pool(pool, paths, rules, jobs, fix)
+            yield from _from_pool(pool, paths, rules, jobs, fix, named)
         finally:
             pool.stop()
             pool.join()
@@ -116,12 +128,13 @@ def _begin(memory_bytes: int) -> None:
 
 
 def _from_pool(
-    pool: ProcessPool, paths: Sequence[Path], rules: Sequence[RuleText], jobs: int, fix: bool
+    pool: ProcessPool, paths: Sequence[Path], rules: Sequence[RuleText], jobs: int, fix: bool, named: Sequence[Path]
 ) -> Iterator[Audited]:
     codes = tuple(rule.code for rule in rules)
     waiting: deque[tuple[Path, Any]] = deque()
     for path in paths:
-        waiting.append((path, pool.schedule(called, args=(AUDIT, (path, codes, fix)), timeout=LIMITS.seconds)))
+        arguments = (path, codes, fix, root_of(path, named))
+        waiting.append((path, pool.schedule(called, args=(AUDIT, arguments), timeout=LIMITS.seconds)))
         if len(waiting) >= AHEAD * jobs:
             yield _result(*waiting.popleft(), rules)
     while waiting:
@@ -149,4 +162,5 @@ def audit_assets(
 ) -> list[Audited]:
     """Audit every asset at or below paths and return what was found of each; raises UsageError for a wrong path or code."""
     rules = rules_selected(select, ignore)
-    return list(audit_all(find_all(Path(path) for path in paths), rules, jobs=jobs, fix=fix))
+    given = [Path(path) for path in paths]
+    return list(audit_all(find_all(given), rules, jobs=jobs, fix=fix, named=given))

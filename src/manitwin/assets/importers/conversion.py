@@ -30,6 +30,8 @@ def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
     return files, record
 
 
-def read_for_import(place: Path, format: Format | Literal["auto"]) -> tuple[dict[str, bytes], ImportRecord]:
-    """Read an asset and return what is imported of it, in a process with limits; raises AssetError."""
-    return imported_files(read_asset(place, format))
+def read_for_import(
+    place: Path, format: Format | Literal["auto"], root: Path | None = None
+) -> tuple[dict[str, bytes], ImportRecord]:
+    """Read an asset below a ``root`` and return what is imported of it, in a process with limits; raises AssetError."""
+    return imported_files(read_asset(place, format, root=root))

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from manitwin.assets.read import find_assets, is_file_below, robotwin_data
+from manitwin.assets.root import root_of
 from manitwin.assets.within_limits import within_limits
 from manitwin.errors import AssetError, UsageError
 from manitwin.formats.bounded_file import read_bytes
@@ -53,7 +54,7 @@ def import_assets(paths: Iterable[Path], out: Path, *, format: Format | Literal[
             raise UsageError(f"{path}: not there; give an asset's file or folder, or a folder of assets")
         for place in _places(path, format):
             try:
-                files, record = within_limits(READ, place, format)
+                files, record = within_limits(READ, place, format, root_of(place, [path]))
             except AssetError as error:
                 yield Imported(place, None, None, str(error))
                 continue

@@ -19,14 +19,14 @@ _UNSAID = ("unknown", "-1", "")
 _HEIGHT_OFF = 0.05  # of the height that the file says: a tilted or wrongly scaled mesh is off by more
 
 
-def read(path: Path) -> Asset:
+def read(path: Path, root: Path | None = None) -> Asset:
     """Read EmbodiedGen's URDF, or the one in a folder (result/NAME.urdf); raises AssetError as the URDF reader does.
 
     Its mu1 and mu2 are the static and the dynamic friction that its annotator was asked for. Without a rotation in the
     visual's origin (older versions) the mesh's Y axis is up.
     Source: embodied_gen/validators/urdf_convertor.py of HorizonRobotics/EmbodiedGen.
     """
-    found = open_urdf(path)
+    found = open_urdf(path, root)
     asset = asset_of(found, path, contact=_contact(found))
     info = found.tree.element.find(".//extra_info")
     remarks = list(asset.remarks)

@@ -16,6 +16,7 @@ from manitwin.assets.asset_files import AssetFiles, joined
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
 from manitwin.assets.readers.mjcf_model import CompiledMjcf, MjcfSource, compiled, open_mjcf
+from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.textures import (
     bake_transform,
@@ -34,16 +35,16 @@ _KINDS = mujoco.mjtGeom
 _MESH_KINDS = (int(_KINDS.mjGEOM_MESH), int(_KINDS.mjGEOM_SDF))
 
 
-def read(path: Path) -> Asset:
+def read(path: Path, root: Path | None = None) -> Asset:
     """Read an MJCF file, or the only one in a folder; the asset's axes are those of the object's first body.
 
-    Defaults, frames and shapes are resolved by MuJoCo; meshes and textures are read here, below the file's folder. An
-    <inertial> is what the file declares; a mass that follows from a geom's mass or density that the file writes is kept
-    without a centre and inertia, with a remark; what only MuJoCo's own default density gives is not declared. Raises
+    Defaults, frames and shapes are resolved by MuJoCo; meshes and textures are read here, below ``root`` (``root_of`` the path
+    by default). An <inertial> is what the file declares; a mass that follows from a geom's mass or density that the file writes
+    is kept without a centre and inertia, with a remark; what only MuJoCo's own default density gives is not declared. Raises
     AssetError naming what is broken. Source: the MJCF reference of MuJoCo.
     """
     file = only_file(path) if path.is_dir() else path
-    files = AssetFiles(path if path.is_dir() else file.resolve().parent)
+    files = AssetFiles(root or root_of(path), file.resolve().parent)
     files.used.add(file.resolve())
     source = open_mjcf(file, files)
     result = compiled(source, files)
@@ -87,6 +88,8 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, 
     if not shaped:
         if model.body_geomnum[0] > 0:  # shapes fixed to the world: a static object
             return [(0, np.eye(4))]
+        if files.missing and groups:  # whose meshes are not there
+            return next(iter(groups.values()))
         raise AssetError(f"{file.name}: no body of it has a geom")
     for group in shaped[1:]:
         files.remark(

@@ -26,8 +26,13 @@ _ASSETS = frozenset({"mesh", "material", "texture"})
 # plug-ins are code, and the others make many bodies of one line
 _NOT_READ = ("attach", "composite", "flexcomp", "plugin", "replicate", "model")
 _WORDS = frozenset({"name", "file", "mesh", "material", "texture", "class", "childclass", "model", "user"})
+_OF_SHAPE_AND_MASS = frozenset(
+    {"pos", "size", "scale", "fromto", "vertex", "refpos", "mass", "density", "diaginertia", "fullinertia", "friction"}
+)
+"""Attributes whose numbers are those of an object; stiffnesses and limits may be as large as anybody likes."""
 _MAX_INCLUDES = 32
 _HEAD_BYTES = 1 << 16
+_LEAST_MASS_KG, _LEAST_INERTIA_KG_M2 = 1e-9, 1e-12
 _MAX_ELEMENTS = 100_000
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
 
@@ -52,7 +57,7 @@ def open_mjcf(file: Path, files: AssetFiles) -> MjcfSource:
     """Parse an MJCF file and put its includes in; raises AssetError for what is broken or not read."""
     root = read_xml(file, "mujoco")
     comments = comments_before(root)
-    _put_in_includes(file, root, files)
+    _put_in_includes(file, root, file, files, {file.resolve()})
     if sum(1 for _ in root.iter()) > _MAX_ELEMENTS:
         raise AssetError(f"{file.name}: more than {_MAX_ELEMENTS} elements; it is no single object")
     for tag in _NOT_READ:
@@ -67,27 +72,58 @@ def open_mjcf(file: Path, files: AssetFiles) -> MjcfSource:
             entry.getparent().remove(entry)
     for element in root.iter(etree.Element):
         _check_numbers(file, element)
+    _leave_out_repeated(root, files)
+    _leave_out_unknown_materials(root, files)
     return MjcfSource(file, root, texts)
 
 
-def _put_in_includes(file: Path, root: etree._Element, files: AssetFiles) -> None:
-    """Replace <include> by the children of the included root, as MuJoCo does; each file once."""
-    done: set[Path] = {file.resolve()}
+def _put_in_includes(
+    main: Path, root: etree._Element, file: Path, files: AssetFiles, done: set[Path], depth: int = 0
+) -> None:
+    """Replace <include> by the children of the included root, as MuJoCo does; each file once.
+
+    A file is looked up from the main file's folder, and then from that of the ``file`` which includes it.
+    """
     while (include := root.find(".//include")) is not None:
-        name = include.get("file") or ""
-        found = files.find(name, [file.parent / name])
+        name = (include.get("file") or "").replace("\\", "/")
+        found = files.find(name, [main.parent / name, file.parent / name])
         if found is None:
-            raise AssetError(f"{file.name}: the file {name[:80]!r} that it includes is not in its folder")
-        if found in done or len(done) > _MAX_INCLUDES:
+            raise AssetError(
+                f"{file.name}: the file {name[:80]!r} that it includes is not there, or above the root"
+                f" {files.root.name!r}; give the folder that holds all of it"
+            )
+        if found in done or len(done) > _MAX_INCLUDES or depth > _MAX_INCLUDES:
             raise AssetError(f"{file.name}: includes {name[:80]!r} twice, or too many files")
         done.add(found)
         head = read_bytes(found, MAX_XML_BYTES, AssetError)[:_HEAD_BYTES]
         tag = "mujocoinclude" if b"<mujocoinclude" in head else "mujoco"
         included = read_xml(found, tag)
+        _put_in_includes(main, included, found, files, done, depth + 1)
         parent, position = include.getparent(), include.getparent().index(include)
         parent.remove(include)
         for offset, child in enumerate(list(included)):
             parent.insert(position + offset, child)
+
+
+def _leave_out_repeated(root: etree._Element, files: AssetFiles) -> None:
+    """Take out assets that are written twice: parts of robots and scenes bring their own, and are joined by programs."""
+    seen: dict[tuple[str, str], dict[str, str]] = {}
+    for entry in root.xpath("asset/*[@name]"):
+        key, written = (entry.tag, entry.get("name")), dict(entry.attrib)
+        if seen.setdefault(key, written) is not written and seen[key] == written:
+            entry.getparent().remove(entry)
+            files.remark(
+                f"<{entry.tag}> {entry.get('name')[:60]!r} is written twice, which MuJoCo refuses; once was read"
+            )
+
+
+def _leave_out_unknown_materials(root: etree._Element, files: AssetFiles) -> None:
+    known = {entry.get("name") for entry in root.iterfind("asset/material")}
+    for element in root.iter("geom", "site"):
+        name = element.get("material")
+        if name is not None and name not in known:
+            del element.attrib["material"]
+            files.remark(f"the material {name[:60]!r} is nowhere written, which MuJoCo refuses; its shapes are grey")
 
 
 def _check_numbers(file: Path, element: etree._Element) -> None:
@@ -99,7 +135,8 @@ def _check_numbers(file: Path, element: etree._Element) -> None:
                 value = float(word)
             except ValueError:
                 break
-            if not math.isfinite(value) or abs(value) > MAX_NUMBER:
+            bounded = name in _OF_SHAPE_AND_MASS
+            if math.isnan(value) or (bounded and abs(value) > MAX_NUMBER):
                 raise AssetError(f"{file.name}: <{element.tag} {name}> is {value}, no number that an object can have")
 
 
@@ -131,7 +168,15 @@ def compiled(source: MjcfSource, files: AssetFiles) -> CompiledMjcf:
     meshes = _take_meshes(source, spec, files)
     textures = _take_textures(source, spec, files)
     try:
-        model = spec.compile()
+        try:
+            model = spec.compile()
+        except (ValueError, RuntimeError, mujoco.FatalError) as error:
+            if "mass and inertia of moving bodies" not in str(error):
+                raise
+            if not files.missing:  # else it would have one with its meshes
+                files.remark("a body of it moves and has no mass, which MuJoCo refuses")
+            spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_MASS_KG, _LEAST_INERTIA_KG_M2
+            model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         raise AssetError(f"{name}: MuJoCo cannot compile it: {_line(error)}") from error
     return CompiledMjcf(spec, model, meshes, textures)

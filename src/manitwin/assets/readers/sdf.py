@@ -13,6 +13,7 @@ from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.read import is_file_below, only_file
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
+from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
 from manitwin.formats.xml_file import comments_before, number, read_xml, text_of
 
@@ -33,24 +34,25 @@ class SdfModel:
     files: AssetFiles
 
 
-def read(path: Path) -> Asset:
+def read(path: Path, root: Path | None = None) -> Asset:
     """Read an SDF file, or a model's folder; the asset's axes are those of the model.
 
-    Meshes are looked up beside the file and, for ``model://``, in the model's folder. Links behind joints that move, nested
+    Meshes are looked up from the file's folder and from those above it up to ``root`` (``root_of`` the path by default), those
+    of ``model://`` in the folder of the model's name before any other. Links behind joints that move, nested
     and included models are left out with a remark. Raises AssetError naming what is broken. Source: the SDFormat
     specification, version 1.9.
     """
-    opened = open_sdf(path)
+    opened = open_sdf(path, root)
     return asset_of(opened, path)
 
 
-def open_sdf(path: Path) -> SdfModel:
+def open_sdf(path: Path, folder: Path | None = None) -> SdfModel:
     """Parse an SDF and choose the object in it; raises AssetError."""
     file = path
     if path.is_dir():
         file = path / MAIN_FILE if is_file_below(path / MAIN_FILE, path) else only_file(path)
     root = read_xml(file, "sdf")
-    files = AssetFiles(file.parent)
+    files = AssetFiles(folder or root_of(path), file.resolve().parent)
     files.used.add(file.resolve())
     config = file.parent / CONFIG_FILE
     beside = read_xml(config, "model", inside=config.parent) if is_file_below(config, config.parent) else None
@@ -80,6 +82,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         unit_m=1.0,
         inertial=_declared_inertial(opened),
         contact=_declared_contact(opened),
+        static=(text_of(opened.model, "static") or "").lower() in ("true", "1"),
         license=licence,
         attribution=attribution,
         files=opened.files.sorted_files(),

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import manifold3d
 import numpy as np
 import trimesh
 from lxml import etree  # type: ignore[import-untyped]
@@ -14,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import AssetFiles, joined
-from manitwin.assets.readers.urdf_shapes import mesh_parts, plain_material
+from manitwin.assets.readers.urdf_shapes import candidates, mesh_parts, plain_material
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part
@@ -22,7 +23,8 @@ from manitwin.formats.xml_file import number, numbers, text_of
 from manitwin.geometry.poses import transform
 
 MODEL_FRAME = "__model__"
-_SCHEMES = ("model://", "package://")
+_SHEET_M = 1e-3
+_MAX_POINTS = 10_000
 
 
 def pose_of(element: etree._Element, what: str) -> np.ndarray:
@@ -56,6 +58,8 @@ class ModelFrames:
         for element in (*model.findall("link"), *model.findall("frame"), *model.findall("joint")):
             name = element.get("name") or ""
             what = f"{file.name}: {element.tag} {name!r}"
+            if element.tag == "joint" and name in self._base:
+                continue  # before SDFormat 1.7 a joint might have the name of a link, and no pose was relative to it
             if not name or name in self._base:
                 raise AssetError(f"{what}: without a name, or with that of another")
             default = element.get("attached_to") or MODEL_FRAME
@@ -170,13 +174,7 @@ class SdfShapes:
 
     def _candidates(self, uri: str) -> Iterator[Path]:
         clean = uri.replace("\\", "/").removeprefix("file://")
-        root = self._files.root
-        for scheme in _SCHEMES:
-            if clean.startswith(scheme):
-                inside = clean.removeprefix(scheme)  # the model's name comes first, and the model is this folder
-                yield from (root / inside.partition("/")[2], root / inside)
-                return
-        yield self._file.parent / clean
+        yield from candidates(clean, self._file, self._files.root)
 
     def _mesh_path(self, element: etree._Element) -> Path | None:
         uri = text_of(element, "geometry/mesh/uri")
@@ -194,7 +192,39 @@ def _primitive(shape: etree._Element, what: str) -> trimesh.Trimesh | None:
     if shape.tag in ("cylinder", "capsule"):
         build = primitives.cylinder if shape.tag == "cylinder" else primitives.capsule
         return build(_positive(shape, "radius", what), _positive(shape, "length", what))
+    if shape.tag == "plane":
+        return _plane(shape, what)
+    if shape.tag == "polyline":
+        return _polyline(shape, what)
     return None
+
+
+def _plane(shape: etree._Element, what: str) -> trimesh.Trimesh:
+    """Return the rectangle that a plane shows, as a sheet under it; to collide with it has no end."""
+    normal = numbers(text_of(shape, "normal") or "0 0 1", 3, f"{what} normal")
+    length = float(np.linalg.norm(normal))
+    if length == 0:
+        raise AssetError(f"{what} normal: a vector of length 0 has no direction")
+    size = numbers(text_of(shape, "size") or "1 1", 2, f"{what} size")
+    if (size <= 0).any():
+        raise AssetError(f"{what} size: {size.min()} is not above zero")
+    sheet = trimesh.creation.box((*size, _SHEET_M))
+    sheet.apply_translation((0, 0, -_SHEET_M / 2))
+    sheet.apply_transform(trimesh.geometry.align_vectors((0, 0, 1), normal / length))
+    return sheet
+
+
+def _polyline(shape: etree._Element, what: str) -> trimesh.Trimesh:
+    """Return the prism over a closed line of points, from z = 0 to its height."""
+    points = [numbers(" ".join((point.text or "").split()), 2, f"{what} point") for point in shape.findall("point")]
+    height = _positive(shape, "height", what)
+    prism = None
+    if 3 <= len(points) <= _MAX_POINTS:
+        outline = manifold3d.CrossSection([np.array(points)], manifold3d.FillRule.NonZero)
+        prism = outline.extrude(height).to_mesh64()
+    if prism is None or not len(prism.tri_verts):
+        raise AssetError(f"{what}: its polyline of {len(points)} points encloses no area; give 3 to {_MAX_POINTS}")
+    return trimesh.Trimesh(prism.vert_properties[:, :3], prism.tri_verts.astype(np.int64), process=False)
 
 
 def _positive(shape: etree._Element, tag: str, what: str) -> float:

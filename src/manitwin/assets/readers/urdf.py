@@ -13,8 +13,9 @@ from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
 from manitwin.assets.readers.urdf_shapes import LinkShapes
+from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
-from manitwin.formats.xml_file import comments_before, number
+from manitwin.formats.xml_file import comments_before, number, text_of
 from manitwin.robots.urdf import (
     JOINT_TYPES,
     UrdfRules,
@@ -44,21 +45,21 @@ class UrdfObject:
     files: AssetFiles
 
 
-def read(path: Path) -> Asset:
+def read(path: Path, root: Path | None = None) -> Asset:
     """Read a URDF, or the only one in a folder; the asset's axes are those of the first link of the object.
 
-    Meshes are looked up beside the file and, for ``package://``, in the asset's folder: the folder given, or the nearest
-    one above the file that has a package.xml. Links behind joints that move are left out with a remark. Raises AssetError
-    naming what is broken. Source: the URDF XML specification of ROS.
+    Meshes are looked up from the file's folder and from those above it up to ``root`` (``root_of`` the path by default), those
+    of ``package://`` in the folder of the package's name before any other. Links behind joints that move are left out with a
+    remark. Raises AssetError naming what is broken. Source: the URDF XML specification of ROS.
     """
-    return asset_of(open_urdf(path), path)
+    return asset_of(open_urdf(path, root), path)
 
 
-def open_urdf(path: Path) -> UrdfObject:
+def open_urdf(path: Path, root: Path | None = None) -> UrdfObject:
     """Parse a URDF and choose the object in it; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
     tree = read_urdf(file, RULES, file.name)
-    files = AssetFiles(path if path.is_dir() else _package_of(file))
+    files = AssetFiles(root or root_of(path), file.resolve().parent)
     files.used.add(file.resolve())
     return UrdfObject(file, tree, _rigid_links(tree, files), files)
 
@@ -134,26 +135,17 @@ def gazebo_friction(found: UrdfObject) -> tuple[float, float | None] | None:
     inside = [element for link, _ in found.links for element in link.iter("gazebo")]
     beside = [element for element in found.tree.element.findall("gazebo") if element.get("reference") in names]
     for element in [*inside, *beside]:
-        first = element.find("mu1")
+        first, second = text_of(element, "mu1"), text_of(element, "mu2")
         if first is not None:
-            second = element.find("mu2")
             return (
-                number(first.text, f"{found.file.name}: mu1"),
-                None if second is None else number(second.text, f"{found.file.name}: mu2"),
+                number(first, f"{found.file.name}: mu1"),
+                None if second is None else number(second, f"{found.file.name}: mu2"),
             )
     return None
 
 
 def _value(found: UrdfObject, element: etree._Element | None) -> float | None:
     return None if element is None else number(element.get("value"), f"{found.file.name}: {element.tag}")
-
-
-def _package_of(file: Path) -> Path:
-    folder = file.resolve().parent
-    for above in (folder, *folder.parents):
-        if (above / "package.xml").is_file():
-            return above
-    return folder
 
 
 def _rigid_links(tree: UrdfTree, files: AssetFiles) -> tuple[tuple[etree._Element, np.ndarray], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,11 +13,12 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.root import upward
 from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part, pbr_material, srgb_to_linear
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
-_PACKAGE = "package://"
+_SCHEMES = ("package://", "model://")
 _BARE_MESHES = (".stl",)  # a mesh that has a colour of its own keeps it
 
 
@@ -77,15 +79,7 @@ class LinkShapes:
 
     def _candidates(self, name: str) -> Iterator[Path]:
         clean = name.replace("\\", "/").removeprefix("file://")
-        root, beside = self._files.root, self._file.parent
-        if clean.startswith(_PACKAGE):
-            inside = clean.removeprefix(_PACKAGE)
-            yield from (root / inside, beside / inside)
-            without_package = inside.partition("/")[2]
-            if without_package:
-                yield from (root / without_package, beside / without_package)
-        else:
-            yield beside / clean
+        yield from candidates(clean, self._file, self._files.root)
 
     def _mesh_file(self, element: etree._Element) -> Path | None:
         shape = element.find("geometry/mesh")
@@ -100,6 +94,27 @@ class LinkShapes:
             return None
         own = _rgba(material)
         return own if own is not None else self._colors.get(material.get("name"))
+
+
+def candidates(name: str, file: Path, root: Path) -> Iterator[Path]:
+    """Yield where a file that a description names may lie: from the description's folder upward to the root.
+
+    What names a package or model (``package://NAME/...``) lies in the folder of that name, or in a folder that holds the
+    package without being called so. Isaac Gym takes names from the folder that its caller says, which is one above.
+    """
+    scheme = next((scheme for scheme in _SCHEMES if name.startswith(scheme)), "")
+    inside = name.removeprefix(scheme)
+    folders = list(upward(file.parent, root))
+    if not scheme:
+        yield file.parent / inside
+        places = (Path(os.path.normpath(folder / inside)) for folder in folders[1:])
+        yield from (place for place in places if place.is_relative_to(folders[-1]))
+        return
+    package, _, rest = inside.partition("/")
+    yield from (folder / rest for folder in folders if folder.name == package and rest)
+    yield from (folder / inside for folder in folders)
+    if rest:
+        yield from (folder / rest for folder in folders)
 
 
 def _scale(element: etree._Element) -> np.ndarray:

@@ -48,30 +48,38 @@ def audit(
     rules = rules_selected((select or "").split(","), (ignore or "").split(","))
     if not rules:
         raise UsageError("--select and --ignore leave no rule; leave one of them out")
-    assets = find_all(paths or [])
+    fragments: list[Path] = []
+    assets = find_all(paths or [], fragments)
     if not assets:
         raise UsageError(f"{', '.join(map(str, paths or []))}: holds no asset of a known format; {VALID_ASSETS}")
     audited = []
-    for each in audit_all(assets, rules, jobs=jobs, fix=fix):
+    for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths or []):
         audited.append(each)
         if format == "text":
-            _write_text(each)
+            _write_text(each, len(assets) > 1)
+    if fragments:
+        err_console.print(
+            f"{len(fragments)} descriptions without a shape, which others include, are no assets and were left alone"
+        )
     _write_end(audited, rules, format)
     raise typer.Exit(1 if any(f.severity == "error" for each in audited for f in each.findings) else 0)
 
 
-def _write_text(each: Audited) -> None:
-    from manitwin.assets.audit.report import text_of
+def _write_text(each: Audited, one_of_several: bool) -> None:
+    from manitwin.assets.audit.report import SAID_ONCE, text_of
 
-    text = text_of(each)
+    text = text_of(each, leave=SAID_ONCE if one_of_several else ())
     if text:
         write_text(text + "\n")
 
 
 def _write_end(audited: Sequence[Audited], rules: Sequence[RuleText], format: str) -> None:
-    from manitwin.assets.audit.report import json_of, sarif_of, summary
+    from manitwin.assets.audit.report import json_of, sarif_of, shared_text, summary
 
     if format == "text":
+        shared = shared_text(audited) if len(audited) > 1 else ""
+        if shared:
+            write_text(shared + "\n")
         write_text(summary(audited) + "\n")
         return
     write_json(json_of(audited) if format == "json" else sarif_of(audited, rules))

@@ -11,6 +11,7 @@ import trimesh
 from manitwin.formats.isolated import ProcessCrashed, run_isolated
 from manitwin.formats.meshes.dae import read_dae
 from manitwin.formats.meshes.gltf import read_gltf
+from manitwin.formats.meshes.msh import read_msh
 from manitwin.formats.meshes.obj import read_obj
 from manitwin.formats.meshes.ply import read_ply
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
@@ -27,6 +28,7 @@ _SUFFIXES = {
     "stl": (".stl",),
     "dae": (".dae",),
     "usdz": (".usdz",),
+    "msh": (".msh",),
 }
 _MAX_COORDINATE = 1e12
 """In the file's unit: a survey's millimetres stay below, and areas and volumes of such numbers are finite in single precision."""
@@ -39,7 +41,8 @@ class MeshFile:
 
     ``parts`` are trimesh meshes with TextureVisuals and PBRMaterial, in the file's own unit and axes, scene transforms
     baked. ``unit_m`` is the length of that unit in metres and ``up`` the file's up axis ('x' | 'y' | 'z'), None where
-    the format does not say. ``findings`` are plain sentences about what was left out or assumed.
+    the format does not say. ``findings`` are plain sentences about what was left out or assumed, ``files`` the other files
+    that were read for it.
     """
 
     parts: list[trimesh.Trimesh]
@@ -47,15 +50,20 @@ class MeshFile:
     unit_m: float | None
     up: str | None
     findings: list[str]
+    files: tuple[Path, ...] = ()
 
 
-def read_mesh(path: Path, *, limits: MeshLimits | None = None) -> MeshFile:
-    """Read a mesh file, by content and not by name; files that it names are only read from its own folder.
+def read_mesh(
+    path: Path, *, limits: MeshLimits | None = None, root: Path | None = None, texture_folders: tuple[Path, ...] = ()
+) -> MeshFile:
+    """Read a mesh file, by content and not by name; files that it names are only read from its own folder, or ``root``.
+
+    ``texture_folders``: where pictures are looked up by their name alone, if they are not where the mesh says.
 
     Raises InputError: ``unreadable``, ``too_large``, ``empty``, ``wrong_type``, ``animated``, ``no_faces``, ``not_finite``.
     """
     sniffed = sniff(path)
-    source = MeshSource(path, limits or MeshLimits())
+    source = MeshSource(path, limits or MeshLimits(), root=root, texture_folders=texture_folders)
     if sniffed.kind != "mesh":
         raise source.refused("wrong_type", f"holds an image ({sniffed.format}), not a mesh", "give it as an image")
     if path.suffix.lower() not in _SUFFIXES[sniffed.format]:
@@ -68,7 +76,7 @@ def read_mesh(path: Path, *, limits: MeshLimits | None = None) -> MeshFile:
     if unit_m is not None and not _MIN_UNIT_M <= unit_m <= _MAX_UNIT_M:
         source.find(f"its unit of {unit_m} m was not used")
         unit_m = None
-    return MeshFile(parts, sniffed.format, unit_m, up, source.findings)
+    return MeshFile(parts, sniffed.format, unit_m, up, source.findings, source.files())
 
 
 def _read(format: str, source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, str | None]:
@@ -80,7 +88,7 @@ def _read(format: str, source: MeshSource) -> tuple[list[trimesh.Trimesh], float
         return read_dae(source)
     if format == "usdz":
         return _read_usdz(source)
-    readers = {"obj": read_obj, "ply": read_ply, "stl": read_stl}
+    readers = {"obj": read_obj, "ply": read_ply, "stl": read_stl, "msh": read_msh}
     return readers[format](source), None, None
 
 

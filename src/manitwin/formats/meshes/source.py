@@ -63,9 +63,10 @@ class MeshLimits:
 class MeshSource:
     """A mesh file, and the only way for a reader to reach the files that it names.
 
-    Names are looked up below the file's own folder and nowhere else: absolute paths, ``..``, links that lead out and
-    remote addresses are never followed, and only regular files are opened. ``findings`` collects plain sentences about what
-    was left out or assumed, ``textures`` what was decoded, by its bytes' digest.
+    Names are looked up from the file's own folder, below it or below ``root`` and nowhere else: absolute paths, links that
+    lead out and remote addresses are never followed, and only regular files are opened. What is not there is looked for in
+    ``texture_folders`` by its name alone. ``findings`` collects plain sentences about what was left out or assumed,
+    ``textures`` what was decoded, by its bytes' digest.
     """
 
     path: Path
@@ -73,6 +74,8 @@ class MeshSource:
     findings: list[str] = field(default_factory=list)
     bytes_read: int = 0
     textures: dict[str, Image.Image | None] = field(default_factory=dict)
+    root: Path | None = None
+    texture_folders: tuple[Path, ...] = ()
     _texture_pixels: int = 0
     _contents: dict[Path, bytes] = field(default_factory=dict)
 
@@ -93,15 +96,24 @@ class MeshSource:
 
         Raises InputError ``too_large`` where all files together are larger than the limit.
         """
+        outside = False
         for spelling in spellings(name):
-            found = inside_folder(self.path.parent, spelling)
-            if found is None:
-                self.find(f"{what} {_short(name)} lies outside the file's own folder and was not read")
-                return None
-            if is_regular(found):
-                return self._read(found)
-        self.find(f"{what} {_short(name)} is not there; carried on without it")
+            named = inside_folder(self.path.parent, spelling, root=self.root)
+            outside = outside or named is None
+            places = [(self.root or self.path.parent, named)]
+            places += [(folder, inside_folder(folder, spelling.rpartition("/")[2])) for folder in self.texture_folders]
+            for inside, found in places:
+                if found is not None and is_regular(found):
+                    return self._read(found, inside)
+        if outside:
+            self.find(f"{what} {_short(name)} lies outside the file's own folder and was not read")
+        else:
+            self.find(f"{what} {_short(name)} is not there; carried on without it")
         return None
+
+    def files(self) -> tuple[Path, ...]:
+        """Return the other files that were read, sorted."""
+        return tuple(sorted(self._contents))
 
     def find(self, sentence: str) -> None:
         """Note a finding once."""
@@ -157,13 +169,13 @@ class MeshSource:
             cause = f"its {format} is broken ({type(error).__name__}: {str(error)[:80]})"
             raise self.unreadable(cause, "export it again") from error
 
-    def _read(self, found: Path) -> bytes:
+    def _read(self, found: Path, inside: Path) -> bytes:
         # each file once: many materials may name one texture
         if found not in self._contents:
             together = f"it and the files that it names have more than {self.limits.max_bytes} bytes"
             left, refuse = self.limits.max_bytes - self.bytes_read, partial(InputError, "unreadable")
             self._contents[found] = read_bytes(
-                found, left, refuse, inside=self.path.parent, refuse_size=lambda _: self.too_large(together)
+                found, left, refuse, inside=inside, refuse_size=lambda _: self.too_large(together)
             )
             self.bytes_read += len(self._contents[found])
         return self._contents[found]

@@ -18,10 +18,11 @@ AWAY_SHARE = 0.1
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a mass without its centre."""
+    """Complain of a mass and an inertia without the centre; without an inertia either, INE001 says both."""
     inertial = measured.asset.inertial
-    if inertial.mass_kg is not None and inertial.center_of_mass_m is None:
-        yield Complaint("a mass is declared, but no centre of mass")
+    declared = inertial.mass_kg is not None and inertial.inertia_kg_m2 is not None
+    if declared and inertial.center_of_mass_m is None:
+        yield Complaint("a mass and an inertia are declared, but no centre of mass")
 
 
 def outside(measured: MeasuredAsset) -> Iterator[Complaint]:

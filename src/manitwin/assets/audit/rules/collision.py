@@ -69,7 +69,7 @@ def has_convex_pieces(measured: MeasuredAsset) -> bool:
 def filled_opening(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of a container that the collision shapes fill."""
     air = measured.air
-    if air is None or air.opens is None or not has_convex_pieces(measured):
+    if measured.asset.static or air is None or air.opens is None or not has_convex_pieces(measured):
         return
     kept = 1 - float(measured.shapes.within(air.points_m[air.hollow]).mean())
     if kept < LEAST_KEPT:
@@ -82,7 +82,7 @@ def filled_opening(measured: MeasuredAsset) -> Iterator[Complaint]:
 def sticks_out(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of collision shapes that reach far into the open air beside the object, hollows of containers apart."""
     air = measured.air
-    if air is None or not has_convex_pieces(measured):
+    if measured.asset.static or air is None or not has_convex_pieces(measured):
         return
     limit = max(STICKS_OUT_M, STICKS_OUT_SHARE * measured.longest_m)
     beside = air.points_m[~air.hollow]
@@ -148,16 +148,18 @@ def _is_concave(shape: CollisionShape, hull_volume_m3: float) -> bool:
 
 
 def costly(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of more shapes or vertices than engines take well."""
+    """Complain of more shapes, or of convex hulls of more vertices, than engines take well."""
     shapes = measured.asset.collision
     if len(shapes) > MANY_SHAPES:
         yield Complaint(f"{len(shapes)} collision shapes: every contact becomes slow", values={"shapes": len(shapes)})
-    large = [shape for shape in shapes if shape.convex and len(shape.vertices) > MANY_VERTICES]
+    corners = zip(measured.shapes.kept, measured.shapes.corners, strict=True)
+    large = [(shapes[index], count) for index, count in corners if shapes[index].convex and count > MANY_VERTICES]
     if large:
-        most = max(len(shape.vertices) for shape in large)
+        most = max(count for _, count in large)
         yield Complaint(
-            f"{len(large)} convex shapes have more than {MANY_VERTICES} vertices, up to {most}: PhysX simplifies them",
-            file=large[0].file,
+            f"the hulls of {len(large)} convex shapes have more than {MANY_VERTICES} vertices, up to {most}: PhysX"
+            " simplifies them",
+            file=large[0][0].file,
             values={"vertices": most},
         )
 

@@ -21,10 +21,11 @@ ballast or a motor moves matter within the shape. Our choice: among 25 real obje
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a mass without an inertia."""
+    """Complain of a mass without an inertia; where its centre is not declared either, that is part of it."""
     inertial = measured.asset.inertial
     if inertial.mass_kg is not None and inertial.inertia_kg_m2 is None:
-        yield Complaint("a mass is declared, but no inertia: it is left to the simulator")
+        centre = " and no centre of mass: they are" if inertial.center_of_mass_m is None else ": it is"
+        yield Complaint(f"a mass is declared, but no inertia{centre} left to the simulator")
 
 
 def principal_moments(inertia: np.ndarray) -> np.ndarray | None:

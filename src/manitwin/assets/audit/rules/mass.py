@@ -42,8 +42,8 @@ SIZE_SLACK = 1.5
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an asset that declares no mass."""
-    if measured.asset.inertial.mass_kg is None:
+    """Complain of an asset that may move and declares no mass."""
+    if measured.asset.inertial.mass_kg is None and not measured.asset.static:
         yield Complaint("no mass is declared: the simulator takes one of its own")
 
 

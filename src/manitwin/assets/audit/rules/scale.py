@@ -29,6 +29,8 @@ FLOOR_SHARE, CENTER_SHARE = 0.01, 0.02
 def outside_hand_size(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of objects that nobody handles."""
     longest = measured.longest_m
+    if measured.asset.static:
+        return
     if measured.bounds is not None and not SMALLEST_M <= longest <= LARGEST_M:
         usual = Interval(low=0.02, typical=0.15, high=0.5) if measured.prior is None else measured.prior.longest_axis_m
         yield Complaint(

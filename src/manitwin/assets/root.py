@@ -1,0 +1,40 @@
+"""The root of an asset: the folder above which nothing is read for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+PACKAGE_MARKS = ("package.xml", "model.config")
+"""A package of ROS, and a model of Gazebo: their folders are self-contained."""
+REPOSITORY_MARK = ".git"
+
+
+def root_of(path: Path, named: Iterable[Path] = ()) -> Path:
+    """Return the root of an asset in a file or folder, links resolved.
+
+    It is the folder that the user ``named``, where the asset lies in one; else the repository that it lies in, or the package
+    or model (``PACKAGE_MARKS``), or its own folder. A home folder is no repository, nor are those above it.
+    """
+    own = path.resolve() if path.is_dir() else path.resolve().parent
+    within = [folder.resolve() for folder in named if folder.is_dir()]
+    holding = [folder for folder in within if own.is_relative_to(folder)]
+    if holding:
+        return min(holding, key=lambda folder: len(folder.parts))
+    private = {Path.home().resolve(), *Path.home().resolve().parents}
+    above = [folder for folder in (own, *own.parents) if folder not in private]
+    for marks in ((REPOSITORY_MARK,), PACKAGE_MARKS):
+        for folder in above:
+            if any((folder / mark).exists() for mark in marks):
+                return folder
+    return own
+
+
+def upward(folder: Path, root: Path) -> Iterator[Path]:
+    """Yield a folder and those above it up to the root, which comes last; the folder alone where it is not below the root."""
+    folder, root = folder.resolve(), root.resolve()
+    yield folder
+    if folder.is_relative_to(root):
+        while folder != root:
+            folder = folder.parent
+            yield folder
