@@ -6,12 +6,15 @@ import io
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import trimesh
 from PIL import Image
 
 from manitwin.geometry.poses import transform
+from manitwin.render.cameras import framing_camera, project
 from manitwin.render.card import HEIGHT, PANEL, RED, WIDTH, CardText, make_card
 from manitwin.render.card_panels import GRASP, CardGrasp, CardPoint, diverse, input_panel
+from manitwin.render.center_of_mass import MassCenter, draw_mass_center
 from manitwin.render.renderer import BACKDROP
 from manitwin.render.surfaces import plain_part
 from manitwin.robots.grippers.gripper import load_gripper
@@ -85,3 +88,22 @@ def test_a_stamp_is_seen_on_every_picture_of_what_was_made() -> None:
         left = 24 + column * (PANEL + 16)
         red = [(image[96 : 96 + PANEL, left : left + PANEL] == RED).all(2).sum() for image in (plain, stamped)]
         assert red[0] == 0 and red[1] > 500
+
+
+def test_centre_of_mass_is_drawn_where_it_is_with_a_ring_as_wide_as_it_is_uncertain() -> None:
+    camera = framing_camera(
+        box().vertices, azimuth_deg=0.0, elevation_deg=0.0, fov_y_deg=24.0, width_px=200, height_px=200
+    )
+    grey = np.full((200, 200, 3), 128, dtype=np.uint8)
+    center = np.array([0.0, 0.01, 0.03])
+    drawn = draw_mass_center(grey, MassCenter(center, 0.02), camera)
+    changed = np.argwhere((drawn != 128).any(2))[:, ::-1] + 0.5
+    pixels, depth = project(center[None], camera)
+    away = np.linalg.norm(changed - pixels[0], axis=1)
+    assert changed.mean(0) == pytest.approx(pixels[0], abs=0.5)
+    ring_px = camera.focal_px * 0.02 / depth[0]
+    assert np.median(away[away > ring_px / 2]) == pytest.approx(ring_px, abs=1.0)
+    small = draw_mass_center(grey, MassCenter(center, 0.0), camera)
+    assert 40 < (small != 128).any(2).sum() < 200, "the disc alone"
+    assert {(0, 0, 0), (1, 1, 1)} <= {tuple(p) for p in (small[(small != 128).any(2)] > 128).astype(int)}
+    assert card(mass=MassCenter(center, 0.01)) != card()

@@ -20,6 +20,7 @@ from manitwin.pipeline.object_state import load_hulls, load_solid, object_name
 from manitwin.pipeline.quality import filled_in, quality_checks
 from manitwin.render.card import CardText, make_card
 from manitwin.render.card_panels import CardGrasp, CardPoint
+from manitwin.render.center_of_mass import MassCenter
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.grasp_table import read_grasp_table
 
@@ -31,7 +32,7 @@ class FinishStage:
     gripper: Gripper
 
     name: ClassVar[str] = "finish"
-    version: ClassVar[str] = "8"
+    version: ClassVar[str] = "9"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb", "solid.npz", "hulls.npz", "grasps.parquet", "photo.png?", "matte?", "naming?", "generation?", "geometry",
         "gate", "physical", "size", "collision", "language", "points", "frames_missing", GRASP_POINTS, "grasps",
@@ -46,6 +47,8 @@ class FinishStage:
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Draw the card of an accepted twin."""
         photo = np.asarray(Image.open(draft.path("photo.png"))) if "photo.png" in draft.paths else None
+        physical = draft.field("physical")
+        mass = MassCenter(np.array(physical["center_of_mass_m"]), float(physical["center_of_mass_uncertainty_m"]))
         card = make_card(
             parts=read_glb(draft.path("visual.glb")),
             solid=load_solid(draft.path("solid.npz")),
@@ -53,6 +56,7 @@ class FinishStage:
             points=_card_points(draft.field("points") | draft.field(GRASP_POINTS)),
             grasps=self._card_grasps(draft.path("grasps.parquet")),
             text=card_text(draft),
+            mass=mass,
             photo=photo,
             prompt=draft.payload.text,
         )

@@ -30,6 +30,7 @@ from manitwin.render.card_panels import (
     mesh_panel,
     render_panel,
 )
+from manitwin.render.center_of_mass import MassCenter
 from manitwin.render.markers import font_of
 from manitwin.render.raycast import merged
 from manitwin.render.renderer import BACKDROP
@@ -65,14 +66,16 @@ def make_card(
     points: Sequence[CardPoint],
     grasps: Sequence[CardGrasp],
     text: CardText,
+    mass: MassCenter | None = None,
     photo: np.ndarray | None = None,
     prompt: str | None = None,
 ) -> bytes:
     """Draw a twin's card and return it as PNG.
 
     ``parts`` are the textured meshes, ``solid`` the repaired one, ``hulls`` the vertices ``(V, 3)`` of each collision
-    hull, all in the object frame in metres. The first column shows ``photo (H, W, 3 or 4) uint8`` or ``prompt``; where
-    the input was a mesh it shows the bare shape. Raises RendererMissing where nothing renders.
+    hull, all in the object frame in metres; ``mass`` is drawn over the hulls. The first column shows
+    ``photo (H, W, 3 or 4) uint8`` or ``prompt``; where the input was a mesh it shows the bare shape. Raises RendererMissing
+    where nothing renders.
     """
     mesh = merged(list(parts))
     outline = convex_corners(np.asarray(mesh.vertices))[0]  # all that a camera's choice depends on
@@ -87,7 +90,7 @@ def make_card(
     columns = (
         (first, caption),
         (render_panel(parts, mesh, hero), "twin as rendered"),
-        (mesh_panel(solid, hulls, hero), f"{len(solid.faces):,} triangles, {len(hulls)} convex collision hulls"),
+        (mesh_panel(solid, hulls, hero, mass), f"{len(solid.faces):,} triangles, {len(hulls)} convex collision hulls"),
         (grasp_panel(parts, mesh, points, grasps, hero), f"points, and {drawn} of {len(grasps)} verified grasps"),
     )
     card = Image.new("RGB", (WIDTH, HEIGHT), "white")
@@ -100,7 +103,8 @@ def make_card(
         if text.stamp is not None and index > 0:  # the input is the input
             _stamp(card, text.stamp, left, TOP)
     _legend(draw)
-    draw.text((MARGIN + 2, HEIGHT - 16), _shortened(text.footer, 1400, 12), fill=GREY, font=font_of(12), anchor="lm")
+    room = 1400 if mass is None else _mass_legend(draw, MARGIN + 3 * PANEL + 2 * GAP, HEIGHT - 16) - MARGIN - GAP
+    draw.text((MARGIN + 2, HEIGHT - 16), _shortened(text.footer, room, 12), fill=GREY, font=font_of(12), anchor="lm")
     stream = io.BytesIO()
     card.save(stream, "PNG", compress_level=5)
     return stream.getvalue()
@@ -142,6 +146,17 @@ def _legend(draw: ImageDraw.ImageDraw) -> None:
         x -= 14
         draw.ellipse((x, y - 4, x + 8, y + 4), fill=color)
         x -= 18
+
+
+def _mass_legend(draw: ImageDraw.ImageDraw, right: int, y: int) -> int:
+    """Explain the quartered disc, and the ring around it, up to the right edge of the hulls; return where that begins."""
+    words = "centre of mass; ring: how far it may be off"
+    left = right - round(font_of(12).getlength(words))
+    draw.text((left, y), words, fill=GREY, font=font_of(12), anchor="lm")
+    draw.ellipse((left - 18, y - 6, left - 6, y + 6), fill="white", outline=INK)
+    for start in (90, 270):
+        draw.pieslice((left - 18, y - 6, left - 6, y + 6), start, start + 90, fill=INK)
+    return left - 18
 
 
 def _prompt_panel(prompt: str) -> np.ndarray:

@@ -14,6 +14,7 @@ from manitwin.geometry.hulls.reduction import convex_corners, hull_mesh
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.render.cameras import Camera, framing_camera, project, silhouette_area_px
+from manitwin.render.center_of_mass import MassCenter, draw_mass_center
 from manitwin.render.markers import draw_frames, draw_markers
 from manitwin.render.overlays import ground_shadow, visible_edges
 from manitwin.render.raycast import cast_camera, merged, visible_points
@@ -74,8 +75,10 @@ def clay_panel(mesh: trimesh.Trimesh, hero: Camera) -> np.ndarray:
     return _grounded([plain_part(mesh, CLAY)], mesh, _turned(hero, np.asarray(mesh.vertices), 180.0))
 
 
-def mesh_panel(solid: trimesh.Trimesh, hulls: Sequence[np.ndarray], hero: Camera) -> np.ndarray:
-    """Draw the convex collision hulls, each in its colour, under the edges of the solid mesh."""
+def mesh_panel(
+    solid: trimesh.Trimesh, hulls: Sequence[np.ndarray], hero: Camera, mass: MassCenter | None = None
+) -> np.ndarray:
+    """Draw the convex collision hulls, each in its colour, under the edges of the solid mesh, and the centre of mass."""
     camera = _turned(hero, np.concatenate([np.asarray(solid.vertices), *hulls]), 0.0)
     parts = _colored([hull_mesh(hull) for hull in hulls], HULL_COLORS, roughness=0.9)
     picture = shared_renderer().render(parts, [camera])[0].rgb.astype(np.float32)
@@ -84,7 +87,8 @@ def mesh_panel(solid: trimesh.Trimesh, hulls: Sequence[np.ndarray], hero: Camera
     # A fine mesh would be black: its lines together take away at most a quarter of the light.
     strength = min(2.2, 0.25 * max(1, int((depth > 0).sum())) / max(1e-6, float(cover.sum())))
     alpha = np.minimum(cover * strength, 0.85)[..., None]
-    return np.rint(picture * (1 - alpha) + WIRE * alpha).astype(np.uint8)
+    drawn = np.rint(picture * (1 - alpha) + WIRE * alpha).astype(np.uint8)
+    return drawn if mass is None else draw_mass_center(drawn, mass, camera)
 
 
 def grasp_panel(
