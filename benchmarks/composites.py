@@ -23,14 +23,19 @@ from manitwin.render.cameras import Camera, framing_camera
 from manitwin.render.procedural_textures import periodic_noise, procedural_texture
 from manitwin.render.renderer import shared_renderer
 
-Part = Literal["tuning", "held-out"]
+Part = Literal["tuning", "held-out", "calibration"]
 Kind = Literal["single", "cut", "several"]
 
 WIDTH_PX, HEIGHT_PX = 640, 512
 GROUNDS: dict[Part, tuple[str, ...]] = {
     "tuning": ("plain", "plain", "plain", "paper", "paper", "wood", "cloth", "concrete"),
     "held-out": ("plain", "plain", "plain", "paper", "wood", "marble", "metal", "carpet", "tiles", "felt"),
+    "calibration": (
+        *("plain", "plain", "plain", "paper", "wood", "cloth", "concrete"),
+        *("terrazzo", "linen", "leather", "checks"),
+    ),
 }
+SEEDS: dict[Part, int] = {"tuning": 0, "held-out": 1, "calibration": 2}
 FLAT = 0.3  # height over footprint, below which a thing lies and is photographed from above
 CLEAR = ("glass", "wine glass", "glass bottle", "jar", "vase", "bottle", "water bottle", "measuring cup")
 
@@ -63,8 +68,8 @@ class _Thing:
 
 
 def composite(part: Part, number: int) -> Composite:
-    """Make a picture of one of the two parts by its number."""
-    rng = np.random.default_rng([number, 0 if part == "tuning" else 1])
+    """Make a picture of one of the parts by its number."""
+    rng = np.random.default_rng([number, SEEDS[part]])
     drawn = rng.random()
     kind: Kind = "single" if drawn < 0.72 else "cut" if drawn < 0.86 else "several"
     things = [_thing(rng, None)]
@@ -272,6 +277,21 @@ def _noise_of(rng: np.random.Generator, family: str) -> np.ndarray:
         return 0.12 * periodic_noise(rng, 512, wavelengths=(0.02, 0.02), slope=0.2)
     if family == "felt":
         return 0.05 * periodic_noise(rng, 512, wavelengths=(0.05, 0.02), slope=0.3)
+    if family == "terrazzo":
+        chips = periodic_noise(rng, 512, wavelengths=(0.04, 0.04), slope=1.5)
+        return float(rng.uniform(0.08, 0.3)) * np.clip(6 * (np.abs(chips) - 1.2), 0, 1) * np.sign(chips)
+    if family == "linen":
+        phase = 2 * np.pi * 48 * (np.arange(512) + 0.5) / 512
+        threads = np.sin(phase)[:, None] * np.sin(phase)[None]
+        return 0.04 * threads + 0.03 * periodic_noise(rng, 512, wavelengths=(0.3, 0.01), slope=0.4)
+    if family == "leather":
+        grain = np.abs(periodic_noise(rng, 512, wavelengths=(0.04, 0.04), slope=1.2))
+        return np.asarray(0.1 * np.minimum(grain, 0.6) + 0.02 * periodic_noise(rng, 512, wavelengths=(0.6, 0.6)))
+    if family == "checks":
+        bands = np.sign(np.sin(2 * np.pi * 4 * (np.arange(512) + 0.5) / 512))
+        return float(rng.uniform(0.03, 0.2)) * (bands[:, None] + bands[None]) / 2 + 0.01 * periodic_noise(
+            rng, 512, wavelengths=(0.02, 0.02), slope=0.2
+        )
     tiles = 0.03 * periodic_noise(rng, 512, wavelengths=(0.4, 0.4), slope=1.0)
     tiles[::128] = tiles[1::128] = tiles[:, ::128] = tiles[:, 1::128] = -float(rng.uniform(0.2, 0.6))
     return tiles

@@ -16,6 +16,7 @@ from PIL import Image, ImageCms, ImageOps
 
 from manitwin.errors import InputError
 from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.focal_length import focal_length_35mm
 from manitwin.formats.image_frames import MAX_PICTURES, count_pictures
 from manitwin.formats.printable import printable_line
 from manitwin.formats.sniff import HEIC_NOT_READ, image_format, sniff
@@ -33,10 +34,14 @@ _MULTI_PICTURE = ("MPO",)  # a phone's JPEG with depth map or preview behind the
 
 @dataclass(frozen=True)
 class Photo:
-    """``pixels (H, W, 3 or 4) uint8`` upright sRGB (RGBA where the file has transparency), and what was done to get it."""
+    """``pixels (H, W, 3 or 4) uint8`` upright sRGB (RGBA where the file has transparency), and what was done to get it.
+
+    ``focal_mm`` is the lens as 35 mm equivalent where EXIF states it believably.
+    """
 
     pixels: np.ndarray
     findings: tuple[str, ...]
+    focal_mm: float | None = None
 
 
 def read_image(path: Path, *, frame: int | None = None, max_side_px: int | None = None) -> Photo:
@@ -66,10 +71,12 @@ def _read(path: Path, frame: int | None, max_side_px: int | None) -> Photo:
     with _opened(path) as image:
         _check_size(path, image)
         _choose_frame(path, image, frame, findings)
+        size = image.size  # a draft is smaller
         if max_side_px is not None and image.format == "JPEG":
             image.draft(None, (max_side_px, max_side_px))  # decodes at a half, a quarter, an eighth: never smaller
         _decode(path, image)
         turned = _orientation(image, findings) not in (0, 1)
+        focal_mm = focal_length_35mm(image, size, findings)
         profile = image.info.get("icc_profile")
         # a copy of hundreds of megapixels only where there is something to turn
         upright = _upright(image, findings) if turned else image
@@ -89,7 +96,7 @@ def _read(path: Path, frame: int | None, max_side_px: int | None) -> Photo:
             )
         rgb = _scaled(rgb, (max(1, round(rgb.width * scale)), max(1, round(rgb.height * scale))))
         findings.append(f"scaled down to {rgb.width} x {rgb.height}")
-    return Photo(np.asarray(rgb), tuple(findings))
+    return Photo(np.asarray(rgb), tuple(findings), focal_mm)
 
 
 def png_of(pixels: np.ndarray) -> bytes:

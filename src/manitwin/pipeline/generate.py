@@ -21,8 +21,8 @@ class GenerateStage:
     """Write ``generated.glb`` and the field ``generation``."""
 
     name: ClassVar[str] = "generate"
-    version: ClassVar[str] = "7"
-    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "naming?")
+    version: ClassVar[str] = "8"
+    reads: ClassVar[tuple[str, ...]] = ("photo.png?", "photos/?", "matte?", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("generated.glb", "generation")
 
     def __init__(self, settings: GenerateConfig, generator: Generator, submit_again: bool = False):
@@ -47,6 +47,7 @@ class GenerateStage:
             seed=generator_seed(draft),
             guessed=draft.payload.name is None,
             views=views if takes_views else (),
+            focal_mm=draft.field("matte")["focal_mm"] if "matte" in draft.fields else None,
         )
         made = run_generator(
             self.generator, request, folder, settings=self.settings, jobs=draft.jobs, submit_again=self._submit_again
@@ -74,13 +75,15 @@ def read_views(draft: Draft[Item]) -> tuple[PhotoView, ...]:
     if len(pictures) < 2:
         return ()
     files, turns = draft.payload.files, draft.payload.turns_deg
+    focals_mm = draft.field("matte")["focals_mm"]
     return tuple(
         PhotoView(
             name=Path(files[number]).name,
             rgba=np.asarray(Image.open(picture)),
             turn_deg=turns[number] if turns else None,
+            focal_mm=focal_mm,
         )
-        for picture in pictures
+        for picture, focal_mm in zip(pictures, focals_mm, strict=True)
         for number in [int(picture.stem)]
     )
 

@@ -21,7 +21,7 @@ class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
@@ -60,6 +60,7 @@ class PhotoStage:
             "findings": [*photo.findings, *matte.findings],
             "scores": matte.scores,
             "agreement": matte.agreement,
+            "focal_mm": photo.focal_mm,
         }
 
     def _network_field(self) -> dict[str, Any]:
@@ -75,7 +76,7 @@ class PhotosStage(PhotoStage):
     One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
     """
 
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "photos/", "matte")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
@@ -104,6 +105,7 @@ class PhotosStage(PhotoStage):
         findings = [f"{name}: {finding}" for name, field in kept for finding in field["findings"]]
         worst = min((field for _, field in kept), key=lambda field: field["confidence"])
         matte = worst | {"findings": [*left_out, *findings], "photos": [field["confidence"] for _, field in kept]}
+        matte["focals_mm"] = [field["focal_mm"] for _, field in kept]
         return {"matte": matte | self._network_field()}
 
 

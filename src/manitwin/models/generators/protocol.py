@@ -23,12 +23,13 @@ class PhotoView:
     """One of several photos of a thing: its file's name, ``rgba (H, W, 4) uint8`` matted, and where it was taken from.
 
     ``turn_deg`` is the camera's turn about the vertical, counter-clockwise seen from above, that of the first given photo 0; None
-    where nobody states it.
+    where nobody states it. ``focal_mm`` is the lens as 35 mm equivalent, None where the photo does not state it.
     """
 
     name: str
     rgba: np.ndarray
     turn_deg: float | None
+    focal_mm: float | None = None
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ class GenerationRequest:
     ``rgba`` is the matted photo, ``(H, W, 4) uint8`` upright sRGB whose alpha is the object's mask, or None where ``text`` is
     given. ``name`` is what the user says it is, or with ``guessed`` what a classifier takes it for. ``seed`` makes the answer
     repeatable where the generator can. ``views`` are all photos where there are several, ``rgba`` the first of them; only a
-    generator that ``takes_views`` is given them.
+    generator that ``takes_views`` is given them. ``focal_mm`` is the lens of ``rgba`` as 35 mm equivalent, where it is stated.
     """
 
     rgba: np.ndarray | None
@@ -47,6 +48,7 @@ class GenerationRequest:
     seed: int
     guessed: bool = False
     views: tuple[PhotoView, ...] = ()
+    focal_mm: float | None = None
 
 
 @dataclass(frozen=True)

@@ -36,14 +36,14 @@ def guided_from_photo(request: GenerationRequest, reader: TemplateReader) -> Job
     findings = list(choice.findings)
     if choice.category is None:
         findings.append(f"{reader.source} says that it is none of the templates")
-        return noted(from_photo(rgba, request.name), reader, None, findings)
+        return noted(from_photo(rgba, request.name, request.focal_mm), reader, None, findings)
     filled, left_out = reader.fill(shown, choice.category)
     findings += left_out
-    first = _fit(filled, rgba, name)
+    first = _fit(filled, rgba, name, request.focal_mm)
     called = name or choice.category
     if first is None:
         findings.append(f"no {filled.category} near the measures that {reader.source} gave is a solid")
-        return noted(from_photo(rgba, request.name), reader, filled, findings)
+        return noted(from_photo(rgba, request.name, request.focal_mm), reader, filled, findings)
 
     def compare(this: _Fit, before: str) -> Likeness:
         fitted = this.fitted
@@ -56,7 +56,7 @@ def guided_from_photo(request: GenerationRequest, reader: TemplateReader) -> Job
     def correct(this: _Fit, corrected: Filled) -> tuple[_Fit, str]:
         other = replace(this.filled, category=corrected.category).corrected(corrected)
         begin = replace(other, measures={**this.fitted.made.measures, **corrected.measures})
-        second = _fit(begin, rgba, name) if corrected.measures else None
+        second = _fit(begin, rgba, name, request.focal_mm) if corrected.measures else None
         if second is not None and second.fitted.residual.cost < this.fitted.residual.cost:
             return replace(
                 second, filled=other
@@ -82,12 +82,12 @@ def guided_from_photo(request: GenerationRequest, reader: TemplateReader) -> Job
     return noted(job, reader, kept.filled, findings, agreed)
 
 
-def _fit(filled: Filled, rgba: np.ndarray, name: str | None) -> _Fit | None:
+def _fit(filled: Filled, rgba: np.ndarray, name: str | None, focal_mm: float | None) -> _Fit | None:
     """Fit a filled template; its usual measures, and what the user's name means, may explain the photo better."""
     said = template_for(name)
     others = [filled.category] if filled.measures else []
     others += kinds_of(filled.category) if said is None or said.category == filled.category else [said.category]
-    fitted = fit(filled.category, rgba, filled.measures, or_of=others)
+    fitted = fit(filled.category, rgba, filled.measures, or_of=others, focal_mm=focal_mm)
     if fitted is None:
         return None
     wishes = filled.wishes if fitted.category == filled.category else {}

@@ -46,10 +46,15 @@ class Job:
     metric: bool = False
 
 
-def from_photo(rgba: np.ndarray, name: str | None) -> Job:
-    """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected."""
+def from_photo(rgba: np.ndarray, name: str | None, focal_mm: float | None = None) -> Job:
+    """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected.
+
+    ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
+    """
     template = template_for(name)
-    fitted = None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category))
+    fitted = (
+        None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category), focal_mm=focal_mm)
+    )
     return fitted_or_lifted(fitted, rgba, name)
 
 

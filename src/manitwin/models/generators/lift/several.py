@@ -83,12 +83,13 @@ def _stated(views: Sequence[PhotoView]) -> list[float] | None:
 def _fitted(category: str, views: Sequence[PhotoView]) -> SeveralFitted | None:
     """Fit the kind of thing that explains the first photo best; at the stated turns where there are any."""
     kinds, photos, turns = kinds_of(category), [view.rgba for view in views], _stated(views)
-    meant = fit(category, photos[0], or_of=kinds) if kinds else None
+    focals_mm = [view.focal_mm for view in views]
+    meant = fit(category, photos[0], or_of=kinds, focal_mm=focals_mm[0]) if kinds else None
     category = category if meant is None else meant.category
-    found = fit_several(category, photos, turns_deg=turns)
+    found = fit_several(category, photos, turns_deg=turns, focals_mm=focals_mm)
     if turns is None or (found is not None and found.confidence >= LEAST_CONFIDENCE and not _wrong(found, views)):
         return found
-    free = fit_several(category, photos)
+    free = fit_several(category, photos, focals_mm=focals_mm)
     if free is None or free.confidence < LEAST_CONFIDENCE:
         return found
     wrong = _wrong(free, views, told_only=True)

@@ -19,6 +19,8 @@ _EDGE_LAB = 14.0  # a gradient of this many units of Lab a pixel, after smoothin
 _DIAGONAL_35MM = 43.27
 TYPICAL_FOCAL_MM, FOCAL_SPREAD = 36.0, 0.45
 """The lens of phones and cameras as 35 mm equivalent, and the standard deviation of its logarithm: 26 to 80 mm are usual."""
+KNOWN_FOCAL_SPREAD = 0.2
+"""The same where the lens is known: how far the box of a thing is from 1.6 of its half diagonals."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,8 @@ class Evidence:
 
     ``mask (S, S) bool``; ``outline`` the signed distance to its outline over the reach, in -1..1, positive inside;
     ``edge (S, S)`` how much of an inner edge lies at each pixel or next to it, 0..1; ``lab (S, S, 3) float32``; ``inner (S, S)
-    bool`` well inside; ``perspective`` the object's size over its distance for a usual lens; ``center_px`` and ``box_px`` the
-    box in the photo: its centre (x, y) and its longer side.
+    bool`` well inside; ``perspective`` the object's size over its distance for the known or a usual lens, ``focal_spread`` the
+    standard deviation of its logarithm; ``center_px`` and ``box_px`` the box in the photo: its centre (x, y) and its longer side.
     """
 
     mask: np.ndarray
@@ -37,6 +39,7 @@ class Evidence:
     lab: np.ndarray
     inner: np.ndarray
     perspective: float
+    focal_spread: float
     center_px: tuple[float, float]
     box_px: float
 
@@ -61,6 +64,7 @@ def evidence_of(rgba: np.ndarray, focal_mm: float | None = None) -> Evidence:
         lab=lab,
         inner=depth > _RIM_PX,
         perspective=box_px / focal_px,
+        focal_spread=FOCAL_SPREAD if focal_mm is None else KNOWN_FOCAL_SPREAD,
         center_px=center,
         box_px=box_px,
     )

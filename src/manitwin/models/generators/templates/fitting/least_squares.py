@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.models.generators.templates.fitting.evidence import FOCAL_SPREAD, Evidence
+from manitwin.models.generators.templates.fitting.evidence import Evidence
 from manitwin.models.generators.templates.fitting.residual import outline_difference
 from manitwin.models.generators.templates.fitting.shape import MOST_SPREADS, CoarseSolid, Family
 from manitwin.models.generators.templates.fitting.view import LEAST_PERSPECTIVE, MOST_PERSPECTIVE, View
@@ -122,8 +122,9 @@ class _State:
 
     def _block(self, number: int, pose: np.ndarray, solid: CoarseSolid) -> np.ndarray:
         middle, spread = self._rolls[number]
-        prior = [(pose[2] - middle) / spread, (pose[3] - self._problem._usual[number]) / FOCAL_SPREAD]
-        drawn = outline_difference(solid, _decoded(pose), self._problem._evidences[number])
+        evidence = self._problem._evidences[number]
+        prior = [(pose[2] - middle) / spread, (pose[3] - self._problem._usual[number]) / evidence.focal_spread]
+        drawn = outline_difference(solid, _decoded(pose), evidence)
         return np.concatenate([drawn, _PRIOR * np.array(prior)])
 
 

@@ -50,13 +50,17 @@ def fit_several(
     initial_measures: Mapping[str, float] | None = None,
     *,
     turns_deg: Sequence[float] | None = None,
+    focals_mm: Sequence[float | None] | None = None,
 ) -> SeveralFitted | None:
     """Fit one thing of a category to several photos ``(H, W, 4) uint8`` of it, whose alphas are its masks.
 
     The measures are common, the views each photo's own; ``turns_deg``, the camera's counter-clockwise turns about the vertical,
-    say where the views' search starts. None where no measures give a solid.
+    say where the views' search starts; ``focals_mm`` are the lenses as 35 mm equivalent where they are known. None where no
+    measures give a solid.
     """
-    template, evidences = load_templates()[category], [evidence_of(rgba) for rgba in photos]
+    template = load_templates()[category]
+    lenses = [None] * len(photos) if focals_mm is None else focals_mm
+    evidences = [evidence_of(rgba, focal_mm) for rgba, focal_mm in zip(photos, lenses, strict=True)]
     usual = Family(template, initial_measures)
     searched = range(len(photos)) if turns_deg is None else [0, _most_crossing(turns_deg)]
     alone = [found[0] for number in searched if (found := search([usual], evidences[number]))]
