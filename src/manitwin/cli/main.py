@@ -23,6 +23,7 @@ from manitwin.cli.commands.affordances import affordances
 from manitwin.cli.commands.audit import audit
 from manitwin.cli.commands.build import build, run
 from manitwin.cli.commands.carve import carve
+from manitwin.cli.commands.catalog import catalog
 from manitwin.cli.commands.doctor import doctor
 from manitwin.cli.commands.evaluate import evaluate
 from manitwin.cli.commands.export import export
@@ -35,6 +36,7 @@ from manitwin.cli.commands.prompts import prompts
 from manitwin.cli.commands.publish import publish
 from manitwin.cli.commands.query import query
 from manitwin.cli.commands.render import render
+from manitwin.cli.commands.search import search
 from manitwin.cli.commands.segmentation import segmentation
 from manitwin.cli.commands.stats import stats
 from manitwin.cli.commands.status import status
@@ -90,10 +92,10 @@ def _manitwin(
 for watched in (build, layout, tasks, trajectories, render):
     register(app, reported(watched, own_log=True))
 register(app, reported(run, own_log=True), "run", hidden=True)
-for making in (index, stats, publish, export, segmentation, affordances):
+for making in (index, stats, publish, export, segmentation, affordances, catalog):
     register(app, reported(making))
 register(app, reported(import_), "import")
-for other in (status, retry, check, query, doctor, models, fake, prompts, audit, carve, evaluate):
+for other in (status, retry, check, query, search, doctor, models, fake, prompts, audit, carve, evaluate):
     register(app, other)
 
 

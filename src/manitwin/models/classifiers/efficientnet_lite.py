@@ -47,18 +47,39 @@ def load_weights() -> dict[str, np.ndarray]:
     return parse_torch_checkpoint(content, path.name, Unavailable)
 
 
+FEATURE_LAYERS: dict[str, tuple[int, int]] = {
+    "_blocks.2": (0, 24),
+    "_blocks.4": (24, 40),
+    "_blocks.10": (64, 112),
+    "feature": (176, 1280),
+}
+"""Where in ``features`` each layer's means begin, and how many they are: from textures and colours to kinds of things."""
+FEATURES = 1456
+
+
+def features(pictures: np.ndarray) -> np.ndarray:
+    """Return the means of ``FEATURE_LAYERS`` over each of pictures ``(N, 224, 224, 3) uint8`` sRGB: ``(N, 1456) float32``.
+
+    Raises Unavailable without the weights.
+    """
+    return _run(_feature_network(), pictures, FEATURES)
+
+
 def logits(pictures: np.ndarray) -> np.ndarray:
     """Return the logits ``(N, 1000)`` of pictures ``(N, 224, 224, 3) uint8`` sRGB; raises Unavailable without the weights."""
+    return _run(_network(), pictures, CLASSES)
+
+
+def _run(network: cv2.dnn.Net, pictures: np.ndarray, width: int) -> np.ndarray:
     if pictures.shape[1:] != (SIDE_PX, SIDE_PX, 3) or pictures.dtype != np.uint8:
         raise ValueError(
             f"pictures are (N, {SIDE_PX}, {SIDE_PX}, 3) uint8, these are {pictures.shape} {pictures.dtype}"
         )
-    network = _network()
     rows = []
     for picture in pictures:  # one at a time: the same bytes whatever else is asked
         network.setInput(((picture.astype(np.float32) - MEAN) / DEVIATION).transpose(2, 0, 1)[None].copy())
         rows.append(network.forward()[0].copy())
-    return np.array(rows, np.float32).reshape(-1, CLASSES)
+    return np.array(rows, np.float32).reshape(-1, width)
 
 
 @cache
@@ -66,9 +87,36 @@ def _network() -> cv2.dnn.Net:
     return cv2.dnn.readNetFromONNX(np.frombuffer(network_bytes(load_weights()), np.uint8))
 
 
+@cache
+def _feature_network() -> cv2.dnn.Net:
+    return cv2.dnn.readNetFromONNX(np.frombuffer(feature_network_bytes(load_weights()), np.uint8))
+
+
 def network_bytes(weights: dict[str, np.ndarray]) -> bytes:
     """Return the network as ONNX: input ``(1, 3, 224, 224)``, output ``logits (1, 1000)``; batch norms are folded in."""
     network = _Layers(weights)
+    graph, value = network.graph, _trunk(network)["feature"]
+    value = graph.node("Flatten", [graph.node("GlobalAveragePool", [value], "pooled")], "feature", axis=1)
+    dense = [value, graph.weight("_fc.weight", weights["_fc.weight"]), graph.weight("_fc.bias", weights["_fc.bias"])]
+    return graph.to_bytes(graph.node("Gemm", dense, "logits", transB=1), (1, CLASSES))
+
+
+def feature_network_bytes(weights: dict[str, np.ndarray]) -> bytes:
+    """Return the network as ONNX whose output ``(1, 1456)`` are the means of ``FEATURE_LAYERS``."""
+    network = _Layers(weights)
+    graph, values = network.graph, _trunk(network)
+    means = [
+        graph.node(
+            "Flatten", [graph.node("GlobalAveragePool", [values[name]], f"{name}.pooled")], f"{name}.mean", axis=1
+        )
+        for name in FEATURE_LAYERS
+    ]
+    return graph.to_bytes(graph.node("Concat", means, "features", axis=1), (1, FEATURES))
+
+
+def _trunk(network: _Layers) -> dict[str, str]:
+    """Add all convolutions; return the names of the blocks' values, ``feature`` being the last before the mean."""
+    values = {}
     side, value = network.convolution("input", SIDE_PX, "_conv_stem", "_bn0", 3, stride=2)
     for block, (kernel, stride, expansion, repeated) in enumerate(_blocks()):
         begin, name = value, f"_blocks.{block}."
@@ -80,11 +128,8 @@ def network_bytes(weights: dict[str, np.ndarray]) -> bytes:
         _, value = network.convolution(value, side, name + "_project_conv", name + "_bn2", 1, activation=False)
         if repeated:
             value = network.graph.node("Add", [begin, value], f"{name}sum")
-    _, value = network.convolution(value, side, "_conv_head", "_bn1", 1)
-    graph = network.graph
-    value = graph.node("Flatten", [graph.node("GlobalAveragePool", [value], "pooled")], "feature", axis=1)
-    dense = [value, graph.weight("_fc.weight", weights["_fc.weight"]), graph.weight("_fc.bias", weights["_fc.bias"])]
-    return graph.to_bytes(graph.node("Gemm", dense, "logits", transB=1), (1, CLASSES))
+        values[f"_blocks.{block}"] = value
+    return values | {"feature": network.convolution(value, side, "_conv_head", "_bn1", 1)[1]}
 
 
 def _blocks() -> list[tuple[int, int, int, bool]]:

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from manitwin.models.fakes.chat import Answer, ChatRequest, WrittenAnswer, hang, openai_complaint, write
+from manitwin.models.fakes.embeddings import embeddings_response
 from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.server import Request, Response
 from manitwin.models.fakes.vlm_answers import rehearsal_answer
@@ -34,7 +35,7 @@ _DETAILS = ("auto", "low", "high", "original")
 
 
 class FakeOpenAi:
-    """Chat completions at ``/v1``.
+    """Chat completions at ``/v1``, and embeddings.
 
     ``models`` are those that are there (any, without it); ``formats`` are the kinds of ``response_format`` that it takes;
     ``reasoning`` refuses what models that reason refuse: ``max_tokens``, and any temperature but 1. ``retry_after`` is the
@@ -62,6 +63,8 @@ class FakeOpenAi:
         refused = self._refused(request)
         if refused is not None:
             return refused
+        if (request.method, request.path) == ("POST", "/v1/embeddings"):
+            return embeddings_response(request)
         if (request.method, request.path) != ("POST", "/v1/chat/completions"):
             return _error(404, f"Invalid URL ({request.method} {request.path})")
         try:

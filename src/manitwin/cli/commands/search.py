@@ -1,0 +1,81 @@
+"""``manitwin search``: the twins that words describe, or that a picture shows."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import error_console, note_old_layout, out_console
+from manitwin.cli.documents import Json, print_document
+
+CAPTION_CHARACTERS = 60
+
+
+def search(
+    dataset: Annotated[
+        str,
+        options.existing("A data set: a folder, or, for words, a URL.", "DATASET", "the folder or URL of a data set"),
+    ],
+    words: Annotated[str | None, typer.Argument(help='What to look for: "a blue mug".', metavar="[WORDS]")] = None,
+    image: Annotated[
+        Path | None,
+        typer.Option(
+            help="A photo or crop of one thing to find instead; transparency says what is background.",
+            metavar="FILE",
+            callback=choices.must_exist("a picture of one thing"),
+        ),
+    ] = None,
+    embedder: Annotated[
+        str | None,
+        typer.Option(
+            help="Rank words also by a model of embeddings: openai:MODEL, or openai:MODEL@URL.", metavar="SPEC"
+        ),
+    ] = None,
+    limit: Annotated[int, typer.Option(help="Print at most so many twins.", callback=choices.count_of("--limit"))] = 10,
+    json_: Json = False,
+) -> None:
+    """Print the twins that words describe, or that look like the thing in a picture, the best first."""
+    from manitwin.errors import UsageError
+    from manitwin.twin.dataset_root import DatasetRoot
+
+    if (words is None) == (image is None):
+        raise UsageError('say what to look for: words such as "a blue mug", or --image FILE, one of them')
+    if image is not None and embedder is not None:
+        raise UsageError("--embedder is for words; leave it out with --image")
+    root = DatasetRoot(dataset)
+    note_old_layout(root)
+    background: str | None = None
+    if image is not None:
+        from manitwin.dataset.search.search import search_picture
+        from manitwin.formats.image_file import read_image
+
+        hits, background = search_picture(root, read_image(image).pixels, limit=limit, on_twin=_drawn)
+    else:
+        from manitwin.config import ServicesConfig
+        from manitwin.dataset.search.search import search_words
+        from manitwin.models.embedders.texts import text_embedder
+
+        model = None if embedder is None else text_embedder(embedder, ServicesConfig())
+        hits = search_words(root, words or "", limit=limit, embedder=model)
+    if json_:
+        asked = {"words": words, "image": None if image is None else str(image)}
+        print_document({**asked, "background": background, "hits": [asdict(hit) for hit in hits]})
+        return
+    if background == "none":
+        error_console.print("the thing was not told from its background: the whole picture is compared", markup=False)
+    for hit in hits:
+        out_console.print(f"{hit.score:8.3f}  {hit.twin_id}  {hit.category}: {_cut(hit.caption)}")
+    if not hits:
+        out_console.print("no twin has any of these words")
+
+
+def _drawn(twin_id: str) -> None:
+    error_console.print(f"{twin_id}: drawn and embedded, which is kept", markup=False)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= CAPTION_CHARACTERS else f"{text[: CAPTION_CHARACTERS - 1]}…"

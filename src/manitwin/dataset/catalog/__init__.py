@@ -1,0 +1,1 @@
+"""Catalogues: pictures, point clouds, captions and categories of twins, for retrieval, classification and captioning."""

@@ -1,0 +1,97 @@
+"""A twin's surface as points with normals and colours, and as pictures from around."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from manitwin.geometry.sampling import sample_surface
+from manitwin.render.cameras import Camera, framing_camera
+from manitwin.render.renderer import BACKDROP, shared_renderer
+from manitwin.twin.loaded_twin import Twin
+
+POINTS = (10_000, 8_192)
+"""OpenShape's and ULIP's numbers; the smaller cloud is the beginning of the larger one."""
+VIEWS, STEP_DEG = 30, 12
+"""ULIP's pictures: one every 12 degrees."""
+ELEVATIONS_DEG = (30.0, 10.0, 50.0)
+FOV_Y_DEG = 30.0
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """``points_m (N, 3)``, outward unit ``normals (N, 3)`` and ``rgb (N, 3) uint8`` sRGB base colours, object frame."""
+
+    points_m: np.ndarray
+    normals: np.ndarray
+    rgb: np.ndarray
+
+
+@dataclass(frozen=True)
+class View:
+    """A picture ``rgb (H, W, 3) uint8``, the distance along the viewing axis ``depth_m (H, W)``, 0 beside it, and its camera."""
+
+    azimuth_deg: int
+    camera: Camera
+    rgb: np.ndarray
+    depth_m: np.ndarray
+
+
+def surface_points(twin: Twin, count: int, seed: int) -> SurfacePoints:
+    """Sample points evenly by area over a twin's visual surface, each with the colour of the texture there."""
+    rng = np.random.default_rng([seed, zlib.crc32(twin.record.twin_id.encode())])
+    vertices, faces = trimesh.util.append_faces(
+        [part.vertices for part in twin.visual], [part.faces for part in twin.visual]
+    )
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    points, normals, face = sample_surface(mesh, count, rng)
+    rgb = np.zeros((count, 3), np.uint8)
+    begin = 0
+    for part in twin.visual:
+        at = np.flatnonzero((face >= begin) & (face < begin + len(part.faces)))
+        rgb[at] = _colors(part, face[at] - begin, points[at])
+        begin += len(part.faces)
+    return SurfacePoints(points, normals, rgb)
+
+
+def _colors(part: trimesh.Trimesh, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the base colours ``(N, 3) uint8`` of a visual part at points on its faces."""
+    if not len(faces):
+        return np.zeros((0, 3), np.uint8)
+    visual = part.visual
+    weights = trimesh.triangles.points_to_barycentric(part.triangles[faces], points, method="cross")
+    weights = np.nan_to_num(weights, nan=1 / 3)  # of a face without area any corner will do
+    if isinstance(visual, trimesh.visual.ColorVisuals):
+        corners = np.asarray(visual.vertex_colors)[part.faces[faces], :3].astype(float)
+        return np.rint((corners * weights[..., None]).sum(1)).astype(np.uint8)
+    assert isinstance(visual, trimesh.visual.TextureVisuals)
+    if visual.uv is None:
+        found = visual.material.main_color
+    else:  # of a material without a picture one colour comes back
+        uv = np.asarray(visual.uv)[part.faces[faces]]
+        found = visual.material.to_color((uv * weights[..., None]).sum(1))
+    return np.broadcast_to(np.asarray(found, np.uint8)[..., :3], (len(faces), 3))
+
+
+def views_around(twin: Twin, size_px: int) -> list[View]:
+    """Draw a standing twin every 12 degrees, from 30, 10 and 50 degrees above the horizon in turn."""
+    points = np.concatenate([part.vertices for part in twin.visual])
+    cameras = [
+        framing_camera(
+            points,
+            azimuth_deg=float(STEP_DEG * number),
+            elevation_deg=ELEVATIONS_DEG[number % len(ELEVATIONS_DEG)],
+            fov_y_deg=FOV_Y_DEG,
+            width_px=size_px,
+            height_px=size_px,
+        )
+        for number in range(VIEWS)
+    ]
+    frames = shared_renderer().render(twin.visual, cameras, background=BACKDROP)
+    return [
+        View(STEP_DEG * number, camera, frame.rgb, frame.depth)
+        for number, (camera, frame) in enumerate(zip(cameras, frames, strict=True))
+    ]

@@ -1,0 +1,92 @@
+"""A page about a data set that was made: counts, tables and sample pictures in one HTML file, which needs no request."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib import resources
+
+from manitwin.formats.markdown import one_line
+
+_STYLE = """
+.samples { display: grid; grid-template-columns: repeat(auto-fill, minmax(14rem, 1fr)); gap: 1rem; }
+.samples > figure { margin: 0; }
+.samples img { width: 100%; height: auto; display: block; border-radius: 4px; }
+"""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A sample: a PNG and what it shows."""
+
+    png: bytes
+    caption: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of texts and numbers below headings; the first column names the row."""
+
+    caption: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str | int | float | None]]
+
+
+@dataclass(frozen=True)
+class Section:
+    """A headed part of the page: tables, and pictures beside each other."""
+
+    title: str
+    parts: Sequence[Picture | Table]
+
+
+def page(title: str, lead: Sequence[str], sections: Sequence[Section]) -> bytes:
+    """Return the page in the style of ``manitwin stats``; the same content gives the same bytes."""
+    style = resources.files("manitwin.dataset.statistics").joinpath("report.css").read_text(encoding="utf-8")
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{escape(title)}</title>\n'
+        f"<style>\n{style}{_STYLE}</style>\n</head>\n<body>\n<header>\n<h1>{escape(title)}</h1>\n"
+        + "".join(f"<p>{escape(one_line(line))}</p>\n" for line in lead)
+        + "</header>\n<main>\n"
+        + "".join(_section(section) for section in sections)
+        + "</main>\n</body>\n</html>\n"
+    ).encode()
+
+
+def _section(section: Section) -> str:
+    tables = "".join(_table(part) for part in section.parts if isinstance(part, Table))
+    figures = "".join(_figure(part) for part in section.parts if isinstance(part, Picture))
+    samples = f'<div class="samples">\n{figures}</div>\n' if figures else ""
+    body = tables + samples or '<p class="none">There is nothing to show.</p>\n'
+    return f"<section>\n<h2>{escape(section.title)}</h2>\n{body}</section>\n"
+
+
+def _figure(picture: Picture) -> str:
+    said = escape(one_line(picture.caption))
+    data = base64.b64encode(picture.png).decode()
+    return f'<figure><img alt="{said}" src="data:image/png;base64,{data}"><figcaption>{said}</figcaption></figure>\n'
+
+
+def _table(table: Table) -> str:
+    heads = "".join(f'<th scope="col">{escape(name)}</th>' for name in table.headings)
+    rows = "".join(
+        f'<tr><th scope="row" class="text">{_cell(row[0])}</th>'
+        + "".join(f"<td>{_cell(value)}</td>" for value in row[1:])
+        + "</tr>\n"
+        for row in table.rows
+    )
+    return (
+        f'<div class="scroll"><table>\n<caption>{escape(table.caption)}</caption>\n'
+        f"<thead><tr>{heads}</tr></thead>\n<tbody>\n{rows}</tbody>\n</table></div>\n"
+    )
+
+
+def _cell(value: str | int | float | None) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, str):
+        return escape(one_line(value))
+    return f"{value:,}" if isinstance(value, int) else f"{value:.3g}"

@@ -1,0 +1,130 @@
+"""Find twins of a data set by words or by a picture."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from manitwin.dataset.index.query import Index
+from manitwin.dataset.search.stored import Stored, VectorStore
+from manitwin.dataset.search.words import described, rank_by_words
+from manitwin.errors import UsageError
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.store import sha256_of_json
+
+if TYPE_CHECKING:
+    from manitwin.models.embedders.foreground import Found
+    from manitwin.models.embedders.texts import TextEmbedder
+
+COLUMNS = ("twin_id", "revision", "name", "category", "color", "material", "size", "shape", "function", "caption")
+BEST_VIEWS = 3
+"""A twin is as like a picture as the mean of its three most alike views: one alone may be so by chance."""
+FUSION = 60
+"""Added to ranks that are joined (Cormack, Clarke and Büttcher 2009, "Reciprocal rank fusion")."""
+
+
+@dataclass(frozen=True)
+class Hit:
+    """A twin that was found; ``score`` orders the hits of one search, and is comparable to no other's.
+
+    ``matched``: of words, the fields that have each; None of a picture, and of a twin that was found by its embedding alone.
+    """
+
+    twin_id: str
+    score: float
+    category: str
+    name: str | None
+    caption: str
+    matched: dict[str, list[str]] | None
+
+
+def search_words(root: DatasetRoot, question: str, *, limit: int, embedder: TextEmbedder | None = None) -> list[Hit]:
+    """Return at most ``limit`` twins, the best first: those that have words of the question, by BM25.
+
+    With an ``embedder`` all twins are ranked by the cosine of their captions' vectors too, which are kept, and both ranks are
+    joined. Raises UsageError without an index or words.
+    """
+    rows = _rows(root)
+    by_words = rank_by_words(question, [described(row) for row in rows])
+    scores, matched = {hit.place: hit.score for hit in by_words}, {hit.place: hit.matched for hit in by_words}
+    if embedder is not None and rows:
+        asked = embedder.embed([question])[0]
+        likeness = text_vectors(root, rows, embedder) @ asked
+        nearest = np.argsort(-likeness, kind="stable").tolist()
+        scores = _joined_ranks([hit.place for hit in by_words], nearest)
+    order = sorted(scores, key=lambda place: (-scores[place], place))[:limit]
+    return [_hit(rows[place], scores[place], matched.get(place)) for place in order]
+
+
+def search_picture(
+    root: DatasetRoot,
+    pixels: np.ndarray,
+    *,
+    limit: int,
+    on_twin: Callable[[str], None] = lambda twin_id: None,
+) -> tuple[list[Hit], Found]:
+    """Return the twins that look most like what ``pixels (H, W, 3 or 4) uint8`` show, and how that was told from behind it.
+
+    Raises UsageError without an index, for a data set at a URL, and for a picture in which nothing is.
+    """
+    from manitwin.dataset.search.twin_looks import twin_looks
+    from manitwin.models.embedders.foreground import foreground
+    from manitwin.models.embedders.looks import look_of
+
+    rows = _rows(root)
+    rgb, mask, found = foreground(pixels)
+    try:
+        look = look_of(rgb, mask)
+    except ValueError as error:
+        raise UsageError(f"the picture shows nothing ({error}); give a larger crop of one thing") from error
+    looks = dict(twin_looks(root, {row["twin_id"]: row["revision"] for row in rows}, on_twin))
+    scores = [likeness(look, looks[row["twin_id"]]) for row in rows]
+    order = np.argsort(-np.array(scores), kind="stable").tolist()[:limit]
+    return [_hit(rows[place], scores[place], None) for place in order], found
+
+
+def likeness(look: np.ndarray, views: np.ndarray) -> float:
+    """Return the mean of the three largest dot products of a look ``(D,)`` with those of a twin's views ``(V, D)``."""
+    return float(np.sort(views.astype(np.float64) @ look.astype(np.float64))[-BEST_VIEWS:].mean())
+
+
+def text_vectors(root: DatasetRoot, rows: Sequence[dict[str, Any]], embedder: TextEmbedder) -> np.ndarray:
+    """Return the vectors ``(N, D)`` of the twins' descriptions; those that are not kept are asked for and kept."""
+    store = VectorStore(root, f"texts-{hashlib.sha256(embedder.identity.encode()).hexdigest()[:16]}")
+    texts = [f"{row['category']}: {row['caption']}" for row in rows]
+    digests = [sha256_of_json([embedder.identity, text]) for text in texts]
+    kept = [store.read(row["twin_id"]) for row in rows]
+    missing = [
+        place
+        for place, each in enumerate(kept)
+        if each is None or each.content != digests[place] or len(each.vectors) != 1
+    ]
+    for place, vector in zip(missing, embedder.embed([texts[place] for place in missing]), strict=True):
+        kept[place] = store.write(rows[place]["twin_id"], Stored(rows[place]["revision"], digests[place], vector[None]))
+    vectors = [each.vectors[0] for each in kept if each is not None]
+    if len({len(vector) for vector in vectors}) > 1:
+        raise UsageError(
+            f"{root.url}/search: vectors of several lengths for one model; remove the folder, and search again"
+        )
+    return np.array(vectors)
+
+
+def _joined_ranks(*orders: list[int]) -> dict[int, float]:
+    scores: dict[int, float] = {}
+    for order in orders:
+        for rank, place in enumerate(order, 1):
+            scores[place] = scores.get(place, 0.0) + 1 / (FUSION + rank)
+    return scores
+
+
+def _rows(root: DatasetRoot) -> list[dict[str, Any]]:
+    rows: list[dict[str, Any]] = Index(root).select("twins", columns=COLUMNS).to_pylist()
+    return rows
+
+
+def _hit(row: dict[str, Any], score: float, matched: dict[str, list[str]] | None) -> Hit:
+    return Hit(row["twin_id"], score, row["category"], row["name"], row["caption"], matched)

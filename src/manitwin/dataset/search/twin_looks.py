@@ -1,0 +1,92 @@
+"""What twins look like from around, in the ways in which they rest, embedded once and kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from manitwin.dataset.search.stored import Stored, VectorStore
+from manitwin.errors import UsageError
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.models.embedders.looks import GREY, LENGTH, VERSION, look_of
+from manitwin.render.cameras import Camera, framing_camera
+from manitwin.render.renderer import shared_renderer
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.record import Placement
+from manitwin.twin.resting import resting_poses
+from manitwin.twin.store import sha256_of_json
+
+PLACEMENTS, AROUND = 3, 12
+ELEVATIONS_DEG = (15.0, 35.0, 60.0)
+"""As one sees a table from a chair, standing, and from above."""
+PICTURE_PX, FOV_Y_DEG = 160, 30.0
+SPACE = f"pictures-{VERSION}"
+
+
+def twin_looks(
+    root: DatasetRoot,
+    revisions: dict[str, str],
+    on_twin: Callable[[str], None] = lambda twin_id: None,
+) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the looks ``(V, 1536) float32`` of twins by id (``revisions``: what the index says of each), made where none fit.
+
+    Those kept fit as long as the twin's surface and placements are the same. ``on_twin`` hears of each that is drawn: a second
+    of CPU time. Raises UsageError for a data set behind a URL.
+    """
+    if root.local is None:
+        raise UsageError(
+            f"{root.url}: is at a URL; copy the data set here, its twins are drawn to be compared with a picture"
+        )
+    store = VectorStore(root, SPACE, LENGTH)
+    for twin_id, revision in revisions.items():
+        kept = store.read(twin_id)
+        if kept is None or kept.revision != revision:
+            twin = Twin(root.local / root.twin_name(twin_id))
+            content = content_digest(twin)
+            if kept is not None and kept.content == content:
+                looks = kept.vectors
+            else:
+                on_twin(twin_id)
+                looks = looks_around(twin)
+            kept = store.write(twin_id, Stored(twin.record.revision, content, looks))
+        yield twin_id, kept.vectors
+
+
+def content_digest(twin: Twin) -> str:
+    """Return the digest of what a twin's looks are made of: its surface, and how it rests."""
+    resting = [list(placement.quaternion_wxyz) for placement in _placements(twin)]
+    return sha256_of_json([SPACE, twin.record.files["visual.glb"], resting])
+
+
+def looks_around(twin: Twin) -> np.ndarray:
+    """Return the looks ``(V, 1536)`` of a twin from 12 sides in each of its three likeliest placements that stayed."""
+    points = np.concatenate([part.vertices for part in twin.visual])
+    cameras = [
+        camera
+        for number, placement in enumerate(_placements(twin))
+        for camera in _around(points, rotation_from_quaternion_wxyz(np.array(placement.quaternion_wxyz)), number)
+    ]
+    frames = shared_renderer().render(twin.visual, cameras, background=(GREY, GREY, GREY))
+    return np.array([look_of(frame.rgb, frame.coverage) for frame in frames])
+
+
+def _placements(twin: Twin) -> list[Placement]:
+    return [pose.placement for pose in resting_poses(twin.record.placements or [])[:PLACEMENTS]]
+
+
+def _around(points_m: np.ndarray, object_to_plane: np.ndarray, number: int) -> Iterator[Camera]:
+    """Yield cameras around an object at rest, in the object frame; other placements are seen from between these sides."""
+    resting, back = points_m @ object_to_plane.T, np.eye(4)
+    back[:3, :3] = object_to_plane.T
+    for place in range(AROUND):
+        camera = framing_camera(
+            resting,
+            azimuth_deg=360 / AROUND * (place + number / PLACEMENTS),
+            elevation_deg=ELEVATIONS_DEG[place % len(ELEVATIONS_DEG)],
+            fov_y_deg=FOV_Y_DEG,
+            width_px=PICTURE_PX,
+            height_px=PICTURE_PX,
+        )
+        yield Camera(back @ camera.camera_to_object, camera.fov_y_rad, PICTURE_PX, PICTURE_PX)

@@ -1,0 +1,79 @@
+"""Texts as vectors by a model behind the embeddings API that OpenAI, vLLM, Ollama, llama.cpp and others serve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+
+from manitwin.config import ServicesConfig
+from manitwin.errors import ConfigError
+from manitwin.models.services.http import HttpService
+from manitwin.models.services.keys import bearer, key_from_environment, split_url
+from manitwin.models.vlm.chat_from_spec import KEY_OF_HOST, KEY_OF_OTHERS
+from manitwin.models.vlm.openai_chat import OPENAI_URL, openai_refusal
+
+BATCH = 64
+MOST_NUMBERS = 65536
+
+
+class TextEmbedder:
+    """Embed texts by one model at one server (https://platform.openai.com/docs/api-reference/embeddings/create).
+
+    Raises what ``HttpService`` does, and BadReply for an answer that is no finite vector for each text, all of one length.
+    """
+
+    def __init__(self, model: str, base_url: str, key: str | None, services: ServicesConfig):
+        self.model, self.base_url = model, base_url
+        self._service = HttpService(
+            "openai", base_url, authorization=bearer(key), services=services, key=key, refusal=openai_refusal
+        )
+
+    @property
+    def identity(self) -> str:
+        """What decides the vectors: server and model."""
+        return f"{self.base_url} {self.model}"
+
+    def embed(self, texts: Sequence[str]) -> np.ndarray:
+        """Return the unit vectors ``(N, D) float32`` of texts, in their order."""
+        rows: list[np.ndarray] = []
+        for begin in range(0, len(texts), BATCH):
+            asked = list(texts[begin : begin + BATCH])
+            answer = self._service.post_json("embeddings", {"model": self.model, "input": asked})
+            rows += self._vectors(answer.get("data"), len(asked))
+        if len({len(row) for row in rows}) > 1:
+            raise self._service.unreadable("vectors of one length")
+        return np.array(rows, np.float32)
+
+    def _vectors(self, data: Any, count: int) -> list[np.ndarray]:
+        """Read ``data[].embedding``, put in order by ``index``."""
+        found: dict[int, np.ndarray] = {}
+        for each in data if isinstance(data, list) else ():
+            values = each.get("embedding") if isinstance(each, dict) else None
+            place = each.get("index") if isinstance(each, dict) else None
+            if not (isinstance(values, list) and 0 < len(values) <= MOST_NUMBERS and type(place) is int):
+                break
+            if not all(type(value) in (int, float) and math.isfinite(value) for value in values) or not any(values):
+                break
+            vector = np.array(values, np.float64)
+            found[place] = vector / np.linalg.norm(vector)
+        if sorted(found) != list(range(count)):
+            raise self._service.unreadable(f"data[].embedding for each of {count} texts: it is no answer of embeddings")
+        return [found[place] for place in range(count)]
+
+
+def text_embedder(spec: str, services: ServicesConfig) -> TextEmbedder:
+    """Return the embedder of ``openai:MODEL`` or ``openai:MODEL@URL``; raises ConfigError without a model or a key."""
+    name, _, argument = spec.partition(":")
+    model, url = split_url(argument)
+    if name != "openai" or not model:
+        raise ConfigError(
+            f"{spec!r} names no embedding model; give openai:MODEL, or openai:MODEL@URL for a server of your own"
+        )
+    url = url or OPENAI_URL
+    key_name = KEY_OF_HOST.get(urlsplit(url).hostname or "", KEY_OF_OTHERS)
+    key = key_from_environment((key_name,), url, spec, own_server=key_name == KEY_OF_OTHERS)
+    return TextEmbedder(model, url, key, services)

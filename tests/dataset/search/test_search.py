@@ -1,0 +1,153 @@
+"""Search of a small data set: by words, by a served model, by pictures, and what is kept for the next time."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from manitwin.dataset.index.rebuild import rebuild
+from manitwin.dataset.search import twin_looks as drawing
+from manitwin.dataset.search.search import search_picture, search_words, text_vectors
+from manitwin.dataset.search.stored import FOLDER, Stored, VectorStore
+from manitwin.dataset.search.twin_looks import SPACE, twin_looks
+from manitwin.dataset.search.words import described, rank_by_words, words
+from manitwin.errors import UsageError
+from manitwin.render.cameras import framing_camera
+from manitwin.render.renderer import shared_renderer
+from manitwin.twin.dataset_root import DatasetRoot, twin_name
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.store import RECORD, seal
+from scene_twins import can, slab, write_thing
+
+
+@pytest.fixture(scope="module")
+def root(tmp_path_factory: pytest.TempPathFactory) -> DatasetRoot:
+    folder = tmp_path_factory.mktemp("set")
+    for number, thing in enumerate((can(), slab("knife", 0.22, 0.02, 0.01, 0.08), slab("box", 0.12, 0.08, 0.06))):
+        write_thing(folder, number, thing)
+    _say(folder, 2, color="dark blue (80 %), white (20 %)", caption="A dark blue box.")
+    rebuild(DatasetRoot(folder), jobs=1)
+    return DatasetRoot(folder)
+
+
+def _say(folder: Path, number: int, **words: str) -> None:
+    from twin_folders import twin_id
+
+    twin = folder / twin_name(twin_id(number))
+    record = json.loads((twin / RECORD).read_bytes())
+    record["language"] |= words
+    del record["revision"], record["files"]
+    seal(twin, record)
+
+
+def revisions(root: DatasetRoot) -> dict[str, str]:
+    assert root.local is not None
+    return {each: Twin(root.local / root.twin_name(each)).record.revision for each in root.twin_ids()}
+
+
+def test_words_find_what_the_thing_is_before_its_color(root: DatasetRoot) -> None:
+    found = search_words(root, "some BLUE boxes", limit=5)
+    assert found[0].category == "box" and found[0].matched == {
+        "blue": ["caption", "color"],
+        "box": ["aliases", "caption", "category"],
+    }
+    assert search_words(root, "tin", limit=5)[0].category == "can", "an alias of the priors"
+    assert search_words(root, "xylophone", limit=5) == []
+    assert len(search_words(root, "can knife box", limit=2)) == 2
+    with pytest.raises(UsageError, match="no word"):
+        search_words(root, "of the ...", limit=5)
+
+
+def test_scores_are_those_of_bm25_by_hand() -> None:
+    texts = [described({"category": word}) | {"aliases": ""} for word in ("xa", "xb", "xb")]
+    hits = rank_by_words("xa xb", texts)
+    assert [hit.place for hit in hits] == [0, 1, 2]
+    # one field of its mean length: weight 6, k1 1.2; rarities log(1 + 2.5/1.5) and log(1 + 1.5/2.5)
+    assert hits[0].score == pytest.approx(np.log(1 + 2.5 / 1.5) * 6 * 2.2 / 7.2)
+    assert hits[1].score == hits[2].score == pytest.approx(np.log(1 + 1.5 / 2.5) * 6 * 2.2 / 7.2)
+
+
+def test_words_are_in_the_singular_and_in_one_spelling() -> None:
+    assert words("The gray knives for Glasses, berries and brushes") == ["grey", "knife", "glass", "berry", "brush"]
+    assert "unknown" not in described({"category": "mug", "color": "unknown color (untextured)"})["color"]
+
+
+class Embedder:
+    """Stands for a served model: vectors by the first letter, and a count of the texts that were asked."""
+
+    identity = "here 1"
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+
+    def embed(self, texts: list[str]) -> np.ndarray:
+        self.asked += texts
+        return np.array([np.eye(26, dtype=np.float32)[ord(text[0].lower()) - 97] for text in texts]).reshape(-1, 26)
+
+
+def test_a_model_of_embeddings_is_asked_once_for_each_text(root: DatasetRoot) -> None:
+    model = Embedder()
+    found = search_words(root, "knight", limit=3, embedder=model)  # type: ignore[arg-type]
+    assert found[0].category == "knife" and found[0].matched is None
+    assert len(model.asked) == 1 + 3
+    again = search_words(root, "knight", limit=3, embedder=model)  # type: ignore[arg-type]
+    assert again == found and len(model.asked) == 2 + 3
+    rows = [
+        {"twin_id": each, "revision": "r", "category": "can", "caption": "new"} for each in list(root.twin_ids())[:1]
+    ]
+    text_vectors(root, rows, model)  # type: ignore[arg-type]
+    assert model.asked[-1] == "can: new"
+
+
+def test_a_picture_finds_its_twin_and_looks_are_made_once(root: DatasetRoot, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert root.local is not None
+    drawn: list[str] = []
+    monkeypatch.setattr(drawing, "AROUND", 3)
+    for twin_id in root.twin_ids():
+        twin = Twin(root.local / root.twin_name(twin_id))
+        points = np.concatenate([part.vertices for part in twin.visual])
+        camera = framing_camera(points, azimuth_deg=77, elevation_deg=28, fov_y_deg=40, width_px=120, height_px=96)
+        (frame,) = shared_renderer().render(twin.visual, [camera], background=(70, 90, 60))
+        hits, found = search_picture(root, frame.rgb, limit=2, on_twin=drawn.append)
+        assert (hits[0].twin_id, found) == (twin_id, "border") and len(hits) == 2
+    assert sorted(drawn) == sorted(root.twin_ids()), "each was drawn for the first question alone"
+
+
+def test_looks_are_made_again_for_another_surface_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drawing, "AROUND", 1)
+    root, drawn = DatasetRoot(tmp_path), list[str]()
+    twin_id = write_thing(tmp_path, 0, can())
+    before = dict(twin_looks(root, revisions(root), drawn.append))[twin_id]
+    file = tmp_path / VectorStore(root, SPACE).file(twin_id)
+    content = file.read_bytes()
+    file.unlink()
+    assert (dict(twin_looks(root, revisions(root), drawn.append))[twin_id] == before).all()
+    assert file.read_bytes() == content and len(drawn) == 2
+    _say(tmp_path, 0, caption="Another sentence.")
+    dict(twin_looks(root, revisions(root), drawn.append))
+    assert len(drawn) == 2, "a sentence changes no look"
+    file.write_bytes(content[:-9])
+    dict(twin_looks(root, revisions(root), drawn.append))
+    assert len(drawn) == 3, "a file that was cut off is made again"
+    write_thing(tmp_path, 0, slab("can", 0.1, 0.1, 0.02))
+    after = dict(twin_looks(root, revisions(root), drawn.append))[twin_id]
+    assert len(drawn) == 4 and (after != before).any()
+
+
+def test_a_store_gives_back_what_it_was_given_and_refuses_other_lengths(tmp_path: Path) -> None:
+    root = DatasetRoot(tmp_path)
+    kept = VectorStore(root, "space").write("ab12", Stored("r", "c", np.array([[0.25, 0.5], [1.0, -2.0]], np.float32)))
+    again = VectorStore(root, "space", 2).read("ab12")
+    assert again is not None and (again.revision, again.content) == ("r", "c")
+    assert (again.vectors == kept.vectors).all()
+    assert VectorStore(root, "space", 3).read("ab12") is None
+    assert VectorStore(root, "other").read("ab12") is None
+    assert [path.name for path in (tmp_path / FOLDER).rglob("*.parquet")] == ["ab12.parquet"]
+
+
+def test_pictures_want_a_local_data_set() -> None:
+    with pytest.raises(UsageError, match="copy the data set"):
+        dict(twin_looks(DatasetRoot("memory://nowhere"), {"ab12": "r"}))
