@@ -87,6 +87,7 @@ PAGES: dict[str, Arrangement] = {
     "docs/build.md": Arrangement(
         blocks={"^file,name,units": "manifest", "^file,name,group": "manifest", "^things: ": "account things"}
     ),
+    "docs/catalog.md": Arrangement(slow=(r"manitwin catalog",)),
     "docs/cluster.md": Arrangement(
         rewritten={r" --address auto": ""},  # without one, it starts a cluster on this machine
         not_run={r"^pip install": NO_NETWORK},
@@ -129,6 +130,12 @@ PAGES: dict[str, Arrangement] = {
         rewritten={r" --watch": "", "mug_0042.glb": "mug.glb"},  # watching ends with the watcher
         slow=(r"\bDATASET\b",),
         blocks={"^DATASET/": "tree DATASET"},
+    ),
+    "docs/search.md": Arrangement(
+        slow=(r"manitwin search DATASET --image",),
+        not_run={
+            r"--embedder openai:nomic": "tests/models/embedders and tests/dataset/search ask the fake of such a server"
+        },
     ),
     "docs/served_grasps.md": Arrangement(not_run=GRASP_SERVERS),
     "docs/tutorial.md": Arrangement(
