@@ -131,3 +131,23 @@ def test_descriptions_that_others_include_are_no_assets_and_are_said(tmp_path: P
     assert [path.name for path in find_all([tmp_path], fragments)] == ["cut.urdf", "object.urdf"]
     assert [path.name for path in fragments] == ["macro.urdf", "materials.xml"]
     assert list(find_assets(tmp_path / "materials.xml")) == [tmp_path / "materials.xml"], "what is named is read"
+
+
+def test_a_model_of_models_is_read_as_the_first_that_it_includes(tmp_path: Path) -> None:
+    shape = "<link name='l'><collision name='c'><geometry><box><size>1 1 2</size></box></geometry></collision></link>"
+    texts = {
+        "board": "<model name='b'><include><uri>model://peg</uri></include></model>",
+        "peg": f"<model name='p'>{shape}</model>",
+        "sun": "<light name='s'/>",
+    }
+    for name, text in texts.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "model.sdf").write_text(f"<sdf version='1.6'>{text}</sdf>")
+        (tmp_path / name / "model.config").write_text(f"<model><name>{name}</name></model>")
+    asset = read_asset(tmp_path / "board", root=tmp_path)
+    assert len(asset.collision) == 1 and "'model://peg' was read" in " ".join(asset.remarks)
+    with pytest.raises(AssetError, match="no <link>"):
+        read_asset(tmp_path / "board")
+    fragments: list[Path] = []
+    assert [path.name for path in find_all([tmp_path], fragments)] == ["board", "peg"]
+    assert [path.parent.name for path in fragments] == ["sun"]

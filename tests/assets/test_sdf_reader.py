@@ -123,6 +123,16 @@ def test_planes_and_polylines_that_are_none_are_refused(tmp_path: Path, shape: s
         read(tmp_path, link("base", f'<visual name="v"><geometry>{shape}</geometry></visual>'))
 
 
+def test_lines_within_lines_are_holes(tmp_path: Path) -> None:
+    squares = [[(-s, -s), (s, -s), (s, s), (-s, s)] for s in (1.0, 0.5)]
+    lines = "".join(
+        f"<polyline>{''.join(f'<point>{x} {y}</point>' for x, y in square)}<height>2</height></polyline>"
+        for square in squares
+    )
+    (part,) = read(tmp_path, link("base", f'<visual name="v"><geometry>{lines}</geometry></visual>')).visual
+    assert np.isclose(part.volume, 2 * (4 - 1))
+
+
 def test_a_joint_may_have_the_name_of_a_link(tmp_path: Path) -> None:
     inside = f'<visual name="v">{BOX}</visual>'
     joint = '<joint name="base" type="fixed"><parent>world</parent><child>base</child></joint>'

@@ -193,6 +193,9 @@ def _assets_below(path: Path, root: Path, fragments: list[Path]) -> Iterator[Pat
     if form == "robotwin":
         yield from robotwin_data(path)
         return
+    if form == "sdf" and _is_fragment(path / "model.sdf"):
+        fragments.append(path / "model.sdf")  # a light, say
+        return
     if form is not None:
         yield path
         return

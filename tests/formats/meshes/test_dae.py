@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -71,3 +72,13 @@ def test_sponge_reads_as_trimesh_reads_it(shared_data: Path) -> None:
     theirs = trimesh.load_mesh(path)
     assert mesh.parts[0].area == pytest.approx(theirs.area, rel=1e-6)
     np.testing.assert_allclose(mesh.parts[0].bounds, theirs.bounds, atol=1e-6)
+
+
+def test_shapes_of_broken_materials_are_read_and_grey(tmp_path: Path) -> None:
+    path = _write(tmp_path)
+    text = path.read_text()
+    assert '<instance_material symbol="' in text
+    path.write_text(re.sub(r'target="#[^"]*"', 'target="#nowhere"', text))
+    mesh = read_mesh(path)
+    assert len(mesh.parts) == 1 and mesh.parts[0].visual.material.baseColorTexture is None
+    assert "materials in it are broken" in " ".join(mesh.findings)

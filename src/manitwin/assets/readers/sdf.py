@@ -13,10 +13,12 @@ from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.read import is_file_below, only_file
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
+from manitwin.assets.readers.urdf_shapes import candidates
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
 from manitwin.formats.xml_file import comments_before, number, read_xml, text_of
 
+_MAX_INCLUDES = 8
 MAIN_FILE, CONFIG_FILE = "model.sdf", "model.config"
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
@@ -51,9 +53,9 @@ def open_sdf(path: Path, folder: Path | None = None) -> SdfModel:
     file = path
     if path.is_dir():
         file = path / MAIN_FILE if is_file_below(path / MAIN_FILE, path) else only_file(path)
-    root = read_xml(file, "sdf")
     files = AssetFiles(folder or root_of(path), file.resolve().parent)
     files.used.add(file.resolve())
+    file, root = _included(file, read_xml(file, "sdf"), files)
     config = file.parent / CONFIG_FILE
     beside = read_xml(config, "model", inside=config.parent) if is_file_below(config, config.parent) else None
     if beside is not None:
@@ -61,6 +63,19 @@ def open_sdf(path: Path, folder: Path | None = None) -> SdfModel:
     model = _only_model(file, root, files)
     frames = ModelFrames(file, model)
     return SdfModel(file, root, beside, model, _rigid_links(file, model, frames, files), frames, files)
+
+
+def _included(file: Path, root: etree._Element, files: AssetFiles) -> tuple[Path, etree._Element]:
+    """Return the file and root of the model that one without links is composed of: the first one that it includes."""
+    for _ in range(_MAX_INCLUDES):
+        model = root.find("model")
+        uri = None if model is None or model.find("link") is not None else text_of(model, "include/uri")
+        found = None if uri is None else files.find(uri, candidates(f"{uri}/{MAIN_FILE}", file, files.root))
+        if found is None:
+            break
+        files.remark(f"it has no link of its own; of the models that it includes, {uri!r} was read")
+        file, root = found, read_xml(found, "sdf")
+    return file, root
 
 
 def asset_of(opened: SdfModel, path: Path) -> Asset:

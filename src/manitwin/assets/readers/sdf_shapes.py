@@ -134,9 +134,11 @@ class SdfShapes:
     def _parts(self, element: etree._Element, what: str) -> list[trimesh.Trimesh]:
         geometry = element.find("geometry")
         shapes = [] if geometry is None else list(geometry.iterchildren(tag="*"))
-        if len(shapes) != 1:
+        if len(shapes) != 1 and {shape.tag for shape in shapes} != {"polyline"}:
             raise AssetError(f"{what}: its <geometry> holds {len(shapes)} shapes, not one")
         shape, color = shapes[0], _diffuse(element, what)
+        if shape.tag == "polyline":  # several: what lies within two of them is a hole
+            return [self._solid(_polyline(shapes, what), shape, color)]
         if shape.tag == "mesh":
             return self._mesh_parts(shape, color, what)
         solid = _primitive(shape, what)
@@ -144,8 +146,11 @@ class SdfShapes:
             if shape.tag != "empty":
                 self._files.remark(f"{element.get('name')!r} is <{shape.tag}>, not read as a shape, and was left out")
             return []
+        return [self._solid(solid, shape, color)]
+
+    def _solid(self, solid: trimesh.Trimesh, shape: etree._Element, color: np.ndarray | None) -> trimesh.Trimesh:
         self._files.count(len(solid.faces))
-        return [make_part(solid.vertices, solid.faces, material=plain_material(color), name=str(shape.tag))]
+        return make_part(solid.vertices, solid.faces, material=plain_material(color), name=str(shape.tag))
 
     def _mesh_parts(self, shape: etree._Element, color: np.ndarray | None, what: str) -> list[trimesh.Trimesh]:
         uri = text_of(shape, "uri") or ""
@@ -194,8 +199,6 @@ def _primitive(shape: etree._Element, what: str) -> trimesh.Trimesh | None:
         return build(_positive(shape, "radius", what), _positive(shape, "length", what))
     if shape.tag == "plane":
         return _plane(shape, what)
-    if shape.tag == "polyline":
-        return _polyline(shape, what)
     return None
 
 
@@ -214,16 +217,20 @@ def _plane(shape: etree._Element, what: str) -> trimesh.Trimesh:
     return sheet
 
 
-def _polyline(shape: etree._Element, what: str) -> trimesh.Trimesh:
-    """Return the prism over a closed line of points, from z = 0 to its height."""
-    points = [numbers(" ".join((point.text or "").split()), 2, f"{what} point") for point in shape.findall("point")]
-    height = _positive(shape, "height", what)
+def _polyline(shapes: list[etree._Element], what: str) -> trimesh.Trimesh:
+    """Return the prism over closed lines of points, from z = 0 to the height of the first."""
+    lines = [
+        [numbers(" ".join((point.text or "").split()), 2, f"{what} point") for point in shape.findall("point")]
+        for shape in shapes
+    ]
+    height = _positive(shapes[0], "height", what)
     prism = None
-    if 3 <= len(points) <= _MAX_POINTS:
-        outline = manifold3d.CrossSection([np.array(points)], manifold3d.FillRule.NonZero)
+    if all(len(line) >= 3 for line in lines) and sum(map(len, lines)) <= _MAX_POINTS:
+        outline = manifold3d.CrossSection([np.array(line) for line in lines], manifold3d.FillRule.EvenOdd)
         prism = outline.extrude(height).to_mesh64()
     if prism is None or not len(prism.tri_verts):
-        raise AssetError(f"{what}: its polyline of {len(points)} points encloses no area; give 3 to {_MAX_POINTS}")
+        said = ", ".join(str(len(line)) for line in lines[:4])
+        raise AssetError(f"{what}: its polyline of {said} points encloses no area; give 3 to {_MAX_POINTS}")
     return trimesh.Trimesh(prism.vert_properties[:, :3], prism.tri_verts.astype(np.int64), process=False)
 
 

@@ -36,12 +36,31 @@ def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, s
     if skinned:
         raise source.refused("animated", "the mesh is bound to a skeleton", "apply the pose and export a still mesh")
     try:
-        document = collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
+        document = _without_broken_materials(_document(data), data, source)
         with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
             parts = _parts(document, source)
     except collada.common.DaeError as error:
         raise source.unreadable(f"its COLLADA is broken ({str(error)[:100]})", _REMEDY) from error
     return parts, unit_m, up
+
+
+def _document(data: bytes) -> Any:
+    return collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
+
+
+def _without_broken_materials(document: Any, data: bytes, source: MeshSource) -> Any:
+    """Return a document whose shapes name no material that could not be read: pycollada leaves out such shapes as a whole."""
+    known = {material.id for material in document.materials}
+    refusal = partial(InputError, "unreadable")
+    root = parse_xml(data, "COLLADA", source.path.name, refusal=refusal, comments=False, max_bytes=None)
+    named = list(root.iter("{*}instance_material"))
+    broken = [each for each in named if (each.get("target") or "").removeprefix("#") not in known]
+    if not broken:
+        return document
+    for each in broken:
+        each.getparent().remove(each)
+    source.find("materials in it are broken, and what has them is grey")
+    return _document(etree.tostring(root))
 
 
 def _check_size(data: bytes, source: MeshSource) -> None:
