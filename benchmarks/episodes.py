@@ -36,7 +36,12 @@ def figures(folder: Path) -> str:
     }
     shares = sorted((good / tried, good, tried, name) for name, (good, tried) in rates.items() if tried)
     many = sum(tried >= 50 for _, _, tried, _ in shares)
-    errors = np.array([a.position_error_m for a in kept])
+    errors = np.array([a.position_error_m for a in kept if a.position_error_m is not None])
+    placed = (
+        f"placement error median {1000 * np.median(errors):.2f} mm, 95 % {1000 * np.quantile(errors, 0.95):.1f} mm"
+        if len(errors)
+        else "nothing is placed"
+    )
     with read_ledger(local_ledger(DatasetRoot(folder))) as ledger:
         (cpu,) = ledger.execute("SELECT sum(cpu_seconds) FROM stages").fetchone()
     dead = [name for name, (_, tried) in rates.items() if not tried]
@@ -45,7 +50,7 @@ def figures(folder: Path) -> str:
         f"{folder.name}: {len(attempts)} attempted, {len(executed)} executed ({len(executed) / len(attempts):.1%}), "
         f"{sum(a.succeeded for a in executed)} succeeded ({sum(a.succeeded for a in executed) / len(executed):.1%}), "
         f"{len(kept)} kept; {many} objects with 50 executed or more, worst {worst}; never executed: {', '.join(dead) or 'none'}; "
-        f"placement error median {1000 * np.median(errors):.2f} mm, 95 % {1000 * np.quantile(errors, 0.95):.1f} mm; "
+        f"{placed}; "
         f"length {np.mean([a.length_s for a in kept]):.2f} s; {cpu / len(attempts):.3f} CPU-s an attempt"
     )
 

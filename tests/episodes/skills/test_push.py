@@ -12,13 +12,15 @@ from granular_things import two_things
 from held_skills import around
 
 from manitwin.episodes.courses import push as push_course
-from manitwin.episodes.episode import run_episode
+from manitwin.episodes.courses.course import Start
+from manitwin.episodes.episode import run_episode, world_of
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.push import MARK, strokes
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal, Surroundings
+from manitwin.episodes.tool_watches import PushWatch
 from manitwin.geometry.poses import transform, transform_points
 from rigid_boxes import above, box
 
@@ -65,6 +67,23 @@ def test_what_is_carried_to_the_mark_is_not_pushed_there() -> None:
     facts = attempt(replace(goal, pushes=False, poses=(there,)), (Grasp("g0", above([0, 0, 0.02]), 0.07),))
     assert facts.evaluation is not None
     assert facts.evaluation.literals[0].failure == "not_touched"
+
+
+def test_a_push_is_watched_at_what_is_pushed_while_another_object_is_taken() -> None:
+    pair = two_things((BOX, ()), (BOX, ()), ((0.5, 0.0), (0.5, 0.16)), vessels=(False, False))
+    problem = PickPlaceProblem(
+        pair.objects[0], pair.objects[0].object_to_world, (), pair.objects[1:], pair.boxes, seed=3
+    )
+    robot, planner = panda()
+    start = Start(problem, pair.objects, planner, EpisodeSettings(), goal_of(pair, 0))
+    with world_of(problem, robot, EpisodeSettings(), 50.0) as world:
+        (watch,) = push_course.PushCourse(start, EpisodeFacts()).watches(world)
+        assert isinstance(watch, PushWatch)
+        world.take(1)
+        assert np.allclose(watch.center()[:2], [0.5, 0.01], atol=0.011)
+        world.bodies[1].set_linear_velocity(np.array([0, 0, 1.0], np.float32))
+        world.step(12)
+        assert watch.center()[2] < 0.03 < world.object_to_world(1)[2, 3]
 
 
 def test_marks_are_in_reach_and_the_way_is_free() -> None:

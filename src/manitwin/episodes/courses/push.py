@@ -57,10 +57,10 @@ class PushCourse(Course):
 
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
         """Return the watch of what the hand touches."""
-        target = world.placed[world.target]
+        target = self.problem.target
 
         def center() -> np.ndarray:
-            return transform_points(world.object_to_world(world.target), target.body.center_of_mass_m[None])[0]
+            return transform_points(world.pose_of(target.name), target.body.center_of_mass_m[None])[0]
 
         return (PushWatch(target.name, frozenset(world.robot.links), center),)
 

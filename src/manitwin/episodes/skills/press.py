@@ -62,9 +62,7 @@ class Press(HeldSkill):
             paths.append(HeldPath(np.array(poses), frozenset({target.name}), FREE_KNOTS))
 
         def watch(world: RobotWorld) -> PressWatch:
-            return PressWatch(
-                target.name, scene.fingers, lambda: world.object_to_world(world.target) @ frame.frame_to_object
-            )
+            return PressWatch(target.name, scene.fingers, lambda: world.pose_of(target.name) @ frame.frame_to_object)
 
         asked_n = SIGNATURES[self.predicate].default
         assert asked_n is not None

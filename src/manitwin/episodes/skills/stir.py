@@ -96,13 +96,12 @@ class Stir(HeldSkill):
             return None if from_end_m < FREE_END * length_m else -round(from_end_m / length_m, 1)
 
         def watch(world: RobotWorld) -> StirWatch:
-            number = [placed.name for placed in world.placed].index(vessel.name)
             granules = world.granules
             return StirWatch(
                 target.name,
                 vessel.name,
-                lambda: (world.object_to_world(world.target) @ stick)[:3, 3],
-                lambda: world.object_to_world(number),
+                lambda: (world.pose_of(target.name) @ stick)[:3, 3],
+                lambda: world.pose_of(vessel.name),
                 opening,
                 (lambda: np.zeros((1, 3))) if granules is None else granules.positions_m,
                 0.0 if granules is None else granules.radius_m,

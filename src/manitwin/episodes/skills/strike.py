@@ -73,7 +73,7 @@ class Strike(HeldSkill):
             return StrikeWatch(
                 target.name,
                 BLOCK,
-                lambda: world.object_to_world(world.target) @ face.frame_to_object,
+                lambda: world.pose_of(target.name) @ face.frame_to_object,
                 face.size_m,
                 world.timestep_s,
             )

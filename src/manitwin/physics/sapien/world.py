@@ -125,6 +125,10 @@ class RobotWorld:
         """Return the pose ``(4, 4)`` of an object's frame."""
         return self.bodies[number].entity_pose.to_transformation_matrix().astype(float)
 
+    def pose_of(self, name: str) -> np.ndarray:
+        """Return the pose ``(4, 4)`` of the frame of an object by name, whichever of them is the target by now."""
+        return self.object_to_world([placed.name for placed in self.placed].index(name))
+
     def settle(self, seconds: float) -> Rest:
         """Let the objects come to rest; the robot stays where it is told to be."""
         return settle(self._system, self.bodies, timestep_s=self.timestep_s, seconds=seconds, limits=RESTS)
