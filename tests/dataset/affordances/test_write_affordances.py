@@ -95,6 +95,12 @@ def test_parts_are_rows_of_shapenetpart(dataset: Path, written: Path) -> None:
     assert lists[f"shuffled_{split_of(twin.record.twin_id)}_file_list"] == [f"shape_data/can/{twin.record.twin_id}"]
 
 
+def test_the_page_shows_the_twins_and_asks_for_nothing(written: Path) -> None:
+    page = (written / "report.html").read_text()
+    assert page.count("<img") == 2 and "2 twins of 2 categories, 1 with parts" in page
+    assert "http" not in page and "<script" not in page
+
+
 def test_same_arguments_give_the_same_bytes(dataset: Path, tmp_path: Path) -> None:
     for name in ("one", "other"):
         write_affordances(dataset, tmp_path / name, points=60, trials=3, seed=4)

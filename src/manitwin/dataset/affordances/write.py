@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.dataset.affordances.maps import SurfaceMaps, has_parts, surface_maps
+from manitwin.dataset.affordances.report import affordances_page, sample_picture
+from manitwin.dataset.report_page import Picture
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.output_folder import new_folder
 from manitwin.twin.dataset_root import DatasetRoot
@@ -21,6 +23,8 @@ from manitwin.twin.part_records import NO_PART
 from manitwin.twin.store import canonical_json
 
 POINTS, TRIALS = 2048, 200
+SHOWN = 24
+"""Twins on the page."""
 SPLITS = (("train", 0.8), ("val", 0.1), ("test", 0.1))
 
 
@@ -58,7 +62,8 @@ def write_affordances(
     """Write the maps of all accepted twins of a local data set below ``out``, whole or not at all.
 
     ``maps/<twin>.npz`` has 3D AffordanceNet's fields; ``parts/`` is laid out as ShapeNetPart, of the twins whose parts are
-    known; ``affordances.json`` lists all. Raises UsageError for a data set without twins and an ``out`` that is not empty.
+    known; ``affordances.json`` lists all, ``report.html`` shows some. Raises UsageError for a data set
+    without twins and an ``out`` that is not empty.
     """
     root = DatasetRoot(dataset)
     if root.local is None:
@@ -74,6 +79,7 @@ def write_affordances(
     part_ids = {name: number for number, name in enumerate(kinds)}
     rows: list[dict[str, object]] = []
     left_out: dict[str, str] = {}
+    samples: list[Picture] = []
     in_splits: dict[str, list[str]] = defaultdict(list)
     with new_folder(Path(out)) as folder:
         for twin in twins:
@@ -89,6 +95,8 @@ def write_affordances(
                 _write(folder / "parts" / category / f"{name}.txt", parts_file(maps, part_ids))
                 in_splits[split_of(name)].append(f"shape_data/{category}/{name}")
             rows.append(_row(maps))
+            if len(samples) < SHOWN:
+                samples.append(sample_picture(maps))
         _write_part_lists(folder / "parts", sorted({_category(twin).replace(" ", "_") for twin in twins}), in_splits)
         listed = {
             "points": points,
@@ -99,12 +107,14 @@ def write_affordances(
             "left_out": left_out,
         }
         _write(folder / "affordances.json", canonical_json(listed).encode())
+        with_parts = sum(map(len, in_splits.values()))
+        _write(folder / "report.html", affordances_page(rows, left_out, samples, with_parts))
     agreements = [row["agreement"] for row in rows if row["agreement"] is not None]
     sim, auc = np.median(np.array(agreements, float), axis=0) if agreements else (None, None)
     return Affordances(
         twins=len(rows),
         with_grasp_map=sum("grasp" in row["maps"] for row in rows),  # type: ignore[operator]
-        with_parts=sum(map(len, in_splits.values())),
+        with_parts=with_parts,
         left_out=left_out,
         median_similarity=None if sim is None else float(sim),
         median_area_under_curve=None if auc is None else float(auc),
