@@ -55,6 +55,15 @@ def test_frames_are_those_of_the_recordings(found: LeRobotSet) -> None:
     assert found.info["total_frames"] == begin
 
 
+def test_frames_tell_which_literal_of_a_goal_is_worked_on(found: LeRobotSet, tmp_path: Path) -> None:
+    assert not found.frames(0)["active_literal"].any()
+    two = episode(0)
+    numbers = (np.arange(two.recording.steps) > 3).astype(np.uint8)
+    two = replace(two, recording=replace(two.recording, active_literal=numbers))
+    write_lerobot([two], tmp_path / "set")
+    assert np.array_equal(read_lerobot(tmp_path / "set").frames(0)["active_literal"], numbers)
+
+
 def test_frames_count_granules_where_a_set_has_them(found: LeRobotSet, tmp_path: Path) -> None:
     assert "observation.granules" not in found.features
     write_lerobot([episode(0), with_granules(episode(1))], tmp_path / "set", granules=True)

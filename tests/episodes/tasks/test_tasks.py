@@ -205,6 +205,21 @@ def test_the_environment_passes_gymnasiums_checker(folder: Path, tasks: list[Tas
     env.close()
 
 
+@pytest.mark.slow
+def test_the_environment_shows_pictures_of_what_is_there(folder: Path, tasks: list[TaskRecord]) -> None:
+    env = manitwin.make_env(folder, tasks[0].task_id, cameras=("front", "wrist"), picture_px=32)
+    first, _ = env.reset(seed=0)
+    assert env.observation_space.contains(first) and set(first["pictures"]) == {"front", "wrist"}
+    assert all(picture.std() > 5 for picture in first["pictures"].values())
+    turned = np.append(env.unwrapped._robot.home_rad, 0.08).astype(np.float32)
+    turned[0] += 0.3
+    for _ in range(10):
+        then, *_ = env.step(turned)
+    assert all((then["pictures"][name] != picture).any() for name, picture in first["pictures"].items())
+    assert np.array_equal(env.render(), then["pictures"]["front"])
+    env.close()
+
+
 def test_bddl_says_what_it_can_and_lists_the_rest(scenes: Path, tasks: list[TaskRecord]) -> None:
     scene = read_scene(scene_files(scenes)[0])
     for task in tasks:

@@ -59,6 +59,7 @@ def features_of(robot: RecordedRobot, *, granules: bool = False) -> tuple[Featur
         Feature("next.success", "bool"),
         Feature("next.done", "bool"),
         Feature("phase", "int64"),
+        Feature("active_literal", "int64"),
         *(Feature(name, dtype) for name, dtype in DEFAULT_FEATURES.items()),
     )
 
@@ -86,6 +87,7 @@ def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task
         "next.success": last & episode.attempt.succeeded,
         "next.done": last,
         "phase": recording.phase.astype(np.int64),
+        "active_literal": _active_literal(recording),
         "timestamp": (number / RATE_HZ).astype(np.float32),
         "frame_index": number,
         "episode_index": np.full(steps, episode_index),
@@ -102,6 +104,12 @@ def _granule_counts(recording: Recording) -> np.ndarray:
     in_target = held[:-1, recording.target].astype(np.int64)
     in_others = held[:-1].sum(1, dtype=np.int64) - in_target
     return np.stack([in_target, in_others, positions.shape[1] - in_target - in_others], axis=1)
+
+
+def _active_literal(recording: Recording) -> np.ndarray:
+    """Return the number of the literal that is worked on ``(T,)``; zeros where the goal has one."""
+    told = recording.active_literal
+    return np.zeros(recording.steps, np.int64) if told is None else told.astype(np.int64)
 
 
 def schema_of(features: tuple[Feature, ...]) -> pa.Schema:
