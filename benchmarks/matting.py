@@ -1,6 +1,6 @@
 """Cut the object out of composites whose mask is known, and print what was accepted, how right it is, and what it cost.
 
-    python benchmarks/matting.py [--part held-out|tuning] [--first 0] [--count 300] [--jobs 1] [--network isnet]
+    python benchmarks/matting.py [--part held-out|tuning|calibration] [--first 0] [--count 300] [--jobs 1] [--network isnet]
                                  [--photos FOLDER] [--sheet PNG]
 
 The pictures are made here (``composites.py``), of templates on grounds of the project's own making; the held-out part has other
@@ -141,7 +141,7 @@ def tile(rgba: np.ndarray) -> np.ndarray:
 def main() -> None:
     """Run the benchmark."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--part", choices=("held-out", "tuning"), default="held-out")
+    parser.add_argument("--part", choices=("held-out", "tuning", "calibration"), default="held-out")
     parser.add_argument(
         "--first", type=int, default=0, help="number of the first composite: others than were measured before"
     )

@@ -32,9 +32,6 @@ _CAUSES = {
     "unshaded": "part of its outline has the background's colour, dimmed: a shadow may hang on it",
     "solid": "the ground may be seen through it, or it has parts of the ground's colour inside",
     "thick": "it is thin for so small a photo, so its outline is a large part of it",
-    "undivided": "the ground may be seen in slots of it",
-    "entire": "edges beside it are as sharp as its outline, so a part of it may be lost",
-    "known_to_colours": "its colours alone do not bear out its outline",
     "sharply_bounded": "it is as grey as a shadow, and part of its outline as soft as one: a shadow may hang on it",
     "outermost": "what looks like its shadow has edges as sharp as its outline, so a clear or grey part of it may be lost",
 }
