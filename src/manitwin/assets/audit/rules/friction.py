@@ -14,6 +14,8 @@ LARGEST = 2.0
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of an asset that declares no friction."""
+    if measured.asset.static:
+        return
     contact = measured.asset.contact
     if contact.friction_static is None and contact.friction_dynamic is None:
         yield Complaint("no friction is declared: the scene's default decides whether a grasp holds")
