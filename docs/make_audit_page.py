@@ -19,6 +19,8 @@ INTRODUCTION = """# Audit: is this asset true?
 manitwin audit PATH...
 manitwin audit ASSETS --select MAS,INE001 --ignore LIC --format sarif > audit.sarif
 manitwin audit ASSETS --fix --jobs 2
+manitwin audit ASSETS --write-baseline audit_baseline.json
+manitwin audit ASSETS --baseline audit_baseline.json
 manitwin audit --explain INE004
 ```
 
@@ -38,6 +40,9 @@ status: 0 no errors, 1 errors, 2 wrong use.
   against it.
 - `--fix` writes what follows from the asset's own words, each file whole, with the old one beside it as `<name>.orig`. It never
   moves an origin.
+- `--write-baseline FILE` notes what is found of each asset, and `--baseline FILE` leaves that out from then on: a project with
+  old findings fails for new ones alone. A finding is known by its asset's path from the baseline's folder and its rule.
+- Of twenty assets and more it ends with what they amount to: by rule, what could not be read and why, and the worst ones.
 - `--format json` has the numbers behind every finding; `sarif` (2.1.0) is what code hosts show beside a change.
 
 From Python: `manitwin.audit_assets(["assets"], ignore=["LIC"], jobs=2)` returns what was found of each asset.

@@ -25,6 +25,8 @@ PLACES = frozenset(
         "record",
         "log",
         "labels",
+        "baseline",
+        "write_baseline",
     }
 )
 """The parameters, of whatever command, that name files, folders or URLs."""

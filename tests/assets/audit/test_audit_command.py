@@ -17,9 +17,10 @@ from click.testing import Result
 from made_mug import MASS_KG, clean, hulls, textured, write_twin, write_urdf
 from typer.testing import CliRunner
 
+from manitwin.assets.audit.baseline import read_baseline
 from manitwin.assets.audit.check import audit_path
 from manitwin.assets.audit.finding import Audited, Finding
-from manitwin.assets.audit.report import explanation, json_of, sarif_of, summary, text_of
+from manitwin.assets.audit.report import digest, explanation, json_of, sarif_of, summary, text_of
 from manitwin.assets.audit.rules import RULES
 from manitwin.assets.audit.run import audit_assets
 from manitwin.assets.audit.selection import rule_of, select_rules
@@ -238,6 +239,60 @@ def test_what_most_assets_have_in_common_is_said_once_with_its_count(tmp_path: P
     assert "1 descriptions without a shape" in done.stderr
     alone = CliRunner().invoke(app, ["audit", str(tmp_path / "one"), "--select", "LIC"])
     assert "  LIC001 warning  no licence is stated" in alone.stdout
+
+
+def test_a_baseline_leaves_out_what_was_known_and_nothing_else(tmp_path: Path, command: Callable[..., Result]) -> None:
+    write_urdf(tmp_path / "assets/one", inertial=PLACEHOLDER)
+    file = tmp_path / "baseline.json"
+    assert command(tmp_path / "assets").exit_code == 1
+    written = command(tmp_path / "assets", "--write-baseline", file)
+    assert written.exit_code == 0
+    assert json.loads(file.read_text())["assets"] == {"assets/one/mug.urdf": ["COM003", "INE004"]}
+    known = command(tmp_path / "assets", "--baseline", file)
+    assert known.exit_code == 0 and "1 assets, 1 without findings" in known.stdout
+    write_urdf(tmp_path / "assets/two", inertial=PLACEHOLDER)
+    new = command(tmp_path / "assets", "--baseline", file)
+    assert new.exit_code == 1 and "two/mug.urdf" in new.stdout and "one/mug.urdf" not in new.stdout
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (None, "no such baseline"),
+        ("{", "is broken"),
+        ("[]", "not an object"),
+        ('{"version": 2, "assets": {}}', "no baseline of version 1"),
+        ('{"version": 1, "assets": {"a": "INE004"}}', "no list of texts"),
+    ],
+)
+def test_a_file_that_is_no_baseline_is_refused_with_the_remedy(tmp_path: Path, content: str | None, said: str) -> None:
+    file = tmp_path / "baseline.json"
+    if content is not None:
+        file.write_text(content)
+    with pytest.raises(UsageError, match=said) as error:
+        read_baseline(file)
+    assert "--write-baseline" in str(error.value)
+
+
+def test_many_assets_end_with_what_they_amount_to() -> None:
+    def found(name: str, code: str, severity: str, message: str) -> Audited:
+        return Audited(name, None, (Finding(code, severity, name, message),))  # type: ignore[arg-type]
+
+    audited = [
+        *(found(f"{n}.urdf", "FIL001", "error", f"{n}.urdf: joint 'j{n}' has 3.{n} values; mend it") for n in range(3)),
+        found("a.urdf", "LIC001", "warning", "no licence is stated"),
+        found("b.urdf", "INE004", "error", "the inertia is the identity"),
+    ]
+    assert digest(audited, RULES).splitlines() == [
+        "assets by rule",
+        "       3 error    FIL001 unreadable",
+        "       1 error    INE004 inertia-placeholder",
+        "       1 warning  LIC001 licence-missing",
+        "not read or without geometry, by cause",
+        "       3 joint ... has N values, as 0.urdf",
+        "most errors",
+        *(f"       1 and 0 warnings: {name}.urdf" for name in "012b"),
+    ]
 
 
 def test_page_of_the_rules_is_that_of_the_code() -> None:

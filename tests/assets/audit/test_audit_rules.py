@@ -294,6 +294,8 @@ def test_twin_whose_frames_are_beside_their_feature_or_of_another_kind(tmp_path:
 def test_a_mass_alone_is_one_finding() -> None:
     found = audit_asset(with_inertial(inertia_kg_m2=None, center_of_mass_m=None)(clean()), RULES)
     assert [finding.code for finding in found] == ["INE001"] and "no centre of mass" in found[0].message
+    of_mujoco = replace(with_inertial(inertia_kg_m2=None, center_of_mass_m=None)(clean()), format="mjcf")
+    assert not {"INE001", "COM001"} & {finding.code for finding in audit_asset(of_mujoco, RULES)}
 
 
 def test_the_corners_of_hulls_are_counted_and_not_those_of_meshes() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import re
 from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import replace
@@ -27,6 +28,10 @@ def count_by_severity(audited: Sequence[Audited]) -> dict[str, int]:
     return {"error": counts["error"], "warning": counts["warning"], "note": counts["note"]}
 
 
+MANY = 20
+"""From so many assets on what they amount to is said as well."""
+_SEVERITIES, _NOT_READ = ("error", "warning", "note"), ("FIL001", "FIL005", "FIL006")
+_LISTED, _CAUSE_CHARACTERS = 10, 100
 SAID_ONCE = ("LIC001", "LIC002")
 """Rules of which most assets of a set have the same fault: of several assets they are said once with their count."""
 
@@ -52,6 +57,42 @@ def shared_text(audited: Sequence[Audited], codes: Collection[str] = SAID_ONCE) 
             count = len({finding.asset for finding in found})
             lines.append(f"{code} {found[0].severity:<8} {count} of {len(audited)} assets: {first}")
     return "\n".join(lines)
+
+
+def digest(audited: Sequence[Audited], rules: Sequence[RuleText]) -> str:
+    """Return what many assets amount to, for a person: by rule, what could not be read and why, and the worst assets."""
+    by_rule = Counter(code for each in audited for code in {finding.code for finding in each.findings})
+    lines = ["assets by rule"]
+    for rule in sorted(rules, key=lambda rule: (_SEVERITIES.index(rule.severity), -by_rule[rule.code], rule.code)):
+        if by_rule[rule.code]:
+            lines.append(f"  {by_rule[rule.code]:>6} {rule.severity:<8} {rule.code} {rule.name}")
+    unread: dict[str, list[str]] = {}
+    for each in audited:
+        for finding in each.findings:
+            if finding.code in _NOT_READ:
+                unread.setdefault(_cause(finding.message), []).append(each.asset)
+    if unread:
+        lines.append("not read or without geometry, by cause")
+        for cause, assets in sorted(unread.items(), key=lambda entry: (-len(entry[1]), entry[0]))[:_LISTED]:
+            lines.append(f"  {len(assets):>6} {cause}, as {printable_line(assets[0])}")
+    errors = {each.asset: count_by_severity([each]) for each in audited}
+    worst = sorted(errors, key=lambda asset: (-errors[asset]["error"], -errors[asset]["warning"], asset))[:_LISTED]
+    if worst and errors[worst[0]]["error"]:
+        lines.append("most errors")
+        for asset in worst:
+            if errors[asset]["error"]:
+                lines.append(
+                    f"  {errors[asset]['error']:>6} and {errors[asset]['warning']} warnings: {printable_line(asset)}"
+                )
+    return "\n".join(lines)
+
+
+def _cause(message: str) -> str:
+    """Return a message without the names and numbers that tell one asset from another."""
+    said = one_line(message).partition(": ")[2] or one_line(message)
+    said = re.sub(r"'[^']*'|\"[^\"]*\"", "...", said.partition(";")[0])
+    said = re.sub(r"\d+(\.\d+)?", "N", said)
+    return said if len(said) <= _CAUSE_CHARACTERS else said[: _CAUSE_CHARACTERS - 3] + "..."
 
 
 def summary(audited: Sequence[Audited]) -> str:

@@ -29,6 +29,12 @@ def audit(
     ] = "text",
     fix: Annotated[bool, typer.Option("--fix", help="Mend what is safe; old files stay beside as .orig.")] = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, max=options.MOST_JOBS, help="Processes.")] = 1,
+    baseline: Annotated[
+        Path | None, typer.Option(help="Known findings, which are not said and fail nothing.", metavar="FILE")
+    ] = None,
+    write_baseline: Annotated[
+        Path | None, typer.Option(help="Write all that is found as a baseline, and exit with 0.", metavar="FILE")
+    ] = None,
     explain: Annotated[str | None, typer.Option(help="Say what a rule is about, and stop.", metavar="CODE")] = None,
 ) -> None:
     """Find what is wrong with assets of any tool: mass, inertia, collision, scale, frames, grasps. Exit 1 on errors."""
@@ -45,6 +51,11 @@ def audit(
 
         write_text(explanation(rule_of(explain)) + "\n")
         return
+    known = None
+    if baseline is not None:
+        from manitwin.assets.audit.baseline import read_baseline
+
+        known = read_baseline(baseline)
     rules = rules_selected((select or "").split(","), (ignore or "").split(","))
     if not rules:
         raise UsageError("--select and --ignore leave no rule; leave one of them out")
@@ -54,6 +65,7 @@ def audit(
         raise UsageError(f"{', '.join(map(str, paths or []))}: holds no asset of a known format; {VALID_ASSETS}")
     audited = []
     for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths or []):
+        each = each if known is None else known.without_known(each)
         audited.append(each)
         if format == "text":
             _write_text(each, len(assets) > 1)
@@ -62,6 +74,9 @@ def audit(
             f"{len(fragments)} descriptions without a shape, which others include, are no assets and were left alone"
         )
     _write_end(audited, rules, format)
+    if write_baseline is not None:
+        _write_baseline(audited, write_baseline)
+        return
     raise typer.Exit(1 if any(f.severity == "error" for each in audited for f in each.findings) else 0)
 
 
@@ -73,13 +88,26 @@ def _write_text(each: Audited, one_of_several: bool) -> None:
         write_text(text + "\n")
 
 
+def _write_baseline(audited: Sequence[Audited], file: Path) -> None:
+    from manitwin.assets.audit.baseline import baseline_text
+    from manitwin.errors import UsageError
+
+    try:
+        file.write_text(baseline_text(audited, file), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{file}: cannot be written ({error.strerror}); give another file") from error
+    err_console.print(f"{file}: a baseline of what was found; --baseline takes it")
+
+
 def _write_end(audited: Sequence[Audited], rules: Sequence[RuleText], format: str) -> None:
-    from manitwin.assets.audit.report import json_of, sarif_of, shared_text, summary
+    from manitwin.assets.audit.report import MANY, digest, json_of, sarif_of, shared_text, summary
 
     if format == "text":
         shared = shared_text(audited) if len(audited) > 1 else ""
         if shared:
             write_text(shared + "\n")
+        if len(audited) >= MANY:
+            write_text(digest(audited, rules) + "\n")
         write_text(summary(audited) + "\n")
         return
     write_json(json_of(audited) if format == "json" else sarif_of(audited, rules))

@@ -21,8 +21,13 @@ ballast or a motor moves matter within the shape. Our choice: among 25 real obje
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of a mass without an inertia; where its centre is not declared either, that is part of it."""
+    """Complain of a mass without an inertia; where its centre is not declared either, that is part of it.
+
+    MJCF says masses or densities of shapes, from which MuJoCo's compiler computes both (``inertiafromgeom``).
+    """
     inertial = measured.asset.inertial
+    if measured.asset.format == "mjcf":
+        return
     if inertial.mass_kg is not None and inertial.inertia_kg_m2 is None:
         centre = " and no centre of mass: they are" if inertial.center_of_mass_m is None else ": it is"
         yield Complaint(f"a mass is declared, but no inertia{centre} left to the simulator")

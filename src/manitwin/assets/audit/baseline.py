@@ -1,0 +1,55 @@
+"""A baseline: the findings that a project knows of already, so that new ones alone fail its checks."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from manitwin.assets.audit.finding import Audited
+from manitwin.errors import UsageError
+from manitwin.formats.json_file import read_json_object
+
+VERSION = 1
+_REMEDY = "write it anew with --write-baseline"
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Known findings: for each asset, by its path from ``folder`` (where the baseline lies), the codes of its rules."""
+
+    folder: Path
+    codes: dict[str, frozenset[str]]
+
+    def without_known(self, each: Audited) -> Audited:
+        """Return what was found of an asset without what is known of it."""
+        known = self.codes.get(_place(each, self.folder), frozenset())
+        return replace(each, findings=tuple(finding for finding in each.findings if finding.code not in known))
+
+
+def read_baseline(file: Path) -> Baseline:
+    """Read a baseline; raises UsageError where it is none."""
+    if not file.exists():
+        raise UsageError(f"{file}: no such baseline; {_REMEDY}")
+    content = read_json_object(file, UsageError, remedy=_REMEDY)
+    assets = content.get("assets")
+    if content.get("version") != VERSION or not isinstance(assets, dict):
+        raise UsageError(f"{file}: no baseline of version {VERSION}; {_REMEDY}")
+    for asset, codes in assets.items():
+        if not isinstance(codes, list) or not all(isinstance(code, str) for code in codes):
+            raise UsageError(f"{file}: the codes of {asset[:80]!r} are no list of texts; {_REMEDY}")
+    return Baseline(file.resolve().parent, {asset: frozenset(codes) for asset, codes in assets.items()})
+
+
+def baseline_text(audited: Sequence[Audited], file: Path) -> str:
+    """Return the baseline of what was found, as it is written to ``file``: sorted, a line for each asset."""
+    folder = file.resolve().parent
+    found = {_place(each, folder): sorted({finding.code for finding in each.findings}) for each in audited}
+    assets = {asset: codes for asset, codes in sorted(found.items()) if codes}
+    return json.dumps({"version": VERSION, "assets": assets}, indent=1, ensure_ascii=True) + "\n"
+
+
+def _place(each: Audited, folder: Path) -> str:
+    return Path(os.path.relpath(Path(each.asset).resolve(), folder)).as_posix()
