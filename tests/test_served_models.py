@@ -249,7 +249,15 @@ def test_a_refused_key_stops_the_run_with_its_reason(tmp_path: Path, fault: str)
     assert not any(key in report.run.stopped for key in KEYS.values()) and twins(tmp_path) == []
 
 
-@pytest.mark.parametrize("fault", ["refusal", "cut_answer", "wrong_schema", "implausible"])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        pytest.param("refusal", marks=pytest.mark.slow),
+        pytest.param("cut_answer", marks=pytest.mark.slow),
+        "wrong_schema",
+        "implausible",
+    ],
+)
 def test_an_answer_that_cannot_be_used_is_never_accepted(tmp_path: Path, fault: str) -> None:
     with servers(vlm=Faults({fault: ALWAYS})) as served:
         report = run_here(tmp_path, served, "a bottle", retries=0)

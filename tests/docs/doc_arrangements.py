@@ -35,6 +35,9 @@ SLOW = (
 )
 """Steps that take many seconds, or want a folder that does."""
 
+DOCTOR = r"\bmanitwin doctor\b"
+"""Starts an engine and a renderer; tests/cli asks it on every run of the tests, and so does docs/backends.md."""
+
 EVERYWHERE: dict[str, str] = {
     # smaller, and in one process
     r"(manitwin build\b)(?!.*--config)": r"\1 --config small.toml",
@@ -99,6 +102,7 @@ PAGES: dict[str, Arrangement] = {
     "docs/generators.md": Arrangement(
         rewritten=TRIPOSR,
         not_run=HUNYUAN | {r"^git clone https://github\.com/VAST-AI-Research/TripoSR": NO_NETWORK},
+        slow=(DOCTOR,),
     ),
     "docs/imports.md": Arrangement(),
     "docs/json.md": Arrangement(blocks={"nothing_here": "answer manitwin build nothing_here.png -o out --json"}),
@@ -108,7 +112,7 @@ PAGES: dict[str, Arrangement] = {
         rewritten={r"^manitwin models add isnet": "manitwin models add isnet --from nothing.tgz"},
         exits={r"^manitwin models add": 2, r"--matting (isnet|my-u2net)": 2},
     ),
-    "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}),
+    "docs/platforms.md": Arrangement(not_run=WHEEL | {r"uv pip compile": NO_NETWORK}, slow=(DOCTOR,)),
     "docs/priors.md": Arrangement(blocks={"melon": "prior kitchen"}),
     "docs/programs.md": Arrangement(
         not_run={
@@ -133,11 +137,8 @@ PAGES: dict[str, Arrangement] = {
     ),
     "docs/search.md": Arrangement(
         slow=(r"manitwin search DATASET --image",),
-        not_run={
-            r"--embedder openai:nomic": "tests/models/embedders and tests/dataset/search ask the fake of such a server"
-        },
     ),
-    "docs/served_grasps.md": Arrangement(not_run=GRASP_SERVERS),
+    "docs/served_grasps.md": Arrangement(not_run=GRASP_SERVERS, slow=(DOCTOR,)),
     "docs/tutorial.md": Arrangement(
         rewritten={r" -n 150 ": " -n12 "},  # of two, as elsewhere, one may fail: there is nothing to train on then
         slow=(r".",),

@@ -19,7 +19,7 @@ from doc_shell import Shell
 
 PROGRAMS = {"sh", "python"}
 LANGUAGES = PROGRAMS | {"toml", "json", "text"}
-SERVED = re.compile(r"--(vlm|generator|grasper)\b")
+SERVED = re.compile(r"--(vlm|generator|grasper|embedder)\b")
 NONE = Arrangement()
 
 WITH_STEPS = [page for page in FILES if steps(page)]

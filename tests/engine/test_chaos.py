@@ -155,7 +155,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.run(["umount", "-l", str(disk)], check=True)
 
 
-@pytest.mark.parametrize("ledger_on_it", [True, False])
+@pytest.mark.parametrize("ledger_on_it", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_full_disk_stops_the_run_and_leaves_nothing_half_written(
     tmp_path: Path, recipe: RehearsalRecipe, small_disk: Path, ledger_on_it: bool
 ) -> None:

@@ -95,6 +95,6 @@ def statistics(case: Case) -> None:
 INDEX = ("index/*", "index/*/*", "*.parquet", "index*.json")
 target("index", dataset, query, files=INDEX, weight=0.5)
 target("ledger", dataset, status, files=(LEDGER, "config.json"), fresh=True, weight=0.3)
-target("check", dataset, check, files=(LEDGER, "config.json", "*.parquet", "*.json"), fresh=True, weight=0.3)
+target("check", dataset, check, files=(LEDGER, "config.json", "*.parquet", "*.json"), fresh=True, weight=0.1)
 target("index-rows", dataset, rows, files=("twin.json", "run.json", "grasps.parquet", "visual.glb"), weight=0.3)
 target("stats", dataset, statistics, files=INDEX, weight=0.1)

@@ -25,6 +25,7 @@ PLACES = frozenset(
         "record",
         "log",
         "labels",
+        "image",
         "baseline",
         "write_baseline",
     }

@@ -149,9 +149,10 @@ def _material(text: str, noun: str) -> str | None:
     words = text.lower().split()
     if not words or len(words) > 2 or words[-1] not in _OF_ONE_MATERIAL or not _PLAIN.fullmatch(" ".join(words)):
         return None
-    if _UNSAID.search(text) or set(words) & set(noun.split()):
+    adjective = _ADJECTIVES.get(words[-1], words[-1])
+    if _UNSAID.search(text) or {*words, adjective} & set(noun.split()):
         return None
-    return " ".join([*words[:-1], _ADJECTIVES.get(words[-1], words[-1])])
+    return " ".join([*words[:-1], adjective])
 
 
 def _use(text: str) -> str | None:
