@@ -107,6 +107,9 @@ PAGES: dict[str, Arrangement] = {
     "docs/imports.md": Arrangement(),
     "docs/json.md": Arrangement(blocks={"nothing_here": "answer manitwin build nothing_here.png -o out --json"}),
     "docs/layouts.md": Arrangement(rewritten={"layout_1_000017": "layout_1_000001"}),
+    "docs/locate.md": Arrangement(
+        rewritten={r"locate TWIN": "locate $(ls -d DATASET/twins/*/* | head -1)"}, slow=(r"manitwin locate",)
+    ),
     "docs/photos.md": Arrangement(
         # without weights, which only a person adds, each is refused
         rewritten={r"^manitwin models add isnet": "manitwin models add isnet --from nothing.tgz"},

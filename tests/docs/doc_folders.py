@@ -17,8 +17,12 @@ from PIL import Image
 
 from foreign_assets import mug_urdf
 from grasped_twins import write_brick
+from manitwin.formats.label_picture import label_picture
+from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD, seal
 from scene_twins import bowl, can, slab, write_thing
+from seen_solids import seen_from
 from twin_folders import tried_as_built, twin_id
 
 SMALL = """\
@@ -115,6 +119,8 @@ class Folders:
             (page / "LABELS.csv").write_text(
                 f"twin_id,category,plausible_mass_low_kg,plausible_mass_high_kg\n{record},mug,0.1,1\n"
             )
+        if "--depth D.png" in said:
+            self._view(page)
         kinds: dict[str, Callable[[], Path]] = {
             "twins": lambda: self.twins,
             "DATASET": lambda: self.dataset,
@@ -126,6 +132,18 @@ class Folders:
             first = re.search(rf"(-o )?\b{name}\b(?!\.)", said)
             if first and not first[1]:
                 shutil.copytree(folder(), page / name)
+
+    def _view(self, page: Path) -> None:
+        """Show the first twin of the data set to a depth camera: D.png, C.png, M.png, K.json and CLOUD.npz."""
+        model = PoseModel.of_twin(Twin(sorted(self.dataset.glob("twins/*/*"))[0]))
+        seen = seen_from(model, 0.5)
+        (page / "D.png").write_bytes(label_picture(np.rint(seen.view.depth_m * 1000)))
+        (page / "M.png").write_bytes(label_picture(seen.mask * 255))
+        Image.fromarray(np.full((*seen.mask.shape, 3), 120, np.uint8)).save(page / "C.png")
+        height, width = seen.mask.shape
+        camera = {"K": seen.view.intrinsics.tolist(), "pixel_centers_at": 0.5, "width": width, "height": height}
+        (page / "K.json").write_text(json.dumps({**camera, "depth_unit_m": 0.001}))
+        np.savez(page / "CLOUD.npz", points=seen.view.points(np.flatnonzero(seen.mask & (seen.view.depth_m > 0))))
 
     def twin_id(self, folder: Path) -> str:
         """Return the id of the mug's twin, if there is one in the folder."""

@@ -28,6 +28,11 @@ PLACES = frozenset(
         "image",
         "baseline",
         "write_baseline",
+        "depth",
+        "rgb",
+        "mask",
+        "camera",
+        "cloud",
     }
 )
 """The parameters, of whatever command, that name files, folders or URLs."""

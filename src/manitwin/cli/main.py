@@ -30,6 +30,7 @@ from manitwin.cli.commands.export import export
 from manitwin.cli.commands.fake import fake
 from manitwin.cli.commands.import_ import import_
 from manitwin.cli.commands.layout import layout
+from manitwin.cli.commands.locate import locate
 from manitwin.cli.commands.maintenance import check, index, retry
 from manitwin.cli.commands.models import models
 from manitwin.cli.commands.prompts import prompts
@@ -95,7 +96,7 @@ register(app, reported(run, own_log=True), "run", hidden=True)
 for making in (index, stats, publish, export, segmentation, affordances, catalog):
     register(app, reported(making))
 register(app, reported(import_), "import")
-for other in (status, retry, check, query, search, doctor, models, fake, prompts, audit, carve, evaluate):
+for other in (status, retry, check, query, search, doctor, models, fake, prompts, audit, carve, evaluate, locate):
     register(app, other)
 
 

@@ -43,6 +43,20 @@ def read_ply(source: MeshSource) -> list[trimesh.Trimesh]:
     if not lists:
         points = sum(e.count for e in elements if e.name == "vertex")
         raise source.refused("no_faces", f"{points} vertices and no faces", "export the surface, not a point cloud")
+    return [_part(_tables(data, encoding, elements, offset, source), texture, source)]
+
+
+def read_ply_points(source: MeshSource) -> np.ndarray:
+    """Return the vertices ``(N, 3) float64`` of a PLY, with or without faces; raises InputError ``unreadable``."""
+    data = source.data()
+    encoding, elements, _, offset = _header(data, source)
+    positions = _stacked(_tables(data, encoding, elements, offset, source).get("vertex", {}), ("x", "y", "z"))
+    if positions is None:
+        raise source.unreadable("the PLY has no vertex positions", REMEDY)
+    return positions
+
+
+def _tables(data: bytes, encoding: str, elements: list[Element], offset: int, source: MeshSource) -> dict[str, Columns]:
     words = Words(data, offset)
     order = ">" if encoding == "binary_big_endian" else "<"
     tables: dict[str, Columns] = {}
@@ -52,7 +66,7 @@ def read_ply(source: MeshSource) -> list[trimesh.Trimesh]:
             tables[element.name] = ascii_rows(element, words, source)
         else:
             tables[element.name], offset = binary_rows(element, data, offset, order, source)
-    return [_part(tables, texture, source)]
+    return tables
 
 
 def _header(data: bytes, source: MeshSource) -> tuple[str, list[Element], str | None, int]:

@@ -1,0 +1,129 @@
+"""What is prepared once of a twin to find its pose: surface points, what each side shows of them, rays, symmetries."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import trimesh
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist
+
+from manitwin.geometry.poses import transform
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.sampling import sample_surface
+from manitwin.geometry.symmetry import Symmetries, find_symmetries
+from manitwin.render.raycast import merged
+from manitwin.scenes.locate.registration import Surface, align
+from manitwin.twin.loaded_twin import Twin
+
+SURFACE_POINTS = 6000
+SHOWN_TRIED, SHOWN_KEPT = 900, 160
+ROUND_STEPS = 36
+"""Turns about the axis of a body of revolution that stand for all of them: every 10 degrees."""
+OWN_TURNS_DEG = np.arange(10, 360, 10)
+"""A handle on the wrong side is a local optimum of alignment: such turns are tried."""
+_SELF_POINTS = 200
+_AWAY = 2.0
+"""Diameters from which a side is looked at."""
+
+
+@dataclass(frozen=True)
+class PoseModel:
+    """A twin's surface in the object frame, m.
+
+    ``sides (V, 3)`` are directions towards the object's
+    viewers and ``shown[v] (S, 3)`` the points that are seen from there; ``center (3,)`` is the middle of the box.
+    ``near_motions (T, 4, 4)`` turn the object so that much of its surface falls on itself: a mug about the axis of its body.
+    """
+
+    twin_id: str
+    caster: RayCaster
+    surface: Surface
+    center: np.ndarray
+    sides: np.ndarray
+    shown: tuple[np.ndarray, ...]
+    shown_trees: tuple[cKDTree, ...]
+    symmetries: Symmetries
+    near_motions: np.ndarray
+
+    @classmethod
+    def of_twin(cls, twin: Twin) -> PoseModel:
+        """Prepare a twin; raises TwinError."""
+        return cls.of_mesh(twin.record.twin_id, merged(twin.visual))
+
+    @classmethod
+    def of_mesh(cls, twin_id: str, mesh: trimesh.Trimesh) -> PoseModel:
+        """Prepare a surface in the object frame; same mesh, same model."""
+        rng = np.random.default_rng(0)
+        points, normals, _ = sample_surface(mesh, SURFACE_POINTS, rng)
+        caster = RayCaster(mesh)
+        corners = trimesh.convex.convex_hull(mesh.vertices).vertices
+        diameter_m = float(pdist(corners).max())
+        sides = np.asarray(trimesh.creation.icosphere(subdivisions=1).vertices)
+        shown = tuple(_shown_from(side, points, caster, diameter_m, rng) for side in sides)
+        surface = Surface(points, normals, cKDTree(points), diameter_m)
+        center = np.asarray((corners.min(0) + corners.max(0)) / 2)
+        return cls(
+            twin_id=twin_id,
+            caster=caster,
+            surface=surface,
+            center=center,
+            near_motions=_near_motions(surface, center),
+            sides=sides,
+            shown=shown,
+            shown_trees=tuple(cKDTree(each) for each in shown),
+            symmetries=find_symmetries(mesh, np.random.default_rng(0)),
+        )
+
+    @property
+    def diameter_m(self) -> float:
+        """The largest distance of two of its points."""
+        return self.surface.diameter_m
+
+    @property
+    def points(self) -> np.ndarray:
+        """The points ``(N, 3)`` of its surface."""
+        return self.surface.points
+
+    @cached_property
+    def same_poses(self) -> np.ndarray:
+        """Return the proper motions ``(S, 4, 4)`` of the object frame after which the shape is where it was; identity first.
+
+        A body of revolution is turned in steps about its axis, also after each turn that swaps its ends.
+        """
+        found = self.symmetries
+        turns = [motion for motion in found.motions if np.linalg.det(motion) > 0]
+        if found.axis is not None:
+            axis = found.axis
+            swaps = [motion for motion in turns if motion @ axis @ axis < 0][:1]
+            steps = np.arange(ROUND_STEPS) * (2 * np.pi / ROUND_STEPS)
+            about = [trimesh.transformations.rotation_matrix(float(angle), axis)[:3, :3] for angle in steps]
+            turns = [each @ swap for swap in (np.eye(3), *swaps) for each in about]
+        center = found.center_m
+        return np.array([transform(turn, center - turn @ center) for turn in turns])
+
+
+def _near_motions(surface: Surface, center: np.ndarray) -> np.ndarray:
+    """Return turns about the axes of the object frame, each aligned so that the nearest part of the surface falls on itself."""
+    turns = np.array(
+        [
+            trimesh.transformations.rotation_matrix(np.deg2rad(angle), axis, center)
+            for axis in np.eye(3)
+            for angle in OWN_TURNS_DEG
+        ]
+    )
+    few = surface.points[:: max(1, len(surface.points) // _SELF_POINTS)]
+    return align(few, surface, turns, iterations=10, kept_share=0.6, facing=False)
+
+
+def _shown_from(
+    side: np.ndarray, points: np.ndarray, caster: RayCaster, diameter_m: float, rng: np.random.Generator
+) -> np.ndarray:
+    """Return those of some surface points that are seen from far along ``side``."""
+    tried = points[rng.choice(len(points), min(SHOWN_TRIED, len(points)), replace=False)]
+    away = _AWAY * diameter_m
+    hit, _ = caster.first_hits(tried + side * away, np.broadcast_to(-side, tried.shape))
+    seen = tried[np.abs(hit - away) < 0.005 * diameter_m]
+    return np.asarray(seen[:SHOWN_KEPT] if len(seen) else tried[:SHOWN_KEPT])

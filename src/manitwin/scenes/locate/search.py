@@ -1,0 +1,119 @@
+"""The poses in which a twin may be seen: sides and turns compared by points, aligned, drawn and compared."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.scenes.locate.comparison import Evidence, explained, pixel_gains, polished, scores_of
+from manitwin.scenes.locate.depth_view import DepthView, known_depth, measured_noise_m
+from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.scenes.locate.registration import align
+from manitwin.scenes.locate.starts import hidden_direction, starts
+
+FOLLOWED, REFINED, TURNED, AROUND, POLISHED = 20, 8, 12, 16, 10
+"""Poses that are aligned roughly, refined, and refined again after turns about the object's own axes."""
+POLISHING, FOLLOWED_LAST = 5, 3
+APART_RAD = np.deg2rad(8)
+"""Turns that alignment makes one are not followed twice."""
+FEW, MANY, ALL = 150, 800, 2400
+"""Observed points and pixels of the first and of the later rounds, and those that decide."""
+TOLERANCE_M, TOLERANCE_OF_NOISE = 0.003, 2.5
+ROUGHLY = 2.0
+"""Tolerances of poses that are not yet refined."""
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Poses ``object_to_camera (K, 4, 4)``, the best first, their scores ``(K,)``, and how they were scored.
+
+    ``gains (K, N)`` is what each pixel of the ``evidence`` says of each (``comparison.pixel_gains``).
+    """
+
+    poses: np.ndarray
+    scores: np.ndarray
+    tolerance_m: float
+    evidence: Evidence
+    gains: np.ndarray
+
+
+def find_candidates(view: DepthView, mask: np.ndarray, model: PoseModel, rng: np.random.Generator) -> Candidates:
+    """Search all orientations for those in which the object explains what ``mask (H, W) bool`` shows."""
+    observed = observed_points(view, mask, model.diameter_m, rng)
+    tolerance_m = TOLERANCE_M + TOLERANCE_OF_NOISE * measured_noise_m(view, mask)
+    reach_px = float(view.intrinsics[0, 0] * model.diameter_m / np.median(observed[:, 2]))
+    evidence = Evidence.of(view, mask, reach_px, MANY, rng)
+    first = Evidence.of(view, mask, reach_px, 2 * FEW, rng)
+    few = observed[:FEW]
+    poses = starts(observed, model, hidden_direction(view, mask))
+    poses = align(few, model.surface, poses, iterations=8, kept_share=0.85)
+    scores = explained(model, poses, first, ROUGHLY * tolerance_m)
+    poses = align(few, model.surface, poses[_best(scores, FOLLOWED)], iterations=8, kept_share=0.9)
+    scores = explained(model, poses, first, tolerance_m)
+    best = _refined(observed, model, poses[_best(scores, REFINED)])
+    scores = explained(model, best, evidence, tolerance_m)
+    turned = (best[_best(scores, 2), None] @ model.near_motions).reshape(-1, 4, 4)
+    rough = explained(model, turned, first, ROUGHLY * tolerance_m)
+    again = _refined(observed, model, turned[_spread(turned, rough, TURNED)])
+    poses = np.concatenate([best, again])
+    poses, scores = _finer(model, poses, evidence, tolerance_m)
+    centers = poses[
+        _spread(poses, scores, FOLLOWED_LAST)
+    ]  # of a block with a hidden end, the second turn is one of a flip
+    around = np.concatenate([centers, (centers[:, None] @ model.near_motions).reshape(-1, 4, 4)])
+    rough = explained(model, around, first, tolerance_m)
+    around, around_scores = _finer(model, around[_spread(around, rough, AROUND)], evidence, tolerance_m)
+    poses, scores = np.concatenate([poses, around]), np.concatenate([scores, around_scores])
+    return _decided(
+        model, poses[_spread(poses, scores, POLISHED)], Evidence.of(view, mask, reach_px, ALL, rng), tolerance_m
+    )
+
+
+def _decided(model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float) -> Candidates:
+    """Return candidates scored by as many pixels as decide, the best first, which is aligned by them once more."""
+    finer = np.concatenate([poses, polished(model, poses[:FOLLOWED_LAST], evidence, tolerance_m, POLISHING)])
+    gains = pixel_gains(model, finer, evidence, tolerance_m)
+    scores = scores_of(gains, evidence)
+    order = np.argsort(-scores, kind="stable")
+    return Candidates(finer[order], scores[order], tolerance_m, evidence, gains[order])
+
+
+def observed_points(view: DepthView, mask: np.ndarray, diameter_m: float, rng: np.random.Generator) -> np.ndarray:
+    """Return points ``(N, 3)`` of what the mask shows, without those that are farther from the middle than the object is long."""
+    pixels = np.flatnonzero(mask & known_depth(view))
+    depth = view.depth_m.ravel()[pixels]
+    pixels = pixels[np.abs(depth - np.median(depth)) < diameter_m]
+    return view.points(rng.permutation(pixels)[:MANY])
+
+
+def _refined(observed: np.ndarray, model: PoseModel, poses: np.ndarray) -> np.ndarray:
+    poses = align(observed[: 2 * FEW], model.surface, poses, iterations=12, kept_share=0.92, reach_m=0.02)
+    return align(observed, model.surface, poses, iterations=4, kept_share=0.92, reach_m=0.02)
+
+
+def _finer(
+    model: PoseModel, poses: np.ndarray, evidence: Evidence, tolerance_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the polished poses ``(K, 4, 4)`` with their scores, the best first."""
+    poses = polished(model, poses, evidence, tolerance_m, POLISHING)
+    scores = explained(model, poses, evidence, tolerance_m)
+    order = np.argsort(-scores, kind="stable")
+    return poses[order], scores[order]
+
+
+def _spread(poses: np.ndarray, scores: np.ndarray, count: int) -> np.ndarray:
+    """Return the places of the best poses of which no two are turned less than ``APART_RAD`` from each other."""
+    kept: list[int] = []
+    for place in _best(scores, len(scores)):
+        turn = poses[kept, :3, :3].transpose(0, 2, 1) @ poses[place, :3, :3]
+        cosine = (np.trace(turn, axis1=1, axis2=2) - 1) / 2
+        if not len(cosine) or cosine.max() < np.cos(APART_RAD):
+            kept.append(int(place))
+        if len(kept) == count:
+            break
+    return np.array(kept)
+
+
+def _best(scores: np.ndarray, count: int) -> np.ndarray:
+    return np.argsort(-scores, kind="stable")[:count]

@@ -1,0 +1,98 @@
+"""``manitwin locate`` on the command line: a box on a floor, seen by a noisy camera."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from json_documents import check_keys
+from manitwin.cli.main import app
+from manitwin.formats.label_picture import label_picture
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform, transform_points
+from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.loaded_twin import Twin
+from scene_twins import can, slab, write_thing
+from seen_solids import Seen, seen_from
+
+
+@dataclass(frozen=True)
+class Files:
+    """Two twins, and the options of a picture that shows the first."""
+
+    box: Path
+    can: Path
+    view: tuple[str, ...]
+    seen: Seen
+    model: PoseModel
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    root = tmp_path_factory.mktemp("located")
+    names = [write_thing(root, n, thing) for n, thing in enumerate((slab("box", 0.14, 0.09, 0.05, 0.3), can()))]
+    box, other = (root / twin_name(name) for name in names)
+    model = PoseModel.of_twin(Twin(box))
+    seen = seen_from(model, 0.5)
+    pictures = {"depth": seen.view.depth_m * 1000, "mask": seen.mask * 255}
+    for name, numbers in pictures.items():
+        (root / f"{name}.png").write_bytes(label_picture(np.rint(numbers)))
+    Image.fromarray(np.full((240, 240, 3), 120, np.uint8)).save(root / "rgb.png")
+    camera = {"K": seen.view.intrinsics.tolist(), "pixel_centers_at": 0.5, "width": 240, "height": 240}
+    (root / "camera.json").write_text(json.dumps({**camera, "depth_unit_m": 0.001}))
+    view = tuple(
+        str(each)
+        for name, file in (("depth", "depth.png"), ("mask", "mask.png"), ("rgb", "rgb.png"), ("camera", "camera.json"))
+        for each in (f"--{name}", root / file)
+    )
+    return Files(box, other, view, seen, model)
+
+
+def run(*arguments: object) -> tuple[int, str]:
+    done = CliRunner().invoke(app, ["locate", *map(str, arguments)])
+    return done.exit_code, done.stdout if done.exception is None or done.exit_code else str(done.exception)
+
+
+def test_a_box_is_found_and_what_was_decided_is_written(files: Files, tmp_path: Path) -> None:
+    code, said = run(files.box, *files.view, "--out", tmp_path / "place", "--json")
+    told = json.loads(said)
+    check_keys(told, "locate")
+    assert code == 0 and told["status"] == "found"
+    pose = told["poses"][0]
+    found = transform(rotation_from_quaternion_wxyz(np.array(pose["quaternion_wxyz"])), np.array(pose["position_m"]))
+    corner = files.model.points[::500]
+    same = [transform_points(found @ turn, corner) for turn in files.model.same_poses]
+    true = transform_points(files.seen.object_to_camera, corner)
+    assert min(np.linalg.norm(each - true, axis=1).max() for each in same) < 0.006
+    assert json.loads((tmp_path / "place" / "location.json").read_text()) == told
+    overlay = np.asarray(Image.open(tmp_path / "place" / "overlay.png"))
+    assert overlay.shape == (480, 960, 3)
+    green = overlay[:, 480:, 1].astype(int) - overlay[:, 480:, 0] > 20
+    assert 0.1 < green.mean() < 0.6, "the box is tinted"
+
+
+def test_another_twin_is_refused_with_status_3(files: Files) -> None:
+    code, said = run(files.can, *files.view)
+    assert code == 3 and said.startswith("not thing: its best pose explains")
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ((), "--depth, --camera, --mask: missing"),
+        (("--depth", "depth.png"), "--camera, --mask: missing"),
+        (("--depth", "depth.png", "--cloud", "camera.json"), "a view by itself"),
+        (("--cloud", "camera.json"), "is no cloud"),
+    ],
+)
+def test_what_cannot_be_asked_is_refused(files: Files, given: tuple[str, ...], said: str) -> None:
+    root = Path(files.view[1]).parent
+    words = [word if word.startswith("--") else root / word for word in given]
+    done = CliRunner().invoke(app, ["locate", str(files.box), *map(str, words)])
+    assert said in str(done.exception) and done.exit_code == 1

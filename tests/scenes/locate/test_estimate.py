@@ -1,0 +1,84 @@
+"""Poses told of noisy pictures, against the poses from which they were drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from manitwin.geometry.poses import transform_points
+from manitwin.scenes.locate.estimate import AMBIGUOUS_MARGIN, LEAST_SCORE, Location, locate_in_view
+from manitwin.scenes.locate.input_files import view_of_cloud
+from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.scenes.locate.search import observed_points
+from seen_solids import seen_from
+
+
+def add(model: PoseModel, found: np.ndarray, true: np.ndarray) -> float:
+    """ADD by its definition, as a share of the diameter: without symmetries, and not by the project's own function."""
+    there = transform_points(true, model.points) - transform_points(found, model.points)
+    return float(np.linalg.norm(there, axis=1).mean() / model.diameter_m)
+
+
+@pytest.mark.parametrize("hidden", [0.0, 0.5])
+def test_a_body_without_symmetry_is_found_also_half_hidden(stool: PoseModel, hidden: float) -> None:
+    seen = seen_from(stool, 0.6, hidden_right=hidden)
+    found = locate_in_view(seen.view, seen.mask, stool)
+    assert found.status == "found" and found.poses[0].score > LEAST_SCORE
+    assert add(stool, found.poses[0].object_to_camera, seen.object_to_camera) < 0.03
+    assert found.poses[0].visible_share == pytest.approx(1 - hidden, abs=0.08)
+
+
+def test_a_hidden_knob_is_said_to_be_ambiguous_and_one_in_sight_is_not(jar: PoseModel) -> None:
+    hidden, shown = seen_from(jar, np.pi), seen_from(jar, 0.7)
+    unsure = locate_in_view(hidden.view, hidden.mask, jar)
+    assert unsure.status == "ambiguous"
+    assert min(pose.score for pose in unsure.poses) >= unsure.best_score - AMBIGUOUS_MARGIN
+    knobs = [pose.object_to_camera[:3, :3] @ [1, 0, 0] for pose in unsure.poses]
+    assert all(knob[2] > 0 for knob in knobs), "each of them has it on the far side"
+    sure = locate_in_view(shown.view, shown.mask, jar)
+    assert sure.status == "found"
+    assert add(jar, sure.poses[0].object_to_camera, shown.object_to_camera) < 0.05
+
+
+def test_another_thing_and_one_of_another_size_are_refused(stool: PoseModel, jar: PoseModel) -> None:
+    seen = seen_from(stool, 0.6)
+    larger = PoseModel.of_mesh("larger", trimesh.creation.box((0.17, 0.12, 0.12)))
+    for other in (jar, larger):
+        answer = locate_in_view(seen.view, seen.mask, other)
+        assert answer.status == "none" and not answer.poses and answer.best_score < LEAST_SCORE
+        assert f"{answer.best_score:.0%} of what is seen" in answer.reason
+
+
+def test_a_body_of_revolution_has_one_pose_and_any_turn_of_it_is_the_same() -> None:
+    can = PoseModel.of_mesh("can", trimesh.creation.cylinder(0.035, 0.11, sections=64))
+    seen = seen_from(can, 1.0)
+    found = locate_in_view(seen.view, seen.mask, can)
+    assert found.status == "found" and can.symmetries.axis is not None
+    axis = found.poses[0].object_to_camera[:3, 2] @ seen.object_to_camera[:3, 2]
+    assert abs(axis) > np.cos(np.deg2rad(3)), "either end may be up"
+
+
+def test_the_same_view_has_the_same_answer_and_a_cloud_of_it_the_same_pose(stool: PoseModel) -> None:
+    seen = seen_from(stool, 2.1)
+    first, again = (locate_in_view(seen.view, seen.mask, stool) for _ in range(2))
+    assert np.array_equal(first.poses[0].object_to_camera, again.poses[0].object_to_camera)
+    points = seen.view.points(np.flatnonzero(seen.mask & (seen.view.depth_m > 0)))
+    by_cloud: Location = locate_in_view(*view_of_cloud(points, "cloud"), stool)
+    assert by_cloud.status == "found"
+    assert add(stool, by_cloud.poses[0].object_to_camera, seen.object_to_camera) < 0.05
+
+
+def test_too_little_is_no_answer(stool: PoseModel) -> None:
+    seen = seen_from(stool, 0.6)
+    few = seen.mask & (np.cumsum(seen.mask).reshape(seen.mask.shape) <= 60)
+    answer = locate_in_view(seen.view, few, stool)
+    assert answer.status == "none" and "pixels show it" in answer.reason
+
+
+def test_points_far_behind_a_mask_are_no_part_of_the_thing(stool: PoseModel) -> None:
+    seen = seen_from(stool, 0.6)
+    wide = seen.mask.copy()
+    wide[:2] = True  # the backdrop, 0.7 m behind
+    points = observed_points(seen.view, wide, stool.diameter_m, np.random.default_rng(0))
+    assert points[:, 2].max() < 1.0
