@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from manitwin.geometry.poses import inverse
-from manitwin.render.cameras import Camera, look_at
+from manitwin.render.cameras import Camera, look_at, pixel_rays
 from manitwin.render.raycast import cast_camera
 from manitwin.scenes.locate.depth_noise import DepthNoise
 from manitwin.scenes.locate.depth_view import DepthView, view_of_camera
@@ -49,13 +49,21 @@ def jar() -> trimesh.Trimesh:
     return trimesh.util.concatenate([body, block((0.02, 0.012, 0.03), (0.05, 0, 0.01))])
 
 
-def seen_from(model: PoseModel, azimuth_rad: float, *, hidden_right: float = 0.0, noise: bool = True) -> Seen:
-    """Look at a model from an azimuth, 0.8 m away, with noise; ``hidden_right``: the share that a board hides."""
+def seen_from(
+    model: PoseModel, azimuth_rad: float, *, hidden_right: float = 0.0, noise: bool = True, table: bool = False
+) -> Seen:
+    """Look at a model from an azimuth, 0.8 m away, with noise; ``hidden_right``: the share that a board hides.
+
+    It stands on a ``table``, or before a wall.
+    """
     eye = model.center + 0.8 * np.array([0.9 * np.cos(azimuth_rad), 0.9 * np.sin(azimuth_rad), 0.43])
     camera = Camera(look_at(eye, model.center), 0.45, 240, 240)
     depth, _, _ = cast_camera(model.caster, camera)
     mask = depth > 0
-    depth = np.where(mask, depth, BACKDROP_M)
+    origins, rays = pixel_rays(camera)
+    level = (model.points[:, 2].min() - origins[:, 2]) / rays[:, 2]
+    behind = level.reshape(depth.shape) if table else np.full_like(depth, BACKDROP_M)
+    depth = np.where(mask, depth, behind)
     if hidden_right:
         edge = np.quantile(np.nonzero(mask)[1], 1 - hidden_right)
         board = np.arange(240)[None] > edge

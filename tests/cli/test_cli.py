@@ -168,6 +168,7 @@ WRONG_VALUES = [
     "locate nothing_here --cloud .",
     "locate . --cloud . --depth .",
     "locate . --depth nothing_here",
+    "locate . --tried 0",
     "render . --cameras behind",
     "render . --codec h266",
     "render nothing_here",

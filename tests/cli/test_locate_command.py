@@ -13,10 +13,12 @@ from typer.testing import CliRunner
 
 from json_documents import check_keys
 from manitwin.cli.main import app
+from manitwin.dataset.index.rebuild import rebuild
+from manitwin.dataset.search import twin_looks
 from manitwin.formats.label_picture import label_picture
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform, transform_points
 from manitwin.scenes.locate.pose_model import PoseModel
-from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.loaded_twin import Twin
 from scene_twins import can, slab, write_thing
 from seen_solids import Seen, seen_from
@@ -39,7 +41,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
     names = [write_thing(root, n, thing) for n, thing in enumerate((slab("box", 0.14, 0.09, 0.05, 0.3), can()))]
     box, other = (root / twin_name(name) for name in names)
     model = PoseModel.of_twin(Twin(box))
-    seen = seen_from(model, 0.5)
+    seen = seen_from(model, 0.5, table=True)
     pictures = {"depth": seen.view.depth_m * 1000, "mask": seen.mask * 255}
     for name, numbers in pictures.items():
         (root / f"{name}.png").write_bytes(label_picture(np.rint(numbers)))
@@ -71,10 +73,39 @@ def test_a_box_is_found_and_what_was_decided_is_written(files: Files, tmp_path: 
     true = transform_points(files.seen.object_to_camera, corner)
     assert min(np.linalg.norm(each - true, axis=1).max() for each in same) < 0.006
     assert json.loads((tmp_path / "place" / "location.json").read_text()) == told
-    overlay = np.asarray(Image.open(tmp_path / "place" / "overlay.png"))
+    overlay = np.asarray(Image.open(tmp_path / "place" / "overlay_0.png"))
     assert overlay.shape == (480, 960, 3)
     green = overlay[:, 480:, 1].astype(int) - overlay[:, 480:, 0] > 20
     assert 0.1 < green.mean() < 0.6, "the box is tinted"
+
+
+def test_without_a_mask_the_box_is_what_stands_above_the_largest_plane(files: Files) -> None:
+    code, said = run(files.box, *(word for word in without(files.view, "--mask")), "--json")
+    assert code == 0
+    x, y, width, height = json.loads(said)["box"]
+    rows, columns = np.nonzero(files.seen.mask)
+    wanted = (columns.min(), rows.min(), np.ptp(columns), np.ptp(rows))
+    assert np.abs(np.subtract((x, y, width, height), wanted)).max() <= 6
+
+
+@pytest.mark.slow
+def test_which_twin_it_is_is_told_by_looks_and_decided_by_the_score(
+    files: Files, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rebuild(DatasetRoot(files.box.parents[2]), jobs=1)
+    monkeypatch.setattr(twin_looks, "AROUND", 2)
+    code, said = run(files.box.parents[2], *files.view, "--json")
+    told = json.loads(said)
+    check_keys(told, "locate DATASET")
+    (thing,) = told["things"]
+    assert code == 0 and thing["twin_id"] == files.box.name and thing["status"] == "found"
+    assert [each["twin_id"] for each in thing["tried"]] == [files.box.name, files.can.name]
+    assert thing["tried"][1]["score"] < thing["least_score"] <= thing["tried"][0]["score"]
+
+
+def without(words: tuple[str, ...], option: str) -> tuple[str, ...]:
+    place = words.index(option)
+    return words[:place] + words[place + 2 :]
 
 
 def test_another_twin_is_refused_with_status_3(files: Files) -> None:
@@ -85,8 +116,8 @@ def test_another_twin_is_refused_with_status_3(files: Files) -> None:
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ((), "--depth, --camera, --mask: missing"),
-        (("--depth", "depth.png"), "--camera, --mask: missing"),
+        ((), "--depth, --camera: missing"),
+        (("--depth", "depth.png"), "--camera: missing"),
         (("--depth", "depth.png", "--cloud", "camera.json"), "a view by itself"),
         (("--cloud", "camera.json"), "is no cloud"),
     ],

@@ -136,7 +136,7 @@ class Folders:
     def _view(self, page: Path) -> None:
         """Show the first twin of the data set to a depth camera: D.png, C.png, M.png, K.json and CLOUD.npz."""
         model = PoseModel.of_twin(Twin(sorted(self.dataset.glob("twins/*/*"))[0]))
-        seen = seen_from(model, 0.5)
+        seen = seen_from(model, 0.5, table=True)
         (page / "D.png").write_bytes(label_picture(np.rint(seen.view.depth_m * 1000)))
         (page / "M.png").write_bytes(label_picture(seen.mask * 255))
         Image.fromarray(np.full((*seen.mask.shape, 3), 120, np.uint8)).save(page / "C.png")

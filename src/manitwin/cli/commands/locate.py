@@ -1,26 +1,34 @@
-"""``manitwin locate``: the pose of a twin in a new view."""
+"""``manitwin locate``: the pose of a twin in a new view, or which twins of a data set are in it."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from manitwin.cli import choices, options
-from manitwin.cli.console import out_console
+from manitwin.cli.console import error_console, out_console
 from manitwin.cli.documents import Json, print_document
 
 if TYPE_CHECKING:
-    from manitwin.scenes.locate.estimate import Location
+    import numpy as np
+
+    from manitwin.scenes.locate.depth_view import DepthView
+    from manitwin.scenes.locate.recognition import Thing
 
 
-def _file(help: str, remedy: str) -> object:
+def _file(help: str, remedy: str) -> Any:
     return typer.Option(help=help, metavar="FILE", callback=choices.must_exist(remedy))
 
 
 def locate(
-    twin: Annotated[Path, options.existing("The twin to look for.", "TWIN", "a folder that manitwin build made")],
+    source: Annotated[
+        Path,
+        options.existing(
+            "The twin to look for, or a data set of twins.", "TWIN|DATASET", "a twin's folder or a data set"
+        ),
+    ],
     depth: Annotated[
         Path | None, _file("A depth picture: PNG of one channel; 0 is unknown.", "a depth picture")
     ] = None,
@@ -28,56 +36,87 @@ def locate(
         Path | None, _file("JSON of its camera: fx, fy, cx, cy, width, height, depth_unit_m.", "a camera's JSON")
     ] = None,
     mask: Annotated[
-        Path | None, _file("Where the thing is: PNG of one channel, 0 where it is not.", "a mask of the thing")
+        Path | None,
+        _file(
+            "Where the thing is: PNG of one channel, 0 where it is not; default: all on the table.", "a thing's mask"
+        ),
     ] = None,
     rgb: Annotated[Path | None, _file("The colours, aligned with the depths.", "a picture")] = None,
     cloud: Annotated[
         Path | None,
         _file("Instead: the points of the thing in the camera's frame, .ply or .npz.", "a cloud of the thing's points"),
     ] = None,
-    out: Annotated[Path | None, options.output_folder("A new folder for location.json and overlay.png.")] = None,
+    tried: Annotated[
+        int,
+        typer.Option(
+            help="Twins of a data set to try of a thing, the most alike.", callback=choices.count_of("--tried")
+        ),
+    ] = 5,
+    out: Annotated[Path | None, options.output_folder("A new folder for location.json and overlays.")] = None,
     seed: Annotated[int, typer.Option(help="The seed of what is sampled.", min=0, max=options.LARGEST_SEED)] = 0,
     json_: Json = False,
 ) -> None:
     """Find where a twin is in a depth picture: its pose, several that look the same, or that it is not what is seen."""
     from manitwin.errors import UsageError
 
-    pictures = {"--depth": depth, "--camera": camera, "--mask": mask}
-    if cloud is not None and any(each is not None for each in (*pictures.values(), rgb)):
+    if cloud is not None and any(each is not None for each in (depth, camera, mask, rgb)):
         raise UsageError("--cloud: is a view by itself; leave out --depth, --camera, --mask and --rgb")
-    if cloud is None and (missing := [name for name, each in pictures.items() if each is None]):
-        raise UsageError(f"{', '.join(missing)}: missing; give --depth, --camera and --mask, or --cloud")
-    from manitwin.scenes.locate.estimate import locate_in_view
-    from manitwin.scenes.locate.input_files import read_cloud, read_view
+    needed = {"--depth": depth, "--camera": camera}
+    if cloud is None and (missing := [name for name, each in needed.items() if each is None]):
+        raise UsageError(f"{', '.join(missing)}: missing; give --depth and --camera, or --cloud")
     from manitwin.scenes.locate.pose_model import PoseModel
-    from manitwin.scenes.locate.report import location_document, write_location
+    from manitwin.scenes.locate.recognition import DatasetTwins, where_is, which_twin
+    from manitwin.scenes.locate.report import location_document, things_document, write_location
+    from manitwin.twin.dataset_root import DatasetRoot
     from manitwin.twin.loaded_twin import Twin
+    from manitwin.twin.store import RECORD
 
-    loaded = Twin(twin)
-    if cloud is not None:
-        view, shown = read_cloud(cloud)
+    one = Twin(source) if (source / RECORD).exists() else None
+    view, masks = _view(depth, camera, mask, rgb, cloud, seed)
+    if one is not None:
+        things = [where_is(view, masks, PoseModel.of_twin(one), seed=seed)]
+        document = location_document(things[0], one)
     else:
-        assert depth is not None and camera is not None
-        view, told = read_view(depth, camera, rgb, mask)
-        assert told is not None
-        shown = told
-        if not shown.any():
-            raise UsageError(f"{mask}: is empty: it shows no pixel of a thing; give a mask of the thing to locate")
-    model = PoseModel.of_twin(loaded)
-    location = locate_in_view(view, shown, model, seed=seed)
-    document = location_document(location, loaded, model)
+        twins = DatasetTwins(DatasetRoot(source), on_twin=_drawn)
+        things = [which_twin(view, each, twins, tried=tried, seed=seed) for each in masks]
+        document = things_document(str(source), things, twins.twin)
     if out is not None:
-        write_location(out, document, view, shown, model, location)
+        write_location(out, document, view, things)
     if json_:
         print_document(document)
     else:
-        _print(location, loaded.record.name or loaded.record.twin_id)
-    raise typer.Exit(3 if location.status == "none" else 0)
+        for thing, told in zip(things, [document] if one is not None else document["things"], strict=True):
+            _print(thing, told["name"] or told["twin_id"], one is None)
+    raise typer.Exit(0 if any(thing.location.status != "none" for thing in things) else 3)
 
 
-def _print(location: Location, name: str) -> None:
+def _view(
+    depth: Path | None, camera: Path | None, mask: Path | None, rgb: Path | None, cloud: Path | None, seed: int
+) -> tuple[DepthView, list[np.ndarray]]:
+    """Return what is seen, and the masks of the things in it."""
+    import numpy as np
+
+    from manitwin.errors import UsageError
+    from manitwin.scenes.locate.input_files import read_cloud, read_view
+    from manitwin.scenes.locate.proposals import proposals, table_plane
+
+    if cloud is not None:
+        view, shown = read_cloud(cloud)
+        return view, [shown]
+    assert depth is not None and camera is not None
+    view, told = read_view(depth, camera, rgb, mask)
+    if told is None:
+        return view, proposals(view, table_plane(view, np.random.default_rng(seed)))
+    if not told.any():
+        raise UsageError(f"{mask}: is empty: it shows no pixel of a thing; give a mask of the thing to locate")
+    return view, [told]
+
+
+def _print(thing: Thing, name: str, is_one_of_many: bool) -> None:
+    location = thing.location
     if location.status == "none":
-        out_console.print(f"not {name}: {location.reason}")
+        alike = f" (and no other of {len(thing.tried)})" if is_one_of_many else ""
+        out_console.print(f"not {name}{alike}: {location.reason}")
         return
     out_console.print(f"{name}: {location.status}; {location.reason}")
     for pose in location.poses:
@@ -85,3 +124,7 @@ def _print(location: Location, name: str) -> None:
         out_console.print(
             f"  score {pose.score:.3f}, {pose.visible_share:.0%} of it seen, at {x:.4f} {y:.4f} {z:.4f} m in the camera's frame"
         )
+
+
+def _drawn(twin_id: str) -> None:
+    error_console.print(f"{twin_id}: drawn and embedded, which is kept", markup=False)

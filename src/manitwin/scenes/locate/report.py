@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,19 +12,20 @@ from manitwin.formats.image_file import png_of
 from manitwin.formats.output_folder import new_folder
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.scenes.locate.depth_view import DepthView
-from manitwin.scenes.locate.estimate import AMBIGUOUS_MARGIN, LEAST_SCORE, Location
+from manitwin.scenes.locate.estimate import AMBIGUOUS_MARGIN, LEAST_SCORE
 from manitwin.scenes.locate.overlay import overlay
-from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.scenes.locate.recognition import Thing
+from manitwin.scenes.perception.object_views import box_of
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import canonical_json
 
 FRAME = "camera: x right, y down, z ahead (OpenCV); metres; quaternions wxyz"
-LOCATION, OVERLAY = "location.json", "overlay.png"
+LOCATION = "location.json"
 
 
-def location_document(location: Location, twin: Twin, model: PoseModel) -> dict[str, Any]:
+def location_document(thing: Thing, twin: Twin) -> dict[str, Any]:
     """Return a location as JSON values: the answer, its poses, and what it was judged by."""
-    symmetries = model.symmetries
+    location, symmetries = thing.location, thing.model.symmetries
     return {
         "status": location.status,
         "reason": location.reason,
@@ -31,6 +33,7 @@ def location_document(location: Location, twin: Twin, model: PoseModel) -> dict[
         "revision": twin.record.revision,
         "name": twin.record.name,
         "frame": FRAME,
+        "box": box_of(thing.mask),
         "poses": [
             {
                 "position_m": pose.object_to_camera[:3, 3].round(6).tolist(),
@@ -52,11 +55,34 @@ def location_document(location: Location, twin: Twin, model: PoseModel) -> dict[
     }
 
 
-def write_location(
-    out: Path, document: dict[str, Any], view: DepthView, mask: np.ndarray, model: PoseModel, location: Location
-) -> None:
-    """Write ``location.json`` and ``overlay.png`` into a new folder, whole or not at all; equal input gives equal bytes."""
-    picture = overlay(view, mask, model, location.poses, location.tolerance_m)
+def things_document(dataset: str, things: Sequence[Thing], twins: Callable[[str], Twin]) -> dict[str, Any]:
+    """Return which twin of a data set each thing of a view is, and what was tried in its place."""
+    return {
+        "dataset": dataset,
+        "things": [
+            {
+                **location_document(thing, twins(thing.location.twin_id)),
+                "tried": [
+                    {
+                        "twin_id": each.twin_id,
+                        "likeness": None if each.likeness is None else round(each.likeness, 4),
+                        "score": round(each.score, 4),
+                    }
+                    for each in thing.tried
+                ],
+            }
+            for thing in things
+        ],
+    }
+
+
+def write_location(out: Path, document: dict[str, Any], view: DepthView, things: Sequence[Thing]) -> None:
+    """Write ``location.json`` and an ``overlay_<n>.png`` of each thing into a new folder, whole or not at all.
+
+    Equal input gives equal bytes.
+    """
     with new_folder(out) as folder:
         (folder / LOCATION).write_text(canonical_json(document), encoding="utf-8")
-        (folder / OVERLAY).write_bytes(png_of(picture))
+        for place, thing in enumerate(things):
+            picture = overlay(view, thing.mask, thing.model, thing.location.poses, thing.location.tolerance_m)
+            (folder / f"overlay_{place}.png").write_bytes(png_of(picture))

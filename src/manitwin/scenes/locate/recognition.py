@@ -1,0 +1,100 @@
+"""Which thing of a view is a twin, and which twin of a data set a thing is: looks propose, what is explained decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.dataset.index.query import Index
+from manitwin.dataset.search.search import likeness
+from manitwin.dataset.search.twin_looks import twin_looks
+from manitwin.errors import UsageError
+from manitwin.models.embedders.looks import look_of
+from manitwin.scenes.locate.depth_view import DepthView
+from manitwin.scenes.locate.estimate import Location, locate_in_view
+from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.loaded_twin import Twin
+
+CANDIDATES = 5
+"""Twins that are tried of a thing, the most alike: the first alone is often another (docs/search.md)."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A twin that was looked for in a thing's place: how alike it looks (None: not asked), and the score of its best pose."""
+
+    twin_id: str
+    likeness: float | None
+    score: float
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A thing of a view: its mask ``(H, W) bool``, the answer, and every twin that was tried, the best first."""
+
+    mask: np.ndarray
+    location: Location
+    model: PoseModel
+    tried: tuple[Tried, ...]
+
+
+class DatasetTwins:
+    """The accepted twins of a data set with an index, each prepared once, and what they look like."""
+
+    def __init__(self, root: DatasetRoot, on_twin: Callable[[str], None] = lambda twin_id: None):
+        """Read looks that are kept, and draw the others; raises UsageError without an index, and for a data set at a URL."""
+        rows = Index(root).select("twins", columns=["twin_id", "revision"]).to_pylist()
+        self._root = root
+        self._looks = dict(twin_looks(root, {row["twin_id"]: row["revision"] for row in rows}, on_twin))
+        self._models: dict[str, PoseModel] = {}
+        if not self._looks:
+            raise UsageError(f"{root.url}: has no accepted twin; build some, or name another data set")
+
+    def twin(self, twin_id: str) -> Twin:
+        """Return one of the twins."""
+        assert self._root.local is not None
+        return Twin(self._root.local / self._root.twin_name(twin_id))
+
+    def model(self, twin_id: str) -> PoseModel:
+        """Return one of the twins, prepared."""
+        if twin_id not in self._models:
+            self._models[twin_id] = PoseModel.of_twin(self.twin(twin_id))
+        return self._models[twin_id]
+
+    def ranked(self, rgb: np.ndarray, mask: np.ndarray) -> list[tuple[str, float]]:
+        """Return the twins with how alike they look to what ``mask`` shows, the most alike first."""
+        rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
+        cut = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        look = look_of(rgb[cut], mask[cut])
+        found = [(twin_id, likeness(look, views)) for twin_id, views in self._looks.items()]
+        return sorted(found, key=lambda each: (-each[1], each[0]))
+
+
+def which_twin(
+    view: DepthView, mask: np.ndarray, twins: DatasetTwins, *, tried: int = CANDIDATES, seed: int = 0
+) -> Thing:
+    """Look for the twins that a thing looks most like, and return the one that explains it best, or that none does.
+
+    Raises UsageError for a view without colours.
+    """
+    if view.rgb is None:
+        raise UsageError("which twin a thing is, is told by its looks first; give --rgb")
+    answers = []
+    for twin_id, alike in twins.ranked(view.rgb, mask)[:tried]:
+        location = locate_in_view(view, mask, twins.model(twin_id), seed=seed)
+        answers.append((location, Tried(twin_id, alike, location.best_score)))
+    answers.sort(key=lambda each: -each[0].best_score)
+    best = answers[0][0]
+    return Thing(mask, best, twins.model(best.twin_id), tuple(each for _, each in answers))
+
+
+def where_is(view: DepthView, masks: Sequence[np.ndarray], model: PoseModel, *, seed: int = 0) -> Thing:
+    """Look for a twin in each of several masks, and return the one that it explains best, or that it is none of them."""
+    if not masks:
+        raise UsageError("nothing stands above the table in this picture; give --mask")
+    answers = [(locate_in_view(view, mask, model, seed=seed), mask) for mask in masks]
+    best, mask = max(answers, key=lambda each: each[0].best_score)
+    return Thing(mask, best, model, (Tried(model.twin_id, None, best.best_score),))
