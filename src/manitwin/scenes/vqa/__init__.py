@@ -1,0 +1,1 @@
+"""Questions about drawn scenes with computed answers, for training and judging vision-language models."""

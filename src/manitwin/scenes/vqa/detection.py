@@ -1,0 +1,100 @@
+"""Detection: boxes, counts, and what is there."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+from manitwin.scenes.vqa.context import Context, listed, sentence
+from manitwin.scenes.vqa.question import BOX, CHOICE, LIST, YES_NO, Draft
+from manitwin.scenes.vqa.references import CONTAINERS, OTHER_VESSELS, a_or_an
+from manitwin.scenes.vqa.things import Seen
+
+ABSENT = 4
+"""How many categories that are not there are offered for each picture."""
+
+
+def detection(asked: Context) -> Iterator[Draft]:
+    """Ask for boxes, and in pictures without a doubtful object for counts and lists."""
+    yield from _boxes(asked)
+    if asked.view.is_sure and len(asked.view.clear) >= 2:
+        yield from _counts(asked)
+        yield from _existence(asked)
+        yield from _lists(asked)
+
+
+def _boxes(asked: Context) -> Iterator[Draft]:
+    width, height = asked.view.camera.width_px, asked.view.camera.height_px
+    for seen in asked.named:
+        box = seen.view.visible_box
+        if box is None:
+            continue
+        share = (box[0] / width, box[1] / height, box[2] / width, box[3] / height)
+        yield Draft(
+            "box_of_object", asked.view.name, BOX, {"a": asked.words_of(seen)}, "<b0>", "<b0>",
+            {"objects": asked.names(seen), "box_px": list(box)}, boxes=(share,),
+        )  # fmt: skip
+
+
+def _counts(asked: Context) -> Iterator[Draft]:
+    count = len(asked.view.clear)
+    first = max(1, count - asked.rng.randrange(4))
+    yield Draft(
+        "count_objects", asked.view.name, CHOICE, {"surface": asked.surface}, str(count),
+        sentence(f"there are {count} objects"), {"objects": asked.names(*asked.view.clear)},
+        tuple(str(first + each) for each in range(4)),
+    )  # fmt: skip
+
+
+def _existence(asked: Context) -> Iterator[Draft]:
+    """What is there, and what is not: nothing whose noun is that of something there."""
+    there = {each.thing.category for each in asked.view.clear}
+    nouns = {category.split()[-1] for category in there}
+    vessels = nouns & {*CONTAINERS, *OTHER_VESSELS}
+    absent = [
+        category for category in asked.categories
+        if category.split()[-1] not in nouns and not (category.split()[-1] in ("container", "box") and vessels)
+    ]  # fmt: skip
+    for category in sorted(there):
+        count = sum(each.thing.category == category for each in asked.view.clear)
+        said = f"there is {a_or_an(category)}" if count == 1 else f"there are {count}"
+        yield Draft(
+            "is_there", asked.view.name, YES_NO, {"c": category}, "yes", sentence(f"yes, {said}"),
+            {"objects": asked.names(*asked.view.clear), "asked": category},
+        )  # fmt: skip
+    for category in asked.rng.sample(absent, min(ABSENT, len(absent))):
+        yield Draft(
+            "is_there", asked.view.name, YES_NO, {"c": category}, "no", sentence(f"no, there is no {category}"),
+            {"objects": asked.names(*asked.view.clear), "asked": category},
+        )  # fmt: skip
+
+
+def _lists(asked: Context) -> Iterator[Draft]:
+    in_order = sorted(asked.view.clear, key=lambda each: each.column)
+    yield Draft(
+        "list_objects", asked.view.name, LIST, {"surface": asked.surface},
+        ", ".join(each.thing.category for each in in_order),
+        sentence(f"from left to right: {listed([_described(each) for each in in_order])}"),
+        {"objects": asked.names(*in_order)},
+    )  # fmt: skip
+    if any(each.thing.head in OTHER_VESSELS for each in in_order):
+        return
+    containers = [each for each in in_order if each.thing.head in CONTAINERS]
+    if not containers:
+        return
+    kinds = listed([f"{noun}s" for noun in CONTAINERS])
+    number = {1: "one container", 2: "two containers", 3: "three containers"}.get(
+        len(containers), f"{len(containers)} containers"
+    )
+    verb = "is" if len(containers) == 1 else "are"
+    yield Draft(
+        "list_containers", asked.view.name, LIST, {"surface": asked.surface, "kinds": kinds},
+        ", ".join(each.thing.category for each in containers),
+        sentence(f"there {verb} {number}: {listed([_described(each) for each in containers])}"),
+        {"objects": asked.names(*containers), "counts": dict(Counter(each.thing.head for each in containers))},
+    )  # fmt: skip
+
+
+def _described(seen: Seen) -> str:
+    color = f"{seen.thing.color} " if seen.thing.color else ""
+    return a_or_an(f"{color}{seen.thing.category}")

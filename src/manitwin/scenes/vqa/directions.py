@@ -1,0 +1,69 @@
+"""Directions on the level, with the words that say whose they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.render.cameras import Camera
+
+ALIGNED = 0.94
+"""Least cosine between what the robot and the camera call ahead: within 20 degrees their sides are the same or opposite."""
+ROBOT_FACES = np.array([1.0, 0.0])
+"""The robot stands at the world's origin and faces +X, +Y is to its left."""
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction ``vector (2,)`` in the world's XY plane; ``frame`` is ``picture`` or ``robot``, ``key`` its name there."""
+
+    frame: str
+    key: str
+    words: str
+    vector: tuple[float, float]
+    robot: str
+    """The sentence that says where the robot stands, with a blank behind it; empty where nothing is the robot's."""
+
+
+def picture_directions(camera: Camera) -> list[Direction]:
+    """Return right, left, away and towards as the picture shows them, level."""
+    right = _level(camera.camera_to_object[:3, 0])
+    ahead = np.array([-right[1], right[0]])
+    return [
+        Direction("picture", "right", "to the right as seen in the picture", _pair(right), ""),
+        Direction("picture", "left", "to the left as seen in the picture", _pair(-right), ""),
+        Direction("picture", "away", "straight away from the camera", _pair(ahead), ""),
+        Direction("picture", "towards", "straight towards the camera", _pair(-ahead), ""),
+    ]
+
+
+def robot_directions(camera: Camera, first_object_m: np.ndarray) -> list[Direction]:
+    """Return the robot's right, left, ahead and back, where the picture lets one know them; else none.
+
+    That is where the camera faces the robot across the objects, or looks the same way; ``first_object_m`` is a world point.
+    """
+    right = _level(camera.camera_to_object[:3, 0])
+    ahead = np.array([-right[1], right[0]])
+    cosine = float(ahead @ ROBOT_FACES)
+    if cosine < -ALIGNED and first_object_m[0] > 0:
+        robot = "The robot stands on the far side and faces the camera. "
+    elif cosine > ALIGNED:
+        robot = "The robot faces the same way as the camera. "
+    else:
+        return []
+    return [
+        Direction("robot", "right", "to the robot's right", (0.0, -1.0), robot),
+        Direction("robot", "left", "to the robot's left", (0.0, 1.0), robot),
+        Direction("robot", "away", "straight away from the robot", (1.0, 0.0), robot),
+        Direction("robot", "towards", "straight towards the robot", (-1.0, 0.0), robot),
+    ]
+
+
+def _level(vector: np.ndarray) -> np.ndarray:
+    flat: np.ndarray = np.asarray(vector[:2], float)
+    return flat / np.linalg.norm(flat)
+
+
+def _pair(vector: np.ndarray) -> tuple[float, float]:
+    return float(vector[0]), float(vector[1])

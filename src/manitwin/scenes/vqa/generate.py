@@ -1,0 +1,89 @@
+"""Questions about the pictures of scenes: drafted by scene, chosen over all, and put into words."""
+
+from __future__ import annotations
+
+import random
+import zlib
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+from manitwin.scenes.perception.scene_truth import SceneTruth
+from manitwin.scenes.perception.splits import VALIDATION, split_of
+from manitwin.scenes.vqa.context import Context
+from manitwin.scenes.vqa.detection import detection
+from manitwin.scenes.vqa.functional_planning import functional_planning
+from manitwin.scenes.vqa.language_grounding import language_grounding
+from manitwin.scenes.vqa.question import CHOICE, YES_NO, Draft, Question
+from manitwin.scenes.vqa.references import references
+from manitwin.scenes.vqa.scene_understanding import scene_understanding
+from manitwin.scenes.vqa.selection import chosen
+from manitwin.scenes.vqa.task_planning import task_planning
+from manitwin.scenes.vqa.templates import FAMILIES
+from manitwin.scenes.vqa.things import Shape, things_of, views_of
+
+_MAKERS: Sequence[Callable[[Context], Iterable[Draft]]] = (
+    language_grounding,
+    functional_planning,
+    scene_understanding,
+    task_planning,
+    detection,
+)
+
+
+def drafts_of(
+    scene: SceneTruth, shape_of: Callable[[str], Shape], categories: Sequence[str], seed: int
+) -> list[Draft]:
+    """Return all that may be asked about the pictures of a scene; raises TwinError, UsageError.
+
+    ``categories`` are those of all scenes, of which absent ones are asked about.
+    """
+    things = things_of(scene, shape_of)
+    found: list[Draft] = []
+    for view in views_of(scene, things):
+        rng = random.Random(_seed(seed, scene.record.scene_id, view.name))
+        context = Context(scene, things, view, references(view, rng), categories, rng)
+        for make in _MAKERS:
+            found += make(context)
+    return found
+
+
+def questions_of(
+    scene_ids: Sequence[str], drafts: Sequence[Sequence[Draft]], *, per_scene: int, validation_share: float, seed: int
+) -> list[Question]:
+    """Choose among the drafts of scenes and put them into words: in the split ``val`` into the paraphrases that are held out."""
+    picked = chosen(drafts, per_scene, random.Random(_seed(seed, "chosen")))
+    found = []
+    for scene_id, of_scene in zip(scene_ids, picked, strict=True):
+        rng = random.Random(_seed(seed, scene_id, "words"))
+        split = split_of(scene_id, validation_share)
+        order = sorted(range(len(of_scene)), key=lambda place: (of_scene[place].camera, place))
+        for number, place in enumerate(order):
+            found.append(_worded(of_scene[place], f"{scene_id}_{number:04d}", scene_id, split, rng))
+    return found
+
+
+def _worded(draft: Draft, question_id: str, scene_id: str, split: str, rng: random.Random) -> Question:
+    family = FAMILIES[draft.family]
+    held_out = split == VALIDATION
+    template = len(family.paraphrases) - 1 if held_out else rng.randrange(len(family.paraphrases) - 1)
+    text = family.paraphrases[template].format(**draft.slots)
+    draft = _shuffled(draft, rng)
+    return Question(
+        question_id=question_id, scene_id=scene_id, camera=draft.camera, split=split, category=family.category,
+        family=draft.family, kind=draft.kind, template=template, held_out=held_out, question=text,
+        answer=draft.answer, response=draft.response, options=draft.options, points=draft.points, boxes=draft.boxes,
+        evidence=draft.evidence,
+    )  # fmt: skip
+
+
+def _shuffled(draft: Draft, rng: random.Random) -> Draft:
+    """Put the options into a random order; numbers, directions and what the question has in its words stay as they are."""
+    if draft.kind == YES_NO:
+        return replace(draft, options=("yes", "no"))
+    if draft.kind != CHOICE or draft.family in ("count_objects", "taller", "heavier", "side_for_robot", "side_in_picture"):
+        return draft
+    return replace(draft, options=tuple(rng.sample(draft.options, len(draft.options))))
+
+
+def _seed(seed: int, *names: str) -> int:
+    return zlib.crc32("/".join(map(str, (seed, *names))).encode())

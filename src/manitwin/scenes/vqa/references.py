@@ -1,0 +1,69 @@
+"""Words that mean one object of a picture and no other."""
+
+from __future__ import annotations
+
+import random
+
+from manitwin.scenes.vqa.things import Seen, View, main_word
+
+MARGIN_PX = 40
+"""How far the outermost of some objects is beyond the next (px of a picture 512 wide)."""
+CONTAINERS = ("mug", "cup", "bowl", "bottle", "jar", "can")
+"""The nouns that questions about containers name."""
+OTHER_VESSELS = (
+    "box", "container", "pan", "pot", "vase", "shaker", "plate", "tray", "basket", "bucket", "kettle", "jug", "pitcher",
+    "glass", "carton", "tin", "tube", "bag", "case", "shoe", "bin", "crate", "dispenser", "canister", "holder", "teapot",
+)  # fmt: skip
+"""Nouns of what somebody may call a container: where one is in view, containers are not asked about."""
+_GENERAL = {"container": (*CONTAINERS, *OTHER_VESSELS)}
+"""Nouns that are also true of other nouns."""
+
+
+def references(view: View, rng: random.Random) -> dict[str, str]:
+    """Return by object's name words such as ``the yellow bottle`` for each clear object that has some of its own.
+
+    An object's rivals are those of the same noun of which anything may be seen. First its category alone, with its colour now and
+    then; else its colour, where all rivals have others; else that it is the outermost of its kind in the picture.
+    """
+    found = {}
+    shown = [each for each in view.seen if not each.is_hidden]
+    for seen in view.clear:
+        rivals = [each for each in shown if each is not seen and _may_be_called(each, seen.thing.head)]
+        words = _words(seen, rivals, rng, MARGIN_PX * view.camera.width_px / 512)
+        if words is not None:
+            found[seen.thing.name] = words
+    return found
+
+
+def _may_be_called(other: Seen, noun: str) -> bool:
+    return other.thing.head == noun or other.thing.head in _GENERAL.get(noun, ())
+
+
+def _words(seen: Seen, rivals: list[Seen], rng: random.Random, margin_px: float) -> str | None:
+    thing = seen.thing
+    with_color = rng.random() < 0.5
+    if not rivals:
+        return f"the {thing.color} {thing.category}" if thing.color and with_color else f"the {thing.category}"
+    colors = [each.thing.color for each in rivals]
+    if thing.color and all(color and main_word(color) != main_word(thing.color) for color in colors):
+        return f"the {thing.color} {thing.category}"
+    if not all(each.is_clear and each.thing.head == thing.head for each in rivals):
+        return None
+    columns = [each.column for each in rivals]
+    if seen.column < min(columns) - margin_px:
+        return f"the {thing.head} that is leftmost in the picture"
+    if seen.column > max(columns) + margin_px:
+        return f"the {thing.head} that is rightmost in the picture"
+    return None
+
+
+def region(x: float, y: float) -> str:
+    """Return which ninth of the picture a point lies in, in words; ``x`` and ``y`` in shares of its size."""
+    row = "top" if y < 1 / 3 else "bottom" if y > 2 / 3 else "middle"
+    column = "left" if x < 1 / 3 else "right" if x > 2 / 3 else "center"
+    return "center" if (row, column) == ("middle", "center") else f"{row} {column}"
+
+
+def a_or_an(noun: str) -> str:
+    """Return a noun with its article."""
+    return f"{'an' if noun[:1].lower() in 'aeiou' else 'a'} {noun}"

@@ -1,0 +1,134 @@
+"""Which of the drafts are asked: answers balanced over the whole set by what the words alone would tell, so many a scene."""
+
+from __future__ import annotations
+
+import random
+from collections import Counter, defaultdict
+from collections.abc import Sequence
+
+from manitwin.scenes.vqa.logistic import WordModel
+from manitwin.scenes.vqa.question import CHOICE, NUMBER, YES_NO, Draft
+from manitwin.scenes.vqa.templates import FAMILIES
+
+MOST_OF_ONE_ANSWER = 0.52
+"""Share of the commoner answer of a yes/no family, at most."""
+NUMBER_STEP_CM = 5
+MOST_OF_A_FAMILY = 0.09
+"""Share of a scene's questions that are of one family, at most, where others have enough."""
+_KEPT_SURE = 0.7
+"""A choice is kept with this by (chance / probability of its answer): what words tell half as well as chance is always kept."""
+
+
+def words_of(draft: Draft, option: str = "") -> list[str]:
+    """Return what a reader of the words alone sees of a draft, and of one of its options, as features."""
+    if option:
+        return [f"option {option}", *(f"noun {word}" for word in option.split()[-1:])]
+    return [f"{name} {value}" for name, value in draft.slots.items() if name != "A"]
+
+
+def chosen(drafts: Sequence[Sequence[Draft]], per_scene: int, rng: random.Random) -> list[list[Draft]]:
+    """Return of each scene's drafts those that are asked, at most ``per_scene``.
+
+    In each closed family an answer is kept with a probability inverse to the one that words alone give it (a logistic regression
+    fitted to all drafts), so that words tell nothing of the answers that stay. The balance is that of the whole set: balance
+    within a scene would let one guess an answer from the others.
+    """
+    pool: dict[str, list[tuple[int, Draft]]] = defaultdict(list)
+    for scene, of_scene in enumerate(drafts):
+        for draft in of_scene:
+            pool[draft.family].append((scene, draft))
+    kept: list[dict[str, list[Draft]]] = [defaultdict(list) for _ in drafts]
+    for family in FAMILIES:
+        found = pool.get(family, [])
+        if not found:
+            continue
+        kind = found[0][1].kind
+        if kind == YES_NO:
+            found = _balanced_yes_no(found, rng)
+        elif kind == CHOICE:
+            found = _balanced_choices(found, rng)
+        elif kind == NUMBER:
+            found = _balanced_numbers(found, rng)
+        rng.shuffle(found)
+        for scene, draft in found:
+            kept[scene][family].append(draft)
+    return _trimmed([_round_robin(families, per_scene, rng) for families in kept], rng)
+
+
+def _balanced_yes_no(found: list[tuple[int, Draft]], rng: random.Random) -> list[tuple[int, Draft]]:
+    answers = [draft.answer == "yes" for _, draft in found]
+    if len(set(answers)) < 2:
+        return []
+    model = WordModel.fitted([words_of(draft) for _, draft in found], answers)
+    sides: dict[bool, list[tuple[int, Draft]]] = {True: [], False: []}
+    for each, answer in zip(found, answers, strict=True):
+        yes = model.probability(words_of(each[1]))
+        if rng.random() < min(yes, 1 - yes) / (yes if answer else 1 - yes):
+            sides[answer].append(each)
+    least = min(map(len, sides.values()))
+    return [each for side in (True, False) for each in rng.sample(sides[side], least)]
+
+
+def _balanced_choices(found: list[tuple[int, Draft]], rng: random.Random) -> list[tuple[int, Draft]]:
+    texts, right = [], []
+    for _, draft in found:
+        for option in draft.options:
+            texts.append(words_of(draft, option))
+            right.append(option == draft.answer)
+    model = WordModel.fitted(texts, right)
+    kept = []
+    for scene, draft in found:
+        odds = {option: _odds(model.probability(words_of(draft, option))) for option in draft.options}
+        told = odds[draft.answer] / sum(odds.values())
+        if rng.random() < _KEPT_SURE / len(draft.options) / told:
+            kept.append((scene, draft))
+    return kept
+
+
+def _odds(probability: float) -> float:
+    return probability / max(1 - probability, 1e-9)
+
+
+def _balanced_numbers(found: list[tuple[int, Draft]], rng: random.Random) -> list[tuple[int, Draft]]:
+    """Keep of each step of the numbers at most twice as many as of the rarest third."""
+    steps: dict[int, list[tuple[int, Draft]]] = defaultdict(list)
+    for each in found:
+        steps[int(float(each[1].answer.split()[0]) // NUMBER_STEP_CM)].append(each)
+    counts = sorted(map(len, steps.values()))
+    most = max(1, 2 * counts[len(counts) // 3])
+    return [each for _, step in sorted(steps.items()) for each in rng.sample(step, min(most, len(step)))]
+
+
+def _round_robin(families: dict[str, list[Draft]], per_scene: int, rng: random.Random) -> list[Draft]:
+    """Take from the categories in turn, and in each from its families, as long as there are any."""
+    most = max(1, round(MOST_OF_A_FAMILY * per_scene))
+    by_category: dict[str, list[list[Draft]]] = defaultdict(list)
+    late: list[Draft] = []
+    for family, drafts in families.items():
+        by_category[FAMILIES[family].category].append(list(drafts[:most]))
+        if drafts and drafts[0].kind not in (YES_NO,):
+            late += drafts[most:]
+    taken: list[Draft] = []
+    while len(taken) < per_scene and any(map(any, by_category.values())):
+        for of_category in by_category.values():
+            open_ones = [drafts for drafts in of_category if drafts]
+            if open_ones and len(taken) < per_scene:
+                fullest = max(len(drafts) for drafts in open_ones)
+                taken.append(rng.choice([drafts for drafts in open_ones if len(drafts) == fullest]).pop())
+    rng.shuffle(late)
+    return taken + late[: per_scene - len(taken)]
+
+
+def _trimmed(scenes: list[list[Draft]], rng: random.Random) -> list[list[Draft]]:
+    """Drop questions of yes/no families until no answer has too large a share; a family of one answer goes."""
+    families = sorted({draft.family for of_scene in scenes for draft in of_scene if draft.kind == YES_NO})
+    dropped: set[int] = set()
+    for family in families:
+        of_family = [draft for of_scene in scenes for draft in of_scene if draft.family == family]
+        counts = Counter(draft.answer for draft in of_family)
+        answer, most = counts.most_common(1)[0]
+        rest = len(of_family) - most
+        allowed = int(rest * MOST_OF_ONE_ANSWER / (1 - MOST_OF_ONE_ANSWER))
+        surplus = [draft for draft in of_family if draft.answer == answer]
+        dropped |= {id(draft) for draft in rng.sample(surplus, max(0, most - allowed))}
+    return [[draft for draft in of_scene if id(draft) not in dropped] for of_scene in scenes]

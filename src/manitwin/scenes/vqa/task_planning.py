@@ -1,0 +1,160 @@
+"""Task planning: what happens when objects are slid, and which are heavy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations
+
+import numpy as np
+
+from manitwin.scenes.vqa.context import Context, sentence
+from manitwin.scenes.vqa.directions import Direction
+from manitwin.scenes.vqa.question import CHOICE, YES_NO, Draft
+from manitwin.scenes.vqa.sweeps import LONGEST_M, Way
+from manitwin.scenes.vqa.things import Seen
+
+LENGTHS_CM = (5, 10, 15)
+LEGS_CM = (5, 10)
+MOST_OPTIONS = 4
+
+
+def task_planning(asked: Context) -> Iterator[Draft]:
+    """Ask what slides lead to, and what is heavier."""
+    for seen in asked.slidable:
+        frames = sorted({each.frame for each in asked.directions})
+        frame = asked.rng.choice(frames)
+        directions = [each for each in asked.directions if each.frame == frame]
+        ways = [asked.way(seen, direction) for direction in directions]
+        for direction, way in zip(directions, ways, strict=True):
+            yield from _slides(asked, seen, direction, way)
+        yield from _blocked(asked, seen, directions, ways)
+        yield from _two_legs(asked, seen, directions, ways)
+    yield from _weights(asked)
+
+
+def _stays(asked: Context, seen: Seen, direction: Direction, way: Way, cm: int) -> bool:
+    """Whether the whole way is on the furniture and in the picture."""
+    length_m = cm / 100
+    return length_m <= min(way.leaves_m, LONGEST_M) and asked.in_view(seen, np.array(direction.vector) * length_m)
+
+
+def _slots(asked: Context, seen: Seen, direction: Direction, cm: int) -> dict[str, str]:
+    words = asked.words_of(seen)
+    return {
+        "a": words, "A": words[:1].upper() + words[1:], "cm": str(cm), "d": direction.words, "robot": direction.robot
+    }  # fmt: skip
+
+
+def _told(direction: Direction, cm: int) -> dict[str, object]:
+    return {
+        "frame": direction.frame, "direction": direction.key, "cm": cm,
+        "vector": [round(v, 6) for v in direction.vector],
+    }  # fmt: skip
+
+
+def _slides(asked: Context, seen: Seen, direction: Direction, way: Way) -> Iterator[Draft]:
+    for cm in LENGTHS_CM:
+        verdict = way.verdict(cm / 100)
+        if verdict is None or not _stays(asked, seen, direction, way, cm):
+            continue
+        slots, evidence = _slots(asked, seen, direction, cm), _told(direction, cm)
+        if not verdict:
+            yield Draft(
+                "slide", asked.view.name, YES_NO, slots, "no", sentence("no, its way is free"),
+                {"objects": asked.names(seen), **evidence, "met": None},
+            )  # fmt: skip
+            continue
+        hit = way.first_hit(cm / 100)
+        if hit is None or hit[0] not in asked.words:
+            continue
+        right, met = asked.words[hit[0]], asked.view.of(hit[0])
+        evidence = {
+            "objects": asked.names(seen, met), **evidence, "met": hit[0], "met_after_m": round(hit[1], 4)
+        }  # fmt: skip
+        yield Draft(
+            "slide", asked.view.name, YES_NO, slots, "yes",
+            sentence(f"yes, it hits {right} after about {max(100 * hit[1], 1):.0f} cm"), evidence,
+        )  # fmt: skip
+        others = [asked.words_of(each) for each in asked.named if each.thing.name not in (seen.thing.name, hit[0])]
+        if way.order_is_sure() and len(others) >= 2:
+            yield Draft(
+                "slide_hits", asked.view.name, CHOICE, slots, right, sentence(f"it hits {right}"), evidence,
+                (*asked.rng.sample(others, min(len(others), MOST_OPTIONS - 1)), right),
+            )  # fmt: skip
+
+
+def _blocked(asked: Context, seen: Seen, directions: list[Direction], ways: list[Way]) -> Iterator[Draft]:
+    for cm in LENGTHS_CM:
+        verdicts = [way.verdict(cm / 100) for way in ways]
+        if sorted(map(str, verdicts)) != ["False", "False", "False", "True"]:
+            continue
+        if not all(_stays(asked, seen, d, w, cm) for d, w in zip(directions, ways, strict=True)):
+            continue
+        place = verdicts.index(True)
+        hit = ways[place].first_hit(cm / 100)
+        if hit is None or hit[0] not in asked.words:
+            continue
+        slots = _slots(asked, seen, directions[place], cm)
+        yield Draft(
+            "blocked_direction", asked.view.name, CHOICE, {k: v for k, v in slots.items() if k != "d"},
+            directions[place].words, sentence(f"{directions[place].words}: it would hit {asked.words[hit[0]]}"),
+            {"objects": asked.names(seen, asked.view.of(hit[0])), **_told(directions[place], cm), "met": hit[0],
+             "free": [[round(v, 6) for v in each.vector] for i, each in enumerate(directions) if i != place]},
+            tuple(each.words for each in directions),
+        )  # fmt: skip
+
+
+def _two_legs(asked: Context, seen: Seen, directions: list[Direction], ways: list[Way]) -> Iterator[Draft]:
+    pairs = [(a, b) for a, b in permutations(range(len(directions)), 2)
+             if abs(np.dot(directions[a].vector, directions[b].vector)) < 0.5]  # fmt: skip
+    for first, second in asked.rng.sample(pairs, min(2, len(pairs))):
+        cm, cm2 = asked.rng.choice(LEGS_CM), asked.rng.choice(LEGS_CM)
+        moved = np.array(directions[first].vector) * cm / 100
+        slots = {
+            **_slots(asked, seen, directions[first], cm), "cm2": str(cm2), "d2": directions[second].words
+        }  # fmt: skip
+        evidence = {**_told(directions[first], cm), "cm2": cm2, "direction2": directions[second].key,
+                    "vector2": [round(v, 6) for v in directions[second].vector]}  # fmt: skip
+        verdict = ways[first].verdict(cm / 100)
+        if verdict is None or not _stays(asked, seen, directions[first], ways[first], cm):
+            continue
+        hit, leg = (ways[first].first_hit(cm / 100), "first") if verdict else (None, "second")
+        if not verdict:
+            way = asked.way(seen, directions[second], moved)
+            verdict = way.verdict(cm2 / 100)
+            end = moved + np.array(directions[second].vector) * cm2 / 100
+            if verdict is None or cm2 / 100 > way.leaves_m or not asked.in_view(seen, end):
+                continue
+            hit = way.first_hit(cm2 / 100)
+        if verdict and (hit is None or hit[0] not in asked.words):
+            continue
+        if hit is None or not verdict:
+            yield Draft(
+                "slide_two_legs", asked.view.name, YES_NO, slots, "no",
+                sentence("no, there is no risk of collision: both legs are free"),
+                {"objects": asked.names(seen), **evidence, "met": None},
+            )  # fmt: skip
+        else:
+            yield Draft(
+                "slide_two_legs", asked.view.name, YES_NO, slots, "yes",
+                sentence(f"yes, there is a collision with {asked.words[hit[0]]} on the {leg} leg"),
+                {"objects": asked.names(seen, asked.view.of(hit[0])), **evidence, "met": hit[0], "leg": leg,
+                 "met_after_m": round(hit[1], 4)},
+            )  # fmt: skip
+
+
+def _weights(asked: Context) -> Iterator[Draft]:
+    """Masses are compared where their intervals do not overlap; what lies in or on another is not weighed alone."""
+    for (a, p), (b, q) in permutations(asked.pointed, 2):
+        of_a, of_b = (each.thing.shape.twin.physical.mass_kg for each in (a, b))
+        if of_a.low <= of_b.high and of_b.low <= of_a.high:
+            continue
+        heavier = a if of_a.low > of_b.high else b
+        right = "<p0>" if heavier is a else "<p1>"
+        yield Draft(
+            "heavier", asked.view.name, CHOICE, {"p": "<p0>", "q": "<p1>"}, right,
+            sentence(f"the one at {right}: {asked.words.get(heavier.thing.name, 'the ' + heavier.thing.category)}"),
+            {"objects": asked.names(a, b), "answer": heavier.thing.name,
+             "mass_kg": {each.thing.name: [mass.low, mass.high] for each, mass in ((a, of_a), (b, of_b))}},
+            ("<p0>", "<p1>"), (p, q),
+        )  # fmt: skip

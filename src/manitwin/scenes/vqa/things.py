@@ -1,0 +1,266 @@
+"""A scene's objects as questions need them: words, hulls where they stand, and what each picture shows of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import cv2
+import numpy as np
+import trimesh
+
+from manitwin.geometry.hull_distance import ConvexParts, PlacedParts
+from manitwin.geometry.poses import inverse, transform_points
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.render.cameras import Camera, project
+from manitwin.render.raycast import merged
+from manitwin.scenes.loaded_scene import object_pose
+from manitwin.scenes.perception.object_views import ObjectView
+from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth
+from manitwin.scenes.scene import SceneObject
+from manitwin.scenes.vqa.question import Point
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.part_records import Part
+
+NAMED_SHARE, NAMED_PX = 0.40, 150
+"""What is seen less of is not asked about; pixels are those of a picture of 512 x 512."""
+HIDDEN_PX = 20
+"""What is seen less of is not in the picture; between the two an object is doubtful."""
+REFERENCE_PX = 512
+SURE_COLOR_PERCENT, COLOR_LEAD_PERCENT = 50, 10
+"""A colour is named where it covers so much of the surface, and so much more than the next."""
+
+_SHARE = re.compile(r"^(?P<word>[a-z ]+?)(?: \((?P<percent>\d+) %\))?$")
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A twin's surface for rays and its hulls, object frame; one for all of its scenes."""
+
+    twin: Twin
+    hulls: ConvexParts
+
+    @classmethod
+    def of_twin(cls, folder: Path) -> Shape:
+        """Read a twin; raises TwinError."""
+        twin = Twin(folder)
+        return cls(twin, ConvexParts.of([np.asarray(hull.vertices) for hull in twin.hulls]))
+
+    @cached_property
+    def caster(self) -> RayCaster:
+        """Rays at the whole visual surface."""
+        return RayCaster(merged(self.twin.visual))
+
+    @cached_property
+    def part_casters(self) -> dict[str, tuple[RayCaster, np.ndarray]]:
+        """Rays at each part alone, and its corners ``(V, 3)``, by the part's id."""
+        mesh, labels = merged(self.twin.visual), self.twin.face_parts()
+        found = {}
+        for place, part in enumerate(self.twin.record.parts):
+            alone = trimesh.Trimesh(mesh.vertices, mesh.faces[labels == place], process=False)
+            found[part.id] = (RayCaster(alone), np.asarray(alone.triangles).reshape(-1, 3))
+        return found
+
+
+@dataclass(frozen=True)
+class Thing:
+    """An object where it stands: ``number`` is its id in pictures, ``color`` a sure colour word or None."""
+
+    placed_as: SceneObject
+    number: int
+    shape: Shape
+    pose: np.ndarray
+    color: str | None
+
+    @property
+    def name(self) -> str:
+        """Its name in the scene."""
+        return self.placed_as.name
+
+    @property
+    def category(self) -> str:
+        """The category."""
+        return self.placed_as.category
+
+    @property
+    def head(self) -> str:
+        """The noun of the category: ``bottle`` of ``ketchup bottle``."""
+        return self.category.split()[-1]
+
+    @property
+    def parts(self) -> list[Part]:
+        """The twin's parts."""
+        return self.shape.twin.record.parts
+
+    @cached_property
+    def placed(self) -> PlacedParts:
+        """The hulls where they stand."""
+        return self.shape.hulls.at(self.pose)
+
+    @cached_property
+    def center_m(self) -> np.ndarray:
+        """The middle of its box in the world ``(3,)``."""
+        low, high = self.placed.bounds
+        return np.asarray((low + high) / 2)
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What a picture shows of an object: ``mask (H, W) bool`` of its visible pixels."""
+
+    thing: Thing
+    view: ObjectView
+    picture: PictureTruth
+
+    @cached_property
+    def mask(self) -> np.ndarray:
+        """The visible pixels."""
+        return self.picture.ids == self.thing.number
+
+    @cached_property
+    def column(self) -> float:
+        """The mean column of its visible pixels."""
+        return float(np.nonzero(self.mask)[1].mean() + 0.5)
+
+    @cached_property
+    def inner(self) -> tuple[Point, float]:
+        """The point of the picture deepest inside of its visible pixels, and how deep (px)."""
+        return inner_point(self.mask)
+
+    @property
+    def scale(self) -> float:
+        """Pixels of this picture by those of one of 512 x 512, in area."""
+        return self.picture.camera.width_px * self.picture.camera.height_px / REFERENCE_PX**2
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether a question may name it."""
+        return self.view.visible_share >= NAMED_SHARE and self.view.visible_px >= NAMED_PX * self.scale
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether the picture does not show it."""
+        return self.view.visible_px <= HIDDEN_PX * self.scale
+
+
+@dataclass(frozen=True)
+class View:
+    """A picture with what it shows of all objects."""
+
+    picture: PictureTruth
+    seen: tuple[Seen, ...]
+
+    @property
+    def camera(self) -> Camera:
+        """The camera."""
+        return self.picture.camera
+
+    @property
+    def name(self) -> str:
+        """The camera's name."""
+        return self.picture.name
+
+    @cached_property
+    def clear(self) -> list[Seen]:
+        """The objects that may be named."""
+        return [each for each in self.seen if each.is_clear]
+
+    @cached_property
+    def is_sure(self) -> bool:
+        """Whether each object is either clear or not in the picture: what counts and lists may be asked of."""
+        return all(each.is_clear or each.is_hidden for each in self.seen)
+
+    @cached_property
+    def shows_all(self) -> bool:
+        """Whether every object of the scene is clear: what could be run into is seen."""
+        return all(each.is_clear for each in self.seen)
+
+    def of(self, name: str) -> Seen:
+        """Return what it shows of an object."""
+        return next(each for each in self.seen if each.thing.name == name)
+
+    def pixel(self, point_m: np.ndarray) -> tuple[float, float, float]:
+        """Return column, row and depth (m) of a world point."""
+        pixels, depth_m = project(np.asarray(point_m, float)[None], self.camera)
+        return float(pixels[0, 0]), float(pixels[0, 1]), float(depth_m[0])
+
+
+def things_of(scene: SceneTruth, shape_of: Callable[[str], Shape]) -> list[Thing]:
+    """Return the objects of a scene; raises TwinError."""
+    return [
+        Thing(placed, scene.ids[placed.name], shape, object_pose(placed), sure_color(shape.twin))
+        for placed in scene.record.objects
+        for shape in (shape_of(placed.twin_id),)
+    ]
+
+
+def views_of(scene: SceneTruth, things: list[Thing]) -> list[View]:
+    """Return the pictures of a scene with what each shows."""
+    return [
+        View(picture, tuple(Seen(thing, picture.views[thing.name], picture) for thing in things))
+        for picture in scene.pictures
+    ]
+
+
+def sure_color(twin: Twin) -> str | None:
+    """Return the one colour word of a twin, such as ``dark green``; None where it has none that leads."""
+    if twin.record.language is None:
+        return None
+    found: list[tuple[str, int]] = []
+    for text in twin.record.language.color.split(", "):
+        match = _SHARE.match(text)
+        if match is None or "unknown" in text:
+            return None
+        found.append((match["word"], int(match["percent"] or 100)))
+    next_percent = max((percent for _, percent in found[1:]), default=0)
+    if found[0][1] < SURE_COLOR_PERCENT or found[0][1] - next_percent < COLOR_LEAD_PERCENT:
+        return None
+    return found[0][0]
+
+
+def main_word(color: str) -> str:
+    """Return ``green`` of ``dark green``."""
+    return color.split()[-1]
+
+
+def inner_point(mask: np.ndarray) -> tuple[Point, float]:
+    """Return the pixel's centre deepest inside of a mask ``(H, W) bool``, in shares of its size, and how deep (px).
+
+    Beyond the picture's frame nothing is known: its border counts as the mask's.
+    """
+    padded = np.pad(mask.astype(np.uint8), 1)
+    depth = cv2.distanceTransform(padded, cv2.DIST_L2, 3)[1:-1, 1:-1]
+    row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+    height, width = mask.shape
+    return ((float(column) + 0.5) / width, (float(row) + 0.5) / height), float(depth.max())
+
+
+def part_alone_px(thing: Thing, part: Part, camera: Camera, step_px: int = 2) -> float:
+    """Return about how many pixels a part alone would cover, by rays on every other pixel of the frame."""
+    caster, corners = thing.shape.part_casters[part.id]
+    pixels, depth_m = project(transform_points(thing.pose, corners), camera)
+    if not (depth_m > 0).all():
+        return 0.0
+    low = np.clip(np.floor(pixels.min(0)), 0, [camera.width_px, camera.height_px])
+    high = np.clip(np.ceil(pixels.max(0)), 0, [camera.width_px, camera.height_px])
+    columns, rows = np.meshgrid(
+        np.arange(low[0], high[0], step_px) + 0.5, np.arange(low[1], high[1], step_px) + 0.5
+    )
+    directions = np.stack(
+        [
+            (columns - camera.width_px / 2) / camera.focal_px,
+            -(rows - camera.height_px / 2) / camera.focal_px,
+            -np.ones_like(columns),
+        ],
+        -1,
+    ).reshape(-1, 3)
+    if not len(directions):
+        return 0.0
+    camera_to_thing = inverse(thing.pose) @ camera.camera_to_object
+    directions = directions @ camera_to_thing[:3, :3].T
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    origins = np.broadcast_to(camera_to_thing[:3, 3], directions.shape)
+    return float((caster.first_hits(origins, directions)[1] >= 0).sum() * step_px**2)
