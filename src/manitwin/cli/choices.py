@@ -130,6 +130,8 @@ IMPORT_FORMATS = Choices(
     "format", _of("auto", "twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
 )
 SEGMENTATION_FORMATS = Choices("format", _of("coco", "coco-panoptic", "cityscapes", "bop", "pointcloud"))
+VQA_FORMATS = Choices("format", _of("llava", "parquet", "webdataset"))
+POINT_CONVENTIONS = Choices("convention of points", _of("unit", "robopoint", "roborefer", "pixel", "thousand"))
 AUDIT_FORMATS = Choices("format", _of("text", "json", "sarif"))
 QUERY_FORMATS = Choices("format", _of("table", "csv", "json", "ids"))
 TABLES = Choices("table", _of("twins", "points", "grasps", "placements", "rejections", "stages"))

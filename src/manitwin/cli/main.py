@@ -43,6 +43,7 @@ from manitwin.cli.commands.stats import stats
 from manitwin.cli.commands.status import status
 from manitwin.cli.commands.tasks import tasks
 from manitwin.cli.commands.trajectories import trajectories
+from manitwin.cli.commands.vqa import vqa
 from manitwin.cli.console import error_console, out_console, write_text
 from manitwin.cli.documents import CommandLineError, Json, asked_for_json, print_document, print_failure
 from manitwin.cli.interrupt import Interrupts
@@ -93,7 +94,7 @@ def _manitwin(
 for watched in (build, layout, tasks, trajectories, render):
     register(app, reported(watched, own_log=True))
 register(app, reported(run, own_log=True), "run", hidden=True)
-for making in (index, stats, publish, export, segmentation, affordances, catalog):
+for making in (index, stats, publish, export, segmentation, affordances, catalog, vqa):
     register(app, reported(making))
 register(app, reported(import_), "import")
 for other in (status, retry, check, query, search, doctor, models, fake, prompts, audit, carve, evaluate, locate):

@@ -199,15 +199,15 @@ def convex_distances(first: np.ndarray, second: np.ndarray, *, beyond_m: float =
     pairs = len(first)
     result = np.zeros(pairs)
     direction = second[:, 0] - first[:, 0]
-    corners = np.repeat(_support(first, second, direction)[:, None], 4, axis=1)
+    corners = np.repeat(support(first, second, direction)[:, None], 4, axis=1)
     active = np.arange(pairs)
     for _ in range(MAX_ITERATIONS):
         if not len(active):
             break
-        nearest, used, inside = _nearest_on_simplex(corners)
+        nearest, used, inside = nearest_on_simplex(corners)
         squared = np.einsum("pi,pi->p", nearest, nearest)
         length = np.sqrt(squared)
-        farthest = _support(first[active], second[active], -nearest)
+        farthest = support(first[active], second[active], -nearest)
         bound = np.einsum("pi,pi->p", nearest, farthest) / np.maximum(length, 1e-300)
         inside |= length < TOLERANCE_M
         result[active] = np.where(inside, 0.0, np.where(bound > beyond_m, bound, length))
@@ -217,7 +217,7 @@ def convex_distances(first: np.ndarray, second: np.ndarray, *, beyond_m: float =
     return result
 
 
-def _support(first: np.ndarray, second: np.ndarray, direction: np.ndarray) -> np.ndarray:
+def support(first: np.ndarray, second: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Return the point of ``first - second`` farthest along a direction, ``(P, 3)``."""
     rows = np.arange(len(first))
     ahead = first[rows, np.matmul(first, direction[..., None])[..., 0].argmax(1)]
@@ -226,7 +226,7 @@ def _support(first: np.ndarray, second: np.ndarray, direction: np.ndarray) -> np
     return difference
 
 
-def _nearest_on_simplex(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def nearest_on_simplex(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the point nearest to the origin ``(P, 3)``, the corners that it lies between ``(P, 4)``, and whether it is inside.
 
     ``corners (P, 4, 3)`` may coincide: a simplex of fewer corners has some twice.

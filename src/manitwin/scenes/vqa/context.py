@@ -9,9 +9,11 @@ from functools import cached_property
 
 import numpy as np
 
+from manitwin.geometry.hull_distance import distance
 from manitwin.scenes.perception.scene_truth import SceneTruth
 from manitwin.scenes.vqa.directions import Direction, picture_directions, robot_directions
 from manitwin.scenes.vqa.question import Point
+from manitwin.scenes.vqa.references import one_of
 from manitwin.scenes.vqa.sweeps import Way, can_be_slid, obstacles_of, sweep
 from manitwin.scenes.vqa.things import Seen, Thing, View
 
@@ -29,6 +31,7 @@ class Context:
     words: dict[str, str]
     categories: Sequence[str]
     rng: random.Random
+    gaps: dict[tuple[str, str], float]
 
     @cached_property
     def named(self) -> list[Seen]:
@@ -67,13 +70,23 @@ class Context:
         """Return the words that mean an object."""
         return self.words[seen.thing.name]
 
-    def way(self, seen: Seen, direction: Direction, start_m: np.ndarray | None = None) -> Way:
-        """Return what an object meets on its way; ``start_m (2,)`` is how far it was moved before."""
+    def called(self, seen: Seen) -> str:
+        """Return the words that mean an object, or its category's where it has none: what a point means already."""
+        return self.words.get(seen.thing.name, f"the {one_of(seen.thing.category)}")
+
+    def ways(self, seen: Seen, directions: Sequence[Direction], start_m: np.ndarray | None = None) -> list[Way]:
+        """Return what an object meets in each direction; ``start_m (2,)`` is how far it was moved before."""
         record = self.scene.record
         obstacles = obstacles_of(seen.thing, self.things, record)
-        return sweep(
-            seen.thing, record, obstacles, np.zeros(2) if start_m is None else start_m, direction.vector
-        )
+        start = np.zeros(2) if start_m is None else start_m
+        return sweep(seen.thing, record, obstacles, start, [each.vector for each in directions])
+
+    def gap_m(self, a: Thing, b: Thing) -> float:
+        """Return the distance of two objects; found once for all pictures of a scene."""
+        key = (min(a.name, b.name), max(a.name, b.name))
+        if key not in self.gaps:
+            self.gaps[key] = distance(a.placed, b.placed)
+        return self.gaps[key]
 
     def in_view(self, seen: Seen, end_m: np.ndarray) -> bool:
         """Whether an object's middle, moved by ``end_m (2,)``, is still in the picture."""

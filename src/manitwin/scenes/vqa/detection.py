@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from manitwin.scenes.vqa.context import Context, listed, sentence
 from manitwin.scenes.vqa.question import BOX, CHOICE, LIST, YES_NO, Draft
-from manitwin.scenes.vqa.references import CONTAINERS, OTHER_VESSELS, a_or_an
+from manitwin.scenes.vqa.references import CONTAINERS, OTHER_VESSELS, a_or_an, one_of
 from manitwin.scenes.vqa.things import Seen
 
 ABSENT = 4
@@ -57,14 +57,14 @@ def _existence(asked: Context) -> Iterator[Draft]:
     ]  # fmt: skip
     for category in sorted(there):
         count = sum(each.thing.category == category for each in asked.view.clear)
-        said = f"there is {a_or_an(category)}" if count == 1 else f"there are {count}"
+        said = f"there is {a_or_an(one_of(category))}" if count == 1 else f"there are {count}"
         yield Draft(
-            "is_there", asked.view.name, YES_NO, {"c": category}, "yes", sentence(f"yes, {said}"),
+            "is_there", asked.view.name, YES_NO, {"c": a_or_an(one_of(category))}, "yes", sentence(f"yes, {said}"),
             {"objects": asked.names(*asked.view.clear), "asked": category},
         )  # fmt: skip
     for category in asked.rng.sample(absent, min(ABSENT, len(absent))):
         yield Draft(
-            "is_there", asked.view.name, YES_NO, {"c": category}, "no", sentence(f"no, there is no {category}"),
+            "is_there", asked.view.name, YES_NO, {"c": a_or_an(one_of(category))}, "no", sentence(f"no, there is no {one_of(category)}"),
             {"objects": asked.names(*asked.view.clear), "asked": category},
         )  # fmt: skip
 
@@ -96,5 +96,4 @@ def _lists(asked: Context) -> Iterator[Draft]:
 
 
 def _described(seen: Seen) -> str:
-    color = f"{seen.thing.color} " if seen.thing.color else ""
-    return a_or_an(f"{color}{seen.thing.category}")
+    return a_or_an(one_of(seen.thing.category, seen.thing.color))

@@ -128,7 +128,7 @@ def _functions(asked: Context) -> Iterator[Draft]:
         last = f"<p{len(chosen) - 1}>"
         yield Draft(
             "object_for_function", asked.view.name, CHOICE, {"function": function}, last,
-            sentence(f"the one at {last}: {asked.words.get(seen.thing.name, 'the ' + seen.thing.category)}"),
+            sentence(f"the one at {last}: {asked.called(seen)}"),
             {"objects": asked.names(*(each[0] for each in chosen)), "answer": seen.thing.name,
              "functions": {each[0].thing.name: each[2] for each in chosen}},
             tuple(f"<p{place}>" for place in range(len(chosen))), tuple(each[1] for each in chosen),
@@ -155,7 +155,7 @@ def _grasp_types(asked: Context) -> Iterator[Draft]:
         right = GRASP_WORDS[grasp[0]]
         yield Draft(
             "best_grasp_type", asked.view.name, CHOICE, {"p": "<p0>"}, right,
-            sentence(f"{right}; it is {asked.words.get(seen.thing.name, 'the ' + seen.thing.category)}"),
+            sentence(f"{right}; it is {asked.called(seen)}"),
             {"objects": asked.names(seen), "grasp_type": grasp[0], "confidence": grasp[1], "lead": grasp[2]},
             tuple(GRASP_WORDS.values()), (point,),
         )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import zlib
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
@@ -21,6 +22,8 @@ from manitwin.scenes.vqa.task_planning import task_planning
 from manitwin.scenes.vqa.templates import FAMILIES
 from manitwin.scenes.vqa.things import Shape, things_of, views_of
 
+MOST_DRAFTS = 24
+"""How many drafts of a family (and answer) one scene keeps."""
 _MAKERS: Sequence[Callable[[Context], Iterable[Draft]]] = (
     language_grounding,
     functional_planning,
@@ -39,12 +42,23 @@ def drafts_of(
     """
     things = things_of(scene, shape_of)
     found: list[Draft] = []
+    gaps: dict[tuple[str, str], float] = {}
     for view in views_of(scene, things):
         rng = random.Random(_seed(seed, scene.record.scene_id, view.name))
-        context = Context(scene, things, view, references(view, rng), categories, rng)
-        for make in _MAKERS:
+        context = Context(scene, things, view, references(view, rng), categories, rng, gaps)
+        for make in MOST_DRAFTS = 24
+"""How many drafts of a family (and answer) one scene keeps."""
+_MAKERS:
             found += make(context)
-    return found
+    return _thinned(found, random.Random(_seed(seed, scene.record.scene_id, "thinned")))
+
+
+def _thinned(drafts: Sequence[Draft], rng: random.Random) -> list[Draft]:
+    """Keep so many drafts of each family and, of yes/no questions, of each answer: a thousand scenes fit into memory."""
+    sides: dict[tuple[str, str], list[Draft]] = defaultdict(list)
+    for draft in drafts:
+        sides[draft.family, draft.answer if draft.kind == YES_NO else ""].append(draft)
+    return [draft for side in sides.values() for draft in rng.sample(side, min(len(side), MOST_DRAFTS))]
 
 
 def questions_of(

@@ -59,7 +59,7 @@ def _by_color(asked: Context) -> Iterator[Draft]:
         chosen.append(next(each for each in marked if each[0] is seen))
         yield Draft(
             "object_by_color", asked.view.name, CHOICE, {"color": color}, f"<p{len(chosen) - 1}>",
-            sentence(f"the one at <p{len(chosen) - 1}>: {asked.words.get(seen.thing.name, 'the ' + seen.thing.category)}"),
+            sentence(f"the one at <p{len(chosen) - 1}>: {asked.called(seen)}"),
             {"objects": asked.names(*(each for each, _ in chosen)), "answer": seen.thing.name,
              "colors": {each.thing.name: each.thing.color for each, _ in chosen}},
             tuple(f"<p{place}>" for place in range(len(chosen))), tuple(point for _, point in chosen),

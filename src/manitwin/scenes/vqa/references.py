@@ -15,6 +15,10 @@ OTHER_VESSELS = (
     "glass", "carton", "tin", "tube", "bag", "case", "shoe", "bin", "crate", "dispenser", "canister", "holder", "teapot",
 )  # fmt: skip
 """Nouns of what somebody may call a container: where one is in view, containers are not asked about."""
+PAIRS = frozenset(
+    {"headphones", "earphones", "scissors", "shears", "pliers", "tongs", "tweezers", "glasses", "sunglasses", "goggles"}
+)
+"""Nouns that are plural, of which one is a pair."""
 _GENERAL = {"container": (*CONTAINERS, *OTHER_VESSELS)}
 """Nouns that are also true of other nouns."""
 
@@ -43,17 +47,17 @@ def _words(seen: Seen, rivals: list[Seen], rng: random.Random, margin_px: float)
     thing = seen.thing
     with_color = rng.random() < 0.5
     if not rivals:
-        return f"the {thing.color} {thing.category}" if thing.color and with_color else f"the {thing.category}"
+        return f"the {one_of(thing.category, thing.color if with_color else None)}"
     colors = [each.thing.color for each in rivals]
     if thing.color and all(color and main_word(color) != main_word(thing.color) for color in colors):
-        return f"the {thing.color} {thing.category}"
+        return f"the {one_of(thing.category, thing.color)}"
     if not all(each.is_clear and each.thing.head == thing.head for each in rivals):
         return None
     columns = [each.column for each in rivals]
     if seen.column < min(columns) - margin_px:
-        return f"the {thing.head} that is leftmost in the picture"
+        return f"the {one_of(thing.head)} that is leftmost in the picture"
     if seen.column > max(columns) + margin_px:
-        return f"the {thing.head} that is rightmost in the picture"
+        return f"the {one_of(thing.head)} that is rightmost in the picture"
     return None
 
 
@@ -62,6 +66,12 @@ def region(x: float, y: float) -> str:
     row = "top" if y < 1 / 3 else "bottom" if y > 2 / 3 else "middle"
     column = "left" if x < 1 / 3 else "right" if x > 2 / 3 else "center"
     return "center" if (row, column) == ("middle", "center") else f"{row} {column}"
+
+
+def one_of(noun: str, color: str | None = None) -> str:
+    """Return the words for one thing: ``black pair of scissors``, ``yellow bottle``."""
+    thing = f"pair of {noun}" if noun.split()[-1] in PAIRS else noun
+    return f"{color} {thing}" if color else thing
 
 
 def a_or_an(noun: str) -> str:

@@ -7,7 +7,6 @@ from itertools import combinations, permutations
 
 import numpy as np
 
-from manitwin.geometry.hull_distance import distance
 from manitwin.scenes.vqa.context import Context, sentence
 from manitwin.scenes.vqa.grasp_types import GRASP_WORDS, best_grasp
 from manitwin.scenes.vqa.question import CHOICE, NUMBER, YES_NO, Draft
@@ -63,7 +62,7 @@ def _gaps(asked: Context) -> Iterator[Draft]:
     for a, b in combinations(asked.named, 2):
         if asked.rng.random() < 0.5:
             a, b = b, a
-        gap_m = distance(a.thing.placed, b.thing.placed)
+        gap_m = asked.gap_m(a.thing, b.thing)
         if gap_m > FARTHEST_GAP_M or a.thing.name == b.thing.placed_as.supported_by or gap_m < 0.005:
             continue
         tolerance_cm = max(LEAST_TOLERANCE_CM, TOLERANCE_SHARE * 100 * gap_m)
@@ -79,7 +78,7 @@ def _neighbours(asked: Context) -> Iterator[Draft]:
         return
     for seen in asked.named:
         gaps = sorted(
-            (distance(seen.thing.placed, other.thing.placed), other.thing.name)
+            (asked.gap_m(seen.thing, other.thing), other.thing.name)
             for other in asked.view.clear if other is not seen
         )  # fmt: skip
         if gaps[1][0] - gaps[0][0] <= NEARER_M or any(name not in asked.words for _, name in gaps[:1]):
@@ -100,8 +99,8 @@ def _neighbours(asked: Context) -> Iterator[Draft]:
 def _clearances(asked: Context) -> Iterator[Draft]:
     grasps = {each.thing.name: best_grasp(each.thing) for each in asked.view.clear}
     for seen in asked.slidable:
-        for direction in asked.rng.sample(asked.directions, min(2, len(asked.directions))):
-            way = asked.way(seen, direction)
+        directions = asked.rng.sample(asked.directions, min(2, len(asked.directions)))
+        for direction, way in zip(directions, asked.ways(seen, directions), strict=True):
             lengths = [
                 cm for cm in CLEARANCES_CM
                 if cm / 100 < min(way.leaves_m, LONGEST_M) and way.verdict(cm / 100) is not None
@@ -150,15 +149,11 @@ def _heights(asked: Context) -> Iterator[Draft]:
         yield Draft(
             "taller", asked.view.name, CHOICE, {"p": "<p0>", "q": "<p1>", "surface": asked.surface},
             "<p0>" if taller is a else "<p1>",
-            sentence(f"the one at {'<p0>' if taller is a else '<p1>'}: {_called(asked, taller)}"),
+            sentence(f"the one at {'<p0>' if taller is a else '<p1>'}: {asked.called(taller)}"),
             {"objects": asked.names(a, b), "answer": taller.thing.name,
              "top_m": {each.thing.name: round(top, 4) for each, top in zip((a, b), top_m, strict=True)}},
             ("<p0>", "<p1>"), (p, q),
         )  # fmt: skip
-
-
-def _called(asked: Context, seen: Seen) -> str:
-    return asked.words.get(seen.thing.name, f"the {seen.thing.category}")
 
 
 def _occluders(asked: Context) -> Iterator[Draft]:

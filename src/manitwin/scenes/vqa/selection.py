@@ -52,7 +52,9 @@ def chosen(drafts: Sequence[Sequence[Draft]], per_scene: int, rng: random.Random
         rng.shuffle(found)
         for scene, draft in found:
             kept[scene][family].append(draft)
-    return _trimmed([_round_robin(families, per_scene, rng) for families in kept], rng)
+    taken = [_round_robin(families, per_scene, rng) for families in kept]
+    asked = _trimmed([first for first, _ in taken], rng)
+    return [first + spare[: per_scene - len(first)] for first, (_, spare) in zip(asked, taken, strict=True)]
 
 
 def _balanced_yes_no(found: list[tuple[int, Draft]], rng: random.Random) -> list[tuple[int, Draft]]:
@@ -99,14 +101,19 @@ def _balanced_numbers(found: list[tuple[int, Draft]], rng: random.Random) -> lis
     return [each for _, step in sorted(steps.items()) for each in rng.sample(step, min(most, len(step)))]
 
 
-def _round_robin(families: dict[str, list[Draft]], per_scene: int, rng: random.Random) -> list[Draft]:
-    """Take from the categories in turn, and in each from its families, as long as there are any."""
+def _round_robin(
+    families: dict[str, list[Draft]], per_scene: int, rng: random.Random
+) -> tuple[list[Draft], list[Draft]]:
+    """Take from the categories in turn, and in each from its families; returns those taken, and what may fill gaps.
+
+    Yes/no questions fill none: which of them are asked was balanced over the whole set.
+    """
     most = max(1, round(MOST_OF_A_FAMILY * per_scene))
     by_category: dict[str, list[list[Draft]]] = defaultdict(list)
     late: list[Draft] = []
     for family, drafts in families.items():
         by_category[FAMILIES[family].category].append(list(drafts[:most]))
-        if drafts and drafts[0].kind not in (YES_NO,):
+        if drafts and drafts[0].kind != YES_NO:
             late += drafts[most:]
     taken: list[Draft] = []
     while len(taken) < per_scene and any(map(any, by_category.values())):
@@ -116,7 +123,7 @@ def _round_robin(families: dict[str, list[Draft]], per_scene: int, rng: random.R
                 fullest = max(len(drafts) for drafts in open_ones)
                 taken.append(rng.choice([drafts for drafts in open_ones if len(drafts) == fullest]).pop())
     rng.shuffle(late)
-    return taken + late[: per_scene - len(taken)]
+    return taken, late
 
 
 def _trimmed(scenes: list[list[Draft]], rng: random.Random) -> list[list[Draft]]:

@@ -1,4 +1,4 @@
-"""What an object meets when it is slid level, without turning: distances of convex hulls along the way."""
+"""What an object meets when it is slid level, without turning: convex hulls swept along the way."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.geometry.hull_distance import ConvexParts, PlacedParts, distance
+from manitwin.geometry.hull_distance import ConvexParts, PlacedParts
+from manitwin.geometry.hull_sweep import first_contacts
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.scenes.scene import SceneRecord
 from manitwin.scenes.vqa.things import Thing
@@ -16,8 +17,6 @@ TOUCH_M = 0.0005
 """Two bodies nearer than this touch."""
 MARGIN_M = 0.010
 """What misses by less, or is met in less before the end of the way, is not asked."""
-STEP_M = 0.002
-"""How far an object is moved at once where it is within the margin."""
 LONGEST_M = 0.20
 
 
@@ -79,41 +78,53 @@ def sweep(
     record: SceneRecord,
     obstacles: Mapping[str, PlacedParts],
     start_m: np.ndarray,
-    direction: tuple[float, float],
+    directions: Sequence[tuple[float, float]],
     length_m: float = LONGEST_M,
-) -> Way:
-    """Slide an object level from its place moved by ``start_m (2,)``, along a unit ``direction``; nothing else moves.
+) -> list[Way]:
+    """Slide an object level from its place moved by ``start_m (2,)``, along each of some unit directions; nothing else moves.
 
-    A body that is ``gap`` away cannot be met on the next ``gap`` of the way (conservative advancement), so few places are looked at.
+    Each convex part against each of the others that the box of its way touches, by ray casts against their difference.
     """
-    meetings = {}
-    unit = np.array([*direction, 0.0])
     start = np.array([*start_m, 0.0])
-    low, high = (bound + start for bound in thing.placed.bounds)
-    swept_low = np.minimum(low, low + unit * length_m) - MARGIN_M
-    swept_high = np.maximum(high, high + unit * length_m) + MARGIN_M
-    for name, obstacle in obstacles.items():
-        other_low, other_high = obstacle.bounds
-        if (other_low <= swept_high).all() and (other_high >= swept_low).all():
-            meetings[name] = _meeting(thing, obstacle, start, unit, length_m)
-    return Way(meetings, _leaves(thing, record, start, unit, length_m))
+    moving = thing.placed.parts + start
+    low, high = moving.min(1), moving.max(1)
+    pairs: list[tuple[int, str, int, np.ndarray, np.ndarray, np.ndarray]] = []
+    for place, direction in enumerate(directions):
+        way = np.array([*direction, 0.0]) * length_m
+        swept_low, swept_high = np.minimum(low, low + way) - MARGIN_M, np.maximum(high, high + way) + MARGIN_M
+        for name, obstacle in obstacles.items():
+            other_low, other_high = obstacle.part_bounds
+            near = (other_low[None] <= swept_high[:, None]).all(-1) & (other_high[None] >= swept_low[:, None]).all(-1)
+            rows, columns = np.nonzero(near)
+            if len(rows):
+                unit = np.broadcast_to(way / length_m, (len(rows), 3))
+                pairs.append((place, name, len(rows), moving[rows], obstacle.parts[columns], unit))
+    meetings: list[dict[str, Meeting]] = [{} for _ in directions]
+    if pairs:
+        most = max(each[4].shape[1] for each in pairs)
+        first = np.concatenate([each[3] for each in pairs])
+        second = np.concatenate([_padded(each[4], most) for each in pairs])
+        units = np.concatenate([each[5] for each in pairs])
+        near_m = first_contacts(first, second, units, length_m, MARGIN_M)
+        touch_m = np.full(len(near_m), np.inf)
+        at = np.isfinite(near_m)
+        touch_m[at] = first_contacts(first[at], second[at], units[at], length_m, TOUCH_M)
+        end = 0
+        for place, name, count, *_ in pairs:
+            begin, end = end, end + count
+            meetings[place][name] = Meeting(float(near_m[begin:end].min()), float(touch_m[begin:end].min()))
+    return [
+        Way(met, _leaves(thing, record, start, np.array([*direction, 0.0])))
+        for met, direction in zip(meetings, directions, strict=True)
+    ]
 
 
-def _meeting(thing: Thing, obstacle: PlacedParts, start: np.ndarray, unit: np.ndarray, length_m: float) -> Meeting:
-    near, along = np.inf, 0.0
-    while along <= length_m:
-        pose = thing.pose.copy()
-        pose[:3, 3] += start + along * unit
-        gap = distance(thing.shape.hulls.at(pose), obstacle)
-        if gap <= MARGIN_M:
-            near = min(near, along)
-        if gap <= TOUCH_M:
-            return Meeting(near, along)
-        along += max(gap - MARGIN_M, STEP_M)
-    return Meeting(near, np.inf)
+def _padded(parts: np.ndarray, most: int) -> np.ndarray:
+    """Repeat the first corner of parts ``(P, B, 3)`` until there are ``most``."""
+    return np.concatenate([parts, np.repeat(parts[:, :1], most - parts.shape[1], axis=1)], axis=1)
 
 
-def _leaves(thing: Thing, record: SceneRecord, start: np.ndarray, unit: np.ndarray, length_m: float) -> float:
+def _leaves(thing: Thing, record: SceneRecord, start: np.ndarray, unit: np.ndarray) -> float:
     """Return how far the middle of an object's foot goes before the furniture below it ends."""
     middle = (thing.center_m + start)[:2]
     foot = thing.placed.bounds[0][2]

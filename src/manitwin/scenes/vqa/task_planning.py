@@ -24,7 +24,7 @@ def task_planning(asked: Context) -> Iterator[Draft]:
         frames = sorted({each.frame for each in asked.directions})
         frame = asked.rng.choice(frames)
         directions = [each for each in asked.directions if each.frame == frame]
-        ways = [asked.way(seen, direction) for direction in directions]
+        ways = asked.ways(seen, directions)
         for direction, way in zip(directions, ways, strict=True):
             yield from _slides(asked, seen, direction, way)
         yield from _blocked(asked, seen, directions, ways)
@@ -120,7 +120,7 @@ def _two_legs(asked: Context, seen: Seen, directions: list[Direction], ways: lis
             continue
         hit, leg = (ways[first].first_hit(cm / 100), "first") if verdict else (None, "second")
         if not verdict:
-            way = asked.way(seen, directions[second], moved)
+            way = asked.ways(seen, [directions[second]], moved)[0]
             verdict = way.verdict(cm2 / 100)
             end = moved + np.array(directions[second].vector) * cm2 / 100
             if verdict is None or cm2 / 100 > way.leaves_m or not asked.in_view(seen, end):
@@ -153,7 +153,7 @@ def _weights(asked: Context) -> Iterator[Draft]:
         right = "<p0>" if heavier is a else "<p1>"
         yield Draft(
             "heavier", asked.view.name, CHOICE, {"p": "<p0>", "q": "<p1>"}, right,
-            sentence(f"the one at {right}: {asked.words.get(heavier.thing.name, 'the ' + heavier.thing.category)}"),
+            sentence(f"the one at {right}: {asked.called(heavier)}"),
             {"objects": asked.names(a, b), "answer": heavier.thing.name,
              "mass_kg": {each.thing.name: [mass.low, mass.high] for each, mass in ((a, of_a), (b, of_b))}},
             ("<p0>", "<p1>"), (p, q),

@@ -168,10 +168,10 @@ FAMILIES: Mapping[str, Family] = {
         "How many things lie or stand on the {surface}?",
     )),
     "is_there": Family(DETECTION, (
-        "Is there a {c} in this picture?",
-        "Can you see a {c}?",
-        "Does the picture show a {c}?",
-        "Is a {c} among the objects?",
+        "Is there {c} in this picture?",
+        "Can you see {c}?",
+        "Does the picture show {c}?",
+        "Is {c} among the objects?",
     )),
     "list_objects": Family(DETECTION, (
         "Enumerate and identify all objects on the {surface}.",

@@ -1,0 +1,65 @@
+"""``manitwin vqa``: questions about drawn scenes with computed answers, for vision-language models."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import out_console
+
+
+def vqa(
+    scenes: Annotated[
+        Path,
+        options.existing(
+            "Scenes that `manitwin layout --pictures` drew, or one of them.", "SCENES", "a folder of drawn scenes"
+        ),
+    ],
+    out: Annotated[Path, options.output_folder("The folder to write; it must be new or empty.")],
+    form: Annotated[
+        str, choices.VQA_FORMATS.option("--format", help="llava (LLaVA and ShareGPT), parquet, webdataset.")
+    ] = "llava",
+    per_scene: Annotated[
+        int, typer.Option(help="Questions a scene, at most.", callback=choices.count_of("--per-scene"))
+    ] = 80,
+    points: Annotated[
+        str,
+        choices.POINT_CONVENTIONS.option(
+            "--points", help="How places are written: unit, robopoint, roborefer, pixel or thousand."
+        ),
+    ] = "unit",
+    dataset: Annotated[
+        Path | None,
+        typer.Option(
+            "--twins",
+            help="Where the scenes' twins are; default: where the scenes say.",
+            metavar="DATASET",
+            callback=choices.must_exist("the data set that the scenes were sampled from"),
+        ),
+    ] = None,
+    validation_share: Annotated[
+        float,
+        typer.Option("--val", help="The share of scenes in the split val, which has wordings of its own.", min=0, max=1),
+    ] = 0.1,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0)] = 7,
+) -> None:
+    """Write questions about drawn scenes whose answers are computed, with the evidence beside them."""
+    from manitwin.scenes.vqa.write import write_vqa
+
+    done = write_vqa(
+        scenes,
+        out,
+        form,
+        dataset=dataset,
+        per_scene=per_scene,
+        points=points,
+        validation_share=validation_share,
+        seed=seed,
+    )
+    out_console.print(
+        f"{done.questions:,} questions of {done.families} families about {done.pictures:,} pictures of {done.scenes:,}"
+        f" scenes: {done.files:,} files in {out}"
+    )

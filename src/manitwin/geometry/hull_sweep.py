@@ -1,0 +1,61 @@
+"""When convex hulls that move without turning meet others: many pairs at once.
+
+Source: van den Bergen 2004, "Ray casting against general convex objects with application to continuous collision detection":
+a ray from the origin against the Minkowski difference, clipped at each supporting plane that separates it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from manitwin.geometry.hull_distance import nearest_on_simplex, support
+
+TOLERANCE_M = 1e-4
+MAX_ITERATIONS = 64
+_PARALLEL = 1e-12
+
+
+def first_contacts(
+    moving: np.ndarray, others: np.ndarray, directions: np.ndarray, length_m: float, within_m: float = 0.0
+) -> np.ndarray:
+    """Return how far (m) each of some hulls moves until it is within ``within_m`` of its other; infinite beyond ``length_m``.
+
+    ``moving (P, A, 3)`` and ``others (P, B, 3)`` are the corners of each pair, ``directions (P, 3)`` unit vectors. Pairs that are so
+    near at the start give 0. Right to about ``TOLERANCE_M``, the ways never too long.
+    """
+    pairs = len(moving)
+    result = np.full(pairs, np.inf)
+    along = np.zeros(pairs)
+    corners = np.repeat((others.mean(1) - moving.mean(1))[:, None], 4, axis=1)
+    apart = -corners[:, 0]  # from the nearest known point of the difference to the point that the ray has come to
+    active = np.arange(pairs)
+    for _ in range(MAX_ITERATIONS):
+        if not len(active):
+            break
+        length = np.maximum(np.linalg.norm(apart, axis=1, keepdims=True), _PARALLEL)
+        farthest = support(others[active], moving[active], apart) + within_m * apart / length
+        beyond = np.einsum("pi,pi->p", apart, along[active, None] * directions[active] - farthest)
+        slope = np.einsum("pi,pi->p", apart, directions[active])
+        separated = beyond > 0
+        gone = separated & (slope >= -_PARALLEL)
+        along[active] += np.where(separated & ~gone, -beyond / np.where(slope < 0, slope, -1.0), 0.0)
+        gone |= along[active] > length_m
+        corners = _with(corners, farthest)
+        apart, used, inside = nearest_on_simplex((along[active, None] * directions[active])[:, None] - corners)
+        met = ~gone & (inside | (np.linalg.norm(apart, axis=1) < TOLERANCE_M))
+        result[active[met]] = along[active[met]]
+        going = ~(met | gone)
+        kept = corners[np.arange(len(corners)), used.argmax(1)]
+        corners = np.where(used[..., None], corners, kept[:, None])[going]
+        active, apart = active[going], apart[going]
+    result[active] = along[active]
+    return result
+
+
+def _with(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Put a point into each simplex ``(P, 4, 3)`` in the place of a corner that is there twice."""
+    same = (corners[:, :, None] == corners[:, None]).all(-1) & ~np.eye(4, dtype=bool)
+    place = np.where(same.any((1, 2)), same.any(2).argmax(1), 3)
+    result = corners.copy()
+    result[np.arange(len(corners)), place] = points
+    return result
