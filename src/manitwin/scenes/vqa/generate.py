@@ -7,6 +7,7 @@ import zlib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from manitwin.scenes.perception.scene_truth import SceneTruth
 from manitwin.scenes.perception.splits import VALIDATION, split_of
@@ -46,11 +47,15 @@ def drafts_of(
     for view in views_of(scene, things):
         rng = random.Random(_seed(seed, scene.record.scene_id, view.name))
         context = Context(scene, things, view, references(view, rng), categories, rng, gaps)
-        for make in MOST_DRAFTS = 24
-"""How many drafts of a family (and answer) one scene keeps."""
-_MAKERS:
-            found += make(context)
+        for make in _MAKERS:
+            found += (replace(draft, evidence=_with_words(draft, context)) for draft in make(context))
     return _thinned(found, random.Random(_seed(seed, scene.record.scene_id, "thinned")))
+
+
+def _with_words(draft: Draft, context: Context) -> dict[str, Any]:
+    """Return a draft's evidence, with the words that mean each of its objects."""
+    called = {name: context.words[name] for name in draft.evidence["objects"] if name in context.words}
+    return {**draft.evidence, "called": called}
 
 
 def _thinned(drafts: Sequence[Draft], rng: random.Random) -> list[Draft]:

@@ -1,0 +1,399 @@
+"""A second reader of questions about scenes: answers each anew from scene files, label pictures and twins' files.
+
+It shares no code with what makes the questions: JSON, PNG and OBJ are read as they lie, points are projected by the written matrices,
+and what touches what is asked of MuJoCo.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections import Counter
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import cv2
+import mujoco
+import numpy as np
+import trimesh
+
+STEP_M = 0.002
+LEAST_PX_OF_512 = 20
+LITTLE = set("and or such as of on to a the with for from it up things".split())
+PAIR = "pair of "
+
+
+class SecondScene:
+    """One drawn scene, read as it lies."""
+
+    def __init__(self, folder: Path, dataset: Path):
+        self.folder = folder
+        self.scene = json.loads((folder / "scene.json").read_text())
+        self.facts = json.loads((folder / "pictures" / "pictures.json").read_text())
+        self.objects = {each["name"]: each for each in self.scene["objects"]}
+        self.twins = {name: dataset / "twins" / each["twin_id"][:2] / each["twin_id"] for name, each in self.objects.items()}
+        self.records = {name: json.loads((twin / "twin.json").read_text()) for name, twin in self.twins.items()}
+        self.ids = self.facts["ids"]
+
+    def pose(self, name: str) -> np.ndarray:
+        each, pose = self.objects[name], np.eye(4)
+        matrix = np.zeros(9)
+        mujoco.mju_quat2Mat(matrix, np.array(each["quaternion_wxyz"], float))
+        pose[:3, :3], pose[:3, 3] = matrix.reshape(3, 3), each["position_m"]
+        return pose
+
+    @cached_property
+    def hulls(self) -> dict[str, list[np.ndarray]]:
+        found = {}
+        for name, twin in self.twins.items():
+            files = sorted((twin / "collision").glob("hull_*.obj"))
+            found[name] = [
+                np.array([line.split()[1:4] for line in file.read_text().splitlines() if line.startswith("v ")], float)
+                for file in files
+            ]
+        return found
+
+    def corners(self, name: str) -> np.ndarray:
+        pose = self.pose(name)
+        return np.concatenate(self.hulls[name]) @ pose[:3, :3].T + pose[:3, 3]
+
+    @cached_property
+    def physics(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        spec = mujoco.MjSpec()
+        spec.option.gravity = [0, 0, 0]
+        for name in self.objects:
+            body = spec.worldbody.add_body(name=name)
+            body.add_freejoint()
+            body.explicitinertial, body.mass, body.inertia = True, 1.0, [1, 1, 1]
+            for number, hull in enumerate(self.hulls[name]):
+                shape = trimesh.convex.convex_hull(hull)
+                mesh = spec.add_mesh(name=f"{name}_{number}", uservert=shape.vertices.ravel(), userface=shape.faces.ravel())
+                mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+                mesh.refpos, mesh.refquat = [0, 0, 0], [1, 0, 0, 0]
+                body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"{name}_{number}")
+        model = spec.compile()
+        return model, mujoco.MjData(model)
+
+    def place(self, moved: dict[str, np.ndarray]) -> None:
+        model, data = self.physics
+        for name, each in self.objects.items():
+            start = model.jnt_qposadr[model.body_jntadr[model.body(name).id]]
+            data.qpos[start : start + 3] = np.array(each["position_m"]) + moved.get(name, 0.0)
+            data.qpos[start + 3 : start + 7] = each["quaternion_wxyz"]
+        mujoco.mj_kinematics(model, data)
+
+    def gap(self, first: str, second: str) -> float:
+        self.place({})
+        model, data = self.physics
+        geoms = {name: np.flatnonzero(model.geom_bodyid == model.body(name).id) for name in (first, second)}
+        line = np.zeros(6)
+        return min(
+            mujoco.mj_geomDistance(model, data, int(a), int(b), 1.0, line) for a in geoms[first] for b in geoms[second]
+        )
+
+    def slide(self, name: str, legs: list[tuple[np.ndarray, float]]) -> str | None:
+        """Move an object along legs of (direction, metres); return what it touches first."""
+        model, data = self.physics
+        moved = np.zeros(3)
+        for direction, length in legs:
+            unit = np.array([*direction, 0.0])
+            for along in np.arange(0, length + 1e-9, STEP_M):
+                self.place({name: moved + unit * along})
+                mujoco.mj_collision(model, data)
+                touched = [
+                    {model.geom_bodyid[pair] for pair in contact.geom} - {model.body(name).id}
+                    for contact in data.contact
+                    if contact.dist < 0 and model.body(name).id in {model.geom_bodyid[g] for g in contact.geom}
+                ]
+                if touched:
+                    return str(model.body(touched[0].pop()).name)
+            moved = moved + unit * length
+        return None
+
+
+class SecondView:
+    """One picture of it."""
+
+    def __init__(self, scene: SecondScene, camera: str):
+        self.scene, self.name = scene, camera
+        self.camera = scene.facts["cameras"][camera]
+        self.to_world = np.array(self.camera["camera_to_world"])
+        self.width, self.height = self.camera["width_px"], self.camera["height_px"]
+        self.scale = self.width * self.height / 512**2
+
+    def picture(self, what: str) -> np.ndarray:
+        return cv2.imread(str(self.scene.folder / "pictures" / f"{self.name}_{what}.png"), cv2.IMREAD_UNCHANGED)
+
+    @cached_property
+    def ids(self) -> np.ndarray:
+        return self.picture("ids")
+
+    @cached_property
+    def parts(self) -> np.ndarray:
+        return self.picture("parts")
+
+    @cached_property
+    def depth(self) -> np.ndarray:
+        return self.picture("depth") * self.scene.facts["depth_unit_m"]
+
+    def mask(self, name: str) -> np.ndarray:
+        return self.ids == self.scene.ids[name]
+
+    @cached_property
+    def shown(self) -> list[str]:
+        return [name for name in self.scene.objects if self.mask(name).sum() > LEAST_PX_OF_512 * self.scale]
+
+    def at(self, point: list[float]) -> tuple[int, int]:
+        return int(point[1] * self.height), int(point[0] * self.width)
+
+    def object_at(self, point: list[float]) -> str | None:
+        number = self.ids[self.at(point)]
+        return next((name for name in self.scene.objects if self.scene.ids[name] == number), None)
+
+    def projected(self, world: np.ndarray) -> np.ndarray:
+        seen = (world - self.to_world[:3, 3]) @ self.to_world[:3, :3] * [1, -1, -1]
+        pixels = seen @ np.array(self.camera["K"]).T
+        return np.column_stack([pixels[:, :2] / pixels[:, 2:], seen[:, 2]])
+
+    def direction(self, words: str) -> np.ndarray:
+        right = self.to_world[:2, 0] / np.linalg.norm(self.to_world[:2, 0])
+        back = np.array([right[1], -right[0]])
+        return {
+            "to the right as seen in the picture": right, "to the left as seen in the picture": -right,
+            "straight towards the camera": back, "straight away from the camera": -back,
+            "to the robot's right": np.array([0, -1]), "to the robot's left": np.array([0, 1]),
+            "straight away from the robot": np.array([1, 0]), "straight towards the robot": np.array([-1, 0]),
+        }[words]  # fmt: skip
+
+    def meant(self, words: str) -> list[str]:
+        """Return the objects in the picture that some words may mean."""
+        said = re.sub(r"^the ", "", words)
+        outermost = re.search(r" that is (left|right)most in the picture$", said)
+        said = re.sub(r" that is \w+ in the picture$", "", said).replace(PAIR, "")
+        head = said.split()[-1]
+        same = [name for name in self.shown if self.scene.objects[name]["category"].split()[-1] == head]
+        if outermost:
+            columns = {name: np.nonzero(self.mask(name))[1].mean() for name in same}
+            return [(min if outermost[1] == "left" else max)(columns, key=lambda name: columns[name])]
+        nouns = max(
+            (category for category in (self.scene.objects[name]["category"] for name in same) if said.endswith(category)), key=len, default=""
+        )
+        color = said.removesuffix(nouns).strip()
+        return [name for name in same if not color or _color(self.scene.records[name]) in (color, "")]
+
+
+def _color(record: dict[str, Any]) -> str:
+    return re.sub(r" \(.*", "", record["language"]["color"].split(",")[0])
+
+
+def _best_grasp(record: dict[str, Any]) -> str:
+    return str(max(record["points"]["grasp"], key=lambda point: point["confidence"])["type"])
+
+
+GRASPS = {"parallel-jaw": "parallel_jaw", "pinch": "pinch", "power": "power", "three-finger": "three_finger", "enveloping": "enveloping"}
+_WAY = r"(to the (?:right|left) as seen in the picture|straight (?:towards|away from) the (?:camera|robot)|to the robot's (?:right|left))"
+
+
+def rederived(question: dict[str, Any], view: SecondView) -> bool:
+    """Whether a question's references are unique and its answer is the one found anew."""
+    scene, called = view.scene, question["evidence"]["called"]
+    for name, words in called.items():
+        if (words in question["question"] or words in question["options"]) and view.meant(words) != [name]:
+            return False
+    text = question["question"]
+    asked = sorted((text.lower().index(words), name) for name, words in called.items() if words in text.lower())
+    return _CHECKS[question["family"]](question, view, scene, [name for _, name in asked])
+
+
+def _option_objects(question: dict[str, Any], view: SecondView) -> dict[str, str | None]:
+    return {option: view.object_at(question["points"][int(option[2:-1])]) for option in question["options"]}
+
+
+def _point(q, v, s, asked):
+    return v.object_at(q["points"][0]) == asked[0]
+
+
+def _at_point(q, v, s, asked):
+    there = v.object_at(q["points"][0])
+    return [option for option in q["options"] if v.meant(option) == [there]] == [q["answer"]]
+
+
+def _by_color(q, v, s, asked):
+    colors = {option: _color(s.records[name]) for option, name in _option_objects(q, v).items()}
+    right = colors.pop(q["answer"])
+    return right in q["question"] and all(right.split()[-1] != other.split()[-1] for other in colors.values())
+
+
+def _region(q, v, s, asked):
+    rows, columns = np.nonzero(v.mask(asked[0]))
+    vertical, horizontal = q["answer"].split()
+    return bool((rows < v.height / 2).all() if vertical == "top" else (rows >= v.height / 2).all()) and bool(
+        (columns < v.width / 2).all() if horizontal == "left" else (columns >= v.width / 2).all()
+    )
+
+
+def _grasp_said(text: str) -> str:
+    return next(kind for words, kind in GRASPS.items() if words in text)
+
+
+def _locate(q, v, s, asked):
+    return _point(q, v, s, asked) and _grasp_said(q["answer"]) == _best_grasp(s.records[asked[0]])
+
+
+def _touch(q, v, s, asked):
+    part = s.facts["parts"][str(v.parts[v.at(q["points"][0])])]
+    return part["object"] == asked[0] and re.search(rf"\b(the|its) {part['name']}\b", q["question"]) is not None
+
+
+def _part_visible(q, v, s, asked):
+    number = next(n for n, p in s.facts["parts"].items() if p["object"] == asked[0] and f"the {p['name']} of" in q["question"])
+    count = int((v.parts == int(number)).sum())
+    return count >= 100 * v.scale if q["answer"] == "yes" else count <= 2 * v.scale
+
+
+def _interaction(q, v, s, asked):
+    name = asked[0]
+    point = next(p for p in s.records[name]["points"]["functional"] if f"the {p['label']} of" in q["question"])
+    pose = s.pose(name)
+    x, y, depth = v.projected((pose[:3, :3] @ point["position_m"] + pose[:3, 3])[None])[0]
+    there, seen = v.ids[int(y), int(x)], v.depth[int(y), int(x)]
+    if q["answer"] == "no":
+        return there == s.ids[name] and abs(seen - depth) < 0.008
+    return there == s.ids[q["evidence"]["hidden_by"]] != s.ids[name] and seen < depth - 0.01
+
+
+def _function(q, v, s, asked):
+    functions = {option: s.records[name]["language"]["function"] for option, name in _option_objects(q, v).items()}
+    right = functions.pop(q["answer"])
+    words = set(re.findall(r"\w+", right)) - LITTLE
+    return right in q["question"] and all(not words & (set(re.findall(r"\w+", each)) - LITTLE) for each in functions.values())
+
+
+def _grasp_type(q, v, s, asked):
+    return _grasp_said(q["answer"]) == _best_grasp(s.records[v.object_at(q["points"][0])])
+
+
+def _pair(q, asked):
+    return asked[::-1] if "On which side of" in q["question"] or "on which side of" in q["question"] else asked
+
+
+def _middle(s: SecondScene, name: str) -> np.ndarray:
+    corners = s.corners(name)
+    return (corners.min(0) + corners.max(0)) / 2
+
+
+def _side_robot(q, v, s, asked):
+    a, b = _pair(q, asked)
+    left = _middle(s, a)[1] - _middle(s, b)[1]
+    facing = np.sign(-v.to_world[0, 2]) < 0
+    return "robot" in q["question"] and facing == ("faces the camera" in q["question"]) and q["answer"] == ("left" if left > 0 else "right")
+
+
+def _side_picture(q, v, s, asked):
+    a, b = _pair(q, asked)
+    columns = [np.nonzero(v.mask(name))[1].mean() for name in (a, b)]
+    return ("picture" in q["question"] or "camera" in q["question"]) and q["answer"] == ("left" if columns[0] < columns[1] else "right")
+
+
+def _gap(q, v, s, asked):
+    return abs(s.gap(*asked) - float(q["answer"].split()[0]) / 100) < 0.0015
+
+
+def _nearest(q, v, s, asked):
+    gaps = {name: s.gap(asked[0], name) for name in s.objects if name != asked[0]}
+    return v.meant(q["answer"]) == [min(gaps, key=lambda name: gaps[name])]
+
+
+def _legs(q, v) -> list[tuple[np.ndarray, float]]:
+    ways = [v.direction(words) for words in re.findall(_WAY, q["question"])]
+    lengths = [int(cm) / 100 for cm in re.findall(r"(\d+) cm", q["question"])]
+    return list(zip(ways, lengths, strict=True))
+
+
+def _clearance(q, v, s, asked):
+    return (s.slide(asked[0], _legs(q, v)) is None) == (q["answer"] == "yes")
+
+
+def _grasp_and_clearance(q, v, s, asked):
+    kind = _grasp_said(q["question"])
+    found = [name for name in v.shown if _best_grasp(s.records[name]) == kind]
+    return len(found) == 1 and _clearance(q, v, s, found)
+
+
+def _slide(q, v, s, asked):
+    touched = s.slide(asked[0], _legs(q, v))
+    return (touched is not None) == (q["answer"] == "yes") and touched == q["evidence"]["met"]
+
+
+def _slide_hits(q, v, s, asked):
+    return [s.slide(asked[0], _legs(q, v))] == v.meant(q["answer"])
+
+
+def _blocked(q, v, s, asked):
+    length = int(re.search(r"(\d+) cm", q["question"])[1]) / 100
+    hit = [words for words in q["options"] if s.slide(asked[0], [(v.direction(words), length)]) is not None]
+    return hit == [q["answer"]]
+
+
+def _taller(q, v, s, asked):
+    tops = {option: s.corners(name)[:, 2].max() for option, name in _option_objects(q, v).items()}
+    return max(tops, key=lambda option: tops[option]) == q["answer"]
+
+
+def _heavier(q, v, s, asked):
+    masses = {option: s.records[name]["physical"]["mass_kg"] for option, name in _option_objects(q, v).items()}
+    right = masses.pop(q["answer"])
+    return all(right["low"] > other["high"] for other in masses.values())
+
+
+def _occluder(q, v, s, asked):
+    mesh = trimesh.load(s.twins[asked[0]] / "visual.glb", force="mesh")
+    turned = np.asarray(mesh.vertices)[:, [0, 2, 1]] * [1, -1, 1]  # glTF is Y-up
+    pose = s.pose(asked[0])
+    x, y, depth = v.projected(turned @ pose[:3, :3].T + pose[:3, 3]).T
+    inside = (x >= 0) & (y >= 0) & (x < v.width) & (y < v.height)
+    rows, columns = y[inside].astype(int), x[inside].astype(int)
+    hidden = (v.ids[rows, columns] != s.ids[asked[0]]) & (v.depth[rows, columns] < depth[inside] - 0.005)
+    hiding = Counter(v.ids[rows[hidden], columns[hidden]].tolist())
+    numbers = {number: name for name, number in s.ids.items()}
+    return v.meant(q["answer"]) == [numbers[hiding.most_common(1)[0][0]]]
+
+
+def _box(q, v, s, asked):
+    rows, columns = np.nonzero(v.mask(asked[0]))
+    box = [columns.min() / v.width, rows.min() / v.height, np.ptp(columns) + 1, np.ptp(rows) + 1]
+    return np.allclose(q["boxes"][0], [box[0], box[1], box[2] / v.width, box[3] / v.height], atol=1e-9)
+
+
+def _count(q, v, s, asked):
+    return len(v.shown) == int(q["answer"]) and q["options"].count(q["answer"]) == 1
+
+
+def _is_there(q, v, s, asked):
+    present = {s.objects[name]["category"] for name in v.shown}
+    said = [c for c in present if re.search(rf"\ban? (?:pair of )?{re.escape(c)}\b", q["question"])]
+    return bool(said) == (q["answer"] == "yes")
+
+
+def _list(q, v, s, asked):
+    order = sorted(v.shown, key=lambda name: np.nonzero(v.mask(name))[1].mean())
+    return q["answer"] == ", ".join(s.objects[name]["category"] for name in order)
+
+
+def _containers(q, v, s, asked):
+    order = sorted(v.shown, key=lambda name: np.nonzero(v.mask(name))[1].mean())
+    kinds = [s.objects[name]["category"] for name in order]
+    return q["answer"] == ", ".join(c for c in kinds if f"{c.split()[-1]}s" in q["question"])
+
+
+_CHECKS = {
+    "point_at_object": _point, "object_at_point": _at_point, "object_by_color": _by_color, "region_of_object": _region,
+    "locate_and_grasp": _locate, "touch_point": _touch, "interaction_point_occluded": _interaction,
+    "part_visible": _part_visible, "object_for_function": _function, "best_grasp_type": _grasp_type,
+    "side_for_robot": _side_robot, "side_in_picture": _side_picture, "gap": _gap, "nearest_object": _nearest,
+    "clearance": _clearance, "grasp_and_clearance": _grasp_and_clearance, "taller": _taller, "occluder": _occluder,
+    "slide": _slide, "slide_two_legs": _slide, "slide_hits": _slide_hits, "blocked_direction": _blocked,
+    "heavier": _heavier, "box_of_object": _box, "count_objects": _count, "is_there": _is_there, "list_objects": _list,
+    "list_containers": _containers,
+}  # fmt: skip
