@@ -286,8 +286,10 @@ def _middle(s: SecondScene, name: str) -> np.ndarray:
 def _side_robot(q, v, s, asked):
     a, b = _pair(q, asked)
     left = _middle(s, a)[1] - _middle(s, b)[1]
-    facing = np.sign(-v.to_world[0, 2]) < 0
-    return "robot" in q["question"] and facing == ("faces the camera" in q["question"]) and q["answer"] == ("left" if left > 0 else "right")
+    up_is_ahead = v.to_world[0, 1] > 0  # of the picture, in the robot's frame
+    said_ahead = "same way as the camera" in q["question"] or "faces its upper edge" in q["question"]
+    said_back = "faces the camera" in q["question"] or "faces its lower edge" in q["question"]
+    return (said_ahead if up_is_ahead else said_back) and q["answer"] == ("left" if left > 0 else "right")
 
 
 def _side_picture(q, v, s, asked):

@@ -26,6 +26,8 @@ from manitwin.robots.grippers.gripper import shipped_grippers
 from manitwin.robots.load import load_robot, shipped_robots
 from manitwin.scenes.perception.segmentation import FORMATS as SEGMENTATIONS
 from manitwin.scenes.settings import LayoutSettings
+from manitwin.scenes.vqa.formats import FORMATS as QUESTION_FORMATS
+from manitwin.scenes.vqa.wording import CONVENTIONS
 
 
 def literal(section: type, name: str) -> set[str]:
@@ -47,6 +49,8 @@ def literal(section: type, name: str) -> set[str]:
         (choices.EPISODE_FORMATS, set(collect.FORMATS)),
         (choices.EXPORT_FORMATS, {"all", *formats()}),
         (choices.SEGMENTATION_FORMATS, set(SEGMENTATIONS)),
+        (choices.VQA_FORMATS, set(QUESTION_FORMATS)),
+        (choices.POINT_CONVENTIONS, set(CONVENTIONS)),
         (choices.IMPORT_FORMATS, {"auto", *ASSET_FORMATS}),
         (choices.QUERY_FORMATS, set(WRITERS)),
         (choices.TABLES, set(TABLES)),

@@ -169,6 +169,8 @@ WRONG_VALUES = [
     "locate . --cloud . --depth .",
     "locate . --depth nothing_here",
     "locate . --tried 0",
+    "vqa . -o out --format xml",
+    "vqa . -o out --points polar",
     "render . --cameras behind",
     "render . --codec h266",
     "render nothing_here",

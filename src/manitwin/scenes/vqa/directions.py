@@ -10,6 +10,8 @@ from manitwin.render.cameras import Camera
 
 ALIGNED = 0.94
 """Least cosine between what the robot and the camera call ahead: within 20 degrees their sides are the same or opposite."""
+STEEP = 0.8
+"""Cosine between a camera's view and straight down from which on the picture is one from above."""
 ROBOT_FACES = np.array([1.0, 0.0])
 """The robot stands at the world's origin and faces +X, +Y is to its left."""
 
@@ -46,10 +48,13 @@ def robot_directions(camera: Camera, first_object_m: np.ndarray) -> list[Directi
     right = _level(camera.camera_to_object[:3, 0])
     ahead = np.array([-right[1], right[0]])
     cosine = float(ahead @ ROBOT_FACES)
+    from_above = camera.camera_to_object[2, 2] > STEEP
     if cosine < -ALIGNED and first_object_m[0] > 0:
-        robot = "The robot stands on the far side and faces the camera. "
+        far = "The robot stands beyond the upper edge of the picture and faces its lower edge. "
+        robot = far if from_above else "The robot stands on the far side and faces the camera. "
     elif cosine > ALIGNED:
-        robot = "The robot faces the same way as the camera. "
+        near = "The robot stands beyond the lower edge of the picture and faces its upper edge. "
+        robot = near if from_above else "The robot faces the same way as the camera. "
     else:
         return []
     return [

@@ -30,8 +30,9 @@ NAMED_SHARE, NAMED_PX = 0.40, 150
 HIDDEN_PX = 20
 """What is seen less of is not in the picture; between the two an object is doubtful."""
 REFERENCE_PX = 512
-SURE_COLOR_PERCENT, COLOR_LEAD_PERCENT = 50, 10
-"""A colour is named where it covers so much of the surface, and so much more than the next."""
+SURE_COLOR_PERCENT, SURE_GREY_PERCENT, COLOR_LEAD_PERCENT = 50, 80, 10
+"""A colour is named where it covers so much of the surface, and so much more than the next; greys catch the eye less."""
+GREYS = ("white", "grey", "black")
 
 _SHARE = re.compile(r"^(?P<word>[a-z ]+?)(?: \((?P<percent>\d+) %\))?$")
 
@@ -216,7 +217,8 @@ def sure_color(twin: Twin) -> str | None:
             return None
         found.append((match["word"], int(match["percent"] or 100)))
     next_percent = max((percent for _, percent in found[1:]), default=0)
-    if found[0][1] < SURE_COLOR_PERCENT or found[0][1] - next_percent < COLOR_LEAD_PERCENT:
+    least_percent = SURE_GREY_PERCENT if main_word(found[0][0]) in GREYS else SURE_COLOR_PERCENT
+    if found[0][1] < least_percent or found[0][1] - next_percent < COLOR_LEAD_PERCENT:
         return None
     return found[0][0]
 
