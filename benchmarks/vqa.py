@@ -2,8 +2,8 @@
 
     python benchmarks/vqa.py SCENES OTHER_SCENES [--twins DATASET] [--per-scene 80] [--checked N]
 
-The reader of words alone (``manitwin.scenes.vqa.blind``) is trained on the questions of SCENES and asked those of OTHER_SCENES, which
-were drawn by another seed; then the other way round. The answers of the first N scenes of OTHER_SCENES are derived again by
+The reader of words alone (``manitwin.scenes.vqa.blind``) is trained on the questions of SCENES and asked those of OTHER_SCENES,
+which were drawn by another seed; then the other way round. The answers of the first N scenes of OTHER_SCENES are derived again by
 ``tests/scene_answers.py``, which reads the files as they lie and asks MuJoCo what touches what.
 """
 
@@ -18,12 +18,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
-from scene_answers import SecondScene, SecondView, rederived
-
 from manitwin.scenes.scene_files import dataset_of, scene_files
 from manitwin.scenes.vqa.blind import blind_scores
 from manitwin.scenes.vqa.question import YES_NO, Question
 from manitwin.scenes.vqa.write import ask_scenes
+from scene_answers import SecondScene, SecondView, rederived
 
 
 def main() -> None:
@@ -65,7 +64,9 @@ def _blind(sets: list[list[Question]]) -> None:
         count = sum(each.questions for each in found)
         chance = sum(each.questions * each.chance for each in found) / count
         blind = sum(each.questions * each.blind for each in found) / count
-        print(f"blind {family}: {count} questions, chance {chance:.3f}, blind {blind:.3f}, {100 * (blind - chance):+.1f} points")
+        print(
+            f"blind {family}: {count} questions, chance {chance:.3f}, blind {blind:.3f}, {100 * (blind - chance):+.1f} points"
+        )
 
 
 def _checked(questions: list[Question], files: list[Path], twins: Path | None) -> None:
@@ -84,7 +85,9 @@ def _checked(questions: list[Question], files: list[Path], twins: Path | None) -
                 agrees, why = False, repr(error)
             (right if agrees else wrong)[each.family] += 1
             if not agrees:
-                print("differs:", each.question_id, each.family, each.question, "|", each.answer, dict(each.evidence), why)
+                print(
+                    "differs:", each.question_id, each.family, each.question, "|", each.answer, dict(each.evidence), why
+                )
     print(f"derived again: {right.total()} of {right.total() + wrong.total()} agree", dict(wrong), end=" ")
     print(f"({(time.process_time() - start) / max(len(files), 1):.1f} CPU-s a scene)")
 

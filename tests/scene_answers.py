@@ -1,7 +1,7 @@
 """A second reader of questions about scenes: answers each anew from scene files, label pictures and twins' files.
 
-It shares no code with what makes the questions: JSON, PNG and OBJ are read as they lie, points are projected by the written matrices,
-and what touches what is asked of MuJoCo.
+It shares no code with what makes the questions: JSON, PNG and OBJ are read as they lie, points are projected by the written
+matrices, and what touches what is asked of MuJoCo.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import trimesh
 
 STEP_M = 0.002
 LEAST_PX_OF_512 = 20
-LITTLE = set("and or such as of on to a the with for from it up things".split())
+LITTLE = set(re.findall(r"\w+", "and or such as of on to a the with for from it up things"))
 PAIR = "pair of "
 
 
@@ -32,7 +32,9 @@ class SecondScene:
         self.scene = json.loads((folder / "scene.json").read_text())
         self.facts = json.loads((folder / "pictures" / "pictures.json").read_text())
         self.objects = {each["name"]: each for each in self.scene["objects"]}
-        self.twins = {name: dataset / "twins" / each["twin_id"][:2] / each["twin_id"] for name, each in self.objects.items()}
+        self.twins = {
+            name: dataset / "twins" / each["twin_id"][:2] / each["twin_id"] for name, each in self.objects.items()
+        }
         self.records = {name: json.loads((twin / "twin.json").read_text()) for name, twin in self.twins.items()}
         self.ids = self.facts["ids"]
 
@@ -68,7 +70,9 @@ class SecondScene:
             body.explicitinertial, body.mass, body.inertia = True, 1.0, [1, 1, 1]
             for number, hull in enumerate(self.hulls[name]):
                 shape = trimesh.convex.convex_hull(hull)
-                mesh = spec.add_mesh(name=f"{name}_{number}", uservert=shape.vertices.ravel(), userface=shape.faces.ravel())
+                mesh = spec.add_mesh(
+                    name=f"{name}_{number}", uservert=shape.vertices.ravel(), userface=shape.faces.ravel()
+                )
                 mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX
                 mesh.refpos, mesh.refquat = [0, 0, 0], [1, 0, 0, 0]
                 body.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=f"{name}_{number}")
@@ -177,7 +181,13 @@ class SecondView:
             columns = {name: np.nonzero(self.mask(name))[1].mean() for name in same}
             return [(min if outermost[1] == "left" else max)(columns, key=lambda name: columns[name])]
         nouns = max(
-            (category for category in (self.scene.objects[name]["category"] for name in same) if said.endswith(category)), key=len, default=""
+            (
+                category
+                for category in (self.scene.objects[name]["category"] for name in same)
+                if said.endswith(category)
+            ),
+            key=len,
+            default="",
         )
         color = said.removesuffix(nouns).strip()
         return [name for name in same if not color or _color(self.scene.records[name]) in (color, "")]
@@ -191,8 +201,17 @@ def _best_grasp(record: dict[str, Any]) -> str:
     return str(max(record["points"]["grasp"], key=lambda point: point["confidence"])["type"])
 
 
-GRASPS = {"parallel-jaw": "parallel_jaw", "pinch": "pinch", "power": "power", "three-finger": "three_finger", "enveloping": "enveloping"}
-_WAY = r"(to the (?:right|left) as seen in the picture|straight (?:towards|away from) the (?:camera|robot)|to the robot's (?:right|left))"
+GRASPS = {
+    "parallel-jaw": "parallel_jaw",
+    "pinch": "pinch",
+    "power": "power",
+    "three-finger": "three_finger",
+    "enveloping": "enveloping",
+}
+_WAY = (
+    r"(to the (?:right|left) as seen in the picture|straight (?:towards|away from) the (?:camera|robot)"
+    r"|to the robot's (?:right|left))"
+)
 
 
 def rederived(question: dict[str, Any], view: SecondView) -> bool:
@@ -247,7 +266,9 @@ def _touch(q, v, s, asked):
 
 
 def _part_visible(q, v, s, asked):
-    number = next(n for n, p in s.facts["parts"].items() if p["object"] == asked[0] and f"the {p['name']} of" in q["question"])
+    number = next(
+        n for n, p in s.facts["parts"].items() if p["object"] == asked[0] and f"the {p['name']} of" in q["question"]
+    )
     count = int((v.parts == int(number)).sum())
     return count >= 100 * v.scale if q["answer"] == "yes" else count <= 2 * v.scale
 
@@ -267,7 +288,9 @@ def _function(q, v, s, asked):
     functions = {option: s.records[name]["language"]["function"] for option, name in _option_objects(q, v).items()}
     right = functions.pop(q["answer"])
     words = set(re.findall(r"\w+", right)) - LITTLE
-    return right in q["question"] and all(not words & (set(re.findall(r"\w+", each)) - LITTLE) for each in functions.values())
+    return right in q["question"] and all(
+        not words & (set(re.findall(r"\w+", each)) - LITTLE) for each in functions.values()
+    )
 
 
 def _grasp_type(q, v, s, asked):
@@ -295,7 +318,9 @@ def _side_robot(q, v, s, asked):
 def _side_picture(q, v, s, asked):
     a, b = _pair(q, asked)
     columns = [np.nonzero(v.mask(name))[1].mean() for name in (a, b)]
-    return ("picture" in q["question"] or "camera" in q["question"]) and q["answer"] == ("left" if columns[0] < columns[1] else "right")
+    return ("picture" in q["question"] or "camera" in q["question"]) and q["answer"] == (
+        "left" if columns[0] < columns[1] else "right"
+    )
 
 
 def _gap(q, v, s, asked):
@@ -374,7 +399,8 @@ def _count(q, v, s, asked):
 
 def _is_there(q, v, s, asked):
     present = {s.objects[name]["category"] for name in v.shown}
-    said = [c for c in present if re.search(rf"\ban? (?:pair of )?{re.escape(c)}\b", q["question"])]
+    ends = r"(?:\?| in this| among)"
+    said = [c for c in present if re.search(rf"\ban? (?:pair of )?{re.escape(c)}{ends}", q["question"])]
     return bool(said) == (q["answer"] == "yes")
 
 

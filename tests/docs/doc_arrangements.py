@@ -147,5 +147,6 @@ PAGES: dict[str, Arrangement] = {
         slow=(r".",),
     ),
     "docs/twin.md": Arrangement(blocks={"^<twin_id>/": "tree twins/twins/*/*"}),
+    "docs/vqa.md": Arrangement(slow=(r"manitwin (layout|vqa)",)),
     "docs/vlm.md": Arrangement(not_run=MODEL_SERVERS, blocks={"services": "settings run.toml"}),
 }

@@ -34,6 +34,8 @@ def test_contacts_are_those_of_the_distances_on_the_way(within_m: float) -> None
 def test_box_meets_box_after_the_gap() -> None:
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float) * 0.05
     right = np.array([[1.0, 0, 0]])
-    assert first_contacts(corners[None], corners[None] + [0.15, 0, 0], right, LENGTH_M)[0] == pytest.approx(0.1, abs=2e-4)
+    assert first_contacts(corners[None], corners[None] + [0.15, 0, 0], right, LENGTH_M)[0] == pytest.approx(
+        0.1, abs=2e-4
+    )
     assert np.isinf(first_contacts(corners[None], corners[None] + [0.15, 0, 0], -right, LENGTH_M)[0])
     assert np.isinf(first_contacts(corners[None], corners[None] + [0.15, 0.06, 0], right, LENGTH_M)[0])

@@ -20,8 +20,8 @@ def first_contacts(
 ) -> np.ndarray:
     """Return how far (m) each of some hulls moves until it is within ``within_m`` of its other; infinite beyond ``length_m``.
 
-    ``moving (P, A, 3)`` and ``others (P, B, 3)`` are the corners of each pair, ``directions (P, 3)`` unit vectors. Pairs that are so
-    near at the start give 0. Right to about ``TOLERANCE_M``, the ways never too long.
+    ``moving (P, A, 3)`` and ``others (P, B, 3)`` are the corners of each pair, ``directions (P, 3)`` unit vectors. Pairs that
+    are so near at the start give 0. Right to about ``TOLERANCE_M``, the ways never too long.
     """
     pairs = len(moving)
     result = np.full(pairs, np.inf)

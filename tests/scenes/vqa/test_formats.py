@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import json
 import re
@@ -54,7 +55,10 @@ def test_the_truth_and_the_page_lie_beside(llava: Path) -> None:
 def test_parquet_is_read_by_datasets(scenes: Path, tmp_path: Path) -> None:
     done = write_vqa(scenes, tmp_path / "out", "parquet", per_scene=PER_SCENE, validation_share=0.0)
     read = datasets.load_dataset(
-        "parquet", data_files=str(tmp_path / "out/data/train-*.parquet"), split="train", cache_dir=str(tmp_path / "cache")
+        "parquet",
+        data_files=str(tmp_path / "out/data/train-*.parquet"),
+        split="train",
+        cache_dir=str(tmp_path / "cache"),
     )
     assert len(read) == done.questions
     assert isinstance(read.features["image"], datasets.Image)
@@ -65,10 +69,13 @@ def test_parquet_is_read_by_datasets(scenes: Path, tmp_path: Path) -> None:
     assert all(row["answer"] in row["options"] for row in read if row["kind"] in ("choice", "yes/no"))
 
 
+# webdataset leaves its files to the garbage collector
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_shards_are_read_by_webdataset(scenes: Path, tmp_path: Path) -> None:
     done = write_vqa(scenes, tmp_path / "out", "webdataset", per_scene=PER_SCENE, validation_share=0.0)
     shards = sorted(map(str, (tmp_path / "out").glob("train-*.tar")))
     samples = list(webdataset.WebDataset(shards, shardshuffle=False))
+    gc.collect()
     assert len(samples) == done.pictures
     assert sum(len(json.loads(sample["json"])) for sample in samples) == done.questions
     assert all(Image.open(io.BytesIO(sample["jpg"])).size == (128, 128) for sample in samples)

@@ -42,7 +42,9 @@ def vqa(
     ] = None,
     validation_share: Annotated[
         float,
-        typer.Option("--val", help="The share of scenes in the split val, which has wordings of its own.", min=0, max=1),
+        typer.Option(
+            "--val", help="The share of scenes in the split val, which has wordings of its own.", min=0, max=1
+        ),
     ] = 0.1,
     seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0)] = 7,
 ) -> None:

@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from manitwin.scenes.vqa.logistic import WordModel
 from manitwin.scenes.vqa.question import CLOSED, Question
@@ -50,7 +51,9 @@ def blind_scores(training: Sequence[Question], asked: Sequence[Question]) -> dic
 
 def _score(answers: Sequence[tuple[float, bool]]) -> BlindScore:
     count = len(answers)
-    return BlindScore(count, sum(chance for chance, _ in answers) / count, sum(is_right for _, is_right in answers) / count)
+    return BlindScore(
+        count, sum(chance for chance, _ in answers) / count, sum(is_right for _, is_right in answers) / count
+    )
 
 
 def _model(questions: Sequence[Question]) -> WordModel:
@@ -70,7 +73,7 @@ def _features(question: Question, place: int) -> list[str]:
     shown = worded(question, "thousand", _PICTURE_PX, _PICTURE_PX)
     words = _WORD.findall(re.sub(r"\(\d+, \d+\)", "", shown.question).lower())
     option = re.sub(r"\(\d+, \d+\)", "point", shown.options[place]).lower()
-    pairs = [f"{a} {b}" for a, b in zip(words, words[1:], strict=False)]
+    pairs = [f"{a} {b}" for a, b in pairwise(words)]
     return [
         f"place {place}", f"is {option}", *(f"has {word}" for word in option.split()),
         *(f"{word} > {option}" for word in (*words, *pairs)),

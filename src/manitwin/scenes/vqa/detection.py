@@ -64,7 +64,8 @@ def _existence(asked: Context) -> Iterator[Draft]:
         )  # fmt: skip
     for category in asked.rng.sample(absent, min(ABSENT, len(absent))):
         yield Draft(
-            "is_there", asked.view.name, YES_NO, {"c": a_or_an(one_of(category))}, "no", sentence(f"no, there is no {one_of(category)}"),
+            "is_there", asked.view.name, YES_NO, {"c": a_or_an(one_of(category))}, "no",
+            sentence(f"no, there is no {one_of(category)}"),
             {"objects": asked.names(*asked.view.clear), "asked": category},
         )  # fmt: skip
 

@@ -82,7 +82,9 @@ def _interaction_points(asked: Context, seen: Seen) -> Iterator[Draft]:
             continue
         place = (int(row), int(column))
         reach = max(int(edge_px) - 1, 1)
-        around = asked.view.picture.ids[place[0] - reach : place[0] + reach + 1, place[1] - reach : place[1] + reach + 1]
+        around = asked.view.picture.ids[
+            place[0] - reach : place[0] + reach + 1, place[1] - reach : place[1] + reach + 1
+        ]
         at_depth_m = float(asked.view.picture.depth_m[place])
         evidence = {
             "objects": asked.names(seen), "point": point.id, "label": point.label, "point_depth_m": round(depth_m, 4),
@@ -135,7 +137,9 @@ def _functions(asked: Context) -> Iterator[Draft]:
         )  # fmt: skip
 
 
-_LITTLE = frozenset({"and", "or", "such", "as", "of", "on", "to", "a", "the", "with", "for", "from", "it", "up", "things"})
+_LITTLE = frozenset(
+    {"and", "or", "such", "as", "of", "on", "to", "a", "the", "with", "for", "from", "it", "up", "things"}
+)
 
 
 def _content(function: str | None) -> set[str]:

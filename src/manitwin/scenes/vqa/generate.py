@@ -34,9 +34,7 @@ _MAKERS: Sequence[Callable[[Context], Iterable[Draft]]] = (
 )
 
 
-def drafts_of(
-    scene: SceneTruth, shape_of: Callable[[str], Shape], categories: Sequence[str], seed: int
-) -> list[Draft]:
+def drafts_of(scene: SceneTruth, shape_of: Callable[[str], Shape], categories: Sequence[str], seed: int) -> list[Draft]:
     """Return all that may be asked about the pictures of a scene; raises TwinError, UsageError.
 
     ``categories`` are those of all scenes, of which absent ones are asked about.
@@ -99,7 +97,13 @@ def _shuffled(draft: Draft, rng: random.Random) -> Draft:
     """Put the options into a random order; numbers, directions and what the question has in its words stay as they are."""
     if draft.kind == YES_NO:
         return replace(draft, options=("yes", "no"))
-    if draft.kind != CHOICE or draft.family in ("count_objects", "taller", "heavier", "side_for_robot", "side_in_picture"):
+    if draft.kind != CHOICE or draft.family in (
+        "count_objects",
+        "taller",
+        "heavier",
+        "side_for_robot",
+        "side_in_picture",
+    ):
         return draft
     return replace(draft, options=tuple(rng.sample(draft.options, len(draft.options))))
 

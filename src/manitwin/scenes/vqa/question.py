@@ -28,9 +28,9 @@ Box = tuple[float, float, float, float]
 class Draft:
     """A question before its words are chosen: ``slots`` are put into a template of the family.
 
-    ``answer`` is short, ``response`` a sentence. Both, the slots and the ``options`` may hold ``<p0>``, ``<b0>`` ..., which stand for
-    ``points`` (x, y) and ``boxes`` (x, y, width, height) in shares of the picture's width and height from its upper left corner.
-    ``evidence`` holds what the answer was computed from: names of objects, measured values (SI), margins.
+    ``answer`` is short, ``response`` a sentence. Both, the slots and the ``options`` may hold ``<p0>``, ``<b0>`` ..., which stand
+    for ``points`` (x, y) and ``boxes`` (x, y, width, height) in shares of the picture's width and height from its upper left
+    corner. ``evidence`` holds what the answer was computed from: names of objects, measured values (SI), margins.
     """
 
     family: str

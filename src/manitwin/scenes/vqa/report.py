@@ -70,7 +70,9 @@ def marked(rgb: np.ndarray, question: Question) -> np.ndarray:
 
 def _sample(question: Question, rgb: np.ndarray, convention: str) -> Picture:
     words = worded(question, convention, rgb.shape[1], rgb.shape[0])
-    small = cv2.resize(marked(rgb, question), (SAMPLE_PX, SAMPLE_PX * rgb.shape[0] // rgb.shape[1]), interpolation=cv2.INTER_AREA)
+    small = cv2.resize(
+        marked(rgb, question), (SAMPLE_PX, SAMPLE_PX * rgb.shape[0] // rgb.shape[1]), interpolation=cv2.INTER_AREA
+    )
     return Picture(png_of(small), f"{question.category}, {question.family}. {words.prompt} — {words.response}")
 
 

@@ -11,7 +11,7 @@ from manitwin.scenes.vqa.context import Context, sentence
 from manitwin.scenes.vqa.grasp_types import GRASP_WORDS, best_grasp
 from manitwin.scenes.vqa.question import CHOICE, NUMBER, YES_NO, Draft
 from manitwin.scenes.vqa.sweeps import LONGEST_M, Way
-from manitwin.scenes.vqa.things import Seen, Shape
+from manitwin.scenes.vqa.things import Shape
 
 SIDE_M, SIDE_PX = 0.06, 50
 """How far apart two objects are whose sides are asked."""

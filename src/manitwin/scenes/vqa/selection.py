@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from dataclasses import replace
 
 from manitwin.scenes.vqa.logistic import WordModel
 from manitwin.scenes.vqa.question import CHOICE, NUMBER, YES_NO, Draft
@@ -15,6 +16,12 @@ MOST_OF_ONE_ANSWER = 0.52
 NUMBER_STEP_CM = 5
 MOST_OF_A_FAMILY = 0.09
 """Share of a scene's questions that are of one family, at most, where others have enough."""
+FIXED_CHOICES = frozenset(
+    {"best_grasp_type", "region_of_object", "blocked_direction", "side_for_robot", "side_in_picture"}
+)
+"""Families that offer the same options each time."""
+LEAST_RIGHT = 0.1
+"""Share of such a family's questions that an option must be the answer of."""
 _KEPT_SURE = 0.7
 """A choice is kept with this by (chance / probability of its answer): what words tell half as well as chance is always kept."""
 
@@ -46,7 +53,7 @@ def chosen(drafts: Sequence[Sequence[Draft]], per_scene: int, rng: random.Random
         if kind == YES_NO:
             found = _balanced_yes_no(found, rng)
         elif kind == CHOICE:
-            found = _balanced_choices(found, rng)
+            found = _equalized(found, rng) if family in FIXED_CHOICES else _balanced_choices(found, rng)
         elif kind == NUMBER:
             found = _balanced_numbers(found, rng)
         rng.shuffle(found)
@@ -84,6 +91,26 @@ def _balanced_choices(found: list[tuple[int, Draft]], rng: random.Random) -> lis
         told = odds[draft.answer] / sum(odds.values())
         if rng.random() < _KEPT_SURE / len(draft.options) / told:
             kept.append((scene, draft))
+    return kept
+
+
+def _equalized(found: list[tuple[int, Draft]], rng: random.Random) -> list[tuple[int, Draft]]:
+    """Keep as many of each answer, by the options that there are; options that are hardly ever right are not offered."""
+    groups: dict[frozenset[str], list[tuple[int, Draft]]] = defaultdict(list)
+    for each in found:
+        groups[frozenset(each[1].options)].append(each)
+    kept = []
+    for options in sorted(groups, key=sorted):
+        group = groups[options]
+        counts = Counter(draft.answer for _, draft in group)
+        offered = {answer for answer, count in counts.items() if count >= LEAST_RIGHT * len(group)}
+        if len(offered) < 2:
+            continue
+        least = min(counts[answer] for answer in offered)
+        for answer in sorted(offered):
+            right = [(scene, draft) for scene, draft in group if draft.answer == answer]
+            for scene, draft in rng.sample(right, least):
+                kept.append((scene, replace(draft, options=tuple(each for each in draft.options if each in offered))))
     return kept
 
 

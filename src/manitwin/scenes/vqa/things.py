@@ -248,9 +248,7 @@ def part_alone_px(thing: Thing, part: Part, camera: Camera, step_px: int = 2) ->
         return 0.0
     low = np.clip(np.floor(pixels.min(0)), 0, [camera.width_px, camera.height_px])
     high = np.clip(np.ceil(pixels.max(0)), 0, [camera.width_px, camera.height_px])
-    columns, rows = np.meshgrid(
-        np.arange(low[0], high[0], step_px) + 0.5, np.arange(low[1], high[1], step_px) + 0.5
-    )
+    columns, rows = np.meshgrid(np.arange(low[0], high[0], step_px) + 0.5, np.arange(low[1], high[1], step_px) + 0.5)
     directions = np.stack(
         [
             (columns - camera.width_px / 2) / camera.focal_px,

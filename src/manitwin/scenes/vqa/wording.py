@@ -100,9 +100,7 @@ def worded(question: Question, convention: str, width_px: int, height_px: int) -
     behind = {
         YES_NO: "Answer yes or no.", CHOICE: f"Choose one: {'; '.join(options)}.", POINT: rules.ask_point, BOX: rules.ask_box
     }.get(question.kind, "")  # fmt: skip
-    return Worded(
-        asked, f"{asked} {behind}".strip(), written(question.answer), written(question.response), options
-    )
+    return Worded(asked, f"{asked} {behind}".strip(), written(question.answer), written(question.response), options)
 
 
 _PLAIN = {"robopoint": "unit", "roborefer": "unit"}

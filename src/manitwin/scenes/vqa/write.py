@@ -107,7 +107,9 @@ def write_vqa(
             files, dataset=dataset, per_scene=per_scene, validation_share=validation_share, seed=seed
         )
         if not questions:
-            raise UsageError(f"{scenes}: nothing can be asked about these pictures; sample scenes of two or more objects")
+            raise UsageError(
+                f"{scenes}: nothing can be asked about these pictures; sample scenes of two or more objects"
+            )
         written = Output(folder)
         lines = "".join(json.dumps(each.to_json(), sort_keys=True, ensure_ascii=False) + "\n" for each in questions)
         written.write_bytes(QUESTIONS, lines.encode())
