@@ -15,7 +15,7 @@ LENGTH_M = 0.2
 def test_contacts_are_those_of_the_distances_on_the_way(within_m: float) -> None:
     rng = np.random.default_rng(3)
     moving = 0.02 * rng.normal(size=(60, 15, 3))
-    others = 0.02 * rng.normal(size=(60, 10, 3)) + rng.uniform(-0.12, 0.12, (60, 1, 3))
+    others = 0.02 * rng.normal(size=(60, 10, 3)) + rng.uniform(-0.08, 0.08, (60, 1, 3))
     ways = rng.normal(size=(60, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     found = first_contacts(moving, others, ways, LENGTH_M, within_m)

@@ -14,6 +14,8 @@ import webdataset
 from PIL import Image
 
 from manitwin.errors import UsageError
+from manitwin.scenes.vqa.question import Question
+from manitwin.scenes.vqa.wording import worded
 from manitwin.scenes.vqa.write import write_vqa
 
 PER_SCENE = 30
@@ -91,13 +93,17 @@ def test_shards_are_read_by_webdataset(scenes: Path, tmp_path: Path) -> None:
         ("unit", r"\(0\.\d{3}, 0\.\d{3}\)"),
     ],
 )
-def test_points_in_the_convention_of_a_model(scenes: Path, tmp_path: Path, convention: str, form: str) -> None:
-    scene = scenes / "scenes" / "0000" / "layout_0_000000"
-    write_vqa(scene, tmp_path / "out", per_scene=PER_SCENE, points=convention, validation_share=0.0)
-    rows = json.loads((tmp_path / "out/train.json").read_text())
-    points = [row for row in rows if row["family"] == "point_at_object"]
+def test_points_in_the_convention_of_a_model(questions: list[Question], convention: str, form: str) -> None:
+    points = [each for each in questions if each.family == "point_at_object"]
     assert points
-    assert all(re.fullmatch(form, row["conversations"][1]["value"]) for row in points)
+    for each in points:
+        words = worded(each, convention, 128, 128)
+        assert re.fullmatch(form, words.response)
+        assert words.prompt.startswith(words.question)
+        assert len(words.prompt) > len(words.question)
+        x, y = (float(number) for number in re.findall(r"[\d.]+", words.response))
+        unit = {"pixel": 128, "thousand": 1000}.get(convention, 1)
+        assert (x / unit, y / unit) == pytest.approx(each.points[0], abs=1 / 128)
 
 
 def test_the_same_input_gives_the_same_bytes(llava: Path, scenes: Path, tmp_path: Path) -> None:
