@@ -46,7 +46,7 @@ def vqa(
             "--val", help="The share of scenes in the split val, which has wordings of its own.", min=0, max=1
         ),
     ] = 0.1,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0)] = 7,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0, max=options.LARGEST_SEED)] = 7,
 ) -> None:
     """Write questions about drawn scenes whose answers are computed, with the evidence beside them."""
     from manitwin.scenes.vqa.write import write_vqa

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from manitwin.geometry.hull_distance import ConvexParts, PlacedParts
+from manitwin.geometry.hull_distance import ConvexParts, PlacedParts, overlap_depth
 from manitwin.geometry.hull_sweep import first_contacts
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.scenes.scene import SceneRecord
@@ -15,6 +15,8 @@ from manitwin.scenes.vqa.things import Thing
 
 TOUCH_M = 0.0005
 """Two bodies nearer than this touch."""
+DEEP_M = 0.002
+"""How deep one body must have come into the other, a margin after they touched."""
 MARGIN_M = 0.010
 """What misses by less, or is met in less before the end of the way, is not asked."""
 LONGEST_M = 0.20
@@ -36,9 +38,12 @@ class Way:
     leaves_m: float
 
     def first_hit(self, length_m: float) -> tuple[str, float] | None:
-        """Return what is met first and where, if it is surely met before any other; else None."""
+        """Return what is hit first and where; None where nothing surely is, or something else may be grazed before."""
         hits = sorted((meeting.touch_m, name) for name, meeting in self.meetings.items())
         if not hits or hits[0][0] > length_m - MARGIN_M:
+            return None
+        grazed = (each for each in self.meetings.values() if np.isinf(each.touch_m))
+        if any(each.near_m <= hits[0][0] for each in grazed):
             return None
         return hits[0][1], hits[0][0]
 
@@ -112,11 +117,25 @@ def sweep(
         end = 0
         for place, name, count, *_ in pairs:
             begin, end = end, end + count
-            meetings[place][name] = Meeting(float(near_m[begin:end].min()), float(touch_m[begin:end].min()))
+            met = Meeting(float(near_m[begin:end].min()), float(touch_m[begin:end].min()))
+            if not _is_deep(thing, obstacles[name], start, directions[place], met):
+                met = Meeting(met.near_m, np.inf)
+            meetings[place][name] = met
     return [
         Way(met, _leaves(thing, record, start, np.array([*direction, 0.0])))
         for met, direction in zip(meetings, directions, strict=True)
     ]
+
+
+def _is_deep(
+    thing: Thing, obstacle: PlacedParts, start: np.ndarray, direction: tuple[float, float], met: Meeting
+) -> bool:
+    """Whether an object is well inside of another a margin after they touch: what only grazes is not sure to be hit."""
+    if not np.isfinite(met.touch_m):
+        return False
+    pose = thing.pose.copy()
+    pose[:3, 3] += start + (met.touch_m + MARGIN_M) * np.array([*direction, 0.0])
+    return overlap_depth(thing.shape.hulls.at(pose), obstacle) >= DEEP_M
 
 
 def _padded(parts: np.ndarray, most: int) -> np.ndarray:
