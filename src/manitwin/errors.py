@@ -27,16 +27,19 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 _SHOWN_CHARACTERS = 100
+_MOST_CHARACTERS = 3000
+_LAST_CHARACTERS = 500
 
 
 class ManiTwinError(Exception):
     """Base of every error that this package raises on purpose.
 
-    Its message is text that UTF-8 has: the bytes of a file's name that are none are written out, as ``\\udce9``.
+    Its message is text that UTF-8 has: the bytes of a file's name that are none are written out, as ``\\udce9``. Of a text that
+    names of a file have made longer than 3,000 characters, the beginning and the end (the remedy) are kept.
     """
 
     def __init__(self, *args: object):
-        super().__init__(*(encodable(each) if isinstance(each, str) else each for each in args))
+        super().__init__(*(_shortened(encodable(each)) if isinstance(each, str) else each for each in args))
 
 
 class UsageError(ManiTwinError):
@@ -128,6 +131,13 @@ class RendererMissing(Unavailable):
 def encodable(text: str) -> str:
     """Return text with lone surrogates written out, which no ledger, table or file of UTF-8 takes."""
     return text.encode("utf-8", errors="backslashreplace").decode("utf-8")
+
+
+def _shortened(text: str) -> str:
+    if len(text) <= _MOST_CHARACTERS:
+        return text
+    first = _MOST_CHARACTERS - _LAST_CHARACTERS
+    return f"{text[:first]} ... ({len(text) - _MOST_CHARACTERS} more characters) ... {text[-_LAST_CHARACTERS:]}"
 
 
 def choose_from(kind: str, name: str, valid: Iterable[str]) -> str:

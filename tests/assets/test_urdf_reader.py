@@ -145,6 +145,24 @@ def test_mesh_outside_of_the_folder_is_missing_not_read(tmp_path: Path, name: st
     assert [file.name for file in asset.files] == ["object.urdf"]
 
 
+def test_loop_of_links_is_missing_and_the_next_mesh_is_read(tmp_path: Path) -> None:
+    (tmp_path / "loop.stl").symlink_to("loop.stl")
+    trimesh.creation.box([1, 1, 1]).export(tmp_path / "mesh.stl")
+    visuals = "".join(
+        f'<visual><geometry><mesh filename="{name}"/></geometry></visual>' for name in ("loop.stl", "mesh.stl")
+    )
+    asset = read_asset(urdf(tmp_path, f'<link name="l">{visuals}</link>'))
+    assert asset.missing_files == ("loop.stl",) and len(asset.visual) == 1
+
+
+def test_name_of_a_link_as_long_as_a_book_leaves_the_remedy_readable(tmp_path: Path) -> None:
+    with pytest.raises(AssetError) as raised:
+        read_asset(urdf(tmp_path, f'<link name="{"a" * 100_000}"><visual><geometry/></visual></link>'))
+    assert len(str(raised.value)) < 3100 and str(raised.value).endswith(
+        "give it one of box, capsule, cylinder, mesh, sphere"
+    )
+
+
 def test_link_that_leads_out_of_the_folder_is_missing(tmp_path: Path) -> None:
     folder = tmp_path / "asset"
     folder.mkdir()

@@ -49,6 +49,13 @@ def test_layers_outside_the_folder_are_not_followed(tmp_path: Path, named: str, 
     assert asset.files == (file.resolve(),)
 
 
+def test_loop_of_links_is_no_layer(tmp_path: Path) -> None:
+    (tmp_path / "loop.usda").symlink_to("loop.usda")
+    file = write(tmp_path / "a.usda", f'(defaultPrim="a"\n subLayers=[@loop.usda@]\n)\ndef Xform "a" {{\n {CUBE}}}\n')
+    asset = read_here(file)
+    assert len(asset.visual) == 1 and any("was not followed" in remark for remark in asset.remarks)
+
+
 @pytest.mark.parametrize("arc", ["subLayers", "references", "payload", "variant"])
 def test_the_same_arcs_are_followed_inside_of_it(tmp_path: Path, arc: str) -> None:
     write(tmp_path / "sub" / "b.usda", '(defaultPrim="a")\ndef Xform "a" {\n def Cube "inner" {}\n}\n')

@@ -109,7 +109,9 @@ class Folders:
         _copied(ROOT / "samples" / "mug.glb", page / "mug.glb")
         for name in ("front.png", "side.png", "back.png"):
             photo = np.zeros((300, 300, 4), np.uint8)
-            photo[60:260, 122:178] = 200, 60, 50, 255  # of a bottle that is 21 cm high: 59 mm wide
+            # of a bottle that is 21 cm high: 59 mm wide; of a box: 66 mm of 20 cm
+            left, right = (117, 183) if "--name box" in said else (122, 178)
+            photo[60:260, left:right] = 200, 60, 50, 255
             Image.fromarray(photo).save(page / name)
         (page / "scans").mkdir()
         trimesh.load(ROOT / "samples" / "mug.glb", force="mesh").export(page / "scans" / "mug.obj")

@@ -136,3 +136,18 @@ def test_a_batch_without_its_record_says_so(run: Path, tmp_path: Path) -> None:
     with pytest.raises(EpisodesError, match=r"batch\.json: config_sha256: Field required; run manitwin traj") as raised:
         publish_episodes(half, tmp_path / "out", license_allow=["CC-BY-4.0", "CC0-1.0"])
     assert "\n" not in str(raised.value) and not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("frame", [10**30, 10**6, -1])
+def test_record_of_pictures_with_frames_that_no_film_has_is_refused(
+    run: Path, twins: Path, tmp_path: Path, frame: int
+) -> None:
+    place = Path(shutil.copytree(run, tmp_path / "run"))
+    for record in place.rglob(PICTURES_RECORD):
+        said = json.loads(record.read_bytes())
+        said["first_frames"] = dict.fromkeys(list(said["first_frames"])[:1], frame) | dict(
+            list(said["first_frames"].items())[1:]
+        )
+        record.write_text(json.dumps(said))
+    with pytest.raises(EpisodesError, match="frames, which are not those recorded"):
+        publish_episodes(place, tmp_path / "out", twins=twins, license_allow=["CC0-1.0"])

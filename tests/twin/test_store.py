@@ -4,7 +4,7 @@ from pathlib import Path
 import pytest
 from rejected_records import rejected_record
 
-from manitwin.errors import TwinError
+from manitwin.errors import TwinError, UsageError
 from manitwin.twin.migration import SCHEMA_VERSION
 from manitwin.twin.store import read_record, replace_folder, revision_of, seal, write_bytes_atomically
 
@@ -63,6 +63,13 @@ def test_failed_write_leaves_the_old_file_and_nothing_else(tmp_path: Path, monke
         write_bytes_atomically(target, b"new")
     assert target.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [target]
+
+
+def test_folder_in_the_place_of_a_file_is_said_and_stays(tmp_path: Path) -> None:
+    (tmp_path / "attempts.parquet").mkdir()
+    with pytest.raises(UsageError, match=r"attempts\.parquet: is a folder"):
+        write_bytes_atomically(tmp_path / "attempts.parquet", b"new")
+    assert [each.name for each in tmp_path.iterdir()] == ["attempts.parquet"]
 
 
 def test_replacing_a_folder_leaves_only_the_new_one(tmp_path: Path) -> None:

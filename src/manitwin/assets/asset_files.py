@@ -67,6 +67,17 @@ class AssetFiles:
             self.remark(f"{_short(name)} lies outside the asset's folder and was not read")
         return None
 
+    def used_one(self, candidates: Iterable[Path]) -> Path | None:
+        """Return the first candidate that was found and read before; None where none was."""
+        for candidate in candidates:
+            try:
+                resolved = candidate.resolve()
+            except (OSError, ValueError, RuntimeError):  # as in find
+                continue
+            if resolved in self.used:
+                return resolved
+        return None
+
     def _note_above(self, file: Path) -> None:
         if self.own is not None and not file.is_relative_to(self.own.resolve()):
             self.remark(f"files were read from above its own folder, below the root {self.root.resolve().name!r}")

@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from manitwin.errors import TwinError
+from manitwin.errors import TwinError, UsageError
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json_object, read_json_object
 from manitwin.formats.printable import printable, printable_line
@@ -81,7 +81,12 @@ def write_bytes_atomically(path: Path, content: bytes) -> None:
 
 @contextmanager
 def file_beside(place: Path) -> Iterator[Path]:
-    """Give a path in the same folder; what is written there takes its place when the block ends well, else it is removed."""
+    """Give a path in the same folder; what is written there takes its place when the block ends well, else it is removed.
+
+    Raises UsageError where a folder is in its place.
+    """
+    if place.is_dir():
+        raise UsageError(f"{place}: is a folder, where a file is to be written; move it away")
     place.parent.mkdir(parents=True, exist_ok=True)
     beside = place.with_name(f".{place.name}.{os.getpid()}")
     try:

@@ -183,8 +183,7 @@ class SdfShapes:
 
     def _mesh_path(self, element: etree._Element) -> Path | None:
         uri = text_of(element, "geometry/mesh/uri")
-        paths = [] if uri is None else [path.resolve() for path in self._candidates(uri)]
-        return next((path for path in paths if path in self._files.used), None)
+        return None if uri is None else self._files.used_one(self._candidates(uri))
 
 
 def _primitive(shape: etree._Element, what: str) -> trimesh.Trimesh | None:

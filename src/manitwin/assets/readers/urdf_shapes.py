@@ -85,8 +85,7 @@ class LinkShapes:
         shape = element.find("geometry/mesh")
         if shape is None:
             return None
-        paths = [path.resolve() for path in self._candidates(shape.get("filename") or "")]
-        return next((path for path in paths if path in self._files.used), None)
+        return self._files.used_one(self._candidates(shape.get("filename") or ""))
 
     def _color(self, element: etree._Element) -> np.ndarray | None:
         material = element.find("material")

@@ -128,8 +128,12 @@ class LayerFiles:
             if not member.startswith("../"):
                 return Place(base.file, member)
         elif not outside:
-            file = (base.file.parent / clean).resolve()
-            if file.is_relative_to(self._folder) and (what != "layer" or file.suffix.lower() in _LAYERS):
+            file = _resolved(base.file.parent / clean)
+            if (
+                file is not None
+                and file.is_relative_to(self._folder)
+                and (what != "layer" or file.suffix.lower() in _LAYERS)
+            ):
                 return self._inside_package(file) if what == "layer" else Place(file)
         self._source.find(
             f"{what} {name[:80]!r} lies outside the asset's folder, or is no USD layer; it was not followed"
@@ -230,3 +234,11 @@ def _children(spec: Sdf.PrimSpec) -> Iterator[Sdf.PrimSpec]:
 
 def _items(edits: Sdf.PathListOp) -> list[Sdf.Reference]:
     return list(edits.GetAddedOrExplicitItems())
+
+
+def _resolved(path: Path) -> Path | None:
+    """Return a path without links; None for a loop of links, or a name that no file system can hold."""
+    try:
+        return path.resolve()
+    except (OSError, ValueError, RuntimeError):
+        return None

@@ -84,6 +84,10 @@ def cut_film(film: Path, first_frames: dict[str, int], allowed: Set[str], place:
     """Write the ``allowed`` episodes of a film, which follow each other without gaps, to another; returns where they are."""
     facts = video_facts(film)
     order = sorted(first_frames, key=first_frames.__getitem__)
+    if order and not 0 <= first_frames[order[0]] <= first_frames[order[-1]] < facts.frames:
+        raise EpisodesError(
+            f"{film}: has {facts.frames} frames, which are not those recorded; run manitwin render again"
+        )
     ends = [*(later for _, later in pairwise(first_frames[name] for name in order)), facts.frames]
     clips: dict[str, Clip] = {}
     pictures = frames_of(film)

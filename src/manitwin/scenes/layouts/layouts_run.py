@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Unpack
 
+from pydantic import ValidationError
+
 from manitwin.config import LARGEST_COUNT
 from manitwin.engine.drive import RunOptions, RunReport, drive
-from manitwin.engine.ledger.location import local_ledger
+from manitwin.engine.ledger.location import CONFIG, local_ledger
 from manitwin.engine.ledger.reading import read_ledger
 from manitwin.errors import UsageError
 from manitwin.scenes.layouts.layouts_recipe import LayoutNumber, LayoutsRecipe
@@ -63,7 +65,7 @@ def make_layouts(
     for category in config.layout.include:
         pool.of_category(category)
     root = DatasetRoot(out)
-    config = _with_pictures_there(config, earlier_settings(root))
+    config = _with_pictures_there(config, earlier_settings(root), root.url)
     recipe = LayoutsRecipe(config, place)
     configuration = {"kind": "layouts", "dataset": place, **config.model_dump(mode="json")}
     check_settings(root, configuration, free=DECIDE_NO_SCENE, made="scenes")
@@ -80,11 +82,17 @@ def make_layouts(
     )  # fmt: skip
 
 
-def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any]) -> LayoutsConfig:
+def _with_pictures_there(config: LayoutsConfig, before: dict[str, Any], place: str) -> LayoutsConfig:
     """Return a configuration that draws scenes where an earlier run did: those that it drew are not made without pictures."""
     if config.pictures or not before.get("pictures"):
         return config
-    return config.model_copy(update={"pictures": True, "picture_px": before.get("picture_px", config.picture_px)})
+    drawn = {"pictures": True, "picture_px": before.get("picture_px", config.picture_px)}
+    try:
+        return LayoutsConfig.model_validate({**config.model_dump(), **drawn}, strict=True)
+    except ValidationError as error:
+        raise UsageError(
+            f"{place}/{CONFIG}: its picture_px is no size of pictures; remove the file: the run writes it again"
+        ) from error
 
 
 def without_upright(dataset: str | Path) -> tuple[str, ...]:
