@@ -33,7 +33,7 @@ from manitwin.scenes.layouts.pool import PoolTwin, pool_of
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.twin.loaded_twin import TwinSource
 
-BESIDE_M = {"strike": 0.09}
+BESIDE_M = {"strike": 0.09, "insert": 0.15}
 EXECUTED = {"kept", "unplanned_contact", "disturbed", *EXECUTION_FAILURES}
 
 

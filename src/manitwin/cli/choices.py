@@ -113,6 +113,7 @@ SKILLS = Choices(
         "near",
         "upright",
         "hang",
+        "insert",
         "pour",
         "press",
         "strike",

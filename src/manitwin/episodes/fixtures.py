@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.goals.world_state import Peg
+from manitwin.episodes.goals.world_state import Holder, Peg
 from manitwin.geometry.boxes import footprint
 from manitwin.geometry.poses import quaternion_wxyz, transform, transform_points
 from manitwin.geometry.rigid_body import StaticBox
@@ -22,6 +22,7 @@ BLOCK_HALF_M, BLOCK_HALF_HEIGHT_M = (
 )  # slim and tall: the hand beside a short head has room, the arm above the table
 PANEL_HALF_M, PANEL_HALF_HEIGHT_M = (0.07, 0.05), 0.02
 BUTTON_HALF_M, BUTTON_HALF_HEIGHT_M = 0.010, 0.003
+HOLDER_FLOOR_M, HOLDER_WALL_M = 0.010, 0.006
 
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1) for y in (-1.0, 1) for z in (-1.0, 1)])
 
@@ -31,10 +32,10 @@ class Fixture:
     """Boxes that stand where they are, each a body of the episode's world under its own name.
 
     ``frame_to_world (4, 4)`` is where it works, at the box ``name``: a peg's foot with Z to its tip and X upward, the middle
-    of a face or a button with Z out of it. ``size_m`` is a peg's length, the half width of a face or a button.
+    of a face, a button or a bore's rim with Z out of it. ``size_m`` is a peg's length, the half width of the others.
     """
 
-    kind: Literal["peg", "block", "panel"]
+    kind: Literal["peg", "block", "panel", "holder"]
     name: str
     boxes: tuple[StaticBox, ...]
     frame_to_world: np.ndarray
@@ -48,6 +49,8 @@ class Fixture:
     @property
     def bearing(self) -> frozenset[str]:
         """The names of those boxes that count as furniture when something lies on them: all but where it works, and a post."""
+        if self.kind == "holder":
+            return frozenset()
         return frozenset(box.name for box in self.boxes) - {self.name, f"{self.name}_post"}
 
     @property
@@ -56,6 +59,14 @@ class Fixture:
         if self.kind != "peg":
             return None
         return Peg(self.frame_to_world[:3, 3], self.frame_to_world[:3, 2], self.size_m, PEG_RADIUS_M)
+
+    @property
+    def holder(self) -> Holder | None:
+        """The holder that things are inserted into; None for another kind."""
+        if self.kind != "holder":
+            return None
+        depth_m = 2 * float(self.boxes[1].half_extents_m[2]) - HOLDER_FLOOR_M
+        return Holder(self.frame_to_world, self.size_m, depth_m, frozenset(box.name for box in self.boxes))
 
 
 def peg_stand(position_m: np.ndarray, yaw_rad: float, *, height_m: float = PEG_HEIGHT_M, name: str = "peg") -> Fixture:
@@ -100,6 +111,22 @@ def panel(position_m: np.ndarray, yaw_rad: float, *, name: str = "button") -> Fi
     housing = StaticBox(f"{name}_panel", housing_m, at(PANEL_HALF_HEIGHT_M))
     button = StaticBox(name, button_m, at(level_m + BUTTON_HALF_HEIGHT_M))
     return Fixture("panel", name, (button, housing), at(level_m + 2 * BUTTON_HALF_HEIGHT_M), BUTTON_HALF_M)
+
+
+def holder(
+    position_m: np.ndarray, yaw_rad: float, bore_half_m: float, depth_m: float, *, name: str = "holder"
+) -> Fixture:
+    """Return a holder on the table at ``position_m (3,)``: a square bore that opens upward; it works at its rim."""
+    upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
+    outer_m, half_height_m = bore_half_m + HOLDER_WALL_M, (HOLDER_FLOOR_M + depth_m) / 2
+    floor_m = np.array([outer_m, outer_m, HOLDER_FLOOR_M / 2])
+    boxes = [StaticBox(name, floor_m, upright @ transform(translation=np.array([0.0, 0, HOLDER_FLOOR_M / 2])))]
+    for number, (x, y) in enumerate(((1, 0), (-1, 0), (0, 1), (0, -1))):
+        half_m = np.array([*(HOLDER_WALL_M / 2 if each else outer_m for each in (x, y)), half_height_m])
+        middle = np.array([*((bore_half_m + HOLDER_WALL_M / 2) * np.array([x, y])), half_height_m])
+        boxes.append(StaticBox(f"{name}_wall_{number}", half_m, upright @ transform(translation=middle)))
+    rim = upright @ transform(translation=np.array([0.0, 0, 2 * half_height_m]))
+    return Fixture("holder", name, tuple(boxes), rim, bore_half_m)
 
 
 def to_json(fixture: Fixture) -> dict[str, Any]:

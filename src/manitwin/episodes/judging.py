@@ -12,6 +12,7 @@ from manitwin.episodes.execution import REST_ROWS, Execution
 from manitwin.episodes.goals.evaluation import evaluate
 from manitwin.episodes.goals.world_state import Event, Granules, ObjectState, WorldState
 from manitwin.episodes.outcome import is_at_rest, is_disturbed, moved_m, placement_errors, placement_outcome
+from manitwin.episodes.skills.held_skill import tip_of
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
 
@@ -41,16 +42,25 @@ def state_of(
     rests = at_rest if at_rest is not None else [True] * len(start.objects)
     objects = {
         begun.name: ObjectState(
-            begun.body, pose, begun.object_to_world, still, goal.openings.get(begun.name), goal.holes.get(begun.name)
+            begun.body,
+            pose,
+            begun.object_to_world,
+            still,
+            goal.openings.get(begun.name),
+            goal.holes.get(begun.name),
+            tip_of(goal.frames.get(begun.name, ()), begun.body.hulls),
         )
         for begun, pose, still in zip(start.objects, object_to_world, rests, strict=True)
     }
     furniture = {box.name for box in start.problem.static_boxes}
     furniture |= {name for fixture in goal.fixtures for name in fixture.bearing}
     pegs = {fixture.name: peg for fixture in goal.fixtures if (peg := fixture.peg) is not None}
+    holders = {fixture.name: into for fixture in goal.fixtures if (into := fixture.holder) is not None}
     made = world.granules
     granules = None if made is None else Granules(made.positions_m(), made.radius_m)
-    return WorldState(objects, touching, frozenset(furniture), events, goal.places_m, pegs, granules, start.granules_in)
+    return WorldState(
+        objects, touching, frozenset(furniture), events, goal.places_m, pegs, granules, start.granules_in, holders
+    )
 
 
 def judge(

@@ -9,7 +9,17 @@ import pytest
 
 from manitwin.episodes.goals.evaluation import evaluate, judge
 from manitwin.episodes.goals.goal import Goal, Literal
-from manitwin.episodes.goals.world_state import ROBOT, Event, Granules, Hole, ObjectState, Peg, WorldState
+from manitwin.episodes.goals.world_state import (
+    ROBOT,
+    Event,
+    Granules,
+    Holder,
+    Hole,
+    ObjectState,
+    Peg,
+    Tip,
+    WorldState,
+)
 from manitwin.errors import UsageError
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import transform
@@ -180,6 +190,25 @@ def test_hung() -> None:
     assert hangs(0.60, ("item", "peg")) == "beside_it"
     assert hangs(0.54) == "not_touching"
     assert hangs(0.54, ("item", "peg"), ("item", "table")) == "on_furniture"
+
+
+def test_inserted() -> None:
+    bore = Holder(at(0.5, 0, 0.07), 0.02, 0.06, frozenset({"holder", "wall"}))
+    up = np.diag([1.0, -1, -1, 1])  # the item's tip is at its +Z end: down where it is turned over
+
+    def stands(x: float, turn: np.ndarray, *touching: tuple[str, str], z: float = 0.04) -> str | None:
+        tip = Tip(np.array([0.0, 0, 0.02]), np.array([0.0, 0, 1]))
+        item = replace(thing(at(x, 0, z) @ turn), tip=tip)
+        return judge(
+            replace(state(item, *touching), holders={"holder": bore}), Literal("inserted", "item", "holder")
+        ).failure
+
+    assert stands(0.5, up, ("item", "wall")) is None
+    assert stands(0.65, up, ("item", "wall")) == "beside_it"
+    assert stands(0.5, np.eye(4), ("item", "wall")) == "wrong_end"
+    assert stands(0.5, up) == "not_touching"
+    assert stands(0.5, up, ("item", "wall"), z=0.08) == "not_deep"
+    assert stands(0.5, up, ("item", "wall"), ("item", "table")) == "held_by_something_else"
 
 
 def test_a_goal_is_reached_when_all_of_it_holds_and_says_what_does_not() -> None:

@@ -22,6 +22,7 @@ JUDGES: Mapping[str, Callable[[WorldState, Literal], Judgement]] = {
     "undisturbed": spatial.undisturbed,
     "pushed_to": spatial.pushed_to,
     "hung": functional.hung,
+    "inserted": functional.inserted,
     "poured": functional.poured,
     "pressed": functional.pressed,
     "struck": functional.struck,

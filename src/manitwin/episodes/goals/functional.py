@@ -17,6 +17,7 @@ PRESS_RADIUS_M, PRESS_RAD = 0.012, np.radians(30)
 STRIKE_RAD = np.radians(15)
 CORNER_OF_SQUARE = np.sqrt(np.pi / 2)  # 1.25: half a square's diagonal by the radius of the circle with its area
 HANG_SLACK_M = 0.006
+INSERTED_RAD, INSERTED_SLACK_M = np.radians(45), 0.002  # what a bore is wide for leans on its rim, tip down
 BELLY = 1.5  # rim radii
 OBLONG, CLOSED_SHARE, LEAST_SLOPE = 4.5, 0.9, 0.3  # as holes are taken for holes (geometry.frames.hole)
 
@@ -129,6 +130,32 @@ def hung(state: WorldState, literal: Literal) -> Judgement:
             "moving": thing.at_rest,
         },
         {"along_m": along_m, "off_m": off_m},
+    )
+
+
+def inserted(state: WorldState, literal: Literal) -> Judgement:
+    """Judge that an object stands in a holder with its tip down, the tip the value below the rim, borne by nothing else."""
+    assert literal.second is not None and literal.value is not None
+    thing, into = state.of(literal.subject), state.holder(literal.second)
+    if thing.tip is None:
+        return Judgement(False, "no_tip", {})
+    to_rim = inverse(into.rim_to_world) @ thing.object_to_world
+    tip_m = transform_points(to_rim, thing.tip.position_m[None])[0]
+    off_m, below_m = float(np.abs(tip_m[:2]).max()), float(-tip_m[2])
+    angle_rad = float(np.arccos(np.clip(-(to_rim[:3, :3] @ thing.tip.direction)[2], -1, 1)))
+    touched = state.neighbours(literal.subject)
+    return judged(
+        {
+            "beside_it": off_m <= into.half_m + INSERTED_SLACK_M,
+            "wrong_end": angle_rad <= np.pi / 2,
+            "lying": angle_rad <= INSERTED_RAD,
+            "not_deep": literal.value <= below_m <= into.depth_m + INSERTED_SLACK_M,
+            "not_touching": bool(touched & into.bodies),
+            "held_by_something_else": touched <= into.bodies | {ROBOT},
+            "not_released": ROBOT not in touched,
+            "moving": thing.at_rest,
+        },
+        {"off_m": off_m, "below_rim_m": below_m, "angle_rad": angle_rad},
     )
 
 

@@ -35,6 +35,7 @@ SIGNATURES: Mapping[str, Signature] = {
     "undisturbed": Signature(),
     "pushed_to": Signature("place", "m", 0.02),
     "hung": Signature("fixture"),
+    "inserted": Signature("fixture", "m", 0.03),
     "poured": Signature("object", "share", 0.9),
     "pressed": Signature(None, "N", 5.0),
     "struck": Signature("object", "m/s", 0.15),

@@ -53,6 +53,10 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "hang {a} on the peg", "hang up {a}", "put {a} on the hook", "pick up {a} and hang {it} on the peg",
         "take {a} and slip {it} over the peg", "please hang {a} up by its hole",
     ),
+    "inserted": (
+        "put {a} into the holder", "insert {a} into the holder", "stand {a} in the holder, tip down",
+        "pick up {a} and put {it} into the holder", "slip {a} into the holder", "please put {a} away in the holder",
+    ),
     "poured": (
         "pour what is in {a} into {b}", "empty {a} into {b}", "pour from {a} into {b}", "tip {a} out into {b}",
         "pick up {a}, pour it out into {b} and put {it} back", "please fill {b} with what is in {a}",

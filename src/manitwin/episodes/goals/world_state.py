@@ -32,8 +32,16 @@ class Hole:
 
 
 @dataclass(frozen=True)
+class Tip:
+    """The end of a slender object that goes into a holder first: its place ``(3,)`` and direction ``(3,)``, object frame, m."""
+
+    position_m: np.ndarray
+    direction: np.ndarray
+
+
+@dataclass(frozen=True)
 class ObjectState:
-    """One object: its body, its pose ``(4, 4)`` now and at the beginning, whether it is at rest, its opening and its hole."""
+    """One object: its body, its pose ``(4, 4)`` now and at the beginning, whether it rests, its opening, hole and tip."""
 
     body: RigidBody
     object_to_world: np.ndarray
@@ -41,6 +49,7 @@ class ObjectState:
     at_rest: bool
     opening: Opening | None = None
     hole: Hole | None = None
+    tip: Tip | None = None
 
     @cached_property
     def points_m(self) -> np.ndarray:
@@ -79,6 +88,16 @@ class Peg:
 
 
 @dataclass(frozen=True)
+class Holder:
+    """A square bore: its rim's middle with Z out of it ``(4, 4)``, its half width and depth (m), the names of its boxes."""
+
+    rim_to_world: np.ndarray
+    half_m: float
+    depth_m: float
+    bodies: frozenset[str]
+
+
+@dataclass(frozen=True)
 class Granules:
     """Small spheres that stand for what is poured: their middles ``(N, 3)`` in the world and their radius, m."""
 
@@ -101,6 +120,7 @@ class WorldState:
     pegs: Mapping[str, Peg] = field(default_factory=dict)
     granules: Granules | None = None
     granules_at_start: Mapping[str, int] = field(default_factory=dict)
+    holders: Mapping[str, Holder] = field(default_factory=dict)
 
     def of(self, name: str) -> ObjectState:
         """Return an object's state; raises UsageError naming those that there are."""
@@ -113,6 +133,10 @@ class WorldState:
     def peg(self, name: str) -> Peg:
         """Return a peg; raises UsageError naming those that there are."""
         return self._named(self.pegs, name, "peg")
+
+    def holder(self, name: str) -> Holder:
+        """Return a holder; raises UsageError naming those that there are."""
+        return self._named(self.holders, name, "holder")
 
     def touch(self, first: str, second: str) -> bool:
         """Tell whether two bodies press on each other."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from manitwin.episodes.fixtures import Fixture
-from manitwin.episodes.goals.world_state import Hole
+from manitwin.episodes.goals.world_state import Hole, Tip
 from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprint_at
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, openings_of
@@ -88,3 +88,15 @@ def hole_of(frames: tuple[TwinFrame, ...]) -> Hole | None:
     if frame is None:
         return None
     return Hole(frame.frame_to_object[:3, 3], frame.frame_to_object[:3, 2], frame.size_m)
+
+
+def tip_of(frames: tuple[TwinFrame, ...], hulls: Sequence[np.ndarray]) -> Tip | None:
+    """Return the first tip of a slender thing, its direction that of the length, out of the tip; None: it has none."""
+    frame = next((frame for frame in frames if frame.kind == "tip"), None)
+    if frame is None:
+        return None
+    points = np.concatenate(hulls)
+    middle = (points.max(0) + points.min(0)) / 2
+    along = np.linalg.eigh(np.cov(points.T))[1][:, 2]
+    place = frame.frame_to_object[:3, 3]
+    return Tip(place, along if (place - middle) @ along >= 0 else -along)

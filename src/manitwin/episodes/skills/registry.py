@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from manitwin.episodes.skills.beside import SIDE_SKILLS
 from manitwin.episodes.skills.hang import Hang
+from manitwin.episodes.skills.insert import Insert
 from manitwin.episodes.skills.place_in import PlaceIn
 from manitwin.episodes.skills.place_on import PLACE_ON, STACK
 from manitwin.episodes.skills.pour import Pour
@@ -27,6 +28,7 @@ _SKILLS: tuple[Skill, ...] = (
     *SIDE_SKILLS,
     Upright(),
     Hang(),
+    Insert(),
     Press(),
     Strike(),
     Pour(),
