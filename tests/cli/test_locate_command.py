@@ -103,6 +103,17 @@ def test_which_twin_it_is_is_told_by_looks_and_decided_by_the_score(
     assert thing["tried"][1]["score"] < thing["least_score"] <= thing["tried"][0]["score"]
 
 
+def test_grasps_at_the_pose_add_up_and_a_cloud_has_none(files: Files) -> None:
+    code, said = run(files.box, *files.view, "--grasps", "--json")
+    told = json.loads(said)
+    check_keys(told, "locate")
+    grasps = told["grasps"]
+    assert code == 0 and grasps["verified"] == len(Twin(files.box).grasps())
+    assert grasps["verified"] == len(grasps["free"]) + grasps["obstructed"] + grasps["uncertain"]
+    done = CliRunner().invoke(app, ["locate", str(files.box), "--cloud", str(files.box / "grasps.parquet"), "--grasps"])
+    assert "does not show what is beside it" in str(done.exception)
+
+
 def without(words: tuple[str, ...], option: str) -> tuple[str, ...]:
     place = words.index(option)
     return words[:place] + words[place + 2 :]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,8 +15,10 @@ from manitwin.cli.documents import Json, print_document
 if TYPE_CHECKING:
     import numpy as np
 
+    from manitwin.scenes.locate.carried_grasps import CarriedGrasps
     from manitwin.scenes.locate.depth_view import DepthView
     from manitwin.scenes.locate.recognition import Thing
+    from manitwin.twin.loaded_twin import Twin
 
 
 def _file(help: str, remedy: str) -> Any:
@@ -52,6 +55,9 @@ def locate(
             help="Twins of a data set to try of a thing, the most alike.", callback=choices.count_of("--tried")
         ),
     ] = 5,
+    grasps: Annotated[
+        bool, typer.Option("--grasps", help="Also which verified grasps are free of all that is seen, the best first.")
+    ] = False,
     out: Annotated[Path | None, options.output_folder("A new folder for location.json and overlays.")] = None,
     seed: Annotated[int, typer.Option(help="The seed of what is sampled.", min=0, max=options.LARGEST_SEED)] = 0,
     json_: Json = False,
@@ -61,6 +67,10 @@ def locate(
 
     if cloud is not None and any(each is not None for each in (depth, camera, mask, rgb)):
         raise UsageError("--cloud: is a view by itself; leave out --depth, --camera, --mask and --rgb")
+    if cloud is not None and grasps:
+        raise UsageError(
+            "--grasps: a cloud of the thing alone does not show what is beside it; give --depth and --camera"
+        )
     needed = {"--depth": depth, "--camera": camera}
     if cloud is None and (missing := [name for name, each in needed.items() if each is None]):
         raise UsageError(f"{', '.join(missing)}: missing; give --depth and --camera, or --cloud")
@@ -73,13 +83,14 @@ def locate(
 
     one = Twin(source) if (source / RECORD).exists() else None
     view, masks = _view(depth, camera, mask, rgb, cloud, seed)
+    carried = _carrier(view, seed) if grasps else lambda thing, twin: None
     if one is not None:
         things = [where_is(view, masks, PoseModel.of_twin(one), seed=seed)]
-        document = location_document(things[0], one)
+        document = location_document(things[0], one, carried(things[0], one))
     else:
         twins = DatasetTwins(DatasetRoot(source), on_twin=_drawn)
         things = [which_twin(view, each, twins, tried=tried, seed=seed) for each in masks]
-        document = things_document(str(source), things, twins.twin)
+        document = things_document(str(source), things, twins.twin, carried)
     if out is not None:
         write_location(out, document, view, things)
     if json_:
@@ -87,6 +98,7 @@ def locate(
     else:
         for thing, told in zip(things, [document] if one is not None else document["things"], strict=True):
             _print(thing, told["name"] or told["twin_id"], one is None)
+            _print_grasps(told["grasps"])
     raise typer.Exit(0 if any(thing.location.status != "none" for thing in things) else 3)
 
 
@@ -110,6 +122,37 @@ def _view(
     if not told.any():
         raise UsageError(f"{mask}: is empty: it shows no pixel of a thing; give a mask of the thing to locate")
     return view, [told]
+
+
+def _carrier(view: DepthView, seed: int) -> Callable[[Thing, Twin], CarriedGrasps | None]:
+    """Return what carries a twin's grasps to where it was found in a view, whose table is looked for once."""
+    import numpy as np
+
+    from manitwin.errors import UsageError
+    from manitwin.scenes.locate.carried_grasps import carry_grasps
+    from manitwin.scenes.locate.depth_view import measured_noise_m
+    from manitwin.scenes.locate.proposals import table_plane
+
+    try:
+        plane = table_plane(view, np.random.default_rng(seed))
+    except UsageError as error:
+        raise UsageError(f"--grasps: {error}, for the hand is to keep clear of the table") from error
+    noise_m = measured_noise_m(view, np.ones(view.depth_m.shape, bool))
+    return lambda thing, twin: carry_grasps(thing, twin, view, plane, noise_m)
+
+
+def _print_grasps(told: dict[str, Any] | None) -> None:
+    if told is None:
+        return
+    left = f"{told['obstructed']} are obstructed, {told['uncertain']} not in every pose"
+    out_console.print(
+        f"  {len(told['free'])} of {told['verified']} verified grasps of {told['gripper']} are free; {left}"
+    )
+    for grasp in told["free"][:1]:
+        x, y, z = grasp["position_m"]
+        out_console.print(
+            f"  the best, {grasp['grasp_id']}: at {x:.4f} {y:.4f} {z:.4f} m, {grasp['width_m'] * 1e3:.0f} mm wide"
+        )
 
 
 def _print(thing: Thing, name: str, is_one_of_many: bool) -> None:

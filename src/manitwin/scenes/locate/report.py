@@ -11,6 +11,7 @@ import numpy as np
 from manitwin.formats.image_file import png_of
 from manitwin.formats.output_folder import new_folder
 from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.scenes.locate.carried_grasps import CarriedGrasps
 from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.estimate import AMBIGUOUS_MARGIN, LEAST_SCORE
 from manitwin.scenes.locate.overlay import overlay
@@ -23,8 +24,8 @@ FRAME = "camera: x right, y down, z ahead (OpenCV); metres; quaternions wxyz"
 LOCATION = "location.json"
 
 
-def location_document(thing: Thing, twin: Twin) -> dict[str, Any]:
-    """Return a location as JSON values: the answer, its poses, and what it was judged by."""
+def location_document(thing: Thing, twin: Twin, carried: CarriedGrasps | None = None) -> dict[str, Any]:
+    """Return a location as JSON values: the answer, its poses, what it was judged by, and the grasps that can be used there."""
     location, symmetries = thing.location, thing.model.symmetries
     return {
         "status": location.status,
@@ -52,16 +53,41 @@ def location_document(thing: Thing, twin: Twin) -> dict[str, Any]:
             "turns": sum(bool(np.linalg.det(motion) > 0) for motion in symmetries.motions),
             "axis": None if symmetries.axis is None else symmetries.axis.round(6).tolist(),
         },
+        "grasps": None if carried is None else _grasps(carried),
     }
 
 
-def things_document(dataset: str, things: Sequence[Thing], twins: Callable[[str], Twin]) -> dict[str, Any]:
-    """Return which twin of a data set each thing of a view is, and what was tried in its place."""
+def _grasps(carried: CarriedGrasps) -> dict[str, Any]:
+    return {
+        "gripper": carried.gripper,
+        "verified": carried.verified,
+        "obstructed": carried.obstructed,
+        "uncertain": carried.uncertain,
+        "free": [
+            {
+                "grasp_id": grasp.grasp_id,
+                "position_m": grasp.gripper_to_camera[:3, 3].round(6).tolist(),
+                "quaternion_wxyz": quaternion_wxyz(grasp.gripper_to_camera[:3, :3]).round(7).tolist(),
+                "width_m": round(grasp.width_m, 5),
+                "value": round(grasp.value, 4),
+            }
+            for grasp in carried.grasps
+        ],
+    }
+
+
+def things_document(
+    dataset: str,
+    things: Sequence[Thing],
+    twins: Callable[[str], Twin],
+    carried: Callable[[Thing, Twin], CarriedGrasps | None] = lambda thing, twin: None,
+) -> dict[str, Any]:
+    """Return which twin of a data set each thing of a view is, what was tried in its place, and the grasps of each."""
     return {
         "dataset": dataset,
         "things": [
             {
-                **location_document(thing, twins(thing.location.twin_id)),
+                **location_document(thing, twin := twins(thing.location.twin_id), carried(thing, twin)),
                 "tried": [
                     {
                         "twin_id": each.twin_id,

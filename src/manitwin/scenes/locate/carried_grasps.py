@@ -1,0 +1,135 @@
+"""A twin's verified grasps at the pose that it was found in, as far as what else is seen leaves room for the hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from manitwin.geometry.poses import inverse, rotation_angle_rad, transform_points
+from manitwin.robots.grippers.box import PlacedBox
+from manitwin.robots.grippers.gripper import load_gripper
+from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.scenes.locate.depth_view import DepthView, known_depth
+from manitwin.scenes.locate.proposals import Plane
+from manitwin.scenes.locate.recognition import Thing
+from manitwin.twin.loaded_twin import Grasps, Twin
+
+CLEARANCE_M = 0.004
+"""Between the hand and what is seen beside the thing, besides twice the noise."""
+OPEN_M = 0.02
+"""The hand is so much wider than what it goes around, on both sides together, where it can be."""
+APPROACH_M = (0.0, 0.03, 0.06, 0.1)
+"""Back along the approach: where the hand comes from is to be free as well."""
+ALIKE_M, ALIKE_RAD = 0.01, np.deg2rad(12)
+"""Of an ambiguous pose: a grasp counts that is so near to a verified one in each of the poses."""
+_AROUND_M = 0.35
+_MOST_POINTS = 6000
+_MOST_TURNS = 12
+_SIGNS = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
+
+
+@dataclass(frozen=True)
+class CarriedGrasp:
+    """A verified grasp in the camera's frame: ``gripper_to_camera (4, 4)``, m; ``value`` (0 to 1) is how good it is thought."""
+
+    grasp_id: str
+    gripper_to_camera: np.ndarray
+    width_m: float
+    value: float
+
+
+@dataclass(frozen=True)
+class CarriedGrasps:
+    """The grasps that can be used, the best first, and of how many verified ones: the others were not free, or not certain."""
+
+    gripper: str
+    verified: int
+    obstructed: int
+    uncertain: int
+    grasps: tuple[CarriedGrasp, ...]
+
+
+def carry_grasps(thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_m: float) -> CarriedGrasps | None:
+    """Return a twin's verified grasps at its best pose, free of the observed table and neighbours.
+
+    Where the pose is ambiguous, a grasp counts that is one of the twin's in every pose. The poses that a symmetry of the shape
+    makes are tried in turn, since any of them may be the true one. The hand is tested open, where it grasps and on the last
+    10 cm before, against what is seen beside the thing and against the plane where that is hidden; what is hidden
+    otherwise, it is not tested against. None where nothing was found, or the twin has no grasps of a parallel gripper.
+    """
+    location = thing.location
+    if not location.poses or twin.record.grasps is None:
+        return None
+    gripper = load_gripper(twin.record.grasps.gripper)
+    if not isinstance(gripper, ParallelGripper):
+        return None
+    grasps = twin.grasps()
+    usable = np.array([not retired for retired in grasps.columns["retired"]], bool)
+    poses = [pose.object_to_camera for pose in location.poses]
+    certain = usable & np.all([_known_in(grasps, usable, poses[0], other) for other in poses[1:]], axis=0)
+    turns = thing.model.same_poses[:: max(1, len(thing.model.same_poses) // _MOST_TURNS)]
+    obstacles = _seen_beside(view, thing.mask, poses[0][:3, 3])
+    clearance_m = CLEARANCE_M + 2 * noise_m
+    found: list[CarriedGrasp] = []
+    for place in np.flatnonzero(certain):
+        width_m = float(grasps.width_m[place])
+        boxes = gripper.boxes(min(gripper.opening_m, width_m + OPEN_M))
+        tried = (poses[0] @ turn @ grasps.gripper_to_object[place] for turn in turns)
+        at = next((each for each in tried if _is_free(each, boxes, obstacles, plane, clearance_m)), None)
+        if at is not None:
+            found.append(CarriedGrasp(grasps.columns["grasp_id"][place], at, width_m, _value(grasps, int(place))))
+    found.sort(key=lambda each: (-each.value, each.grasp_id))
+    return CarriedGrasps(
+        gripper.name,
+        int(usable.sum()),
+        int(certain.sum()) - len(found),
+        int(usable.sum() - certain.sum()),
+        tuple(found),
+    )
+
+
+def _known_in(grasps: Grasps, usable: np.ndarray, pose: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return which grasps at one pose are also near a verified one of the twin in another pose, ``(N,) bool``."""
+    known = grasps.gripper_to_object[usable]
+    if not len(known):
+        return np.zeros(len(grasps), bool)
+    there = (inverse(other) @ pose) @ grasps.gripper_to_object
+    tree = cKDTree(known[:, :3, 3])
+    return np.array(
+        [
+            any(rotation_angle_rad(known[k, :3, :3].T @ each[:3, :3]) < ALIKE_RAD for k in near)
+            for each, near in zip(there, tree.query_ball_point(there[:, :3, 3], ALIKE_M), strict=True)
+        ]
+    )
+
+
+def _seen_beside(view: DepthView, mask: np.ndarray, center: np.ndarray) -> np.ndarray:
+    """Return points ``(N, 3)`` of what is seen near the thing and is no part of it."""
+    points = view.points(np.flatnonzero(known_depth(view) & ~mask))
+    points = points[np.linalg.norm(points - center, axis=1) < _AROUND_M]
+    return points[:: max(1, len(points) // _MOST_POINTS)]
+
+
+def _is_free(
+    gripper_to_camera: np.ndarray, boxes: list[PlacedBox], obstacles: np.ndarray, plane: Plane, clearance_m: float
+) -> bool:
+    """Tell whether no obstacle point is in the hand's boxes, and none of these is in the table, on the whole approach."""
+    local = transform_points(inverse(gripper_to_camera), obstacles)
+    for box_to_gripper, half_m in boxes:
+        in_box = transform_points(inverse(box_to_gripper), local)
+        back = box_to_gripper[:3, :3].T @ np.array([0.0, 0.0, 1.0])
+        for step_m in APPROACH_M:
+            if (np.abs(in_box + step_m * back) < half_m + clearance_m).all(1).any():
+                return False
+        corners = transform_points(gripper_to_camera @ box_to_gripper, _SIGNS * half_m)
+        if plane.height_m(corners).min() < 0:
+            return False
+    return True
+
+
+def _value(grasps: Grasps, place: int) -> float:
+    """Return the posterior mean of the share of perturbed trials that held, where there were any, else the score."""
+    share, trials = (grasps.columns[name][place] for name in ("robustness", "robustness_trials"))
+    return float((share * trials + 1) / (trials + 2)) if trials else float(grasps.score[place])
