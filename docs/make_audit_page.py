@@ -41,7 +41,8 @@ status: 0 no errors, 1 errors, 2 wrong use.
 - `--fix` writes what follows from the asset's own words, each file whole, with the old one beside it as `<name>.orig`. It never
   moves an origin.
 - `--write-baseline FILE` notes what is found of each asset, and `--baseline FILE` leaves that out from then on: a project with
-  old findings fails for new ones alone. A finding is known by its asset's path from the baseline's folder and its rule.
+  old findings fails for new ones alone ([in continuous integration](audit_in_ci.md)). A
+  finding is known by its asset's path from the baseline's folder and its rule.
 - Of twenty assets and more it ends with what they amount to: by rule, what could not be read and why, and the worst ones.
 - `--format json` has the numbers behind every finding; `sarif` (2.1.0) is what code hosts show beside a change.
 

@@ -86,6 +86,7 @@ PAGES: dict[str, Arrangement] = {
     "docs/audit.md": Arrangement(
         exits={r"PATH\.\.\.": 1, "--fix": 1}
     ),  # the mug there is wrong: its collision shape fills it
+    "docs/audit_in_ci.md": Arrangement(blocks={"^repos:": "hooks", "^on: ": "workflow"}),
     "docs/backends.md": Arrangement(blocks={"entry-points": "entry_point"}),
     "docs/build.md": Arrangement(
         blocks={"^file,name,units": "manifest", "^file,name,group": "manifest", "^things: ": "account things"}

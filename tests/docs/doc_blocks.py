@@ -12,6 +12,7 @@ from importlib.metadata import EntryPoint
 from itertools import pairwise
 from pathlib import Path
 
+import yaml
 from doc_shell import Shell
 from PIL import Image
 
@@ -107,6 +108,27 @@ def _answer(text: str, folder: Path, command: str) -> None:
     assert fnmatchcase(json.dumps(said), json.dumps(documented).replace("[", "[[]").replace("...", "*"))
 
 
+def _hooks(text: str, folder: Path, _: str) -> None:
+    """A configuration of pre-commit: its local hooks are run on the folder."""
+    for repository in yaml.safe_load(text)["repos"]:
+        assert repository["repo"] == "local"
+        for hook in repository["hooks"]:
+            assert {"id", "name", "entry", "language"} <= hook.keys()
+            Shell(folder).run(hook["entry"])
+
+
+def _workflow(text: str, folder: Path, _: str) -> None:
+    """A workflow of GitHub: the steps of this program are run, and what is uploaded is there afterwards."""
+    steps = [step for job in yaml.safe_load(text)["jobs"].values() for step in job["steps"]]
+    own = [step["run"] for step in steps if step.get("run", "").startswith("manitwin")]
+    assert own
+    for command in own:
+        Shell(folder).run(command)
+    for step in steps:
+        if file := step.get("with", {}).get("sarif_file"):
+            assert json.loads((folder / file).read_bytes())["version"] == "2.1.0"
+
+
 READERS: dict[str, Callable[[str, Path, str], None]] = {
     "settings": _settings,
     "prior": _prior_of_a_category,
@@ -116,4 +138,6 @@ READERS: dict[str, Callable[[str, Path, str], None]] = {
     "manifest": _manifest,
     "account": _account,
     "answer": _answer,
+    "hooks": _hooks,
+    "workflow": _workflow,
 }

@@ -18,7 +18,7 @@ from doc_services import services
 from doc_shell import Shell
 
 PROGRAMS = {"sh", "python"}
-LANGUAGES = PROGRAMS | {"toml", "json", "text"}
+LANGUAGES = PROGRAMS | {"toml", "json", "text", "yaml"}
 SERVED = re.compile(r"--(vlm|generator|grasper|embedder)\b")
 NONE = Arrangement()
 
