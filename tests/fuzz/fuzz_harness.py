@@ -14,7 +14,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
@@ -79,44 +79,42 @@ class Run:
 
 def fuzz(target: Target, count: int, *, first: int = 0, shared: Path | None = None, cpu_s: float = CPU_SECONDS) -> Run:
     """Read ``count`` mutated files of a target from case ``first`` on; the same numbers make the same files."""
+    return fuzz_cases(target, range(first, first + count), shared=shared, cpu_s=cpu_s)
+
+
+def fuzz_cases(target: Target, cases: Sequence[int], *, shared: Path | None = None, cpu_s: float = CPU_SECONDS) -> Run:
+    """Read the mutated files of the given cases of a target, in their order."""
     run = Run(target.name)
     started = time.monotonic()
     with tempfile.TemporaryDirectory(prefix=f"fuzz-{target.name}-") as temporary:
         folder = Path(temporary)
         (folder / "samples").mkdir()
         target.make(folder / "samples")
-        case = first
-        while case < first + count:
-            upto = min(case + CASES_A_WORKER, first + count)
-            case = _work(run, target, folder, case, upto, shared, cpu_s)
+        left = list(cases)
+        while left:
+            some, rest = left[:CASES_A_WORKER], left[CASES_A_WORKER:]
+            left = _work(run, target, folder, some, shared, cpu_s) + rest
     run.seconds = time.monotonic() - started
     return run
 
 
-def _work(run: Run, target: Target, folder: Path, first: int, end: int, shared: Path | None, cpu_s: float) -> int:
-    """Let one process read cases until it ends or is ended; returns the case to go on with."""
+def _work(run: Run, target: Target, folder: Path, cases: list[int], shared: Path | None, cpu_s: float) -> list[int]:
+    """Let one process read cases until it ends or is ended; returns the cases that are left."""
     said = folder / "said"
-    job = {
-        "target": target.name,
-        "folder": str(folder),
-        "first": first,
-        "count": end - first,
-        "said": str(said),
-        "cpu_s": cpu_s,
-    }
+    job = {"target": target.name, "folder": str(folder), "cases": cases, "said": str(said), "cpu_s": cpu_s}
     under_way, status = _readers().do(
         {**job, "shared": None if shared is None else str(shared)}, partial(_note, run, target)
     )
     for left in folder.glob("cases-*"):
         shutil.rmtree(left)
     if under_way is None and status == 0:
-        return end
+        return []
     tail = said.read_bytes()[-4000:].decode(errors="replace")
     if under_way is None:
         raise AssertionError(f"{target.name}: the process ended with status {status} and no case under way:\n{tail}")
     run.outcomes["failed"] += 1
     run.failures.append(_ended(target, under_way, status, tail))
-    return under_way + 1
+    return cases[cases.index(under_way) + 1 :]
 
 
 class Readers:

@@ -7,6 +7,7 @@ import fuzz_datasets
 import fuzz_episodes
 import fuzz_images
 import fuzz_meshes
+import fuzz_scenes
 import fuzz_services
 import fuzz_texts
 import fuzz_twins
@@ -17,6 +18,7 @@ __all__ = [
     "fuzz_episodes",
     "fuzz_images",
     "fuzz_meshes",
+    "fuzz_scenes",
     "fuzz_services",
     "fuzz_texts",
     "fuzz_twins",

@@ -1,6 +1,6 @@
 """The processes that read mutated files: one that has imported all readers, and a child of it for each run of cases.
 
-Whoever starts it writes a job a line, ``{"target", "folder", "first", "count", "shared", "said", "cpu_s"}``, and reads what
+Whoever starts it writes a job a line, ``{"target", "folder", "cases", "shared", "said", "cpu_s"}``, and reads what
 becomes of it: the child's number, each case before and after it is read, so that it is known which case has ended the child, and
 how it ended. The child's address space may grow by 1.5 GB over what reading the samples takes, and a case may take
 ``cpu_s`` of processor time.
@@ -74,7 +74,7 @@ def work(job: dict[str, Any], reports: TextIO) -> None:
         reports.write(json.dumps({"case": -1, "failure": wrong}) + "\n")
         return
     limit_memory()
-    for case in range(job["first"], job["first"] + job["count"]):
+    for case in job["cases"]:
         reports.write(json.dumps({"case": case}) + "\n")
         reports.write(json.dumps({"case": case, **worker.run(case)}) + "\n")
 

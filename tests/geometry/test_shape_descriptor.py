@@ -74,6 +74,7 @@ def test_seed_decides_the_bytes() -> None:
     assert first.tobytes() == again.tobytes() != other.tobytes()
 
 
-def test_surface_without_area_is_refused() -> None:
-    with pytest.raises(ValueError, match="without area"):
-        shape_descriptor(trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]], process=False), seed=0)
+@pytest.mark.parametrize("scale", [0.0, 1e-200, 1e200])
+def test_surface_whose_area_is_zero_or_not_finite_is_refused(scale: float) -> None:
+    with pytest.raises(ValueError, match="has no shape"):
+        shape_descriptor(trimesh.Trimesh(scale * np.eye(3), [[0, 1, 2]], process=False), seed=0)

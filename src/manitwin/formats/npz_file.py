@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Sequence
@@ -24,6 +25,7 @@ _BROKEN = (
     RuntimeError,
     OSError,
     SyntaxError,
+    tokenize.TokenError,
 )
 
 

@@ -36,7 +36,7 @@ class OnnxTensor:
 
 @dataclass(frozen=True)
 class OnnxFile:
-    """``content`` is what the first output needs of a network, nodes in topological order; ``inputs`` leaves weights out."""
+    """``content`` is what one output needs of a network, nodes in topological order; ``inputs`` leaves weights out."""
 
     content: bytes
     inputs: tuple[OnnxTensor, ...]
@@ -52,17 +52,20 @@ def read_onnx(path: Path, refuse: Refusal, *, name: str | None = None) -> OnnxFi
     return parse_onnx(read_bytes(path, MAX_ONNX_BYTES, refuse, name=name), name or path.name, refuse)
 
 
-def parse_onnx(content: bytes, name: str, refuse: Refusal) -> OnnxFile:
-    """Take a network apart as far as is needed; ``name`` begins the line that is refused with."""
+def parse_onnx(content: bytes, name: str, refuse: Refusal, *, output: str | None = None) -> OnnxFile:
+    """Take a network apart as far as is needed; ``name`` begins the line that is refused with.
+
+    Of several outputs the one called ``output`` is kept, or the first where none is.
+    """
     called = printable_line(name, max_characters=200)
     try:
-        return _parsed(memoryview(content))
+        return _parsed(memoryview(content), output)
     except (_Broken, UnicodeDecodeError) as error:
         cause = str(error) if isinstance(error, _Broken) else "a name that is no text"
         raise refuse(f"{called}: no ONNX network that can be read ({cause}); {_MORE}") from error
 
 
-def _parsed(content: memoryview) -> OnnxFile:
+def _parsed(content: memoryview, wanted: str | None) -> OnnxFile:
     top = list(_fields(content))
     graphs = [(value, span) for number, kind, value, span in top if (number, kind) == (_MODEL_GRAPH, _BYTES)]
     if len(graphs) != 1:
@@ -70,6 +73,7 @@ def _parsed(content: memoryview) -> OnnxFile:
     graph, (begin, end) = graphs[0]
     nodes: list[tuple[list[str], list[str], memoryview]] = []
     others: list[memoryview] = []
+    told: list[memoryview] = []
     weights: set[str] = set()
     tensors: dict[int, list[OnnxTensor]] = {_GRAPH_INPUT: [], _GRAPH_OUTPUT: []}
     for number, kind, value, span in _fields(graph):
@@ -79,16 +83,20 @@ def _parsed(content: memoryview) -> OnnxFile:
             if len(nodes) > MAX_NODES:
                 raise _Broken(f"more than {MAX_NODES} nodes")
             continue
+        if number == _GRAPH_OUTPUT and kind == _BYTES:
+            told.append(whole)
+            tensors[_GRAPH_OUTPUT].append(_tensor(value))
+            continue
         others.append(whole)
         if number == _GRAPH_INITIALIZER and kind == _BYTES:
             weights.add(_weight(value))
         elif number in tensors and kind == _BYTES:
             tensors[number].append(_tensor(value))
-            if number == _GRAPH_OUTPUT and len(tensors[number]) > 1:
-                others.pop()
     if not nodes or not tensors[_GRAPH_OUTPUT]:
         raise _Broken("it has no nodes or no output")
-    body = [*_in_order(nodes, tensors[_GRAPH_OUTPUT][0].name), *others]
+    names = [tensor.name for tensor in tensors[_GRAPH_OUTPUT]]
+    kept = names.index(wanted) if wanted in names else 0
+    body = [*_in_order(nodes, names[kept]), *others, told[kept]]
     head = _varint_bytes(_MODEL_GRAPH << 3 | _BYTES) + _varint_bytes(sum(len(part) for part in body))
     parts: list[Any] = [content[:begin], head, *body, content[end:]]
     inputs = tuple(tensor for tensor in tensors[_GRAPH_INPUT] if tensor.name not in weights)

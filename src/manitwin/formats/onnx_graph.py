@@ -19,10 +19,12 @@ Attribute = float | int | list[int]
 class OnnxGraph:
     """A graph of named values: nodes in the order in which they run, and the weights that they take.
 
-    ``input_shape`` is that of its only input, ``input``.
+    ``input_shape`` is that of its only input, ``input_name``, of 32-bit floats or, ``whole``, of 64-bit integers.
     """
 
     input_shape: tuple[int, ...]
+    input_name: str = "input"
+    whole: bool = False
     _nodes: list[bytes] = field(default_factory=list)
     _weights: list[bytes] = field(default_factory=list)
 
@@ -45,13 +47,15 @@ class OnnxGraph:
         """Return the model, whose only output is a value of this shape."""
         graph = b"".join(_bytes(1, node) for node in self._nodes) + _text(2, "graph")
         graph += b"".join(_bytes(5, weight) for weight in self._weights)
-        graph += _bytes(11, _value("input", self.input_shape)) + _bytes(12, _value(output, shape))
+        graph += _bytes(11, _value(self.input_name, self.input_shape, _INT64 if self.whole else _FLOAT)) + _bytes(
+            12, _value(output, shape)
+        )
         return _number(1, IR_VERSION) + _bytes(7, graph) + _bytes(8, _number(2, OPSET))
 
 
-def _value(name: str, shape: tuple[int, ...]) -> bytes:
+def _value(name: str, shape: tuple[int, ...], element: int = _FLOAT) -> bytes:
     sides = b"".join(_bytes(1, _number(1, side)) for side in shape)
-    return _text(1, name) + _bytes(2, _bytes(1, _number(1, _FLOAT) + _bytes(2, sides)))
+    return _text(1, name) + _bytes(2, _bytes(1, _number(1, element) + _bytes(2, sides)))
 
 
 def _attribute(name: str, value: Attribute) -> bytes:
@@ -64,6 +68,7 @@ def _attribute(name: str, value: Attribute) -> bytes:
 
 def _varint(value: int) -> bytes:
     content = bytearray()
+    value &= (1 << 64) - 1  # a negative number is its two's complement
     while value > 0x7F:
         content.append(value & 0x7F | 0x80)
         value >>= 7

@@ -32,13 +32,15 @@ def shape_descriptor(mesh: trimesh.Trimesh, *, seed: int) -> ShapeDescriptor:
     """Describe a surface, without regard to scale, position, orientation, mirroring or tessellation.
 
     Deterministic for a seed; another seed changes ``values`` by sampling noise alone. Raises ValueError for a surface
-    without area.
+    whose area is zero or not finite.
     Source: Osada, Funkhouser, Chazelle, Dobkin 2002, "Shape distributions": D2, by 32,768 pairs of points uniform by area,
     and D1 about the centroid, by the same points. Both are scaled by the trace of the surface's covariance, which is exactly
     D1's mean square and half of D2's, and compared by quantiles, which need no bin width.
     """
-    if not mesh.area > 0:
-        raise ValueError("a surface without area has no shape")
+    with np.errstate(all="ignore"):
+        area = float(mesh.area)
+    if not 0 < area < np.inf:
+        raise ValueError(f"a surface of {area:g} m2 has no shape")
     centroid, covariance = surface_moments(mesh)
     rng = np.random.default_rng(seed)
     first, second = (sample_surface(mesh, _PAIRS, rng)[0] for _ in range(2))

@@ -30,6 +30,22 @@ def cast_camera(caster: RayCaster, camera: Camera) -> tuple[np.ndarray, np.ndarr
     return depth.reshape(shape), normals.reshape(*shape, 3), face.reshape(shape)
 
 
+def cast_pixels(caster: RayCaster, camera: Camera, pixels: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cast a ray through the centres of some pixels ``(N, 2)`` int (row, column).
+
+    Returns the points that are met in the object frame ``(N, 3)`` (of no meaning where nothing is), the lengths of the rays (m)
+    and face indices ``(N,)`` (-1 where nothing is hit).
+    """
+    across = pixels[:, 1] + 0.5 - camera.width_px / 2
+    down = pixels[:, 0] + 0.5 - camera.height_px / 2
+    directions = np.stack([across / camera.focal_px, -down / camera.focal_px, -np.ones(len(pixels))], -1)
+    directions = directions @ camera.camera_to_object[:3, :3].T
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    origins = np.broadcast_to(camera.position, directions.shape)
+    length_m, faces = caster.first_hits(origins, directions)
+    return origins + directions * np.where(faces >= 0, length_m, 0.0)[:, None], length_m, faces
+
+
 def silhouette(caster: RayCaster, camera: Camera) -> np.ndarray:
     """Return where the object is in a picture, ``(H, W) bool``, to four pixels: enough to keep numbers off it."""
     _, _, face = cast_camera(caster, camera.resized(camera.width_px // 4, camera.height_px // 4))

@@ -5,6 +5,8 @@ DATASET/
   ledger.sqlite               the run's ledger (of a URL: a copy, the ledger itself is local)
   twins/<2 hex>/<twin_id>/    finished twins, accepted and rejected
   index/                      Parquet tables
+  reviews.sqlite              what people have said of twins
+  amendments/<2 hex>/<twin_id>.json   what they have put right
   .work/<twin_id>/<stage>/<key>/   results of stages
 """
 

@@ -65,7 +65,10 @@ class FunctionalFrame(Record):
 
 
 class FunctionalPoint(Record):
-    """A point with a specific function; ``frame`` is None where geometry does not tell it reliably."""
+    """A point with a specific function; ``frame`` is None where geometry does not tell it reliably.
+
+    ``source``: human:<annotator> where a person has moved it, else None: it is the annotator's of the provenance.
+    """
 
     id: str
     candidate: int
@@ -76,6 +79,7 @@ class FunctionalPoint(Record):
     confidence: Unit
     rationale: str
     frame: FunctionalFrame | None = None
+    source: str | None = None
 
 
 class GraspPoint(Record):
@@ -83,6 +87,7 @@ class GraspPoint(Record):
 
     ``verified`` counts the first gripper's grasps that held and touch this point's part within the radius of
     association; None: not counted. ``shortfall`` says why they are fewer than were asked for; empty where they are not.
+    ``source`` as that of a functional point.
     """
 
     id: str
@@ -96,6 +101,7 @@ class GraspPoint(Record):
     label: str | None = None
     verified: int | None = Field(default=None, ge=0)
     shortfall: str = ""
+    source: str | None = None
 
 
 class Points(Record):

@@ -87,12 +87,13 @@ class StageProvenance(Record):
 
 
 class Provenance(Record):
-    """The version, configuration, seed and stages that made the twin."""
+    """The version, configuration, seed and stages that made the twin, and the digest of what people have put right of it."""
 
     manitwin_version: str
     config_sha256: str
     seed: int
     stages: dict[str, StageProvenance]
+    amendments_sha256: str | None = None
 
     @property
     def rehearsed(self) -> tuple[str, ...]:

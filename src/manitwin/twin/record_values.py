@@ -54,8 +54,8 @@ class Record(BaseModel):
 class Estimate(Record):
     """A number with its interval and who said so.
 
-    ``source``: measured | user | vlm:<model> | prior:<category> | density*volume | imported:<format> | default. What was
-    imported is another tool's word: it is held against the same plausibility as an estimate.
+    ``source``: measured | user | human:<annotator> | vlm:<model> | prior:<category> | density*volume | imported:<format> |
+    default. What was imported is another tool's word: it is held against the same plausibility as an estimate.
     """
 
     value: Finite

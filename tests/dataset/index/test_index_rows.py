@@ -2,9 +2,11 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+import trimesh
 
 from manitwin.config import BuildConfig
 from manitwin.dataset.index.rows import rows_of
@@ -135,6 +137,14 @@ def test_missing_or_broken_file_is_named(tmp_path: Path, name: str) -> None:
         rows_of(folder)
     (folder / name).unlink()
     with pytest.raises(TwinError, match=name):
+        rows_of(folder)
+
+
+def test_mesh_without_area_is_an_error_that_names_its_file(tmp_path: Path) -> None:
+    folder = tmp_path / twin_name(write_accepted(tmp_path, 1))
+    flat = trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False)
+    (folder / "visual.glb").write_bytes(trimesh.Scene(flat).export(file_type="glb"))
+    with pytest.raises(TwinError, match=r"visual\.glb: a surface of 0 m2"):
         rows_of(folder)
 
 

@@ -182,12 +182,14 @@ def _break(tree: dict[str, Any], how: str) -> None:
         tree["bufferViews"][0]["byteStride"] = -4
     elif how == "matrix":
         tree["nodes"][0]["matrix"] = [1, 2, 3]
+    elif how == "huge scale":
+        tree["nodes"][0]["scale"] = [10**400, 1, 1]
 
 
 @pytest.mark.parametrize(
     "how",
     ["cycle", "absurd count", "short view", "short buffer", "index out of range", "draco", "version", "outside buffer",
-     "remote buffer", "negative stride", "matrix"],
+     "remote buffer", "negative stride", "matrix", "huge scale"],
 )  # fmt: skip
 def test_hostile_documents_are_unreadable_in_one_line(tmp_path: Path, how: str) -> None:
     folder = tmp_path / "inputs"

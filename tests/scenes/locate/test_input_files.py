@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +53,7 @@ def test_cameras_of_others_are_read(tmp_path: Path, changed: dict[str, Any], uni
         ({"fx": -1}, "fx is -1"),
         ({"width": None}, "width is missing"),
         ({"K": [1, 2, 3]}, "3 x 3"),
+        ({"K": [10**400, *range(8)]}, "3 x 3"),
         ({"K": np.eye(3).tolist()[::-1]}, "pinhole"),
         ({"pixel_centers_at": 1}, "0 (OpenCV"),
     ],
@@ -87,11 +90,20 @@ def test_clouds_are_read_from_ply_and_npz(tmp_path: Path) -> None:
         assert np.abs(np.abs(seen[:, :2]).max(0) - 0.05).max() < 0.003
 
 
+def zipped(array: bytes) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("points.npy", array)
+    return stream.getvalue()
+
+
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
         ("c.npz", {"other": np.zeros((100, 3))}, "no array points"),
         ("c.npz", {"points": np.zeros((100, 3))}, "behind the camera"),
+        ("c.npz", {"points": np.tile((1.0, 1.0, 1e-300), (100, 1))}, "beside the camera"),
+        ("c.npz", zipped(b"\x93NUMPY\x01\x00\x04\x00((  "), "no .npz that can be read"),
         ("c.npz", {"points": np.ones((100, 2))}, r"\(N, 3\)"),
         ("c.npz", {"points": np.ones((9, 3))}, "9 points"),
         ("c.npz", {"points": np.array([{}] * 100)}, "no plain numbers"),

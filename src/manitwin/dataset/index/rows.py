@@ -156,7 +156,10 @@ def _grasp_summary(grasps: GraspSummary) -> _Row:
 
 
 def _descriptor(path: Path) -> ShapeDescriptor:
-    return shape_descriptor(surface(path), seed=_SEED)
+    try:
+        return shape_descriptor(surface(path), seed=_SEED)
+    except ValueError as error:
+        raise TwinError(f"{path}: {error}; {REMEDY}") from error
 
 
 def surface(path: Path) -> trimesh.Trimesh:

@@ -139,7 +139,7 @@ def _local_matrix(node: dict[str, Any], source: MeshSource) -> np.ndarray:
         matrix[:3, :3] = rotation * np.asarray(node.get("scale", (1, 1, 1)), dtype=np.float64).reshape(3)
         matrix[:3, 3] = np.asarray(node.get("translation", (0, 0, 0)), dtype=np.float64).reshape(3)
         return matrix
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise source.unreadable("a node's transform is broken", "export it again") from error
 
 

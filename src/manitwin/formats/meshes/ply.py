@@ -165,7 +165,8 @@ def _stacked(columns: Columns, names: tuple[str, ...]) -> np.ndarray | None:
     found = [columns.get(name) for name in names]
     if any(not isinstance(column, np.ndarray) for column in found):
         return None
-    return np.stack([np.asarray(column, dtype=np.float64) for column in found], axis=1)
+    with np.errstate(invalid="ignore"):  # a signalling NaN of 32 bits becomes a quiet one
+        return np.stack([np.asarray(column, dtype=np.float64) for column in found], axis=1)
 
 
 def _colors(columns: Columns) -> np.ndarray | None:

@@ -36,6 +36,11 @@ _ALSO: tuple[tuple[str, tuple[Kind, ...]], ...] = (
 _UNSAID: tuple[Kind, ...] = ("surface",)
 _DOWN = re.compile(r"base\b|bottom|underside|\bfoot\b|sole", re.IGNORECASE)
 _POURS = re.compile(r"spout|pour", re.IGNORECASE)
+_AIMS = re.compile(r"nozzle|sprayer|outlet|muzzle|\blens\b|scan|\bbeam", re.IGNORECASE)
+_GRIPS = (r"trigger", r"grip", r"handle|\bbody\b")
+_CUTS = re.compile(r"(?<!putty )knife|cleaver|scalpel|cutting|\bblades?\b", re.IGNORECASE)
+_WIPES = re.compile(r"wip(e|ing)|scour|scrub|bristles", re.IGNORECASE)
+_WIPERS = re.compile(r"sponge|eraser|cloth\b|towel|duster|\bsoap\b(?! (dispenser|bottle|dish))", re.IGNORECASE)
 _WHOLE = re.compile(
     r"bristles|jaws?\b|wires|\bend\b|base\b|bottom|underside|\bfoot\b|sole|front|back\b|\btop\b|upper|surface|flap|\blid\b|\bcap\b",
     re.IGNORECASE,
@@ -89,3 +94,23 @@ def ahead_or_aside(label: str) -> bool:
 def pours(label: str) -> bool:
     """Tell whether the word for a tip means what is poured over."""
     return _POURS.search(label) is not None
+
+
+def aims(label: str) -> bool:
+    """Tell whether something comes out of a place of that name in one direction, or looks out of it."""
+    return _AIMS.search(label) is not None
+
+
+def grip_rank(label: str) -> int | None:
+    """Return how near a place of that name is to where a thing that is aimed is held: 0 a trigger; None: not at all."""
+    return next((rank for rank, words in enumerate(_GRIPS) if re.search(words, label, re.IGNORECASE)), None)
+
+
+def cuts(category: str, label: str) -> bool:
+    """Tell whether the edge of that name of such a thing is one that cuts: a knife's, not a ruler's or a spatula's."""
+    return _CUTS.search(f"{category} {label}") is not None
+
+
+def wipes(category: str, label: str) -> bool:
+    """Tell whether the face of that name of such a thing wipes: a sponge's any, of other things that which is called so."""
+    return _WIPERS.search(category) is not None or _WIPES.search(label) is not None

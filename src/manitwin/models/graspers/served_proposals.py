@@ -90,7 +90,7 @@ def ask_for_proposals(
             raise ValueError(f"scores of the shape {score.shape} for {len(poses)} poses, or not finite")
     except KeyError as error:
         raise BadReply(f"{server.what}: the answer has no field {error}") from error
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, OverflowError) as error:
         raise BadReply(f"{server.what}: the answer holds {said(error)}") from error
     best = np.argsort(-score, kind="stable")[: request.max_proposals]
     poses, score = poses[best], score[best].clip(0, 1)

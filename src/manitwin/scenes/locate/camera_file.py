@@ -54,7 +54,7 @@ def _intrinsics(told: dict[str, Any], path: Path) -> np.ndarray:
     if given is not None:
         try:
             matrix = np.array(given, float).reshape(3, 3)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise UsageError(f"{path}: K is no matrix of 3 x 3 numbers; {REMEDY}") from error
     else:
         principal = next((names for names in _PRINCIPAL if names[0] in told), _PRINCIPAL[0])

@@ -21,6 +21,7 @@ from manitwin.scenes.locate.depth_view import LEAST_PX, DepthView
 CLOUD_ARRAYS = ("points", "xyz_m", "xyz")
 MAX_CLOUD_BYTES = 256 << 20
 MOST_SIDE_PX = 480
+_MOST_TANGENT = float(np.tan(np.deg2rad(89.0)))
 _PITCH_OF_SPACING = 1.6
 """Pixels so much wider than points lie apart leave few holes in what a cloud shows."""
 _MARGIN = 0.5
@@ -71,7 +72,9 @@ def view_of_cloud(points_m: np.ndarray, name: str) -> tuple[DepthView, np.ndarra
         raise UsageError(
             f"{name}: has points behind the camera; give them in its frame: x right, y down, z ahead, metres"
         )
-    tangents = points_m[:, :2] / points_m[:, 2:]
+    tangents = points_m[:, :2] / np.maximum(points_m[:, 2:], np.finfo(float).tiny)
+    if np.abs(tangents).max() > _MOST_TANGENT:
+        raise UsageError(f"{name}: has points beside the camera, farther than 89 degrees off its axis; take them out")
     low, high = tangents.min(0), tangents.max(0)
     spacing = float(np.median(cKDTree(tangents).query(tangents, k=2)[0][:, 1]))
     pitch = max(_PITCH_OF_SPACING * spacing, float((high - low).max()) / MOST_SIDE_PX, 1e-6)
