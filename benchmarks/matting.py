@@ -26,6 +26,7 @@ from composites import Composite, Part, composite
 from scipy.stats import spearmanr
 
 from manitwin.config import MattingConfig
+from manitwin.dataset.evaluation.annotation_scores import wilson_interval
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
@@ -77,9 +78,13 @@ def report(judged: list[Judged]) -> None:
     right = [each for each in accepted if each.kind == "single" and each.iou > RIGHT_IOU]
     whole = [each for each in accepted if each.kind == "single"]
     print(f"{len(judged)} composites, {len(single)} of one whole thing")
-    print(f"accepted of those: {len(whole)} = {share(len(whole), len(single))}")
-    print(f"of these with IoU > {RIGHT_IOU}: {len(right)} = {share(len(right), len(whole))}")
-    print(f"of them above 0.90: {share(sum(each.iou > 0.9 for each in whole), len(whole))}")
+    found = sum(each.iou > RIGHT_IOU for each in single)
+    print(f"accepted of those: {len(whole)} = {with_interval(len(whole), len(single))}")
+    print(f"of these with IoU > {RIGHT_IOU}: {len(right)} = {with_interval(len(right), len(whole))}")
+    print(
+        f"masks of one whole thing with IoU > {RIGHT_IOU}, accepted or not: {found} = {with_interval(found, len(single))}"
+    )
+    print(f"of the accepted above 0.90: {share(sum(each.iou > 0.9 for each in whole), len(whole))}")
     for kind in ("cut", "several"):
         some = [each for each in judged if each.kind == kind]
         print(f"{kind}: {len(some)}, wrongly accepted {sum(each.accepted for each in some)}")
@@ -96,6 +101,12 @@ def report(judged: list[Judged]) -> None:
         taken = [each for each in some if each.accepted]
         good = sum(each.iou > RIGHT_IOU for each in taken)
         print(f"  {name:<12} {len(some):>4}: accepted {share(len(taken), len(some)):>5}, right {good} of {len(taken)}")
+
+
+def with_interval(part: int, whole: int) -> str:
+    """Return a share in per cent with its 95 % interval."""
+    low, high = wilson_interval(part, whole)
+    return f"{share(part, whole)} ({100 * low:.0f} to {100 * high:.0f})"
 
 
 def share(part: int, whole: int) -> str:

@@ -174,6 +174,7 @@ def _check_same_geometry(first: Lifted, second: Lifted) -> None:
     assert volumes[0] == pytest.approx(volumes[1], rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.shared_data
 def test_turned_photo_gives_the_geometry_of_its_original(shared_data: Path) -> None:
     turned, original = shared_data / "bad" / "exif_rotated.jpg", shared_data / "photos" / "claw_hammer.jpg"

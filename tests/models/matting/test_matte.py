@@ -11,6 +11,7 @@ import pytest
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
+from manitwin.models.matting.matte import study_photo
 
 SIZE = (300, 400)
 
@@ -53,6 +54,31 @@ def test_soft_shadow_is_not_part_of_the_object() -> None:
     matte = matte_photo(_photo(scene), "x.png")
     assert _overlap(matte.rgba, truth) > 0.95
     assert "a cast shadow was left out" in matte.findings
+
+
+@pytest.mark.parametrize("light", [1.1, 0.8], ids=["paler than the ground", "dimmer than the ground"])
+def test_cap_of_the_ground_s_colour_with_an_outline_in_focus_is_no_shadow(light: float) -> None:
+    scene, body = _scene(), _blob((200, 190), (75, 60))
+    cap = np.zeros(SIZE, bool)
+    cap[90:150, 155:245] = True
+    scene[cap] *= light
+    scene[body] = (200, 90, 20)
+    study = study_photo(_photo(scene))
+    matted, truth = study.alpha > 127, cap | body
+    assert (matted & truth).sum() / (matted | truth).sum() > 0.95
+    assert (
+        study.confidence > 0.9
+    )  # also where colours alone do not know of it: it has all edges in focus for its outline
+
+
+def test_grey_body_that_fills_the_frame_is_no_gap() -> None:
+    """A smooth surface explains it as well as the ground, and nothing but its own edge is around it."""
+    scene = np.full((*SIZE, 3), 214.0) + np.random.default_rng(0).normal(0, 1.0, (*SIZE, 3))
+    scene[12:-12, 14:-14] = np.linspace(128, 112, SIZE[0] - 24)[:, None, None]
+    found = study_photo(_photo(scene)).alpha > 127
+    truth = np.zeros(SIZE, bool)
+    truth[12:-12, 14:-14] = True
+    assert (found & truth).sum() / (found | truth).sum() > 0.95
 
 
 def test_hole_of_a_ring_stays_a_hole() -> None:

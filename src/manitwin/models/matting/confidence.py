@@ -28,9 +28,10 @@ class MatteScores:
     sharp it is against the object's own strong edges; ``separable`` how well the colours just inside and
     just outside the outline differ from the background's (Youden's J); ``complete`` nothing else stands out of the
     background; ``uncut`` how little of it the image border cuts; ``stable``
-    agreement of two independent opinions; ``whole`` little lies outside the largest connected part;
-    ``plain`` how uniform the background is; ``outermost`` share of the outline with no edge beyond it, in what passes for
-    shade, that is nearly as sharp; ``sharply_bounded`` how little of it is as soft as a shadow's edge with shade inside;
+    agreement of two independent opinions, or how well the mask explains every edge in focus; ``whole`` little lies outside the
+    largest connected part; ``plain`` how uniform the background is; ``outermost`` share of the outline with no edge beyond it,
+    in what passes for shade, that is nearly as sharp; ``sharply_bounded`` how little of it is as soft as a shadow's edge with
+    shade inside;
     ``unshaded`` how little along it has the ground's own tint, dimmed, where the rest has other colours;
     ``solid`` how little of it, enclosed by the rest, has the ground's own tint: a hole may be filled;
     ``thick`` how small its outline is against its area: a third of a pixel off all around is 5 % of a thin thing.
@@ -89,13 +90,16 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0) -> MatteScores:
     _, _, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
     areas = stats[1:, cv2.CC_STAT_AREA]
     strips = shade_strips(background, mask, segmentation.gradient)
+    outlined, beyond = _in_focus(segmentation, outline)
+    # two opinions differ, and one has all edges in focus for its outline and leaves none beside it
+    settled = _ramp(outlined, 0.92, 0.99) * _ramp(-beyond, -0.3, -0.05)
     return MatteScores(
         on_edges=_ramp(on_edges, 0.4, 0.9),
         crisp=_ramp(float(np.median(sharpest[free])) / typical if free.any() else 0.0, 0.15, 0.5),
         separable=_ramp(hit - false, 0.1, 0.7),
         complete=_ramp(1 - _left_over(segmentation) / mask.sum(), 0.3, 0.9),
         uncut=_ramp(-float((mask & border).sum()) / 2 / _longest(mask), -0.06, -0.01),
-        stable=_ramp(segmentation.agreement, 0.6, 0.95),
+        stable=max(_ramp(segmentation.agreement, 0.6, 0.95), settled),
         whole=_ramp(float(areas.max() / areas.sum()), 0.88, 1.0),
         plain=_ramp(-background.noise_lab - 20 * background.unexplained, -12, -3),
         outermost=_ramp(-_overshadowed(segmentation, outline), -0.25, -0.05),
@@ -163,6 +167,13 @@ def _softly_bounded(segmentation: Segmentation, outline: np.ndarray) -> float:
     limit_px = max(PENUMBRA_PX, WIDER * float(np.percentile(width_px[at], 25)))
     soft = (width_px > limit_px) & segmentation.background.shade[nearest[0], nearest[1]]
     return float(soft[at].mean())
+
+
+def _in_focus(segmentation: Segmentation, outline: np.ndarray) -> tuple[float, float]:
+    """Return the share of the outline on narrow edges, and how many of those lie beside the mask, as a share of the outline."""
+    mask, narrow = segmentation.mask, segmentation.narrow
+    beside = dilated(mask, round(0.1 * max(mask.shape))) & ~dilated(mask, 6)
+    return float(dilated(narrow, 3)[outline].mean()), float((narrow & beside).sum() / outline.sum())
 
 
 def _left_over(segmentation: Segmentation) -> float:

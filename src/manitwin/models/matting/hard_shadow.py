@@ -19,6 +19,9 @@ BOUNCE = 0.35  # of the object's tint: as much of its own colour it throws into 
 LEAST_ATTACHED, MOST_ATTACHED = 0.35, 0.65  # share of the rim that lies on the object: half, for a strip beside it
 STRONGER = 1.1  # the object's edge against the shadow's edge towards the light
 PENUMBRA_PX = 1.5  # a perfect edge is 1.05 wide under the gradient's blur, and a light of some extent widens a shadow's
+ALL_NARROW = (
+    0.9  # of the edge towards the light: near its foot a shadow is as sharp as a thing, a thing is so all along
+)
 LEAST_PIXELS = 5e-5  # of the picture: smaller strips than this are left to the graph cut
 STEEPNESS = 5.0  # an edge as strong as ``edge`` costs exp(-5) of what flat ground costs
 FLAT_COST = 10_000  # capacities are whole numbers
@@ -26,18 +29,22 @@ FLAT_COST = 10_000  # capacities are whole numbers
 
 @dataclass(frozen=True)
 class _Evidence:
-    """Measures of a region: shares, edges in L*a*b* per pixel, and the width of the edge towards the light in pixels."""
+    """Measures of a region: shares, edges in L*a*b* per pixel, and the width of the edge towards the light in pixels.
+
+    ``narrow`` is the share of that edge that is as narrow as the photo's own edges.
+    """
 
     attached: float
     object_edge: float
     light_edge: float
     light_width_px: float
+    narrow: float
     shaded: float
     falling: float
     loose: float
 
 
-def hard_shadow(background: Background, solid: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+def hard_shadow(background: Background, solid: np.ndarray, gradient: np.ndarray, narrow: np.ndarray) -> np.ndarray:
     """Return the parts (H, W) of ``solid`` that are a cast shadow with a visible edge.
 
     A minimum cut parts the outside from what has other colours than a shadow. What the outside gets of ``solid`` is shadow
@@ -61,7 +68,9 @@ def hard_shadow(background: Background, solid: np.ndarray, gradient: np.ndarray)
     for index in range(1, count):
         region = labels == index
         if region.sum() >= LEAST_PIXELS * solid.size:
-            evidence = _evidence(region, solid, reached, sharp, contrast, dim & (tint < TINT), falling)
+            evidence = _evidence(
+                region, solid, reached, sharp, contrast, dim & (tint < TINT), falling, dilated(narrow, 3)
+            )
             if _is_shadow(evidence):
                 found |= dilated(region, 1) & reached
     return found
@@ -77,6 +86,7 @@ def _is_shadow(evidence: _Evidence) -> bool:
         LEAST_ATTACHED < evidence.attached < MOST_ATTACHED
         and evidence.object_edge > STRONGER * evidence.light_edge
         and evidence.light_width_px > PENUMBRA_PX
+        and evidence.narrow < ALL_NARROW
         and evidence.shaded > 0.55
         and evidence.falling > 0.98
         and evidence.loose < 0.03
@@ -109,11 +119,12 @@ def _evidence(
     contrast: np.ndarray,
     shaded: np.ndarray,
     falling: np.ndarray,
+    near_narrow: np.ndarray,
 ) -> _Evidence:
     near = dilated(region, 3) & ~region
     to_object, to_light = near & solid & ~reached, near & ~solid
     if not to_object.any() or not to_light.any():
-        return _Evidence(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+        return _Evidence(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0)
     inner = eroded(region, 2)
     depth = float(np.median(contrast[inner if inner.any() else region]))
     light_edge = float(np.median(sharp[to_light]))
@@ -123,6 +134,7 @@ def _evidence(
         object_edge=float(np.percentile(sharp[to_object], 25)),
         light_edge=light_edge,
         light_width_px=float(edge_width_px(np.array(depth), np.array(light_edge))),
+        narrow=float(near_narrow[to_light].mean()),
         shaded=float(shaded[region].mean()),
         falling=float(falling[whole & solid].mean()),
         loose=_loose_share(solid, region),

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from manitwin.models.matting.background import Background, length, model_background
+from manitwin.models.matting.edge_scale import edge_scale, narrow_edges
 from manitwin.models.matting.hard_shadow import hard_shadow
 from manitwin.models.matting.outline import (
     dilated,
@@ -27,6 +28,7 @@ from manitwin.models.matting.shadow import cast_shadow, gaps
 SAME = 0.97  # agreement beyond which there is nothing to settle
 BLIND = 0.6  # share of the first opinion's object that colours must know of
 CUT_MARGIN_PX = 16
+MOSTLY_NARROW = 0.7  # of an outline: what is in focus all around is a thing's
 BALL_SHARE = 0.010  # of the longer side: gaps in an outline narrower than twice this do not let the flood in
 
 
@@ -34,7 +36,8 @@ BALL_SHARE = 0.010  # of the longer side: gaps in an outline narrower than twice
 class Segmentation:
     """A mask (H, W) at working resolution, and what it was made from; ``hard`` is the part of ``shadow`` with an edge.
 
-    ``agreement`` is how far the opinion by surfaces and flood agrees with what both opinions make together.
+    ``agreement`` is how far the opinion by surfaces and flood agrees with what both opinions make together; ``narrow`` are the
+    edges in focus (``narrow_edges``).
     """
 
     mask: np.ndarray
@@ -45,6 +48,7 @@ class Segmentation:
     hard: np.ndarray
     agreement: float
     colours: Bracket
+    narrow: np.ndarray
 
     @property
     def known_to_colours(self) -> float:
@@ -66,9 +70,10 @@ def segment(rgb: np.ndarray) -> Segmentation:
     plain = ~walls & (background.distance < 2.5)
     candidate &= ~flood(~candidate | plain, ~candidate, ball_px=2, regrow_px=4)
     candidate &= ~background.seam | opened(candidate, 2 * ball)  # what is left of a seam is a thin line
-    shadow = cast_shadow(background, candidate, gradient, threshold)
+    narrow = narrow_edges(gradient, edge_scale(background.lab), 1.6 * threshold, dilated(candidate, 2))
+    shadow = cast_shadow(background, candidate, gradient, threshold, narrow)
     seen_through = gaps(background, candidate & ~shadow, gradient, threshold)
-    hard = hard_shadow(background, candidate & ~shadow & ~seen_through, gradient)
+    hard = hard_shadow(background, candidate & ~shadow & ~seen_through, gradient, narrow)
     shadow |= hard
     solid = candidate & ~shadow & ~seen_through
     first = _graph_cut(background, solid, hard, core_px=6, doubt=3.0, seed=0)
@@ -78,17 +83,17 @@ def segment(rgb: np.ndarray) -> Segmentation:
         shadow |= strips
         first = without_specks(first & ~strips)
     colours = colour_opinion(rgb)
-    joined, agreement = reconciled(first, colours, shadow | seen_through)
+    joined, agreement = reconciled(first, colours, shadow | seen_through, narrow)
     second = (
         first
         if agreement > SAME
         else _graph_cut(background, joined, hard & ~joined, core_px=6, doubt=3.0, seed=0) & ~_away(joined)
     )
     mask = to_half_contrast(background, second)
-    return Segmentation(mask, background, gradient, threshold, shadow & ~mask, hard & ~mask, agreement, colours)
+    return Segmentation(mask, background, gradient, threshold, shadow & ~mask, hard & ~mask, agreement, colours, narrow)
 
 
-def reconciled(first: np.ndarray, colours: Bracket, shadow: np.ndarray) -> tuple[np.ndarray, float]:
+def reconciled(first: np.ndarray, colours: Bracket, shadow: np.ndarray, narrow: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the mask that two opinions make together, and how far they agree on it, in [0, 1].
 
     What has certainly other colours than the background belongs to it, what cannot have does not; between the two the first
@@ -103,21 +108,25 @@ def reconciled(first: np.ndarray, colours: Bracket, shadow: np.ndarray) -> tuple
         return first, 0.0
     added = opened(colours.certain & ~first, 1)
     removed = opened(first & ~colours.possible, 1)
-    empty = _open_to_outside(removed, first)
+    empty = _open_to_outside(removed, first, dilated(narrow, 3))
     joined = (first | (added & ~shadow)) & ~empty
     differs = opened((added & ~first) | removed, 1).sum() / max(int(joined.sum()), 1)
     return joined, float(np.clip(1 - differs, 0, 1))
 
 
-def _open_to_outside(regions: np.ndarray, solid: np.ndarray) -> np.ndarray:
-    """Return those ``regions`` of ``solid`` that reach its outline: a label of the background's colours lies within it."""
+def _open_to_outside(regions: np.ndarray, solid: np.ndarray, near_narrow: np.ndarray) -> np.ndarray:
+    """Return those ``regions`` of ``solid`` that reach its outline, and not along narrow edges there.
+
+    A label of the background's colours lies within a thing, and a cap of them has an outline in focus, as no shadow has.
+    """
     count, labels, stats, _ = cv2.connectedComponentsWithStats(regions.astype(np.uint8), connectivity=4)
     kept = np.zeros(regions.shape, bool)
     for index in range(1, count):
         left, top, width, height, _area = stats[index]
-        box = np.s_[max(0, top - 2) : top + height + 2, max(0, left - 2) : left + width + 2]
+        box = np.s_[max(0, top - 3) : top + height + 3, max(0, left - 3) : left + width + 3]
         part = labels[box] == index
-        if (dilated(part, 2) & ~solid[box]).any():
+        outer = dilated(part, 2) & ~solid[box]
+        if outer.any() and near_narrow[box][outer].mean() < MOSTLY_NARROW:
             kept[box] |= part
     return kept
 
