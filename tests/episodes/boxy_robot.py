@@ -77,7 +77,7 @@ def moving(robot: Robot, steps: int, objects: np.ndarray) -> Recording:
         target=0,
         joint_positions_rad=joints.astype(np.float32),
         joint_velocities_rad_s=zeros(joints.shape[1]),
-        gripper_opening_m=(0.04 + 0.03 * np.sin(5 * time[:, 0])).astype(np.float32),
+        hand=(0.04 + 0.03 * np.sin(5 * time)).astype(np.float32),
         tip_position_m=tips[:, :3, 3].astype(np.float32),
         tip_quaternion_wxyz=quaternion_wxyz(tips[:, :3, :3]).astype(np.float32),
         object_positions_m=np.tile(objects.astype(np.float32), (steps + 1, 1, 1)),
@@ -88,7 +88,7 @@ def moving(robot: Robot, steps: int, objects: np.ndarray) -> Recording:
         target_on_support=zeros().astype(bool),
         unplanned_contact=zeros().astype(bool),
         action_joint_positions_rad=joints[1:].astype(np.float32),
-        action_gripper_opening_m=zeros()[1:],
+        action_hand=zeros(1)[1:],
         action_tip_position_m=zeros(3)[1:],
         action_tip_quaternion_wxyz=zeros(4)[1:],
         phase=np.zeros(steps, np.uint8),
@@ -97,4 +97,7 @@ def moving(robot: Robot, steps: int, objects: np.ndarray) -> Recording:
 
 def tip_pose(robot: Robot, joint_positions_rad: np.ndarray) -> np.ndarray:
     """Return ``gripper_to_world (4, 4)`` of the grasp frame (+Z approach, X closing)."""
-    return link_poses(robot, joint_positions_rad, 0.0)[robot.tip_link] @ robot.gripper_to_tip
+    return (
+        link_poses(robot, joint_positions_rad, np.zeros(len(robot.hand_state_names)))[robot.tip_link]
+        @ robot.gripper_to_tip
+    )

@@ -46,7 +46,7 @@ def recording(seed: int, steps: int, arm: int = 7, things: int = 3) -> Recording
     real = {
         "joint_positions_rad": joints,
         "joint_velocities_rad_s": np.cos(time_s + phase),
-        "gripper_opening_m": opening,
+        "hand": opening[:, None],
         "tip_position_m": tip,
         "tip_quaternion_wxyz": turned.as_quat(scalar_first=True),
         "object_positions_m": positions,
@@ -55,7 +55,7 @@ def recording(seed: int, steps: int, arm: int = 7, things: int = 3) -> Recording
         "object_angular_velocities_rad_s": np.zeros_like(speeds),
         "finger_forces_n": rng.uniform(0, 50, (steps + 1, 2)),
         "action_joint_positions_rad": np.sin(time_s[:-1] + 1 / RATE_HZ + phase),
-        "action_gripper_opening_m": opening[1:],
+        "action_hand": opening[1:, None],
         "action_tip_position_m": tip[1:],
         "action_tip_quaternion_wxyz": ahead.as_quat(scalar_first=True)[:-1],
     }

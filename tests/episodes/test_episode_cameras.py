@@ -10,6 +10,7 @@ from manitwin.episodes.cameras import named_cameras
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.render.cameras import project
+from manitwin.robots.grippers.suction import SuctionGripper
 from manitwin.robots.load import load_robot, shipped_robots
 
 SIZE = 256
@@ -43,7 +44,8 @@ def test_wrist_camera_sees_the_fingertips_and_what_lies_between_them(name: str) 
     robot = load_robot(name)
     wrist = named_cameras(["wrist"], robot)[0]
     depth = robot.gripper.tip_depth_m
-    half = robot.gripper.opening_m / 2
+    gripper = robot.gripper
+    half = gripper.lip_radius_m if isinstance(gripper, SuctionGripper) else gripper.opening_m / 2
     points = np.array([[half, 0, depth], [-half, 0, depth], [0, 0, depth], [0, 0, depth + 0.05]])
     pixels, distance = project(points, wrist.placed(np.eye(4), SIZE, SIZE))
     assert inside(pixels, distance).all()

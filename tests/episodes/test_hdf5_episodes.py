@@ -34,6 +34,33 @@ def maniskill_loads(group: h5py.Group) -> dict[str, Any]:
     return {k: v[:] if isinstance(v, h5py.Dataset) else maniskill_loads(v) for k, v in group.items()}
 
 
+@pytest.mark.parametrize(
+    ("state", "told"),
+    [(("plunger",), ("vacuum",)), (tuple(f"f{i}" for i in range(16)), tuple(f"f{i}" for i in range(16)))],
+)
+def test_hands_that_are_no_jaws_come_back_too(tmp_path: Path, state: tuple[str, ...], told: tuple[str, ...]) -> None:
+    given, rng = episode(1), np.random.default_rng(4)
+    steps = given.recording.steps
+    hand, action = (
+        rng.uniform(-1, 1, shape).astype(np.float32) for shape in ((steps + 1, len(state)), (steps, len(told)))
+    )
+    other = replace(
+        given,
+        recording=replace(given.recording, hand=hand, action_hand=action),
+        robot=replace(given.robot, finger_joints=state, hand_state=state, hand_action=told),
+    )
+    write_episodes(tmp_path / "one.h5", [other])
+    with EpisodeFile(tmp_path / "one.h5") as file:
+        assert same(file[0], other)
+    with h5py.File(tmp_path / "one.h5") as file:
+        arm = len(given.robot.arm_joints)
+        assert np.array_equal(file["traj_0/obs/agent/qpos"][:, arm:], hand)
+        assert np.array_equal(file["traj_0/actions"][:, arm:], action)
+    wrong = replace(other, recording=replace(other.recording, action_hand=action[:, :0]))
+    with pytest.raises(EpisodesError, match=r"action_hand has the shape"):
+        write_episodes(tmp_path / "wrong.h5", [wrong])
+
+
 def test_episodes_come_back_as_they_were(tmp_path: Path) -> None:
     given = [
         episode(0),
@@ -175,7 +202,7 @@ def test_a_writer_that_fails_leaves_nothing_behind(tmp_path: Path) -> None:
         ({"phase": np.zeros(0, np.uint8)}, "0 steps"),
         ({"target": 3}, "target 3 of 3 objects"),
         ({"finger_forces_n": np.full((21, 2), np.nan, np.float32)}, "finger_forces_n is not finite"),
-        ({"action_gripper_opening_m": np.zeros(21, np.float32)}, "action_gripper_opening_m has the shape"),
+        ({"action_hand": np.zeros((21, 1), np.float32)}, "action_hand has the shape"),
     ],
 )
 def test_recordings_that_do_not_fit_together_are_refused(tmp_path: Path, change: dict[str, Any], said: str) -> None:

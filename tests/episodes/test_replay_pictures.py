@@ -50,7 +50,7 @@ def replay(robot: Robot) -> Iterator[EpisodeReplay]:
 
 def world(robot: Robot, recording: Recording, state: int, ids: dict[str, int]) -> tuple[trimesh.Trimesh, np.ndarray]:
     """Everything but the furniture at a state as one mesh, and the id of each face's thing."""
-    poses = link_poses(robot, recording.joint_positions_rad[state], float(recording.gripper_opening_m[state]))
+    poses = link_poses(robot, recording.joint_positions_rad[state], recording.hand[state])
     things = [
         (ids[f"boxy/{link}"], part, poses[link]) for link, parts in link_visuals(robot.urdf).items() for part in parts
     ]
@@ -112,7 +112,7 @@ def test_link_poses_are_pinocchios(name: str) -> None:
         for joint, value in (*zip(robot.arm_joints, joints, strict=True), *((f, 0.012) for f in robot.finger_joints)):
             q[model.joints[model.getJointId(joint)].idx_q] = value
         pin.framesForwardKinematics(model, data, q)
-        for link, pose in link_poses(robot, joints, 0.024).items():
+        for link, pose in link_poses(robot, joints, np.array([0.024])).items():
             expected = data.oMf[model.getFrameId(link, pin.FrameType.BODY)].homogeneous
             np.testing.assert_allclose(pose, expected, atol=1e-9)
 

@@ -38,7 +38,7 @@ from manitwin.scenes.settings import LayoutsConfig, LayoutSettings
 
 CANARY = "CANARY-51d0e7"
 LONGEST_S = 30
-SAMPLED = 24
+SAMPLED = 10
 SLOW = frozenset({"make_episodes", "draw_episodes"})
 """These make again what they find damaged, which takes seconds."""
 LAYOUTS = LayoutsConfig(seed=2, layout=LayoutSettings(objects=(2, 2), robot="panda"))

@@ -52,18 +52,25 @@ def test_stirring_goes_all_around_inside_and_moves_what_is_there() -> None:
 
 
 @pytest.mark.parametrize(
-    ("mass_kg", "way_m", "expected"), [(0.3, 0.08, None), (0.03, 0.08, "not_all_swept"), (0.3, 0.02, "not_all_swept")]
+    ("mass_kg", "way_m", "down", "expected"),
+    [
+        (0.3, 0.08, -1, None),
+        (0.03, 0.08, -1, "force_off"),
+        (0.3, 0.02, -1, "not_all_swept"),
+        (0.3, 0.08, 1, "wrong_face"),
+    ],
 )
 def test_a_brick_that_slides_wipes_by_its_weight_where_it_comes(
-    mass_kg: float, way_m: float, expected: str | None
+    mass_kg: float, way_m: float, down: int, expected: str | None
 ) -> None:
     start = transform(None, np.array([0.45, 0, 0.02]))
     asked = replace(problem(start), target=replace(problem().target, name="tool", object_to_world=start))
     asked = replace(asked, target=replace(asked.target, body=box([0.04, 0.06, 0.04], mass_kg, 0.3)))
+    face = transform(np.diag([1.0, down, down]))[None]
     patch, half_m = transform(None, np.array([0.49, 0, 0.0])), np.array([0.05, 0.025])
     with world_of(asked, panda()[0], EpisodeSettings(), 50.0) as world:
         points = np.concatenate(world.placed[0].body.hulls)
-        watch = WipeWatch("tool", "table", "patch", patch, half_m, points, lambda: world.object_to_world(0))
+        watch = WipeWatch("tool", "table", "patch", patch, half_m, points, lambda: world.object_to_world(0), face)
         for _ in range(48):
             world.bodies[0].set_linear_velocity(np.array([way_m / (48 * STEP_S), 0, 0], np.float32))
             world.step()
@@ -103,6 +110,16 @@ def test_a_cut_keeps_to_its_line(off_m: float, yaw_deg: float, roll_deg: float, 
         edge[:3, 3] = along_m * np.array([1, 0, 0]) + [0, off_m, 0]
         watch.look(READER, (), 0.0)
     assert failure("cut_motion", watch, "line") == expected
+
+
+def test_a_long_edge_that_is_only_set_down_has_not_been_drawn() -> None:
+    edge = transform(np.diag([1.0, -1, -1]), np.zeros(3))
+    watch = CutWatch("tool", "line", np.eye(4), 0.06, lambda: edge, 0.2)
+    for high_m in np.linspace(0.03, 0, 10):
+        edge[2, 3] = high_m
+        watch.look(READER, (), 0.0)
+    assert watch.events[0].values["share"] == 1
+    assert failure("cut_motion", watch, "line") == "not_drawn"
 
 
 def test_aiming_is_near_straight_and_lasts() -> None:

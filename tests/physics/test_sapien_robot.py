@@ -85,16 +85,28 @@ def test_grasp_frame_is_where_pinocchio_has_it(name: str):
             at = model.joints[model.getJointId(joint)].idx_q
             joints[at] = rng.uniform(model.lowerPositionLimit[at], model.upperPositionLimit[at])
             arm_rad.append(joints[at])
-        simulated.set_state(np.array(arm_rad), 0.02)
+        hand = robot.open_hand / 2
+        for joint, value in zip(robot.finger_joints, hand, strict=True):
+            joints[model.joints[model.getJointId(joint)].idx_q] = value
+        simulated.put(np.array(arm_rad), hand)
         pin.framesForwardKinematics(model, data, joints)
-        tip = data.oMf[model.getFrameId(robot.tip_link)].homogeneous
+        tip, finger = (
+            data.oMf[model.getFrameId(link)].homogeneous for link in (robot.tip_link, last_finger(simulated))
+        )
         assert np.allclose(simulated.tip_pose(), tip, atol=2e-5)
         assert np.allclose(simulated.gripper_pose(), tip @ robot.gripper_to_tip, atol=2e-5)
         assert np.allclose(simulated.joint_positions(), arm_rad, atol=1e-6)
-        assert np.isclose(simulated.opening_m(), 0.02, atol=1e-6)
+        assert np.allclose(simulated.hand_positions(), hand, atol=1e-6)
+        assert np.allclose(
+            simulated.links[last_finger(simulated)].entity_pose.to_transformation_matrix(), finger, atol=2e-5
+        )
 
 
-@pytest.mark.parametrize("name", shipped_robots())
+def last_finger(robot: SapienRobot) -> str:
+    return [name for name in robot.robot.finger_links if name in robot.links][-1]
+
+
+@pytest.mark.parametrize("name", [name for name in shipped_robots() if load_robot(name).has_jaws])
 def test_fingers_meet_a_box_in_the_middle_and_hold_it_through_a_swing(name: str):
     held = Held(load_robot(name), (0.03, 0.02, 0.02), 0.3)
     held.close()

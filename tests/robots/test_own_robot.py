@@ -108,7 +108,7 @@ def test_spoilt_urdf_is_refused_in_one_line(tmp_path: Path, change: tuple[str, s
         (('"turn", "lift"', '"lift", "turn"'), "on the way to panda_palm are turn, lift, roll"),
         (('base_link = "base"', 'base_link = "bas"'), "unknown link 'bas'; did you mean 'base'"),
         (('mount_link = "flange"', 'mount_link = "tool0"'), "unknown link 'tool0'"),
-        (('gripper = "panda"', 'gripper = "suction"'), "not a ParallelGripper"),
+        (('gripper = "panda"', 'gripper = "allegro"'), "not a ParallelGripper"),
         (('gripper = "panda"', 'gripper = "../hand.toml"'), "is not below"),
         (("[0.0, 0.5, 0.0]", "[0.0, 2.5, 0.0]"), "home_rad of lift is 2.5; its limits are -2 to 2"),
         (("[0.0, 0.5, 0.0]", "[0.0, 0.5]"), "home_rad wants 3 values"),
@@ -146,7 +146,9 @@ def test_a_missing_and_a_broken_mesh_are_named(tmp_path: Path):
 
 
 def test_unknown_robots_are_answered_with_the_known_ones():
-    with pytest.raises(UsageError, match=r"did you mean 'panda'.* Valid: panda, ur5_panda, ur5_robotiq, xarm7_panda"):
+    with pytest.raises(
+        UsageError, match=r"did you mean 'panda'.* Valid: panda, ur5_panda, ur5_robotiq, ur5_suction, xarm7_a"
+    ):
         load_robot("pandaa")
     with pytest.raises(UsageError, match=r"mine\.toml is not there"):
         load_robot("mine.toml")

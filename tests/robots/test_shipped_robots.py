@@ -8,12 +8,15 @@ import pinocchio as pin
 import pytest
 from lxml import etree
 
-from manitwin.geometry.poses import inverse, transform
+from manitwin.geometry.poses import inverse, transform, transform_points
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
+from manitwin.robots.grippers.suction import SuctionGripper
 from manitwin.robots.links import bodies_of_urdf, links_of_urdf, poses_at
 from manitwin.robots.load import load_robot, shipped_robots
 from manitwin.robots.robot import Robot
 
 FLANGES = {"panda": "panda_link8", "ur5_panda": "tool0", "ur5_robotiq": "tool0", "xarm7_panda": "link_eef"}
+JAWS = sorted(FLANGES)
 
 
 @pytest.fixture(params=shipped_robots())
@@ -52,7 +55,9 @@ def test_links_are_where_mujoco_has_them(robot: Robot):
                 assert np.allclose(data.body(name).xmat.reshape(3, 3), pose[:3, :3], atol=1e-6)
 
 
-def test_hand_points_out_of_the_flange_and_its_tips_are_at_the_grippers_depth(robot: Robot):
+@pytest.mark.parametrize("name", JAWS)
+def test_hand_points_out_of_the_flange_and_its_tips_are_at_the_grippers_depth(name: str):
+    robot = load_robot(name)
     links = links_of_urdf(robot.urdf)
     half_m = 0.01
     poses = poses_at(links, dict(zip(robot.finger_joints, (half_m, half_m), strict=True)))
@@ -67,6 +72,30 @@ def test_hand_points_out_of_the_flange_and_its_tips_are_at_the_grippers_depth(ro
         assert abs(pad[2, 3] - robot.gripper.tip_depth_m) < 0.001
         inner_m = sign * pad[0, 3] - np.abs(pad[0, :3]) @ half
         assert abs(inner_m - half_m) < 0.0005  # the pads' faces are as far apart as the joints say
+
+
+def test_a_cups_lip_lies_in_the_plane_of_its_file_and_is_as_wide():
+    robot = load_robot("ur5_suction")
+    assert isinstance(robot.gripper, SuctionGripper)
+    lip = next(link for link in links_of_urdf(robot.urdf) if link.name == robot.finger_links[0])
+    corners = np.concatenate([transform_points(shape.shape_to_link, shape.corners_m) for shape in lip.shapes])
+    assert corners[:, 2].max() == pytest.approx(robot.gripper.tip_depth_m)
+    assert np.linalg.norm(corners[:, :2], axis=1).max() == pytest.approx(robot.gripper.lip_radius_m)
+    assert lip.limits == (-robot.gripper.reach_m, robot.gripper.reach_m)
+    assert lip.joint_to_parent[:3, 0] == pytest.approx([0, 0, 1])  # the plunger runs along the approach
+
+
+def test_fingers_of_a_mounted_hand_are_where_its_gripper_has_them():
+    robot = load_robot("xarm7_allegro")
+    assert isinstance(robot.gripper, MultiFingerGripper)
+    joints = robot.gripper.postures[1].joints_at(np.array(0.03))
+    poses = poses_at(links_of_urdf(robot.urdf), dict(zip(robot.finger_joints, joints.tolist(), strict=True)))
+    to_grasp = inverse(poses[robot.tip_link] @ robot.gripper_to_tip)
+    for link, pose in zip(robot.gripper.links, robot.gripper.link_poses(joints), strict=True):
+        assert np.allclose(to_grasp @ poses[link.name], pose, atol=1e-9)
+    assert {robot.side_of(name) for name in robot.gripper.fingers[0]} == {0} == {robot.side_of(robot.hand_links[0])}
+    assert {robot.side_of(name) for links in robot.gripper.fingers[1:] for name in links} == {1}
+    assert robot.side_of("link7") is None
 
 
 def test_home_is_free_of_the_table_and_points_down(robot: Robot):

@@ -10,6 +10,7 @@ import numpy as np
 from manitwin.errors import UsageError, choose_from
 from manitwin.geometry.poses import transform
 from manitwin.render.cameras import Camera, look_at
+from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.robot import Robot
 
 FOV_Y_RAD = 0.75
@@ -71,7 +72,10 @@ def _standing(name: str, eye: np.ndarray, target: np.ndarray) -> NamedCamera:
 
 def _wrist(robot: Robot) -> NamedCamera:
     """Beside the palm, on the side where the fingers do not move, turned towards what they hold."""
-    palm = [box.placed() for box in robot.gripper.palm_boxes]
+    gripper = robot.gripper
+    palm = gripper.boxes(gripper.opening_m)
+    if isinstance(gripper, ParallelGripper):
+        palm = [box.placed() for box in gripper.palm_boxes]
     thick = max((float(pose[1, 3] + np.abs(pose[1, :3]) @ half) for pose, half in palm), default=0.0)
     eye = np.array([0.0, thick + WRIST_CLEARANCE_M, 0.45 * robot.gripper.tip_depth_m])
     target = np.array([0.0, 0.02, robot.gripper.tip_depth_m + 0.03])

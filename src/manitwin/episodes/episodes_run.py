@@ -23,6 +23,7 @@ from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.settings import TrajectoriesConfig
+from manitwin.episodes.skills.hands import check_hand, check_jaws
 from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.skills.skill import Skill
@@ -187,6 +188,9 @@ def make_episodes(
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
     skill = load_skill(config.skill)
     robot, source, root = load_robot(config.robot), EpisodesSource.of(place, twins), DatasetRoot(out)
+    check_hand(robot, skill)
+    if source.tasks is not None:
+        check_jaws(robot, "tasks")
     _check_out(root, source)
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
     if source.tasks is not None:

@@ -24,6 +24,7 @@ from manitwin.episodes.instructions import episode_instructions
 from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
+from manitwin.episodes.sealing_surface import with_surface
 from manitwin.episodes.setting import Setting, scene_setting, table_setting
 from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.skills.registry import load_skill
@@ -182,7 +183,7 @@ class EpisodesStage:
         assert twin.record.language is not None
         grasps = self._grasps(target.twin_id)
         problem = PickPlaceProblem(
-            target=target,
+            target=with_surface(target, twin, self._robot.gripper),
             goal_object_to_world=task.goal_object_to_world,
             grasps=tuple(each.grasp for each in shuffled(grasps.values(), np.random.default_rng([seed, 1]))),
             obstacles=tuple(each for place, each in enumerate(task.objects) if place != task.target),

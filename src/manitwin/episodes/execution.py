@@ -10,14 +10,14 @@ from sapien import physx
 
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.goals.world_state import Event
-from manitwin.episodes.planning.problem import Motion, Phase
+from manitwin.episodes.planning.problem import Grasp, Motion, Phase
 from manitwin.episodes.recorder import Recorder
 from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.geometry.poses import inverse
 from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
+from manitwin.physics.sapien.controls.control import control_of
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
-from manitwin.physics.trial_phases import SharedTarget
 from manitwin.robots.robot import Robot
 
 IN_HAND = frozenset(
@@ -26,8 +26,7 @@ IN_HAND = frozenset(
 STILL_ROWS, REST_ROWS = 5, 10  # 0.25 s and 0.5 s
 FRAME_S = 1 / 60  # between two looks at how hard the hand presses
 STEADY_FRAMES = 6  # the hand presses for so long before it moves on
-PRESSING_SHARE = 0.98  # of the closing force, at which the target has come as far as it goes
-OPENING_S = 0.1  # after the pads have parted, before the hand withdraws
+OPENING_S = 0.1  # after the hand has let go, before the hand withdraws
 # Nine touches of fingers and table lasted 12 to 25 ms: looking at the recorded rows alone, every 50 ms, missed 4 of them.
 WATCH_S = 0.0125
 TRACKING_S = 0.05  # after a motion, for the arm to come to rest
@@ -40,7 +39,7 @@ class Execution:
         self, world: RobotWorld, robot: Robot, closing: TrialSettings, tip_pose: Callable[[np.ndarray], np.ndarray]
     ):
         """Record the first state. Raises ValueError where the timestep does not fit the rate of recording."""
-        self._world, self._robot, self._closing, self._tip_pose = world, robot, closing, tip_pose
+        self._world, self._closing, self._tip_pose = world, closing, tip_pose
         self._steps_per_row = round(1 / RATE_HZ / closing.timestep_s)
         if abs(self._steps_per_row * closing.timestep_s * RATE_HZ - 1) > 1e-9:
             raise ValueError(
@@ -48,8 +47,7 @@ class Execution:
             )
         self._steps_per_look = max(1, int(WATCH_S / closing.timestep_s + 1e-9))
         self.commanded_rad = np.array(robot.home_rad, float)
-        self._opening_target_m = robot.gripper.opening_m
-        self._shared = SharedTarget(robot.gripper.opening_m, closing)
+        self._hand = control_of(world, closing)
         self._presses = False
         self.meant: MeantContacts = NONE_MEANT
         self.watches: list[EventWatch] = []
@@ -58,8 +56,8 @@ class Execution:
         self.unplanned: set[tuple[str, str]] = set()
         self.pressing: frozenset[frozenset[str]] = frozenset()
         self._unplanned_since_row = False
-        self.touches = world.contacts.touches(world.contacts.read())
-        self._recorder = Recorder(world, self.touches)
+        self.touches = self._hand.touches(world.contacts.touches(world.contacts.read()))
+        self._recorder = Recorder(world, self.touches, self._hand.state)
 
     @property
     def length_s(self) -> float:
@@ -75,14 +73,23 @@ class Execution:
         """What the ``watches`` have latched."""
         return tuple(event for watch in self.watches for event in watch.events)
 
-    def follow(self, motion: Motion, until: Callable[[], bool] | None = None) -> bool:
+    def follow(
+        self,
+        motion: Motion,
+        until: Callable[[], bool] | None = None,
+        adjusted: Callable[[int], tuple[np.ndarray, np.ndarray]] | None = None,
+    ) -> bool:
         """Move the arm along a motion and wait until it has come to rest.
 
         A guarded move ends as soon as ``until`` is true, which is asked after every step, and the arm stays where it then is
-        told to be. Returns whether it went all the way.
+        told to be. ``adjusted`` gives what is added to a row's positions and velocities ``(n,)`` as it is reached. Returns
+        whether it went all the way.
         """
         robot = self._world.robot
-        for positions, velocities in zip(motion.positions_rad, motion.velocities_rad_s, strict=True):
+        for row, (positions, velocities) in enumerate(zip(motion.positions_rad, motion.velocities_rad_s, strict=True)):
+            if adjusted is not None:
+                more_rad, faster_rad_s = adjusted(row)
+                positions, velocities = positions + more_rad, velocities + faster_rad_s
             # the drives pull to where the arm is to be in the middle of the step, or it would run ahead of its targets
             robot.set_targets(positions - velocities * (self._closing.timestep_s / 2), velocities)
             self.commanded_rad = positions
@@ -108,34 +115,32 @@ class Execution:
         for _ in range(steps):
             self._advance(phase)
 
+    def shape(self, grasp: Grasp | None) -> None:
+        """Shape the hand for a grasp; jaws and cups stay as they are."""
+        for _ in self._hand.shaping(None if grasp is None else grasp.joints_rad):
+            self.wait(Phase.REACH, self._closing.steps_per_frame)
+
     def close(self) -> None:
         """Close the hand until it presses; from then on it keeps pressing with the closing force, whatever gives way."""
         self._world.expect_load(True)
         self._presses, closing, steady = True, self._closing, 0
         for _ in range(round(closing.close_time_s / closing.frame_s)):
             self.wait(Phase.CLOSE, closing.steps_per_frame)
-            steady = steady + 1 if self._pressing_n() > PRESSING_SHARE * closing.force_n else 0
+            steady = steady + 1 if self._hand.presses else 0
             if steady > STEADY_FRAMES:
                 break
 
     def close_empty(self) -> None:
         """Close the hand on nothing, at the closing speed; it does not press."""
-        closing, opening_m = self._closing, self._opening_target_m
-        while opening_m > 0:
-            opening_m = max(0.0, opening_m - 2 * closing.close_speed_m_s * closing.frame_s)
-            self._tell_opening(opening_m)
-            self.wait(Phase.CLOSE, closing.steps_per_frame)
+        for _ in self._hand.closing_empty():
+            self.wait(Phase.CLOSE, self._closing.steps_per_frame)
         self.wait(Phase.CLOSE, self._steps(OPENING_S))
 
     def open(self) -> None:
-        """Open the hand at the closing speed."""
+        """Let go, at the closing speed."""
         self._presses = False
-        closing, full_m = self._closing, self._robot.gripper.opening_m
-        opening_m = max(self._opening_target_m, 0.0)
-        while opening_m < full_m:
-            opening_m = min(full_m, opening_m + 2 * closing.close_speed_m_s * closing.frame_s)
-            self._tell_opening(opening_m)
-            self.wait(Phase.OPEN, closing.steps_per_frame)
+        for _ in self._hand.opening():
+            self.wait(Phase.OPEN, self._closing.steps_per_frame)
         self.wait(Phase.OPEN, self._steps(OPENING_S))
         self._world.expect_load(False)
 
@@ -170,17 +175,9 @@ class Execution:
     def _steps(self, time_s: float) -> int:
         return round(time_s / self._closing.timestep_s)
 
-    def _tell_opening(self, opening_m: float) -> None:
-        self._opening_target_m = opening_m
-        self._world.robot.set_opening_target(opening_m)
-
-    def _pressing_n(self) -> float:
-        opening_m = self._world.robot.opening_m()
-        return (opening_m - self._opening_target_m) / 2 * self._closing.finger_stiffness_n_m
-
     def _advance(self, phase: Phase) -> None:
         if self._presses and self.steps % self._closing.steps_per_frame == 0:
-            self._tell_opening(2 * self._shared.move_on(self._world.robot.opening_m() / 2))
+            self._hand.squeeze()
         ends_row = (self.steps + 1) % self._steps_per_row == 0
         before = self._world.robot.joint_positions() if ends_row else None
         self._world.step()
@@ -192,6 +189,7 @@ class Execution:
                 self._record(phase, before, contacts)
 
     def _watch(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
+        self._hand.look(contacts)
         unplanned = self._world.contacts.unplanned(contacts, in_hand=phase in IN_HAND, meant=self.meant)
         for watch in self.watches:
             watch.look(self._world.contacts, contacts, self.length_s)
@@ -203,10 +201,11 @@ class Execution:
     ) -> None:
         """Add a row. Speeds are those of the last step: PhysX's are those at its end, where stiff drives have slowed down."""
         velocities = (self._world.robot.joint_positions() - joint_positions_before_rad) / self._closing.timestep_s
-        self.touches = self._world.contacts.touches(contacts)
+        self.touches = self._hand.touches(self._world.contacts.touches(contacts))
         self._recorder.add(
             self.commanded_rad,
-            self._opening_target_m,
+            self._hand.told,
+            self._hand.state,
             phase,
             velocities,
             self.touches,

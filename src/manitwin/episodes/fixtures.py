@@ -1,4 +1,4 @@
-"""Fixtures: what a skill needs beside twins: a peg on a stand, a block to strike, a panel with a button. Boxes that stay."""
+"""Fixtures: what a skill needs beside twins: a peg on a stand, a block to strike, a board, a holder. Boxes that stay."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Fixture:
     of a face, a button or a bore's rim with Z out of it. ``size_m`` is a peg's length, the half width of the others.
     """
 
-    kind: Literal["peg", "block", "panel", "holder"]
+    kind: Literal["peg", "block", "panel", "holder", "board"]
     name: str
     boxes: tuple[StaticBox, ...]
     frame_to_world: np.ndarray
@@ -96,6 +96,16 @@ def block(position_m: np.ndarray, yaw_rad: float, *, name: str = "block") -> Fix
     middle = upright @ transform(translation=np.array([0.0, 0.0, BLOCK_HALF_HEIGHT_M]))
     top = upright @ transform(translation=np.array([0.0, 0.0, 2 * BLOCK_HALF_HEIGHT_M]))
     return Fixture("block", name, (StaticBox(name, half_m, middle),), top, BLOCK_HALF_M)
+
+
+def board(position_m: np.ndarray, yaw_rad: float, half_m: np.ndarray, *, name: str = "board") -> Fixture:
+    """Return a level board on the table at ``position_m (3,)`` with half extents ``(3,)``; it works at its top's middle."""
+    upright = transform(Rotation.from_euler("z", yaw_rad).as_matrix(), np.asarray(position_m, float))
+    high_m = float(half_m[2])
+    box = StaticBox(name, np.asarray(half_m, float), upright @ transform(translation=np.array([0.0, 0, high_m])))
+    return Fixture(
+        "board", name, (box,), upright @ transform(translation=np.array([0.0, 0, 2 * high_m])), float(half_m[0])
+    )
 
 
 def panel(position_m: np.ndarray, yaw_rad: float, *, name: str = "button") -> Fixture:

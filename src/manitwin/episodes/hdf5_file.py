@@ -22,6 +22,7 @@ from manitwin.episodes.attempts import Attempt, attempt_from
 from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta
 from manitwin.episodes.stored_episode import (
     RecordedObject,
+    RecordedRobot,
     StoredEpisode,
     robot_from,
     to_json,
@@ -30,6 +31,7 @@ from manitwin.errors import EpisodesError
 from manitwin.formats.hdf5_file import Hdf5
 from manitwin.formats.json_file import parse_json_object
 from manitwin.formats.printable import printable_line
+from manitwin.robots.robot import OPENING
 from manitwin.twin.store import file_beside
 
 LIBVER = ("v110", "v110")
@@ -76,6 +78,8 @@ class _SaidRobot(_Said):
     upper_rad: list[FiniteFloat]
     velocity_limits_rad_s: list[FiniteFloat]
     max_opening_m: FiniteFloat
+    hand_state: list[str] = Field(default=[OPENING], min_length=1, max_length=64)
+    hand_action: list[str] = Field(default=[OPENING], min_length=1, max_length=64)
 
 
 class _SaidObject(_Said):
@@ -170,10 +174,10 @@ def _said(content: bytes | None, where: str) -> dict[str, Any]:
 
 def _write(group: h5py.Group, episode: StoredEpisode) -> None:
     recording = checked(episode)
-    steps, opening = recording.steps, recording.gripper_opening_m[:, None]
-    positions = np.hstack([recording.joint_positions_rad, opening / 2, opening / 2])
-    finger_speeds = np.append(np.diff(recording.gripper_opening_m) * np.float32(RATE_HZ / 2), np.float32(0))[:, None]
-    velocities = np.hstack([recording.joint_velocities_rad_s, finger_speeds, finger_speeds])
+    steps, hand = recording.steps, _hand_joints(recording.hand, episode.robot)
+    positions = np.hstack([recording.joint_positions_rad, hand])
+    speeds = np.append(np.diff(hand, axis=0) * np.float32(RATE_HZ), np.zeros((1, hand.shape[1]), np.float32), axis=0)
+    velocities = np.hstack([recording.joint_velocities_rad_s, speeds])
     base = np.zeros((steps + 1, 13), np.float32)
     base[:, 3] = 1
     ended = np.arange(steps) == steps - 1
@@ -188,7 +192,7 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
         "obs/agent/qvel": velocities,
         "obs/extra/tcp_pose": np.hstack([recording.tip_position_m, recording.tip_quaternion_wxyz]),
         "obs/extra/obj_pose": poses[:, target],
-        "actions": np.hstack([recording.action_joint_positions_rad, recording.action_gripper_opening_m[:, None]]),
+        "actions": np.hstack([recording.action_joint_positions_rad, recording.action_hand]),
         "terminated": ended,
         "truncated": np.zeros(steps, bool),
         "success": ended & episode.attempt.succeeded,
@@ -214,6 +218,11 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
         )
 
 
+def _hand_joints(hand: np.ndarray, robot: RecordedRobot) -> np.ndarray:
+    """Return the positions of the hand's joints ``(T + 1, J)``: of jaws, half of the opening each."""
+    return np.repeat(hand / 2, 2, axis=1) if robot.hand_state == (OPENING,) else hand
+
+
 def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> StoredEpisode:
     robot, objects = robot_from(said["robot"]), tuple(RecordedObject(**thing) for thing in said["objects"])
     arm = len(robot.arm_joints)
@@ -229,9 +238,11 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
     if len({len(states) for states in each}) != 1:
         raise EpisodesError(f"{where}: the states of its objects are not equally many; {_REMEDY}")
     states = np.stack(each, axis=1)
-    positions, velocities = array("obs/agent/qpos", arm + 2), array("obs/agent/qvel", arm + 2)
+    jaws = robot.hand_state == (OPENING,)
+    width = arm + (2 if jaws else len(robot.hand_state))
+    positions, velocities = array("obs/agent/qpos", width), array("obs/agent/qvel", width)
     tip, action_tip = array("obs/extra/tcp_pose", 7), array(f"{EXTRA}/action_tip_pose", 7)
-    actions = array("actions", arm + 1)
+    actions = array("actions", arm + len(robot.hand_action))
     extra = {name: array(f"{EXTRA}/{name}") for name in ("phase", "target_on_support", "unplanned_contact")}
     extra["finger_forces_n"] = array(f"{EXTRA}/finger_forces_n", 2)
     if has_granules(content, group):
@@ -245,7 +256,7 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
         target=said["target"],
         joint_positions_rad=positions[:, :arm],
         joint_velocities_rad_s=velocities[:, :arm],
-        gripper_opening_m=2 * positions[:, arm],
+        hand=2 * positions[:, arm : arm + 1] if jaws else positions[:, arm:],
         tip_position_m=tip[:, :3],
         tip_quaternion_wxyz=tip[:, 3:],
         object_positions_m=states[..., :3],
@@ -253,7 +264,7 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
         object_linear_velocities_m_s=states[..., 7:10],
         object_angular_velocities_rad_s=states[..., 10:],
         action_joint_positions_rad=actions[:, :arm],
-        action_gripper_opening_m=actions[:, arm],
+        action_hand=actions[:, arm:],
         action_tip_position_m=action_tip[:, :3],
         action_tip_quaternion_wxyz=action_tip[:, 3:],
         **extra,
@@ -272,7 +283,7 @@ def checked(episode: StoredEpisode) -> Recording:
     Raises EpisodesError where shapes do not fit together, a number is not finite, or the target is none of the objects.
     """
     recording, name = episode.recording, episode.attempt.episode_id
-    steps, arm, things = recording.steps, len(episode.robot.arm_joints), len(episode.objects)
+    steps, things = recording.steps, len(episode.objects)
     if steps == 0 or not 0 <= recording.target < things:
         raise EpisodesError(
             f"episode {name}: {steps} steps, target {recording.target} of {things} objects; record it again"
@@ -285,7 +296,7 @@ def checked(episode: StoredEpisode) -> Recording:
             continue
         array = np.asarray(getattr(recording, entry.name))
         rows = steps if entry.name.startswith("action_") or entry.name in _OF_ACTIONS else steps + 1
-        shape = (rows, *_widths(arm, things, recording).get(entry.name, ()))
+        shape = (rows, *_widths(episode.robot, things, recording).get(entry.name, ()))
         if array.shape != shape:
             raise EpisodesError(
                 f"episode {name}: {entry.name} has the shape {array.shape}, not {shape}; record it again"
@@ -297,7 +308,8 @@ def checked(episode: StoredEpisode) -> Recording:
     return Recording(target=recording.target, **arrays)
 
 
-def _widths(arm: int, things: int, recording: Recording) -> dict[str, tuple[int, ...]]:
+def _widths(robot: RecordedRobot, things: int, recording: Recording) -> dict[str, tuple[int, ...]]:
+    arm = len(robot.arm_joints)
     positions = recording.granule_positions_m
     return {
         "granule_positions_m": () if positions is None else (*positions.shape[1:2], 3),
@@ -311,6 +323,8 @@ def _widths(arm: int, things: int, recording: Recording) -> dict[str, tuple[int,
         "object_linear_velocities_m_s": (things, 3),
         "object_angular_velocities_rad_s": (things, 3),
         "finger_forces_n": (2,),
+        "hand": (len(robot.hand_state),),
+        "action_hand": (len(robot.hand_action),),
         "action_joint_positions_rad": (arm,),
         "action_tip_position_m": (3,),
         "action_tip_quaternion_wxyz": (4,),

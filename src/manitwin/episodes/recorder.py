@@ -17,7 +17,7 @@ from manitwin.physics.sapien.world import RobotWorld
 class _State(NamedTuple):
     joint_positions_rad: np.ndarray
     joint_velocities_rad_s: np.ndarray
-    gripper_opening_m: float
+    hand: np.ndarray
     tip_to_world: np.ndarray
     object_positions_m: list[np.ndarray]
     object_quaternions_wxyz: list[np.ndarray]
@@ -28,7 +28,7 @@ class _State(NamedTuple):
 
 class _Action(NamedTuple):
     joint_positions_rad: np.ndarray
-    gripper_opening_m: float
+    hand: np.ndarray
     phase: Phase
     active_literal: int | None
 
@@ -36,16 +36,17 @@ class _Action(NamedTuple):
 class Recorder:
     """Takes a first state, then an action and the state that it led to at a time."""
 
-    def __init__(self, world: RobotWorld, touches: Touches):
-        """Take the first state."""
+    def __init__(self, world: RobotWorld, touches: Touches, hand: np.ndarray):
+        """Take the first state; ``hand (h,)`` is that of the hand."""
         self._world = world
-        self._states: list[_State] = [self._state(np.zeros(len(world.robot.robot.arm_joints)))]
+        self._states: list[_State] = [self._state(np.zeros(len(world.robot.robot.arm_joints)), hand)]
         self._touches, self._unplanned, self._actions = [touches], [False], list[_Action]()
 
     def add(
         self,
         joint_positions_rad: np.ndarray,
-        gripper_opening_m: float,
+        hand_told: np.ndarray,
+        hand: np.ndarray,
         phase: Phase,
         joint_velocities_rad_s: np.ndarray,
         touches: Touches,
@@ -54,8 +55,8 @@ class Recorder:
         literal: int | None = None,
     ) -> None:
         """Add what the controllers were told, and the state that it led to: the world's as it is, and the arm's speeds."""
-        self._actions.append(_Action(joint_positions_rad, gripper_opening_m, phase, literal))
-        self._states.append(self._state(joint_velocities_rad_s))
+        self._actions.append(_Action(joint_positions_rad, hand_told, phase, literal))
+        self._states.append(self._state(joint_velocities_rad_s, hand))
         self._touches.append(touches)
         self._unplanned.append(unplanned)
 
@@ -81,7 +82,7 @@ class Recorder:
             target_on_support=np.array([touches.on_support for touches in self._touches]),
             unplanned_contact=np.array(self._unplanned),
             action_joint_positions_rad=np.array(told["joint_positions_rad"], np.float32),
-            action_gripper_opening_m=np.array(told["gripper_opening_m"], np.float32),
+            action_hand=np.array(told["hand"], np.float32),
             action_tip_position_m=told_tips[:, :3, 3].astype(np.float32),
             action_tip_quaternion_wxyz=told_quaternions[1:].astype(np.float32),
             phase=np.array(told["phase"], np.uint8),
@@ -89,13 +90,13 @@ class Recorder:
             active_literal=None if None in told["active_literal"] else np.array(told["active_literal"], np.uint8),
         )
 
-    def _state(self, joint_velocities_rad_s: np.ndarray) -> _State:
+    def _state(self, joint_velocities_rad_s: np.ndarray, hand: np.ndarray) -> _State:
         robot, bodies = self._world.robot, self._world.bodies
         poses = [body.entity_pose for body in bodies]
         return _State(
             joint_positions_rad=robot.joint_positions(),
             joint_velocities_rad_s=joint_velocities_rad_s,
-            gripper_opening_m=robot.opening_m(),
+            hand=hand,
             tip_to_world=robot.gripper_pose(),
             object_positions_m=[pose.p for pose in poses],
             object_quaternions_wxyz=[pose.q for pose in poses],

@@ -15,9 +15,12 @@ class Recording:
     """States ``(T + 1, ...)`` and the actions ``(T, ...)`` between them; float32, SI, world frame, quaternions wxyz.
 
     Action t is what the controllers are told to reach by state t + 1. Objects are in the scene's order, the target at
-    ``target``. ``gripper_opening_m`` is the distance between the pads. The tip is the twin's grasp frame (+Z approach, X
-    closing). ``phase (T,)`` holds numbers of ``planning.problem.Phase``. ``finger_forces_n`` press on the target;
-    ``unplanned_contact`` says that the robot touched with more than 0.5 N what it should not, since the state before.
+    ``target``. ``hand (T + 1, h)`` is what the hand is: the opening of jaws (m), a cup's plunger (m), or the joints of
+    other hands (rad); ``action_hand (T, h)`` what it is told: the same, or 1 where a cup's vacuum is on, else 0. The tip is
+    the twin's grasp frame (+Z approach, X closing). ``phase (T,)`` holds numbers of ``planning.problem.Phase``.
+    ``finger_forces_n`` press on the target from two sides: the jaws, or thumb and palm and the other fingers; a cup's lip,
+    where it has sealed, presses in both with the vacuum's force less the pull. ``unplanned_contact`` says that the robot
+    touched with more than 0.5 N what it should not, since the state before.
     Where there are granules, ``granule_positions_m (T + 1, N, 3)`` are their middles and ``granules_in_objects (T + 1, O)``
     says how many each object holds. Of a goal of several literals ``active_literal (T,)`` is the number of the one that is
     worked on; the target, and what presses on it, are those of the last one.
@@ -26,7 +29,7 @@ class Recording:
     target: int
     joint_positions_rad: np.ndarray
     joint_velocities_rad_s: np.ndarray
-    gripper_opening_m: np.ndarray
+    hand: np.ndarray
     tip_position_m: np.ndarray
     tip_quaternion_wxyz: np.ndarray
     object_positions_m: np.ndarray
@@ -37,7 +40,7 @@ class Recording:
     target_on_support: np.ndarray
     unplanned_contact: np.ndarray
     action_joint_positions_rad: np.ndarray
-    action_gripper_opening_m: np.ndarray
+    action_hand: np.ndarray
     action_tip_position_m: np.ndarray
     action_tip_quaternion_wxyz: np.ndarray
     phase: np.ndarray
@@ -46,19 +49,29 @@ class Recording:
     active_literal: np.ndarray | None = None
 
     @property
+    def gripper_opening_m(self) -> np.ndarray:
+        """The distance between the pads of jaws ``(T + 1,)``."""
+        return np.asarray(self.hand[:, 0])
+
+    @property
+    def action_gripper_opening_m(self) -> np.ndarray:
+        """The distance that the pads of jaws are told ``(T,)``."""
+        return np.asarray(self.action_hand[:, 0])
+
+    @property
     def steps(self) -> int:
         """The number T of actions."""
         return len(self.phase)
 
 
 def joint_delta(recording: Recording) -> np.ndarray:
-    """Return ``(T, n + 1) float32``: the arm's targets less its positions, rad, and the target opening itself, m."""
+    """Return ``(T, n + h) float32``: the arm's targets less its positions, rad, and what the hand is told itself."""
     moved = recording.action_joint_positions_rad - recording.joint_positions_rad[:-1]
-    return _with_opening(moved, recording)
+    return _with_hand(moved, recording)
 
 
 def tip_delta(recording: Recording) -> np.ndarray:
-    """Return ``(T, 7) float32``: how the tip's target differs from its pose, and the target opening itself.
+    """Return ``(T, 6 + h) float32``: how the tip's target differs from its pose, and what the hand is told itself.
 
     Three metres and a rotation vector of three radians, both along the axes of the world, which are those of the robot's
     base: ``p_target = p + d[:3]``, ``R_target = exp(d[3:6]) R``. This is the frame of ManiSkill's ``pd_ee_delta_pose``
@@ -67,8 +80,8 @@ def tip_delta(recording: Recording) -> np.ndarray:
     moved = recording.action_tip_position_m - recording.tip_position_m[:-1]
     before = Rotation.from_quat(recording.tip_quaternion_wxyz[:-1], scalar_first=True)
     after = Rotation.from_quat(recording.action_tip_quaternion_wxyz, scalar_first=True)
-    return _with_opening(np.hstack([moved, (after * before.inv()).as_rotvec()]), recording)
+    return _with_hand(np.hstack([moved, (after * before.inv()).as_rotvec()]), recording)
 
 
-def _with_opening(delta: np.ndarray, recording: Recording) -> np.ndarray:
-    return np.hstack([delta, recording.action_gripper_opening_m[:, None]]).astype(np.float32)
+def _with_hand(delta: np.ndarray, recording: Recording) -> np.ndarray:
+    return np.hstack([delta, recording.action_hand]).astype(np.float32)

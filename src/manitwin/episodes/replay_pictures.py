@@ -58,14 +58,14 @@ def link_drawables(urdf: str, tolerance_m: float) -> dict[str, Drawable]:
     return {link: drawable(parts, tolerance_m=tolerance_m) for link, parts in link_visuals(urdf).items()}
 
 
-def link_poses(robot: Robot, joint_positions_rad: np.ndarray, gripper_opening_m: float) -> dict[str, np.ndarray]:
-    """Return every link's ``link_to_world (4, 4)``, by name; the fingers stand at half of the opening each.
+def link_poses(robot: Robot, joint_positions_rad: np.ndarray, hand: np.ndarray) -> dict[str, np.ndarray]:
+    """Return every link's ``link_to_world (4, 4)``, by name.
 
-    ``joint_positions_rad`` are the arm's, in the order of ``robot.arm_joints``; fingers that a recording has in front of
-    them follow the opening alone.
+    ``joint_positions_rad`` are the arm's, in the order of ``robot.arm_joints``; ``hand (h,)`` is that of a recording: jaws
+    stand at half of the opening each.
     """
     joints = dict(zip(robot.arm_joints, np.asarray(joint_positions_rad, float), strict=False))
-    joints.update(dict.fromkeys(robot.finger_joints, float(gripper_opening_m) / 2))
+    joints.update(zip(robot.finger_joints, robot.hand_joints(np.asarray(hand, float)).tolist(), strict=True))
     return poses_at(links_of_urdf(robot.urdf), joints)
 
 
@@ -161,14 +161,17 @@ class EpisodeReplay:
         self,
         object_to_world: Sequence[np.ndarray],
         joint_positions_rad: np.ndarray,
-        gripper_opening_m: float,
+        hand: np.ndarray,
         cameras: Sequence[NamedCamera],
         *,
         size_px: int,
     ) -> list[np.ndarray]:
-        """Return pictures ``(size, size, 3) uint8`` of a state that is not recorded; poses ``(4, 4)`` in the objects' order."""
-        hand = self._place(object_to_world, joint_positions_rad, gripper_opening_m)
-        placed = [camera.placed(hand, size_px, size_px) for camera in cameras]
+        """Return pictures ``(size, size, 3) uint8`` of a state that is not recorded; poses ``(4, 4)`` in the objects' order.
+
+        ``hand (h,)`` is as recordings have it.
+        """
+        gripper_to_world = self._place(object_to_world, joint_positions_rad, hand)
+        placed = [camera.placed(gripper_to_world, size_px, size_px) for camera in cameras]
         return [frame.rgb for frame in self._renderer.render(placed)]
 
     def _show(self, recording: Recording, state: int) -> np.ndarray:
@@ -179,14 +182,14 @@ class EpisodeReplay:
         if recording.granule_positions_m is not None:
             for name, position in zip(self._granules, recording.granule_positions_m[state], strict=True):
                 self._renderer.set_pose(name, transform(None, position))
-        return self._place(objects, recording.joint_positions_rad[state], float(recording.gripper_opening_m[state]))
+        return self._place(objects, recording.joint_positions_rad[state], recording.hand[state])
 
     def _place(
-        self, object_to_world: Sequence[np.ndarray], joint_positions_rad: np.ndarray, gripper_opening_m: float
+        self, object_to_world: Sequence[np.ndarray], joint_positions_rad: np.ndarray, hand: np.ndarray
     ) -> np.ndarray:
         for name, pose in zip(self._objects, object_to_world, strict=True):
             self._renderer.set_pose(name, pose)
-        poses = link_poses(self._robot, joint_positions_rad, gripper_opening_m)
+        poses = link_poses(self._robot, joint_positions_rad, hand)
         for link in self._links:
             self._renderer.set_pose(f"{self._robot.name}/{link}", poses[link])
         return poses[self._robot.tip_link] @ self._robot.gripper_to_tip

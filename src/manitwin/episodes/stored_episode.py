@@ -8,13 +8,16 @@ from typing import Any
 
 from manitwin.episodes.attempts import Attempt
 from manitwin.episodes.recording import Recording
-from manitwin.robots.robot import Robot
+from manitwin.robots.robot import OPENING, Robot
 from manitwin.robots.urdf import UrdfTree
 
 
 @dataclass(frozen=True)
 class RecordedRobot:
-    """A robot by name and digest, with the names and limits of its joints; the arm's in the order of the recorded arrays."""
+    """A robot by name and digest, with the names and limits of its joints; the arm's in the order of the recorded arrays.
+
+    ``hand_state`` and ``hand_action`` name what is recorded of the hand and what it is told.
+    """
 
     name: str
     sha256: str
@@ -24,6 +27,8 @@ class RecordedRobot:
     upper_rad: tuple[float, ...]
     velocity_limits_rad_s: tuple[float, ...]
     max_opening_m: float
+    hand_state: tuple[str, ...] = (OPENING,)
+    hand_action: tuple[str, ...] = (OPENING,)
 
 
 @dataclass(frozen=True)
@@ -65,6 +70,8 @@ def recorded_robot(robot: Robot) -> RecordedRobot:
         upper_rad=tuple(high for _, high in arm),
         velocity_limits_rad_s=tuple(float(limit) for limit in robot.velocity_limits_rad_s),
         max_opening_m=float(robot.gripper.opening_m),
+        hand_state=robot.hand_state_names,
+        hand_action=robot.hand_action_names,
     )
 
 

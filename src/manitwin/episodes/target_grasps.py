@@ -10,8 +10,10 @@ import numpy as np
 
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.geometry.poses import transform
-from manitwin.robots.grippers.gripper import load_gripper, shipped_grippers
+from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.loaded_twin import Grasps, Twin
 
 CLEARANCE_M = 0.004  # between the open pads and what they go around, both sides together
@@ -34,12 +36,12 @@ class TargetGrasp:
     value: float
 
 
-def usable_grasps(twin: Twin, gripper: ParallelGripper) -> tuple[TargetGrasp, ...]:
-    """Return the verified grasps that are not retired: the gripper's own, else those of another parallel one, transferred.
+def usable_grasps(twin: Twin, gripper: Gripper) -> tuple[TargetGrasp, ...]:
+    """Return the verified grasps that are not retired: the gripper's own, else, of jaws, those of other jaws, transferred.
 
     A transferred grasp has its fingertips where they were verified; what does not fit between the pads is left out.
     """
-    for name in _sources(twin, gripper.name):
+    for name in _sources(twin, gripper):
         if found := _of_gripper(twin, name, gripper):
             return found
     return ()
@@ -52,12 +54,13 @@ def shuffled(grasps: Iterable[TargetGrasp], rng: np.random.Generator) -> tuple[T
     return tuple(chosen[i] for i in np.argsort(-keys, kind="stable"))
 
 
-def _sources(twin: Twin, wanted: str) -> list[str]:
-    """Return the parallel grippers that the twin has grasps of: the one that is wanted, its own, then by name."""
+def _sources(twin: Twin, gripper: Gripper) -> list[str]:
+    """Return the grippers whose grasps may be used: the one that is wanted, and for jaws the other parallel ones there are."""
     summary = twin.record.grasps
     if summary is None:
         return []
-    known = _parallel_grippers() | {wanted}
+    wanted = gripper.name
+    known = {wanted} | (_parallel_grippers() if isinstance(gripper, ParallelGripper) else frozenset())
     names = [name for name in (summary.gripper, *sorted(summary.other_grippers)) if name in known]
     return sorted(names, key=lambda name: name != wanted)
 
@@ -67,17 +70,20 @@ def _parallel_grippers() -> frozenset[str]:
     return frozenset(name for name in shipped_grippers() if isinstance(load_gripper(name), ParallelGripper))
 
 
-def _of_gripper(twin: Twin, name: str, gripper: ParallelGripper) -> tuple[TargetGrasp, ...]:
+def _of_gripper(twin: Twin, name: str, gripper: Gripper) -> tuple[TargetGrasp, ...]:
     grasps = twin.grasps(gripper=name)
     types = {point.id: point.type for point in twin.record.points.grasp} if twin.record.points else {}
     values = _values(grasps)
+    jointed, jaws = isinstance(gripper, MultiFingerGripper), isinstance(gripper, ParallelGripper)
     found = []
     for i in range(len(grasps)):
         fits = grasps.width_m[i] + CLEARANCE_M <= gripper.opening_m
         if grasps.columns["retired"][i] or not (fits or name == gripper.name):
             continue
-        shift = transform(None, np.array([0, 0, grasps.depth_m[i] - gripper.tip_depth_m]))
-        grasp = Grasp(grasps.columns["grasp_id"][i], grasps.gripper_to_object[i] @ shift, float(grasps.width_m[i]))
+        shift = transform(None, np.array([0, 0, grasps.depth_m[i] - gripper.tip_depth_m if jaws else 0.0]))
+        pose, width_m = grasps.gripper_to_object[i] @ shift, float(grasps.width_m[i])
+        joints = np.array([grasps.columns[column][i] for column in JOINTS], float) if jointed else None
+        grasp = Grasp(grasps.columns["grasp_id"][i], pose, width_m, joints)
         point = grasps.columns["grasp_point_id"][i]
         found.append(TargetGrasp(grasp, types.get(point), name != gripper.name, values[i]))
     return tuple(found)

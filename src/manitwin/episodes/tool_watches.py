@@ -26,6 +26,7 @@ STIRRED_DEPTH = 0.3  # of the vessel's, below its rim
 CELL_M = 0.01
 WIPING_N = (1.0, 5.0)
 SMOOTHED_LOOKS = 12  # the force of one step is noise: a tenth of a second
+FACE_RAD = np.radians(15)
 FACE_M = 0.002  # what is no farther from the plane than this belongs to the face
 CUT_OFF_M, CUT_RAD, CUT_STEP_M = 0.005, np.radians(10), 0.005
 AIMED_RAD = 0.15
@@ -106,8 +107,9 @@ class StirWatch:
 class WipeWatch:
     """Latches which cells (1 cm) of a level patch a tool's face swept while it pressed on ``surface`` with 1 to 5 N.
 
-    ``patch_to_world`` is the patch's middle with Z up, ``half_m (2,)`` its half extents. Values: ``share`` swept, ``force_n``
-    in the mean while it touched, ``in_band``, the share of that time with such a force.
+    ``patch_to_world`` is the patch's middle with Z up, ``half_m (2,)`` its half extents. ``faces_to_tool (F, 4, 4)`` are the
+    frames of the faces that wipe, Z out: one looks down within 15 degrees while cells count. Values: ``share`` swept,
+    ``force_n`` in the mean while it touched, ``in_band``, the share of that time with such a force, ``by_face``, with a face.
     """
 
     tool: str
@@ -117,9 +119,11 @@ class WipeWatch:
     half_m: np.ndarray
     tool_points_m: np.ndarray
     tool_to_world: Pose
+    faces_to_tool: np.ndarray
     force_n: float = 0.0
     _recent: deque[float] = field(default_factory=lambda: deque(maxlen=SMOOTHED_LOOKS))
     _forces: list[float] = field(default_factory=list)
+    _by_face: list[bool] = field(default_factory=list)
     _swept: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -136,6 +140,7 @@ class WipeWatch:
         forces = np.array(self._forces)
         in_band = (forces >= WIPING_N[0]) & (forces <= WIPING_N[1])
         values = {"share": self._swept.mean(), "force_n": forces.mean(), "in_band": in_band.mean()}
+        values["by_face"] = np.mean(self._by_face)
         return (Event("wiped", self.tool, self.place, {name: float(value) for name, value in values.items()}),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
@@ -145,10 +150,12 @@ class WipeWatch:
         self.force_n = float(np.mean(self._recent))
         if not any(self._recent):
             return
+        tool_to_patch = inverse(self.patch_to_world) @ self.tool_to_world()
         self._forces.append(self.force_n)
-        if not WIPING_N[0] <= self.force_n <= WIPING_N[1]:
+        self._by_face.append(bool(((tool_to_patch @ self.faces_to_tool)[:, 2, 2] <= -np.cos(FACE_RAD)).any()))
+        if not self._by_face[-1] or not WIPING_N[0] <= self.force_n <= WIPING_N[1]:
             return
-        points = transform_points(inverse(self.patch_to_world) @ self.tool_to_world(), self.tool_points_m)
+        points = transform_points(tool_to_patch, self.tool_points_m)
         face = points[points[:, 2] < points[:, 2].min() + FACE_M, :2]
         if len(face) < 3 or np.linalg.matrix_rank(face - face[0], tol=1e-4) < 2:
             return
@@ -161,7 +168,8 @@ class CutWatch:
     """Latches how much of a line an edge went along: within 5 mm of it, and 10 degrees from it and from upright.
 
     ``line_to_world`` has its origin in the line's middle, X along it, Z up; ``edge`` gives the edge's frame (X along it, Z out
-    of it). Values: ``share`` of the line; ``off_m``, ``angle_rad``, the least that they were.
+    of it). Values: ``share`` of the line; ``drawn``, how far along it the edge moved meanwhile, by its length; ``off_m``,
+    ``angle_rad``, the least that they were.
     """
 
     tool: str
@@ -173,6 +181,7 @@ class CutWatch:
     force_n: float = 0.0
     _off_m: float = np.inf
     _angle_rad: float = np.inf
+    _along_m: tuple[float, float] = (np.inf, -np.inf)
     _met: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -185,7 +194,8 @@ class CutWatch:
         """One event where the edge came near."""
         if not np.isfinite(self._off_m):
             return ()
-        values = {"share": float(self._met.mean()), "off_m": self._off_m, "angle_rad": self._angle_rad}
+        drawn = max(self._along_m[1] - self._along_m[0], 0.0) / self.length_m
+        values = {"share": float(self._met.mean()), "drawn": drawn, "off_m": self._off_m, "angle_rad": self._angle_rad}
         return (Event("cut_motion", self.tool, self.place, values),)
 
     def look(self, reader: ContactReader, contacts: Sequence[physx.PhysxContact], time_s: float) -> None:
@@ -197,8 +207,10 @@ class CutWatch:
         to_line = (self._places_m - edge[0, 3]) / max(along[0], 1e-6)
         beside = edge[1:3, 3] + to_line[:, None] * along[1:]
         off_m = np.where(np.abs(to_line) <= self.edge_length_m / 2, np.linalg.norm(beside, axis=1), np.inf)
-        if angle_rad <= CUT_RAD:
+        if angle_rad <= CUT_RAD and (off_m <= CUT_OFF_M).any():
             self._met |= off_m <= CUT_OFF_M
+            at_m = float(edge[0, 3])
+            self._along_m = min(self._along_m[0], at_m), max(self._along_m[1], at_m)
         if off_m.min() < self._off_m:
             self._off_m, self._angle_rad = float(off_m.min()), angle_rad
 

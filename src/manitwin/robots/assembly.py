@@ -37,7 +37,7 @@ def mount(tree: UrdfTree, hand: UrdfTree, mount_link: str, root_link: str, root_
             )
     for element in hand.element:
         tree.element.append(copy.deepcopy(element))
-    joint = _joint(tree.element, f"{root_link}_mount", "fixed", mount_link, root_link)
+    joint = add_joint(tree.element, f"{root_link}_mount", "fixed", mount_link, root_link)
     set_origin(joint, root_to_mount)
 
 
@@ -51,10 +51,10 @@ def generated_hand(gripper: ParallelGripper, mass_kg: float) -> UrdfTree:
     palm = [box.placed() for box in gripper.palm_boxes]
     fingers = {side: [box.placed(0.0, sign) for box in gripper.finger_boxes] for side, sign in SIDES}
     density = mass_kg / sum(_volume(boxes) for boxes in (palm, *fingers.values()))
-    _link(robot, palm_link(name), palm, density)
+    add_box_link(robot, palm_link(name), palm, density)
     for side, sign in SIDES:
-        _link(robot, finger_link(name, side), fingers[side], density)
-        joint = _joint(robot, finger_joint(name, side), "prismatic", palm_link(name), finger_link(name, side))
+        add_box_link(robot, finger_link(name, side), fingers[side], density)
+        joint = add_joint(robot, finger_joint(name, side), "prismatic", palm_link(name), finger_link(name, side))
         set_origin(joint, np.eye(4))
         add(joint, "axis", xyz=f"{sign} 0 0")
         half_m = repr(gripper.opening_m / 2)
@@ -81,14 +81,16 @@ def _volume(boxes: list[PlacedBox]) -> float:
     return float(sum(8 * half.prod() for _, half in boxes))
 
 
-def _joint(robot: etree._Element, name: str, kind: str, parent: str, child: str) -> etree._Element:
+def add_joint(robot: etree._Element, name: str, kind: str, parent: str, child: str) -> etree._Element:
+    """Add a joint between two links to a URDF, and return it."""
     joint = add(robot, "joint", name=name, type=kind)
     add(joint, "parent", link=parent)
     add(joint, "child", link=child)
     return joint
 
 
-def _link(robot: etree._Element, name: str, boxes: list[PlacedBox], density_kg_m3: float) -> None:
+def add_box_link(robot: etree._Element, name: str, boxes: list[PlacedBox], density_kg_m3: float) -> None:
+    """Add a link of boxes of one density to a URDF."""
     link = add(robot, "link", name=name)
     for box_to_link, half_m in boxes:
         for tag in ("visual", "collision"):
@@ -99,10 +101,10 @@ def _link(robot: etree._Element, name: str, boxes: list[PlacedBox], density_kg_m
             if tag == "visual":
                 material = add(shape, "material", name=f"{name}_grey")
                 add(material, "color", rgba=_GREY)
-    _inertial(link, boxes, density_kg_m3)
+    add_inertial(link, boxes, density_kg_m3)
 
 
-def _inertial(link: etree._Element, boxes: list[PlacedBox], density_kg_m3: float) -> None:
+def add_inertial(link: etree._Element, boxes: list[PlacedBox], density_kg_m3: float) -> None:
     """Write the mass properties of boxes of one density (Steiner's theorem), overlaps counted twice."""
     masses = np.array([density_kg_m3 * 8 * half.prod() for _, half in boxes])
     centers = np.array([pose[:3, 3] for pose, _ in boxes])

@@ -89,7 +89,7 @@ class MergedHand(BaseModel):
 
 
 class GeneratedHand(BaseModel):
-    """A hand made of the boxes of a parallel gripper's file, mounted."""
+    """A hand made of the boxes of the file of a parallel gripper or a suction cup, mounted."""
 
     model_config = STRICT
     kind: Literal["generated"]
@@ -97,6 +97,16 @@ class GeneratedHand(BaseModel):
     mount_link: str
     gripper_to_mount: PoseField
     mass_kg: float = Field(gt=0)
+
+
+class DescribedHand(BaseModel):
+    """A hand with many joints, mounted: the links of the URDF that its gripper's file names."""
+
+    model_config = STRICT
+    kind: Literal["described"]
+    gripper: str
+    mount_link: str
+    gripper_to_mount: PoseField
 
 
 class RobotDefinition(BaseModel):
@@ -113,7 +123,7 @@ class RobotDefinition(BaseModel):
     limits_rad: dict[str, tuple[float, float]] = {}
     fixed_joints: dict[str, float] = {}
     urdf: UrdfField
-    hand: Annotated[OwnHand | MergedHand | GeneratedHand, Field(discriminator="kind")]
+    hand: Annotated[OwnHand | MergedHand | GeneratedHand | DescribedHand, Field(discriminator="kind")]
     workspace: Workspace
 
 

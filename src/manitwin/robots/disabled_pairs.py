@@ -26,11 +26,9 @@ SEED = 0
 Pairs = tuple[tuple[str, str], ...]
 
 
-def disabled_pairs(
-    tree: UrdfTree, srdf: Path | None, definition: RobotDefinition, finger_joints: tuple[str, str]
-) -> Pairs:
+def disabled_pairs(tree: UrdfTree, srdf: Path | None, definition: RobotDefinition, palm: str) -> Pairs:
     """Return the pairs, each sorted, all sorted; raises Unavailable without the extra that computes them."""
-    pairs = _adjacent(tree) | _within_hand(tree, finger_joints)
+    pairs = _adjacent(tree) | _within_hand(tree, palm)
     if srdf is not None:
         pairs |= _of_srdf(srdf, tree)
     else:
@@ -65,9 +63,9 @@ def _solid(tree: UrdfTree, link: str, up: bool) -> Iterable[str]:
     return [name for other in near for name in _solid(tree, other, up)]
 
 
-def _within_hand(tree: UrdfTree, finger_joints: tuple[str, str]) -> set[tuple[str, str]]:
+def _within_hand(tree: UrdfTree, palm: str) -> set[tuple[str, str]]:
     """Return the hand's own links: its fingers meet when it is closed."""
-    hand = tree.below(parent_of(tree.joint(finger_joints[0])))
+    hand = tree.below(palm)
     return {_pair(first, second) for first, second in combinations(hand, 2)}
 
 

@@ -1,4 +1,4 @@
-"""A robot as data: an arm with a parallel gripper, as planner and simulation take it.
+"""A robot as data: an arm with a hand of any kind of gripper, as planner and simulation take it.
 
 World frame: the arm's base link at the origin, +Z up, +X forward; the table's top is the plane z = 0 below it.
 """
@@ -13,7 +13,12 @@ import numpy as np
 from pydantic import Field
 
 from manitwin.robots.grippers.box import STRICT
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.robots.grippers.suction import SuctionGripper
+
+OPENING, VACUUM = "gripper_opening_m", "vacuum"
 
 
 @dataclass(frozen=True)
@@ -28,13 +33,14 @@ class Workspace:
 
 @dataclass(frozen=True)
 class Robot:
-    """An arm of n revolute joints and a hand of two prismatic fingers that open by equal amounts.
+    """An arm of n revolute joints and a hand: two jaws that open by equal amounts, a suction cup, or fingers with joints.
 
     ``urdf`` is the whole robot as text, its meshes by absolute path. ``gripper_to_tip (4, 4)`` is the pose of the twin's grasp
-    frame (+Z approach, X closing) in the frame of ``tip_link``. ``finger_joints`` go from 0 (closed) to half of the opening;
-    the first one's finger is on the side of +X of the grasp frame. ``hand_links`` are the palm, which comes first, and all
-    that hangs from it: they may touch the held object. ``finger_links`` are those two that press on it. ``disabled_pairs``
-    are pairs of links that are not tested for collision with each other.
+    frame (+Z approach, X closing) in the frame of ``tip_link``. ``finger_joints`` are all joints of the hand. Those of jaws
+    go from 0 (closed) to half of the opening, the first one's finger on the side of +X of the grasp frame; a cup's is that
+    of its spring plunger; those of a hand with more joints are in the order of its gripper's file. ``hand_links`` are the palm,
+    which comes first, and all that hangs from it: they may touch the held object. ``finger_links`` are those that press on
+    it. ``disabled_pairs`` are pairs of links that are not tested for collision with each other.
     """
 
     name: str
@@ -42,14 +48,52 @@ class Robot:
     source: str
     urdf: str
     arm_joints: tuple[str, ...]
-    finger_joints: tuple[str, str]
+    finger_joints: tuple[str, ...]
     tip_link: str
     gripper_to_tip: np.ndarray
-    gripper: ParallelGripper
+    gripper: Gripper
     hand_links: tuple[str, ...]
-    finger_links: tuple[str, str]
+    finger_links: tuple[str, ...]
     disabled_pairs: tuple[tuple[str, str], ...]
     home_rad: np.ndarray
     velocity_limits_rad_s: np.ndarray
     acceleration_limits_rad_s2: np.ndarray
     workspace: Workspace
+
+    @property
+    def has_jaws(self) -> bool:
+        """Whether the hand is one of two jaws."""
+        return isinstance(self.gripper, ParallelGripper)
+
+    @property
+    def hand_state_names(self) -> tuple[str, ...]:
+        """The names of what is recorded of the hand: the opening of jaws, else its joints (rad, or m)."""
+        return (OPENING,) if self.has_jaws else self.finger_joints
+
+    @property
+    def hand_action_names(self) -> tuple[str, ...]:
+        """The names of what the hand is told: the opening of jaws, whether a cup's vacuum is on (0, 1), or its joints."""
+        return (VACUUM,) if isinstance(self.gripper, SuctionGripper) else self.hand_state_names
+
+    @property
+    def open_hand(self) -> np.ndarray:
+        """The positions ``(J,)`` of ``finger_joints`` that a robot begins with: open; a cup where it is pressed on."""
+        if isinstance(self.gripper, MultiFingerGripper):
+            return self.gripper.postures[0].joints_at(np.array(self.gripper.postures[0].openings_m[-1]))
+        return self.hand_joints(np.array([self.gripper.opening_m if self.has_jaws else 0.0]))
+
+    def hand_joints(self, hand_state: np.ndarray) -> np.ndarray:
+        """Return the positions ``(J,)`` of ``finger_joints`` of a recorded state ``(h,)`` of the hand."""
+        return np.repeat(hand_state / 2, 2) if self.has_jaws else np.asarray(hand_state, float)
+
+    def side_of(self, link: str) -> int | None:
+        """Return on which of the two sides of what is held a link presses: 0 or 1; None: it is to press on neither.
+
+        The first jaw, a cup, or thumb and palm are 0; the second jaw, or the other fingers, are 1.
+        """
+        if isinstance(self.gripper, MultiFingerGripper):
+            owners = {
+                each.name: owner for each, owner in zip(self.gripper.links, self.gripper.finger_of_link, strict=True)
+            }
+            return None if link not in owners else int(owners[link] > 0)
+        return self.finger_links.index(link) if link in self.finger_links else None

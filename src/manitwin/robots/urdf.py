@@ -183,9 +183,17 @@ def set_origin(element: etree._Element, pose: np.ndarray) -> None:
     origin = element.find("origin")
     if origin is None:
         origin = add(element, "origin")
-    rpy = Rotation.from_matrix(pose[:3, :3]).as_euler("xyz")
+    rpy = _roll_pitch_yaw(pose[:3, :3])
     origin.set("xyz", " ".join(repr(float(value)) for value in pose[:3, 3]))
     origin.set("rpy", " ".join(repr(float(value)) for value in rpy))
+
+
+def _roll_pitch_yaw(rotation: np.ndarray) -> np.ndarray:
+    """Return the angles about fixed x, y, z (rad) of a rotation; where the pitch is a quarter turn, the yaw is 0."""
+    if np.hypot(rotation[0, 0], rotation[1, 0]) > 1e-6:
+        return np.asarray(Rotation.from_matrix(rotation).as_euler("xyz"))
+    sign = -float(np.sign(rotation[2, 0]))
+    return np.array([np.arctan2(sign * rotation[0, 1], sign * rotation[0, 2]), sign * np.pi / 2, 0.0])
 
 
 def geometry_of(shape: etree._Element) -> etree._Element:

@@ -10,9 +10,10 @@ from granular_things import mixing_bowl, two_things, with_fewer
 from held_skills import attempt, beside
 
 from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.skills.held_skill import stick_frame
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal
-from manitwin.episodes.skills.stir import floor_below_rim, stick_frame
+from manitwin.geometry.cavity_floor import floor_below_rim
 from manitwin.geometry.poses import transform
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 from rigid_boxes import above, block, box

@@ -93,6 +93,7 @@ class Course(ABC):
     def grasp_and_lift(self, execution: Execution, reach: Motion, approach: Motion, lift: Motion) -> None:
         """Reach, approach, close and lift; raises Ended where the object is left behind."""
         tip_pose = self.start.planner.tip_pose
+        execution.shape(self.facts.grasp)
         execution.follow(reach)
         execution.follow(approach)
         execution.close()

@@ -10,21 +10,24 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from manitwin.episodes.courses.course import Course, Ended, Start
+from manitwin.episodes.courses.regulated import Admittance, with_heights
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.planning.closed_hand import fingertip_corners
 from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner, HeldPlan
-from manitwin.episodes.planning.path_timing import joint_spline
+from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, Phase
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
-from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask
+from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask, Regulated
+from manitwin.geometry.poses import transform
 from manitwin.physics.sapien.contacts import MeantContacts
 from manitwin.physics.sapien.world import RobotWorld
 
 BACK_S = 1.2
 YIELDED_S, PRESSED_S = 0.1, 0.2  # after the touch of a blow, and of a press
+RISEN_M = (0.01, 0.03)  # straight up, before the way back
 PEAK_OF_QUINTIC = 1.875  # its largest by its mean speed
 
 
@@ -156,8 +159,12 @@ class HeldCourse(Course):
             joints = self._onward(self._held.part(first, end), execution, (end - 1) / (count - 1))
             execution.follow(self._planner.timed(joints, task.duration_s / parts, Phase.ACT))
             been.append(execution.commanded_rad)
+        regulated = task.regulated
         if task.guard is not None:
-            self._guarded(task.guard, self._held.part(smooth, count), execution)
+            end = count if regulated is None else regulated.first
+            self._guarded(task.guard, self._held.part(smooth, end), execution)
+        if regulated is not None:
+            self._under_force(regulated, self._held.part(regulated.first, count), execution)
         return been
 
     def _onward(self, part: HeldPath, execution: Execution, place: float) -> CubicSpline:
@@ -188,6 +195,34 @@ class HeldCourse(Course):
             execution.yield_here()
         execution.wait_s(Phase.HOLD, YIELDED_S if guard.beyond > 1 else PRESSED_S)
 
+    def _under_force(self, regulated: Regulated, part: HeldPath, execution: Execution) -> None:
+        """Slide along a path's places from where the target touches now, yielding and following along the normal; then rise.
+
+        Raises Ended where there is no way from there.
+        """
+        watch, arm = self._watch, self._own.parts.arm
+        assert watch is not None, "a move under force asks its watch for it"
+        here, steps_m = execution.target_to_world(), part.poses[:, :3, 3] - part.poses[0, :3, 3]
+        onward = replace(part, poses=np.array([transform(None, step) @ here for step in steps_m]))
+        measured, planner, both = execution.gripper_to_object(), self._planner, None
+        for way, grasp in ((onward, measured), (part, measured), (part, self._grasp_now)):
+            way = way.part(1, len(way.poses))
+            joints = planner.onward(self.problem, way, grasp, execution.commanded_rad, as_hulls=self.task.as_hulls)
+            both = None if joints is None else with_heights(joints, arm, regulated.normal)
+            if both is not None:
+                break
+        if both is None:
+            raise Ended("replan_failed")
+        way_m = float(np.linalg.norm(np.diff(steps_m, axis=0), axis=1).sum())
+        limits = tuple(np.concatenate([each, np.full(len(each), np.inf)]) for each in self._own.parts.motions.limits)
+        rows, speeds = time_quintic(
+            both, (limits[0], limits[1]), way_m / regulated.speed_m_s, self._own.parts.timestep_s
+        )
+        count = arm.joints
+        keeps = Admittance(lambda: watch.force_n, regulated.force_n, self._own.parts.timestep_s)
+        motion = Motion(Phase.ACT, rows[:, :count], speeds[:, :count])
+        execution.follow(motion, adjusted=lambda row: keeps.next_change(rows[row, count:]))
+
     def _rest_there(self, execution: Execution) -> None:
         if self.task.hold_s:
             execution.wait_s(Phase.HOLD, self.task.hold_s)
@@ -206,6 +241,11 @@ class HeldCourse(Course):
     def _go_back(self, execution: Execution, been: list[np.ndarray]) -> None:
         """Go back along the path as planned from here, else as the arm came."""
         poses = self._held.poses[:1] if self.task.guard is not None else self._held.poses[::-1][1:]
+        if self.task.rises:
+            here = execution.target_to_world()
+            poses = np.array(
+                [*(transform(None, np.array([0, 0, each])) @ here for each in RISEN_M), self._held.poses[0]]
+            )
         way = HeldPath(poses, self._held.meant)
         grasp = self._grasp_now if self.task.empty else execution.gripper_to_object()
         joints = self._planner.onward(self.problem, way, grasp, execution.commanded_rad, as_hulls=self.task.as_hulls)

@@ -10,6 +10,7 @@ from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.environment.environment import TaskEnvironment
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.settings import EpisodeSettings
+from manitwin.episodes.skills.hands import check_jaws
 from manitwin.episodes.target_grasps import TargetGrasp, usable_grasps
 from manitwin.episodes.tasks.task_files import one_task
 from manitwin.episodes.tasks.task_setting import task_setting
@@ -43,6 +44,7 @@ def make_env(
         raise UsageError(f"{folder / CONFIG}: does not say of which scenes its tasks are; {_REMEDY}")
     dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
     settings, chosen = EpisodeSettings(), load_robot(task.robot if robot is None else robot)
+    check_jaws(chosen, "environments")
     source, planner = TwinSource(dataset), PickPlacePlanner(chosen, timestep_s=settings.timestep_s)
 
     @lru_cache(maxsize=64)

@@ -36,7 +36,11 @@ class WorldPainter:
         """Return ``(size, size, 3) uint8`` of each camera."""
         poses = [world.object_to_world(number) for number in range(len(world.placed))]
         pictures = self._replay.picture(
-            poses, world.robot.joint_positions(), world.robot.opening_m(), self._cameras, size_px=self._size_px
+            poses,
+            world.robot.joint_positions(),
+            np.array([world.robot.opening_m()]),
+            self._cameras,
+            size_px=self._size_px,
         )
         return {camera.name: picture for camera, picture in zip(self._cameras, pictures, strict=True)}
 

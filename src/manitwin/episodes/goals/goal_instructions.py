@@ -69,6 +69,19 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "stir what is in {b} with {a}", "use {a} to stir {b}", "give {b} a stir with {a}", "stir {b} once around with {a}",
         "pick up {a} and stir what is in {b}", "please mix what {b} holds with {a}",
     ),
+    "wiped": (
+        "wipe the board with {a}", "clean the board with {a}", "take {a} and wipe over the board", "rub the board with {a}",
+        "pick up {a} and wipe the middle of the board with {it}", "please give the board a wipe with {a}",
+    ),
+    "cut_motion": (
+        "draw {a} along the middle of the board", "go through a cut on the board with {a}", "show a cut on the board with {a}",
+        "pick up {a} and move {its} edge along the middle of the board", "make a cutting motion on the board with {a}",
+        "please move {a} over the board as if to cut",
+    ),
+    "aimed": (
+        "point {a} at {b}", "aim {a} at {b}", "direct {a} at {b}", "pick up {a} and point {it} at {b}",
+        "take {a} and aim {it} at {b}", "please hold {a} so that {it} points at {b}",
+    ),
     "pressed": (
         "press {a}", "push down on {a} with your fingertips", "press down on {a}", "give {a} a push from above",
         "close your hand and press {a}", "please press {a} once",

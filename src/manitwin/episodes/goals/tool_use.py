@@ -7,6 +7,7 @@ from manitwin.episodes.goals.spatial import Judgement, judged
 from manitwin.episodes.goals.world_state import Event, WorldState
 
 LEAST_STIRRED = 0.3  # of the granules, moved by more than their own width
+LEAST_BY_FACE, LEAST_IN_BAND = 0.5, 0.7  # of the time in which a tool touches what it wipes
 AIMED_M = (0.03, 0.30)
 AIMED_S = 0.25
 
@@ -26,21 +27,30 @@ def stirred(state: WorldState, literal: Literal) -> Judgement:
 
 
 def wiped(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that the value's share of a patch was swept by a tool that pressed on it with 1 to 5 N."""
+    """Judge that the value's share of a patch was swept by a tool's face that pressed on it with 1 to 5 N."""
     assert literal.value is not None
     values = _last(state, "wiped", literal)
     if values is None:
         return Judgement(False, "not_touched", {})
-    return judged({"not_all_swept": values["share"] >= literal.value}, values)
+    return judged(
+        {
+            "wrong_face": values["by_face"] >= LEAST_BY_FACE,
+            "force_off": values["in_band"] >= LEAST_IN_BAND,
+            "not_all_swept": values["share"] >= literal.value,
+        },
+        values,
+    )
 
 
 def cut_motion(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that an edge went along the value's share of a line, within 5 mm and 10 degrees; nothing is divided by it."""
+    """Judge that an edge went along the value's share of a line, within 5 mm and 10 degrees, drawn as far; nothing is divided."""
     assert literal.value is not None
     values = _last(state, "cut_motion", literal)
     if values is None:
         return Judgement(False, "missed", {})
-    return judged({"not_along": values["share"] >= literal.value}, values)
+    return judged(
+        {"not_along": values["share"] >= literal.value, "not_drawn": values["drawn"] >= literal.value}, values
+    )
 
 
 def aimed(state: WorldState, literal: Literal) -> Judgement:

@@ -141,7 +141,7 @@ def check_statistics(path: Path, features: dict[str, dict[str, Any]], statistics
         shape = _shape(feature)
         try:
             told = {kind: np.array(value, float) for kind, value in stats[name].items()}
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, OverflowError) as error:
             raise EpisodesError(
                 f"{path}: the statistics of {name} are no numbers ({str(error)[:120]}); {_REMEDY}"
             ) from error

@@ -13,7 +13,6 @@ from manitwin.episodes.lerobot.lerobot_format import DEFAULT_FEATURES
 from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta
 from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode
 
-OPENING = "gripper_opening_m"
 GRANULES = "observation.granules"
 _POSE = ("x_m", "y_m", "z_m", "qw", "qx", "qy", "qz")
 _TWIST = ("dx_m", "dy_m", "dz_m", "rx_rad", "ry_rad", "rz_rad")
@@ -46,16 +45,16 @@ class Feature:
 
 def features_of(robot: RecordedRobot, *, granules: bool = False) -> tuple[Feature, ...]:
     """Return the features of a robot's episodes in the order of the columns, with or without counts of ``granules``."""
-    joints = robot.arm_joints
+    joints, told = robot.arm_joints, robot.hand_action
     return (
-        Feature("observation.state", "float32", (*joints, OPENING)),
+        Feature("observation.state", "float32", (*joints, *robot.hand_state)),
         Feature("observation.velocity", "float32", joints),
         Feature("observation.tip_pose", "float32", _POSE),
         Feature("observation.target_pose", "float32", _POSE),
         *([Feature(GRANULES, "int64", ("in_target", "in_others", "in_none"))] if granules else []),
-        Feature("action", "float32", (*joints, OPENING)),
-        Feature("action.joint_delta", "float32", (*joints, OPENING)),
-        Feature("action.tip_delta", "float32", (*_TWIST, OPENING)),
+        Feature("action", "float32", (*joints, *told)),
+        Feature("action.joint_delta", "float32", (*joints, *told)),
+        Feature("action.tip_delta", "float32", (*_TWIST, *told)),
         Feature("next.success", "bool"),
         Feature("next.done", "bool"),
         Feature("phase", "int64"),
@@ -72,7 +71,7 @@ def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task
     recording = episode.recording
     steps, now = recording.steps, slice(0, recording.steps)
     number, last = np.arange(steps), np.arange(steps) == recording.steps - 1
-    state = np.hstack([recording.joint_positions_rad, recording.gripper_opening_m[:, None]])
+    state = np.hstack([recording.joint_positions_rad, recording.hand])
     target = recording.target
     poses = [recording.object_positions_m[now, target], recording.object_quaternions_wxyz[now, target]]
     return {
@@ -81,7 +80,7 @@ def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task
         "observation.tip_pose": np.hstack([recording.tip_position_m, recording.tip_quaternion_wxyz])[now],
         "observation.target_pose": np.hstack(poses),
         GRANULES: _granule_counts(episode.recording),
-        "action": np.hstack([recording.action_joint_positions_rad, recording.action_gripper_opening_m[:, None]]),
+        "action": np.hstack([recording.action_joint_positions_rad, recording.action_hand]),
         "action.joint_delta": joint_delta(recording),
         "action.tip_delta": tip_delta(recording),
         "next.success": last & episode.attempt.succeeded,

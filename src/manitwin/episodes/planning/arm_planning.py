@@ -8,11 +8,13 @@ from manitwin.episodes.planning.arm_kinematics import ArmKinematics
 from manitwin.episodes.planning.arm_solutions import ArmSolutions, KnownPoses
 from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.convex_shapes import ShapeStore
-from manitwin.episodes.planning.grasp_candidates import GraspCandidates, HandRoom
+from manitwin.episodes.planning.grasp_candidates import GraspCandidates, HandRoom, turns_of
+from manitwin.episodes.planning.hand_shaping import HandShaping
 from manitwin.episodes.planning.kinematic_body import floating_hand_of
 from manitwin.episodes.planning.motions import Motions
 from manitwin.episodes.planning.problem import PickPlaceProblem, PlannerSettings
 from manitwin.episodes.planning.straight_lines import LineEnds
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.robot import Robot
 
 
@@ -31,7 +33,14 @@ class ArmPlanning:
         self.arm = ArmKinematics(robot, opening_m)
         self.hand = floating_hand_of(self.arm.body)
         self.known, self.ends = KnownPoses(self.arm), LineEnds(self.settings)
-        self.candidates = GraspCandidates(HandRoom(self.hand), self.known, self.settings)
+        self._shaping: tuple[HandShaping, HandShaping] | None = None
+        if isinstance(robot.gripper, MultiFingerGripper):
+            bodies = self.arm.body, self.hand
+            first, second = (HandShaping(body, robot.gripper, robot.open_hand) for body in bodies)
+            self._shaping = first, second
+        moving = frozenset[int]() if self._shaping is None else self._shaping[1].moving
+        turns = turns_of(robot.gripper)
+        self.candidates = GraspCandidates(HandRoom(self.hand, moving), self.known, self.settings, turns)
         self.solutions = ArmSolutions(self.arm, self.known, self.settings)
         self.motions = Motions(robot, self.arm, timestep_s, self.settings)
         self._shapes = ShapeStore()
@@ -44,6 +53,13 @@ class ArmPlanning:
         last = self._world
         if last is None or not last.is_of(problem, goal_object_to_world, as_hulls=as_hulls):
             self._world = last = ProblemWorld(
-                problem, goal_object_to_world, self.arm.body, self.hand, self._shapes, self.settings, as_hulls=as_hulls
+                problem,
+                goal_object_to_world,
+                self.arm.body,
+                self.hand,
+                self._shapes,
+                self.settings,
+                shaping=self._shaping,
+                as_hulls=as_hulls,
             )
         return last

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from manitwin.episodes.planning.convex_shapes import ShapeStore
+from manitwin.episodes.planning.hand_shaping import HandShaping
 from manitwin.episodes.planning.joint_paths import JointPath, bisection_places
 from manitwin.episodes.planning.kinematic_body import KinematicBody, broad_phase
 from manitwin.episodes.planning.libraries import pin
 from manitwin.episodes.planning.obstacle_shapes import ObstacleShapes, obstacle_shapes, pose_of
-from manitwin.episodes.planning.problem import Phase, PickPlaceProblem, PlannerSettings
+from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem, PlannerSettings
 
 STANDING = "target"
 """The name of the target's shapes where it stands."""
@@ -51,6 +53,11 @@ class CollisionWorld:
         """Put the held copy of the target where a grasp ``(4, 4)`` has it."""
         placement = self._body.gripper_to_joint * pose_of(gripper_to_object).inverse()
         for index in self._held:
+            self._geometry.geometryObjects[index].placement = placement
+
+    def shape_hand(self, placements: Mapping[int, Any]) -> None:
+        """Put shapes of the hand, by their numbers, at other placements in the frame of the hand's joint."""
+        for index, placement in placements.items():
             self._geometry.geometryObjects[index].placement = placement
 
     def enter(self, phase: Phase, margin_m: float | None = None, meant: frozenset[str] = frozenset()) -> None:
@@ -123,7 +130,7 @@ class _Pairs:
         common = self._own | robot_statics
         self._of_phase = {
             Phase.REACH: common | hand_target | rest_target,
-            Phase.APPROACH: common | hand_target | rest_target,
+            Phase.APPROACH: common | between(sorted(body.touching - body.pressed), standing) | rest_target,
             Phase.LIFT: common | held_all,
             Phase.CARRY: common | held_all,
             Phase.LOWER: common | held_all,
@@ -178,6 +185,7 @@ class ProblemWorld:
         store: ShapeStore,
         settings: PlannerSettings,
         *,
+        shaping: tuple[HandShaping, HandShaping] | None = None,
         as_hulls: bool = False,
     ):
         """Build both worlds; ``as_hulls``: the target is carried as its own hulls, so that its holes and cavities are free."""
@@ -185,11 +193,18 @@ class ProblemWorld:
         shapes = obstacle_shapes(problem, goal_object_to_world, store, settings.margin_m, as_hulls=as_hulls)
         self.arm = CollisionWorld(arm, shapes, margin_m=settings.margin_m, clearance_m=settings.clearance_m)
         self._hand = CollisionWorld(hand, shapes, margin_m=settings.margin_m, clearance_m=settings.clearance_m)
+        self._shapings = shaping
 
     def is_of(self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray, *, as_hulls: bool = False) -> bool:
         """Tell whether this is the world of this very problem with such a goal, its target carried as asked for."""
         same = self.problem is problem and self._as_hulls == as_hulls
         return same and np.array_equal(self.goal_object_to_world, goal_object_to_world)
+
+    def shape_hand(self, grasp: Grasp) -> None:
+        """Give the hand the joints that a grasp has before it closes; one without joints of its own stays as it is."""
+        if self._shapings is not None and grasp.joints_rad is not None:
+            for world, shaping in zip((self.arm, self._hand), self._shapings, strict=True):
+                world.shape_hand(shaping.placements(grasp.joints_rad[0]))
 
     def hold(self, gripper_to_object: np.ndarray) -> None:
         """Put the held target where a grasp has it."""

@@ -16,8 +16,21 @@ from manitwin.episodes.planning.problem import Phase, PlanFailure, PlannerSettin
 from manitwin.episodes.planning.straight_lines import HALF_TURN, LineEnds
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.rigid_body import StaticBox
+from manitwin.robots.grippers.gripper import Gripper
+from manitwin.robots.grippers.parallel import ParallelGripper
+from manitwin.robots.grippers.suction import SuctionGripper
 
-TURNS = np.array([np.eye(4), HALF_TURN])
+QUARTER_TURN = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+
+def turns_of(gripper: Gripper) -> np.ndarray:
+    """Return the turns about the approach axis ``(K, 4, 4)`` that leave a grasp what it is.
+
+    Jaws may be exchanged, a cup is round (its body is square), and fingers are not alike.
+    """
+    if isinstance(gripper, SuctionGripper):
+        return np.array([np.linalg.matrix_power(QUARTER_TURN, number) for number in range(4)])
+    return np.array([np.eye(4), HALF_TURN] if isinstance(gripper, ParallelGripper) else [np.eye(4)])
 
 
 class HandRoom:
@@ -26,9 +39,10 @@ class HandRoom:
     It is the cheap half of a test: a hand that passes may still overlap a box by an edge.
     """
 
-    def __init__(self, hand: KinematicBody):
-        """Take the corners of the common hull of the shapes that have corners."""
-        pieces = [points for shape in hand.geometry.geometryObjects if (points := corners_of(shape)) is not None]
+    def __init__(self, hand: KinematicBody, moving: frozenset[int] = frozenset()):
+        """Take the corners of the common hull of the shapes that have corners, but those that are ``moving`` with a grasp."""
+        shapes = (shape for index, shape in enumerate(hand.geometry.geometryObjects) if index not in moving)
+        pieces = [points for shape in shapes if (points := corners_of(shape)) is not None]
         points = np.concatenate(pieces)
         self._corners = np.concatenate([points[ConvexHull(points).vertices]])
 
@@ -58,21 +72,23 @@ class Candidate:
 class GraspCandidates:
     """Looks at the hand alone; cheap beside anything that moves the arm."""
 
-    def __init__(self, room: HandRoom, known: KnownPoses, settings: PlannerSettings):
-        """Take what is known of the hand and of the arm's reach."""
+    def __init__(self, room: HandRoom, known: KnownPoses, settings: PlannerSettings, turns: np.ndarray):
+        """Take what is known of the hand and of the arm's reach, and the ``turns (K, 4, 4)`` that a grasp may be tried in."""
+        self.turns = turns
         self._room, self._known, self._settings = room, known, settings
         self._ends = LineEnds(settings)
 
     def of(self, world: ProblemWorld) -> Iterator[Candidate]:
-        """Yield both turns of each grasp."""
+        """Yield all turns of each grasp; the world's hand has the shape of it."""
         grasps = world.problem.grasps
         if not grasps:
             return
-        poses = np.array([grasp.gripper_to_object for grasp in grasps])[:, None] @ TURNS
+        poses = np.array([grasp.gripper_to_object for grasp in grasps])[:, None] @ self.turns
         at_start = self._without_room(world, world.problem.target.object_to_world @ poses)
         at_goal = self._without_room(world, world.goal_object_to_world @ poses)
         for index in range(len(grasps)):
-            for turn in range(len(TURNS)):
+            world.shape_hand(grasps[index])
+            for turn in range(len(self.turns)):
                 failure: PlanFailure | None = None
                 if at_start[index, turn]:
                     failure = "approach_blocked"

@@ -10,6 +10,7 @@ import numpy as np
 from manitwin.episodes.planning.convex_shapes import convex_hull, corners_of
 from manitwin.episodes.planning.libraries import coal, pin
 from manitwin.formats.xml_file import add
+from manitwin.robots.grippers.suction import SuctionGripper
 from manitwin.robots.robot import Robot
 from manitwin.robots.urdf import UrdfTree
 
@@ -21,7 +22,8 @@ class KinematicBody:
     """A model, its convex collision shapes with the pairs to be tested, and the joint that the gripper is fixed to.
 
     ``gripper_to_joint`` is the pose of the twin's grasp frame in the frame of ``joint``. ``touching`` are the shapes that
-    may touch the target when they hold it, ``fingers`` those of them that are the fingers.
+    may touch the target when they hold it, ``fingers`` those of them that are the fingers; ``pressed`` are a cup's lip, which is
+    pressed on the target at the end of the approach. ``links`` names the link of each shape.
     """
 
     model: Any
@@ -30,17 +32,19 @@ class KinematicBody:
     gripper_to_joint: Any
     touching: frozenset[int]
     fingers: frozenset[int] = frozenset()
+    pressed: frozenset[int] = frozenset()
+    links: tuple[str, ...] = ()
 
 
 def arm_of(robot: Robot, opening_m: float | None = None) -> KinematicBody:
     """Build the arm with its fingers open, or as wide as said; joints are ``robot.arm_joints`` in their order."""
-    opening_m = robot.gripper.opening_m if opening_m is None else opening_m
+    hand = robot.open_hand if opening_m is None else np.full(len(robot.finger_joints), opening_m / 2)
     urdf = _without_continuous_joints(robot.urdf)
     model = pin.buildModelFromXML(urdf)
     geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION, None, [])
     configuration = pin.neutral(model)
-    for name in robot.finger_joints:
-        configuration[model.joints[model.getJointId(name)].idx_q] = opening_m / 2
+    for name, position in zip(robot.finger_joints, hand, strict=True):
+        configuration[model.joints[model.getJointId(name)].idx_q] = position
     locked = [i for i in range(1, model.njoints) if model.names[i] not in robot.arm_joints]
     model, geometry = pin.buildReducedModel(model, geometry, locked, configuration)
     tip = model.frames[model.getFrameId(robot.tip_link)]
@@ -62,7 +66,9 @@ def arm_of(robot: Robot, opening_m: float | None = None) -> KinematicBody:
         joint=tip.parentJoint,
         gripper_to_joint=tip.placement * pin.SE3(np.ascontiguousarray(robot.gripper_to_tip)),
         touching=frozenset(i for i, link in enumerate(links) if link in holding),
-        fingers=frozenset(i for i, link in enumerate(links) if link in robot.finger_links),
+        fingers=(fingers := frozenset(i for i, link in enumerate(links) if link in robot.finger_links)),
+        pressed=fingers if isinstance(robot.gripper, SuctionGripper) else frozenset(),
+        links=tuple(links),
     )
 
 
@@ -70,17 +76,20 @@ def floating_hand_of(arm: KinematicBody) -> KinematicBody:
     """Return what moves with the gripper as a body of its own; its configuration is the grasp frame's pose, quaternion xyzw."""
     model = pin.Model()
     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "gripper")
-    geometry, touching, fingers = pin.GeometryModel(), set[int](), set[int]()
+    geometry, kept = pin.GeometryModel(), list[int]()
     joint_to_gripper = arm.gripper_to_joint.inverse()
     for i, shape in enumerate(arm.geometry.geometryObjects):
         if shape.parentJoint == arm.joint:
             placement = joint_to_gripper * shape.placement
-            index = geometry.addGeometryObject(pin.GeometryObject(shape.name, joint, placement, shape.geometry))
-            if i in arm.touching:
-                touching.add(index)
-            if i in arm.fingers:
-                fingers.add(index)
-    return KinematicBody(model, geometry, joint, pin.SE3.Identity(), frozenset(touching), frozenset(fingers))
+            geometry.addGeometryObject(pin.GeometryObject(shape.name, joint, placement, shape.geometry))
+            kept.append(i)
+
+    def of(shapes: frozenset[int]) -> frozenset[int]:
+        return frozenset(index for index, i in enumerate(kept) if i in shapes)
+
+    links = tuple(arm.links[i] for i in kept)
+    parts = of(arm.touching), of(arm.fingers), of(arm.pressed)
+    return KinematicBody(model, geometry, joint, pin.SE3.Identity(), *parts, links)
 
 
 def broad_phase(model: Any, geometry: Any, data: Any) -> Any:
@@ -102,7 +111,7 @@ def _without_continuous_joints(urdf: str) -> str:
     return tree.text()
 
 
-def _convex_shapes(geometry: Any, model: Any, finger_links: tuple[str, str]) -> list[Any]:
+def _convex_shapes(geometry: Any, model: Any, finger_links: tuple[str, ...]) -> list[Any]:
     """Return the shapes with their meshes' hulls, and each finger as the one hull of its pieces."""
     shapes: list[Any] = []
     fingers: dict[str, list[Any]] = {link: [] for link in finger_links}

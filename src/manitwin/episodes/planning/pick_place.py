@@ -8,7 +8,6 @@ import numpy as np
 
 from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.collision_world import ProblemWorld
-from manitwin.episodes.planning.grasp_candidates import TURNS
 from manitwin.episodes.planning.grasp_tally import GraspTally
 from manitwin.episodes.planning.placement import Placement, PlacementPlanner, goals_after_slip
 from manitwin.episodes.planning.problem import (
@@ -47,7 +46,7 @@ class PickPlacePlanner:
         return self.arm.gripper_pose(np.asarray(joint_positions_rad, float))
 
     def plan(self, problem: PickPlaceProblem) -> PlanReport:
-        """Plan with the first grasp that can be, itself or turned by 180 degrees about the approach axis.
+        """Plan with the first grasp that can be, itself or turned about the approach axis (``grasp_candidates.turns_of``).
 
         At most ``settings.max_grasps`` are tried beyond a look at the hand alone. What a grasp fails of is the latest stage
         that it came to.
@@ -85,6 +84,7 @@ class PickPlacePlanner:
         None: there is no way.
         """
         world = self._world_of(problem, goal_object_to_world)
+        world.shape_hand(plan.grasp)
         world.hold(gripper_to_object)
         start = np.array(joint_positions_rad, float)
         rng = np.random.default_rng((problem.seed, 1))
@@ -100,12 +100,14 @@ class PickPlacePlanner:
         return None
 
     def reachable(self, problem: PickPlaceProblem) -> float:
-        """Return the share of grasps with a collision-free inverse kinematics and a straight approach, in either turn."""
+        """Return the share of grasps with a collision-free inverse kinematics and a straight approach, in any turn."""
         world = self._world_of(problem, problem.goal_object_to_world)
-        good = sum(
-            any(self._can_approach(world, grasp.gripper_to_object @ turn) for turn in TURNS) for grasp in problem.grasps
-        )
+        good = sum(self._can_be_reached(world, grasp) for grasp in problem.grasps)
         return good / max(1, len(problem.grasps))
+
+    def _can_be_reached(self, world: ProblemWorld, grasp: Grasp) -> bool:
+        world.shape_hand(grasp)
+        return any(self._can_approach(world, grasp.gripper_to_object @ turn) for turn in self._candidates.turns)
 
     def _can_approach(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> bool:
         if self._candidates.look_at_approach(world, gripper_to_object) is not None:

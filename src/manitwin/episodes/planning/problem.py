@@ -39,11 +39,15 @@ class Phase(IntEnum):
 
 @dataclass(frozen=True)
 class Grasp:
-    """A grasp as the planner takes it: ``gripper_to_object (4, 4)`` in the twin's grasp frame, and the width between the pads."""
+    """A grasp as the planner takes it: ``gripper_to_object (4, 4)`` in the twin's grasp frame, and the width between the pads.
+
+    ``joints_rad (2, J)`` are a hand's joints before closing and those to close to; None: it has none of its own.
+    """
 
     grasp_id: str
     gripper_to_object: np.ndarray
     width_m: float
+    joints_rad: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,11 @@ class Motion:
 
 class Grasped(Protocol):
     """The protocol of a plan that says how it holds the target."""
+
+    @property
+    def grasp(self) -> Grasp:
+        """The candidate that it is of."""
+        ...
 
     @property
     def gripper_to_object(self) -> np.ndarray:

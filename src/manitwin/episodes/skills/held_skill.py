@@ -7,12 +7,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from manitwin.episodes.fixtures import Fixture
+from manitwin.episodes.fixtures import Fixture, board
 from manitwin.episodes.goals.world_state import Hole, Tip
 from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprint_at
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, openings_of
 from manitwin.geometry.boxes import separation_m
+from manitwin.geometry.frames.feature import rotation_of
+from manitwin.geometry.poses import transform
 from manitwin.scenes.layouts.pool import PoolTwin
 from manitwin.scenes.layouts.twin_frames import TwinFrame
 
@@ -72,6 +74,15 @@ class HeldSkill(Skill):
         return None
 
 
+def board_in_reach(around: Surroundings, half_m: np.ndarray, name: str, rng: np.random.Generator) -> Fixture | None:
+    """Draw a board with half extents ``(3,)`` in reach on the furniture; None where none fits."""
+    place = around.area.draw(board(np.zeros(3), 0.0, half_m).footprint_m, [], rng)
+    if place is None:
+        return None
+    position_m = place[:3, 3] + [0.0, 0, around.area.support.height_m]
+    return board(position_m, float(np.arctan2(place[1, 0], place[0, 0])), half_m, name=name)
+
+
 def frames_of(twin: PoolTwin, *kinds: str) -> tuple[TwinFrame, ...]:
     """Return a twin's frames of some kinds, in their order."""
     return tuple(frame for frame in twin.frames if frame.kind in kinds)
@@ -100,3 +111,21 @@ def tip_of(frames: tuple[TwinFrame, ...], hulls: Sequence[np.ndarray]) -> Tip | 
     along = np.linalg.eigh(np.cov(points.T))[1][:, 2]
     place = frame.frame_to_object[:3, 3]
     return Tip(place, along if (place - middle) @ along >= 0 else -along)
+
+
+def stick_frame(points_m: np.ndarray, frames: tuple[TwinFrame, ...], up: np.ndarray) -> np.ndarray:
+    """Return the frame ``(4, 4)`` of the working end: Z along the length, out at the outermost place; X near ``up (3,)``.
+
+    The end is that away from the handle where a frame tells it (an axis named so), else the broader one.
+    """
+    middle = points_m.mean(0)
+    axis = np.linalg.eigh(np.cov(points_m.T))[1][:, 2]
+    along, across = (points_m - middle) @ axis, np.linalg.norm(np.cross(points_m - middle, axis), axis=1)
+    handle = next((f for f in frames if f.kind == "axis" and "handle" in f.label), None)
+    if handle is not None:
+        outward = -float((handle.frame_to_object[:3, 3] - middle) @ axis)
+    else:
+        outward = float(across[along > 0].max(initial=0.0) - across[along < 0].max(initial=0.0))
+    axis = axis if outward >= 0 else -axis
+    along = (points_m - middle) @ axis
+    return transform(rotation_of(axis, up), points_m[int(along.argmax())])

@@ -57,6 +57,20 @@ class Guard:
 
 
 @dataclass(frozen=True)
+class Regulated:
+    """A move under force: from knot ``first`` on, as far as a guard came, while what is watched presses with ``force_n``.
+
+    The way is that of the poses' places alone, from where the guard has stopped; ``normal (3,)``, out of the surface, world
+    frame, is the direction in which the hand yields or follows; ``speed_m_s`` is the mean along it.
+    """
+
+    first: int
+    force_n: float
+    normal: np.ndarray
+    speed_m_s: float
+
+
+@dataclass(frozen=True)
 class HeldTask:
     """One skill's work: ``paths`` are alternatives, of which the first that can be planned is taken.
 
@@ -64,7 +78,8 @@ class HeldTask:
     nothing is grasped. ``as_hulls``: the target is carried as its hulls, and may go into the objects that it ``enters``. The
     path takes ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
     ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or
-    put back where it was. ``watch`` makes what latches events, and what a guard asks for the force.
+    put back where it was. One that ``rises`` goes straight up first, and from there to the path's beginning. ``watch`` makes
+    what latches events, and what a guard asks for the force.
     """
 
     paths: tuple[HeldPath, ...]
@@ -78,4 +93,6 @@ class HeldTask:
     hold_s: float = 0.0
     ending: Literal["let_go", "keep", "put_back"] = "let_go"
     guard: Guard | None = None
+    regulated: Regulated | None = None
+    rises: bool = False
     watch: Callable[[RobotWorld], EventWatch] | None = None

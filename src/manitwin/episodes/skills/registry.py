@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from manitwin.episodes.skills.aim import Aim
 from manitwin.episodes.skills.beside import SIDE_SKILLS
+from manitwin.episodes.skills.cut_motion import CutMotion
 from manitwin.episodes.skills.hang import Hang
 from manitwin.episodes.skills.insert import Insert
 from manitwin.episodes.skills.place_in import PlaceIn
@@ -16,6 +18,7 @@ from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.skills.stir import Stir
 from manitwin.episodes.skills.strike import Strike
 from manitwin.episodes.skills.upright import Upright
+from manitwin.episodes.skills.wipe import Wipe
 from manitwin.errors import UsageError, choose_from
 
 PICK_PLACE = "pick_place"
@@ -34,6 +37,9 @@ _SKILLS: tuple[Skill, ...] = (
     Pour(),
     Push(),
     Stir(),
+    Wipe(),
+    CutMotion(),
+    Aim(),
 )
 
 SKILLS: Mapping[str, Skill] = {skill.name: skill for skill in _SKILLS}

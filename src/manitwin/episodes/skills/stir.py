@@ -2,26 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import ConvexHull
 
 from manitwin.episodes.planning.held_path import HeldPath
 from manitwin.episodes.planning.problem import Grasp
-from manitwin.episodes.skills.held_skill import HeldSkill
+from manitwin.episodes.skills.held_skill import HeldSkill, stick_frame
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.skill import SkillGoal, Surroundings
 from manitwin.episodes.tool_watches import StirWatch
-from manitwin.geometry.cavity import Opening
+from manitwin.geometry.cavity_floor import floor_below_rim
 from manitwin.geometry.frames.feature import UP, rotation_of
 from manitwin.geometry.poses import inverse, transform, transform_points
 from manitwin.physics.sapien.granules import fill
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.stacking import open_poses
-from manitwin.scenes.layouts.twin_frames import TwinFrame
 
 SLENDER = 4.0  # length by width of what stirs
 LEAST_LENGTH_M, LEAST_DEPTH_M, LEAST_RIM_M = 0.12, 0.03, 0.03
@@ -117,44 +114,6 @@ class Stir(HeldSkill):
             ending="put_back",
             watch=watch,
         )
-
-
-def stick_frame(points_m: np.ndarray, frames: tuple[TwinFrame, ...], up: np.ndarray) -> np.ndarray:
-    """Return the frame ``(4, 4)`` of the working end: Z along the length, out at the outermost place; X near ``up (3,)``.
-
-    The end is that away from the handle where a frame tells it (an axis named so), else the broader one.
-    """
-    middle = points_m.mean(0)
-    axis = np.linalg.eigh(np.cov(points_m.T))[1][:, 2]
-    along, across = (points_m - middle) @ axis, np.linalg.norm(np.cross(points_m - middle, axis), axis=1)
-    handle = next((f for f in frames if f.kind == "axis" and "handle" in f.label), None)
-    if handle is not None:
-        outward = -float((handle.frame_to_object[:3, 3] - middle) @ axis)
-    else:
-        outward = float(across[along > 0].max(initial=0.0) - across[along < 0].max(initial=0.0))
-    axis = axis if outward >= 0 else -axis
-    along = (points_m - middle) @ axis
-    return transform(rotation_of(axis, up), points_m[int(along.argmax())])
-
-
-def floor_below_rim(hulls: Sequence[np.ndarray], opening: Opening, radius_m: float) -> float:
-    """Return the height (negative, m) from the rim's middle of the highest floor in a vessel within a radius of its axis."""
-    basis = rotation_of(opening.axis)
-    angles = np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS
-    ring = radius_m * np.column_stack([np.cos(angles), np.sin(angles)])
-    starts = opening.center_m + np.vstack([ring, ring / 2, np.zeros((1, 2))]) @ basis[:, :2].T
-    highest = -opening.depth_m
-    for hull in hulls:
-        planes = ConvexHull(hull).equations
-        slope, offset = planes[:, :3] @ opening.axis, starts @ planes[:, :3].T + planes[:, 3]
-        with np.errstate(divide="ignore"):
-            at = -offset / slope
-        top = np.where(slope > 1e-9, at, np.inf).min(1)
-        bottom = np.where(slope < -1e-9, at, -np.inf).max(1)
-        beside = (np.abs(slope) <= 1e-9) & (offset > 0)
-        met = (bottom < top) & ~beside.any(1) & (top < 0)
-        highest = max(highest, float(top[met].max(initial=-np.inf)))
-    return highest
 
 
 def _round(turn: np.ndarray, center: np.ndarray, rim_radius_m: float, low_m: float, side: np.ndarray) -> np.ndarray:

@@ -8,41 +8,21 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, create_model
 
-from manitwin.config import BuildConfig
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.tasks.candidates import Action, Candidate, single_actions, undoes
 from manitwin.episodes.tasks.task_scene import TaskScene
-from manitwin.errors import ConfigError
-from manitwin.models.vlm import chat_from_spec
 from manitwin.models.vlm.client import ChatClient
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.models.vlm.structured import ask
 
-NONE, NOTHING = "none", "nothing"
+NOTHING = "nothing"
 MOST_LITERALS = 2
 INSTRUCTIONS = (
     "You propose tasks for a robot arm with a two-finger gripper at a table. A task is a goal: one or two literals that are to"
     " become true one after the other, each a predicate about an object and, where it needs one, a second object. Propose what a"
     " person would want done with these things. Use only the predicates and the objects that are listed, and answer in JSON."
 )
-
-
-def chat_of(spec: str) -> ChatClient | None:
-    """Return the model of a spec, None for ``none``; raises ConfigError for one that cannot be."""
-    name, _, argument = spec.partition(":")
-    made = {
-        "openai": chat_from_spec.openai_from_spec,
-        "anthropic": chat_from_spec.anthropic_from_spec,
-        "replay": chat_from_spec.replay_from_spec,
-    }
-    if spec == NONE:
-        return None
-    if name not in made:
-        raise ConfigError(
-            f"vlm {spec!r}: cannot propose tasks; give openai:MODEL@URL, anthropic:MODEL, replay:FILE or none"
-        )
-    return made[name](argument, BuildConfig())
 
 
 def propose(scene: TaskScene, chat: ChatClient, count: int) -> tuple[list[Candidate], dict[str, int]]:

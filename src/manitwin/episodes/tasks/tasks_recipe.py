@@ -25,11 +25,12 @@ from manitwin.episodes.tasks.checking import Planned
 from manitwin.episodes.tasks.difficulty import difficulty_of
 from manitwin.episodes.tasks.drawing import Tally, draw_tasks
 from manitwin.episodes.tasks.phrasings import task_instructions
-from manitwin.episodes.tasks.proposals import chat_of, propose
+from manitwin.episodes.tasks.proposals import propose
 from manitwin.episodes.tasks.task_files import TASKS, tasks_bytes
 from manitwin.episodes.tasks.task_record import TaskRecord, TaskStep, kind_of, task_id_of
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.errors import Rejected, UsageError
+from manitwin.models.vlm.chat_from_spec import chat_of
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.layouts.pool import pool_of
@@ -112,7 +113,7 @@ class TasksStage:
         return {}
 
     def _proposed(self, scene: TaskScene) -> tuple[list[Candidate], dict[str, int]]:
-        chat = chat_of(self.settings.vlm)
+        chat = chat_of(self.settings.vlm, "propose tasks")
         return ([], {}) if chat is None else propose(scene, chat, self.settings.proposals)
 
     def _record(

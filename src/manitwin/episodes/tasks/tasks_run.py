@@ -13,13 +13,14 @@ from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.episodes_run import EpisodesSource
 from manitwin.episodes.settings import TasksConfig
+from manitwin.episodes.skills.hands import check_jaws
 from manitwin.episodes.tasks.bddl import write_bddl
-from manitwin.episodes.tasks.proposals import chat_of
 from manitwin.episodes.tasks.task_files import TASKS, read_tasks, write_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.episodes.tasks.tasks_recipe import COUNTS, SCENE_TASKS, TaskedScene, TasksRecipe
 from manitwin.errors import UsageError
 from manitwin.formats.json_file import read_json_object
+from manitwin.models.vlm.chat_from_spec import chat_of
 from manitwin.robots.load import load_robot
 from manitwin.scenes.run_settings import check_settings
 from manitwin.scenes.scene_files import read_scene, scene_ids, scene_name
@@ -61,8 +62,8 @@ def make_tasks(
     Scenes whose tasks are there are left. Raises UsageError for a place without scenes, an unknown robot or model, an ``out``
     with tasks of other settings, or where another run is at work there.
     """
-    load_robot(config.robot)
-    chat_of(config.vlm)
+    check_jaws(load_robot(config.robot), "tasks")
+    chat_of(config.vlm, "propose tasks")
     source, root = EpisodesSource.of(scenes, twins), DatasetRoot(out)
     if source.scenes is None:
         raise UsageError(f"{scenes}: no scenes; `manitwin layout DATASET -o SCENES` makes some")

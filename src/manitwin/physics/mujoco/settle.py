@@ -21,17 +21,22 @@ STILL_M_S, STILL_RAD_S = 1e-3, 1e-2
 
 
 def settle_on_plane_in_mujoco(
-    body: RigidBody, object_to_plane: Sequence[np.ndarray], *, drop_m: float, seconds: float
+    body: RigidBody,
+    object_to_plane: Sequence[np.ndarray],
+    *,
+    drop_m: float,
+    seconds: float,
+    timestep_s: float = TIMESTEP_S,
 ) -> list[Settled]:
     """Release a body ``drop_m`` above the plane z = 0 in each of several poses (4x4), and see where it comes to rest."""
     if not len(object_to_plane):
         return []
-    model = _model(body)
+    model = _model(body, timestep_s)
     return [_settle(model, body, np.asarray(pose), drop_m, seconds) for pose in object_to_plane]
 
 
-def _model(body: RigidBody) -> mujoco.MjModel:
-    spec, contact = new_spec(TIMESTEP_S), contact_parameters(body.friction_static, SOFT_SOLREF)
+def _model(body: RigidBody, timestep_s: float) -> mujoco.MjModel:
+    spec, contact = new_spec(timestep_s), contact_parameters(body.friction_static, SOFT_SOLREF)
     size = [PLANE_HALF_SIZE_M, PLANE_HALF_SIZE_M, 0.1]
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=size, contype=1, conaffinity=2, **contact)
     add_object(spec, body, contact)
@@ -43,7 +48,7 @@ def _settle(model: mujoco.MjModel, body: RigidBody, pose: np.ndarray, drop_m: fl
     address = model.joint(OBJECT).qposadr[0]
     data.qpos[address : address + 3] = pose[:3, 3] + [0, 0, drop_m]
     data.qpos[address + 3 : address + 7] = quaternion_wxyz(pose[:3, :3])
-    mujoco.mj_step(model, data, round(seconds / TIMESTEP_S))
+    mujoco.mj_step(model, data, round(seconds / model.opt.timestep))
     number = model.body(OBJECT).id
     end = transform(data.xmat[number].reshape(3, 3), data.xpos[number])
     speed = data.qvel[model.joint(OBJECT).dofadr[0] :][:6]

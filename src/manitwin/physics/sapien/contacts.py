@@ -77,6 +77,11 @@ class ContactReader:
         for component, name, role in bodies:
             self._roles[component], self._names[component] = role, name
 
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of all bodies."""
+        return frozenset(self._names.values())
+
     def read(self) -> Sequence[physx.PhysxContact]:
         """Return the contacts of the last step, of which the others tell; expensive where many hulls stand on a table."""
         contacts: Sequence[physx.PhysxContact] = self._system.get_contacts()

@@ -7,6 +7,8 @@ lateral stiffness, see ``trial_phases.SharedTarget``.)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import sapien
 from sapien import physx
@@ -69,6 +71,47 @@ def _try_one(
     return run_phases(scene, object_to_hand[:3, :3], settings)
 
 
+class FingerClosing:
+    """How far each finger has come on its straight line of joints; it stops where a joint of it presses."""
+
+    def __init__(
+        self,
+        gripper: MultiFingerGripper,
+        start_rad: np.ndarray,
+        goal_rad: np.ndarray,
+        order: Sequence[int],
+        *,
+        strength: float,
+        frame_s: float,
+    ):
+        """Take where it begins and where it leads ``(J,)``, joints in the ``order`` given by their numbers in the gripper's file.
+
+        ``strength`` is the share of the gripper's own torque that joints press with.
+        """
+        self._press_nm, self._stiffness = strength * gripper.drive.press_nm, gripper.drive.stiffness_nm_rad
+        self.target_rad, self._start, self._way = start_rad, start_rad, goal_rad - start_rad
+        owners = zip(gripper.links, gripper.finger_of_link, strict=True)
+        of_joint = {link.joint: owner for link, owner in owners}
+        self._finger_of_joint = np.array([of_joint[gripper.joints[number]] for number in order])
+        fingers, step_rad = len(gripper.fingers), gripper.drive.speed_rad_s * frame_s
+        way_rad = np.array([np.abs(self._way)[self._finger_of_joint == finger].max() for finger in range(fingers)])
+        self._step, self._come = step_rad / np.maximum(way_rad, step_rad), np.zeros(fingers)
+        self.all_press = False
+
+    def move_on(self, positions_rad: np.ndarray) -> np.ndarray:
+        """Move on the targets of all fingers that do not press yet by one frame, and return all targets ``(J,)``."""
+        torque_nm = np.abs(self._stiffness * (self.target_rad - positions_rad))
+        presses = [
+            torque_nm[self._finger_of_joint == finger].max() >= self._press_nm for finger in range(len(self._come))
+        ]
+        for finger, stays in enumerate(presses):
+            if not stays:
+                self._come[finger] = min(1.0, self._come[finger] + self._step[finger])
+        self.all_press = all(stays or come == 1.0 for stays, come in zip(presses, self._come, strict=True))
+        self.target_rad = self._start + self._come[self._finger_of_joint] * self._way
+        return self.target_rad
+
+
 class FingeredHand:
     """A hand that can be closed: its articulation, each finger's way from open to closed, and how far it has come."""
 
@@ -78,13 +121,14 @@ class FingeredHand:
         """Put the open hand into the scene."""
         drive = gripper.drive
         strength = settings.force_n / gripper.force_n
-        self._press_nm, self._stiffness = strength * drive.press_nm, drive.stiffness_nm_rad
         material = physx.PhysxMaterial(settings.finger_friction, settings.finger_friction, 0.0)
         finger_of = {link.name: finger for link, finger in zip(gripper.links, gripper.finger_of_link, strict=True)}
         self._links = build_articulation(
             scene,
             gripper.links,
-            lambda link: LinkContact(material, soft_pad=True, collision_groups=_collision_groups(finger_of[link.name])),
+            lambda link: LinkContact(
+                material, soft_pad=True, collision_groups=finger_collision_groups(finger_of[link.name])
+            ),
             contact_offset_m=settings.contact_offset_m,
             root_to_scene=gripper.root_to_gripper,
         )
@@ -94,32 +138,21 @@ class FingeredHand:
         self._joints = self.articulation.active_joints
         drive_joints(
             self._joints,
-            stiffness=self._stiffness,
+            stiffness=drive.stiffness_nm_rad,
             damping=drive.damping_nm_s_rad,
             limit=strength * drive.torque_limit_nm,
             armature=drive.armature_kg_m2,
         )
         order = [gripper.joints.index(joint.name) for joint in self._joints]
-        self._open, self._closed = joints_rad[:, order]
-        of_joint = {link.joint: finger_of[link.name] for link in gripper.links}
-        self._finger_of_joint = np.array([of_joint[joint.name] for joint in self._joints])
-        self._step, self._come = self._steps(len(gripper.fingers), drive.speed_rad_s * settings.frame_s)
-        self.articulation.set_qpos(self._open.astype(np.float32))
-        self._drive_to(self._open)
+        start, goal = joints_rad[:, order]
+        self._closing = FingerClosing(gripper, start, goal, order, strength=strength, frame_s=settings.frame_s)
+        self.articulation.set_qpos(start.astype(np.float32))
+        self._drive_to(start)
         self._owner = {link.entity.per_scene_id: finger_of[name] for name, link in self._links.items()}
-
-    def _steps(self, fingers: int, step_rad: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the share of its way that each finger goes in a frame, and that it has come: none."""
-        way = np.array([np.abs(self._closed - self._open)[self._finger_of_joint == f].max() for f in range(fingers)])
-        return step_rad / np.maximum(way, step_rad), np.zeros(fingers)
 
     def squeeze(self) -> None:
         """Move on the targets of all fingers that do not press yet."""
-        torque_nm = np.abs(self._stiffness * (self._target - self.articulation.get_qpos()))
-        for finger in range(len(self._come)):
-            if torque_nm[self._finger_of_joint == finger].max() < self._press_nm:
-                self._come[finger] = min(1.0, self._come[finger] + self._step[finger])
-        self._drive_to(self._open + self._come[self._finger_of_joint] * (self._closed - self._open))
+        self._drive_to(self._closing.move_on(np.asarray(self.articulation.get_qpos())))
 
     def pressing_n(self, pushes: list[tuple[int, np.ndarray]]) -> tuple[float, ...]:
         """Return how hard thumb and palm together, and the other fingers together, push the object (N)."""
@@ -130,10 +163,10 @@ class FingeredHand:
         return tuple(forces)
 
     def _drive_to(self, joints_rad: np.ndarray) -> None:
-        self._target = joints_rad
         for joint, target in zip(self._joints, joints_rad, strict=True):
             joint.set_drive_target(float(target))
 
 
-def _collision_groups(finger: int) -> tuple[int, ...]:
+def finger_collision_groups(finger: int) -> tuple[int, ...]:
+    """Return SAPIEN's collision groups of a finger's links, by its number: 0 the thumb, -1 the palm."""
     return (1, 1, PALM_BITS if finger < 0 else THUMB_BITS if finger == THUMB else FINGER_BITS, 0)

@@ -1,4 +1,4 @@
-"""A robot in a SAPIEN scene: an articulation whose arm follows joint targets, and whose two fingers share one target."""
+"""A robot in a SAPIEN scene: an articulation whose arm and hand follow joint targets; two jaws share one target."""
 
 from __future__ import annotations
 
@@ -8,9 +8,13 @@ from sapien import physx
 
 from manitwin.physics.sapien.articulation import LinkContact, build_articulation, drive_joints
 from manitwin.physics.sapien.body import CONTACT_OFFSET_M
+from manitwin.physics.sapien.fingers import finger_collision_groups
 from manitwin.physics.sapien.hand import MAX_DRIVE_FORCE
+from manitwin.physics.sapien.shapes import HAND_COLLISION_GROUPS
 from manitwin.physics.sapien.visuals import add_robot_visuals
-from manitwin.robots.links import bodies_of_urdf
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
+from manitwin.robots.grippers.suction import SuctionGripper
+from manitwin.robots.links import Link, bodies_of_urdf
 from manitwin.robots.robot import Robot
 
 # Tracks its trajectories within 0.003 rad, with velocity feed-forward; 50 solver iterations and 50 N held 298 of 304 objects
@@ -21,6 +25,10 @@ FINGER_STIFFNESS_N_M, FINGER_DAMPING_N_S_M = 1e4, 100.0
 # What the motors add, as MuJoCo Menagerie has it for the Panda (arm and fingers) and the UR5e; a URDF does not say. Without it
 # contacts with fingers of 15 g are soft: 50 N press them 0.7 mm into a brick at 1/120 s and 32 iterations, with it 0.1 mm.
 ARM_ARMATURE_KG_M2, FINGER_ARMATURE_KG = 0.1, 0.1
+# A spring that gives way when the lip meets a surface: half pressed in, as a grasp has it, it presses with 2 N.
+# Under vacuum the plunger is blocked: sprung, it would run out to its stop with each thing heavier than 0.2 kg, and jerk it up.
+PLUNGER_STIFFNESS_N_M, PLUNGER_DAMPING_N_S_M, PLUNGER_FORCE_N, PLUNGER_ARMATURE_KG = 200.0, 5.0, 200.0, 0.02
+BLOCKED_STIFFNESS_N_M = 2e4
 SOLVER_ITERATIONS = 50
 
 
@@ -49,13 +57,9 @@ class SapienRobot:
         self._scene = scene  # kept: bodies go with their scene
         friction = robot.gripper.finger_friction if finger_friction is None else finger_friction
         bodies, part_of = bodies_of_urdf(robot.urdf, robot.hand_links[0])
-        arm_contact = LinkContact(physx.get_default_material())
-        pad_contact = LinkContact(physx.PhysxMaterial(friction, friction, 0.0), soft_pad=True)
+        pads = physx.PhysxMaterial(friction, friction, 0.0)
         self.links = build_articulation(
-            scene,
-            bodies,
-            lambda link: pad_contact if link.name in robot.finger_links else arm_contact,
-            contact_offset_m=contact_offset_m,
+            scene, bodies, lambda link: _contact_of(robot, link, pads), contact_offset_m=contact_offset_m
         )
         tip_body, tip_to_body = part_of[robot.tip_link]
         self._tip, self._tip_in_body = self.links[tip_body], sapien.Pose(tip_to_body)
@@ -69,6 +73,7 @@ class SapienRobot:
         self._fingers_at = np.array([joints[name][0] for name in robot.finger_joints])
         arm = [joints[name][1] for name in robot.arm_joints]
         fingers = [joints[name][1] for name in robot.finger_joints]
+        self._finger_joints = fingers
         # bound once: they are called at every step
         self._arm_setters = [(joint.set_drive_target, joint.set_drive_velocity_target) for joint in arm]
         self._finger_setters = [joint.set_drive_target for joint in fingers]
@@ -79,27 +84,27 @@ class SapienRobot:
             limit=ARM_TORQUE_LIMIT_NM,
             armature=ARM_ARMATURE_KG_M2,
         )
-        drive_joints(
-            fingers,
-            stiffness=FINGER_STIFFNESS_N_M,
-            damping=FINGER_DAMPING_N_S_M,
-            limit=MAX_DRIVE_FORCE * finger_force_n,
-            armature=FINGER_ARMATURE_KG,
-        )
+        _drive_hand(robot, fingers, finger_force_n)
         if visual:
             add_robot_visuals(robot.urdf, self.links, part_of)
-        self.set_state(robot.home_rad, robot.gripper.opening_m)
+        self.put(robot.home_rad, robot.open_hand)
+        if isinstance(robot.gripper, SuctionGripper):
+            self.set_hand_targets(np.array([robot.gripper.reach_m]))  # the plunger's spring pushes the lip out
 
     def set_state(self, positions_rad: np.ndarray, opening_m: float) -> None:
-        """Put arm and fingers where they are to be, at rest, with their targets there."""
-        state = np.empty(len(self._arm_at) + 2, np.float32)
+        """Put the arm and jaws where they are to be, at rest, with their targets there."""
+        self.put(positions_rad, np.full(2, opening_m / 2))
+
+    def put(self, positions_rad: np.ndarray, hand: np.ndarray) -> None:
+        """Put arm and hand, joints ``(n,)`` and ``(J,)``, where they are to be, at rest, with their targets there."""
+        state = np.empty(len(self._arm_at) + len(self._fingers_at), np.float32)
         state[self._arm_at] = positions_rad
-        state[self._fingers_at] = opening_m / 2
+        state[self._fingers_at] = hand
         low, high = self.articulation.get_qlimits().T
         self.articulation.set_qpos(np.clip(state, low, high))
         self.articulation.set_qvel(np.zeros_like(state))
         self.set_targets(positions_rad, np.zeros(len(self._arm_at)))
-        self.set_opening_target(opening_m)
+        self.set_hand_targets(hand)
 
     def set_targets(self, positions_rad: np.ndarray, velocities_rad_s: np.ndarray) -> None:
         """Set the arm's targets: positions ``(n,)`` and the velocities ``(n,)`` that the drives' dampers follow."""
@@ -110,20 +115,36 @@ class SapienRobot:
             set_velocity(velocity)
 
     def set_opening_target(self, opening_m: float) -> None:
-        """Set the fingers' one target; one that is less than what is between them presses on it."""
+        """Set the jaws' one target; one that is less than what is between them presses on it."""
         for set_position in self._finger_setters:
             set_position(opening_m / 2)
+
+    def set_hand_targets(self, targets: np.ndarray) -> None:
+        """Set the target of each of the hand's joints ``(J,)``, rad or m, in the order of ``robot.finger_joints``."""
+        for set_position, target in zip(self._finger_setters, targets.tolist(), strict=True):
+            set_position(target)
 
     def joint_positions(self) -> np.ndarray:
         """Return the arm's joint positions ``(n,)`` rad."""
         return np.asarray(self.articulation.get_qpos()[self._arm_at], float)
 
-    def finger_positions_m(self) -> np.ndarray:
-        """Return each finger's distance ``(2,)`` from where both meet."""
+    def block_plunger(self, blocked: bool) -> None:
+        """Hold a cup's plunger where it is, or let its spring push it out again."""
+        assert isinstance(self.robot.gripper, SuctionGripper), "cups have plungers"
+        here, out = self.hand_positions(), np.array([self.robot.gripper.reach_m])
+        self.set_hand_targets(here if blocked else out)
+        _drive_plunger(self._finger_joints, BLOCKED_STIFFNESS_N_M if blocked else PLUNGER_STIFFNESS_N_M)
+
+    def hand_positions(self) -> np.ndarray:
+        """Return the positions ``(J,)`` of the hand's joints, rad or m."""
         return np.asarray(self.articulation.get_qpos()[self._fingers_at], float)
 
+    def finger_positions_m(self) -> np.ndarray:
+        """Return each jaw's distance ``(2,)`` from where both meet."""
+        return self.hand_positions()
+
     def opening_m(self) -> float:
-        """Return the distance between the pads."""
+        """Return the distance between the pads of jaws."""
         return float(self.finger_positions_m().sum())
 
     def tip_pose(self) -> np.ndarray:
@@ -133,3 +154,35 @@ class SapienRobot:
     def gripper_pose(self) -> np.ndarray:
         """Return the pose ``(4, 4)`` of the grasp frame in the world."""
         return np.asarray((self._tip.entity_pose * self._gripper_in_body).to_transformation_matrix(), float)
+
+
+def _contact_of(robot: Robot, link: Link, pads: physx.PhysxMaterial) -> LinkContact:
+    """Return how a link touches: pads are soft, and fingers with joints stop one another as in the trial of their grasps."""
+    groups: tuple[int, ...] = HAND_COLLISION_GROUPS
+    if isinstance(robot.gripper, MultiFingerGripper):
+        owners = {
+            each.name: owner for each, owner in zip(robot.gripper.links, robot.gripper.finger_of_link, strict=True)
+        }
+        groups = finger_collision_groups(int(owners.get(link.name, -1)))  # the arm's are the palm's
+    if link.name in robot.finger_links:
+        return LinkContact(pads, soft_pad=True, collision_groups=groups)
+    return LinkContact(physx.get_default_material(), collision_groups=groups)
+
+
+def _drive_plunger(joints: list[physx.PhysxArticulationJoint], stiffness_n_m: float) -> None:
+    damping = PLUNGER_DAMPING_N_S_M * (stiffness_n_m / PLUNGER_STIFFNESS_N_M) ** 0.5  # as damped, stiff or soft
+    drive_joints(joints, stiffness=stiffness_n_m, damping=damping, limit=PLUNGER_FORCE_N, armature=PLUNGER_ARMATURE_KG)
+
+
+def _drive_hand(robot: Robot, joints: list[physx.PhysxArticulationJoint], force_n: float) -> None:
+    gripper = robot.gripper
+    if isinstance(gripper, SuctionGripper):
+        _drive_plunger(joints, PLUNGER_STIFFNESS_N_M)
+        return
+    if isinstance(gripper, MultiFingerGripper):
+        drive, strength = gripper.drive, force_n / gripper.force_n
+        values = drive.stiffness_nm_rad, drive.damping_nm_s_rad, strength * drive.torque_limit_nm, drive.armature_kg_m2
+    else:
+        values = FINGER_STIFFNESS_N_M, FINGER_DAMPING_N_S_M, MAX_DRIVE_FORCE * force_n, FINGER_ARMATURE_KG
+    stiffness, damping, limit, armature = values
+    drive_joints(joints, stiffness=stiffness, damping=damping, limit=limit, armature=armature)

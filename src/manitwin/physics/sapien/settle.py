@@ -141,7 +141,12 @@ class Settled:
 
 
 def settle_on_plane(
-    body: RigidBody, object_to_plane: Sequence[np.ndarray], *, drop_m: float, seconds: float
+    body: RigidBody,
+    object_to_plane: Sequence[np.ndarray],
+    *,
+    drop_m: float,
+    seconds: float,
+    timestep_s: float = TIMESTEP_S,
 ) -> list[Settled]:
     """Release a body ``drop_m`` above the plane z = 0 in each of several poses (4x4), and see where it comes to rest.
 
@@ -150,7 +155,7 @@ def settle_on_plane(
     """
     if not len(object_to_plane):
         return []
-    scene = scene_with_gravity(TIMESTEP_S)
+    scene = scene_with_gravity(timestep_s)
     scene.add_entity(static_plane(body.friction_static, body.friction_dynamic))
     reach = max(float(np.linalg.norm(hull - body.center_of_mass_m, axis=1).max()) for hull in body.hulls)
     spacing = 8 * reach + 1.0
@@ -160,7 +165,7 @@ def settle_on_plane(
         _release(scene, body, hull_shapes(body.hulls), pose[:3, 3] + offset, pose[:3, :3], may_sleep=True)
         for pose, offset in zip(object_to_plane, offsets, strict=True)
     ]
-    rest = settle(scene.physx_system, bodies, timestep_s=TIMESTEP_S, seconds=seconds)
+    rest = settle(scene.physx_system, bodies, timestep_s=timestep_s, seconds=seconds)
     rest.object_to_world[:, :2, 3] -= np.array(offsets)[:, :2]
     return [
         Settled.of(body, pose, end, bool(at_rest))

@@ -162,10 +162,10 @@ class RobotWorld:
         roles: list[tuple[physx.PhysxBaseComponent, str, Role]] = list(self._fixed)
         for number, (body, placed) in enumerate(zip(self.bodies, self.placed, strict=True)):
             roles.append((body, placed.name, Role.TARGET if number == self.target else Role.OTHER))
-        fingers = dict(zip(robot.finger_links, (Role.PLUS_FINGER, Role.MINUS_FINGER), strict=True))
         for name, link in self.robot.links.items():
+            side = robot.side_of(name)
             hand = Role.HAND if name in robot.hand_links else Role.ARM
-            roles.append((link, name, fingers.get(name, hand)))
+            roles.append((link, name, hand if side is None else Role(side)))
         return roles
 
 

@@ -92,6 +92,12 @@ class MultiFingerGripper(_Described):
 
     root_to_gripper: np.ndarray
     links: tuple[Link, ...]
+    urdf_path: Path
+    urdf_root: Path
+
+    def mesh_path(self, name: str) -> Path:
+        """Return where a mesh of its URDF is; raises ConfigError where it is not there."""
+        return _mesh_path(self.urdf_path, self.urdf_root, name)
 
     @property
     def opening_m(self) -> float:
@@ -168,7 +174,7 @@ def load_multi_finger(data: dict[str, Any], folder: Path) -> MultiFingerGripper:
     content = read_bytes(path, MAX_XML_BYTES, UsageError, name=str(path))
     described["sha256"] = hashlib.sha256(file.sha256.encode() + content).hexdigest()
     root_to_gripper = transform(rotation, np.array(file.root_to_gripper.position_m))
-    return MultiFingerGripper(**described, root_to_gripper=root_to_gripper, links=links)
+    return MultiFingerGripper(**described, root_to_gripper=root_to_gripper, links=links, urdf_path=path, urdf_root=root)
 
 
 def _urdf_path(name: str, urdf: _UrdfField, folder: Path) -> tuple[Path, Path]:

@@ -1,0 +1,1 @@
+"""Hands of robots as episodes close and open them: jaws, fingers with joints, a suction cup."""

@@ -1,0 +1,75 @@
+"""What the hands of robots have in common: frame by frame they are shaped for a grasp, closed until they press, and opened."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Protocol
+
+import numpy as np
+from sapien import physx
+
+from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.world import RobotWorld
+from manitwin.physics.trial import TrialSettings
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
+from manitwin.robots.grippers.suction import SuctionGripper
+
+
+class HandControl(Protocol):
+    """A robot's hand. ``told (h,)`` is what it is told, ``state (h,)`` what it is, by the names of ``Robot``.
+
+    Iterators tell one step of a motion at a time; a frame of ``TrialSettings`` is to pass after each.
+    """
+
+    @property
+    def told(self) -> np.ndarray:
+        """What it is told now ``(h,)``."""
+        ...
+
+    @property
+    def state(self) -> np.ndarray:
+        """What it is now ``(h,)``."""
+        ...
+
+    @property
+    def presses(self) -> bool:
+        """Whether it holds what it closes on as hard as it should."""
+        ...
+
+    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
+        """Take the first of a grasp's joints ``(2, J)``, those before closing and those to close to; others do nothing."""
+        ...
+
+    def squeeze(self) -> None:
+        """Close by one frame; once it presses, go on pressing."""
+        ...
+
+    def closing_empty(self) -> Iterator[None]:
+        """Close on nothing."""
+        ...
+
+    def opening(self) -> Iterator[None]:
+        """Let go."""
+        ...
+
+    def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
+        """See what the last step has done."""
+        ...
+
+    def touches(self, touches: Touches) -> Touches:
+        """Return what presses on the target, given what its contacts tell."""
+        ...
+
+
+def control_of(world: RobotWorld, settings: TrialSettings) -> HandControl:
+    """Return the control of a world's robot."""
+    from manitwin.physics.sapien.controls.cup import CupControl
+    from manitwin.physics.sapien.controls.fingers import FingersControl
+    from manitwin.physics.sapien.controls.jaws import JawsControl
+
+    gripper = world.robot.robot.gripper
+    if isinstance(gripper, SuctionGripper):
+        return CupControl(world, gripper, settings)
+    if isinstance(gripper, MultiFingerGripper):
+        return FingersControl(world, gripper, settings)
+    return JawsControl(world, settings)

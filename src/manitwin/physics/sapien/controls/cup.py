@@ -1,0 +1,154 @@
+"""A suction cup: where its lip touches and its vacuum is on it seals, and it lets go of what loads the lip beyond its limits.
+
+In physics the lip must press on the object, and its ring must seal on the true surface from where it is (``suction.seal``); so
+held, the object hangs from the lip by a stiff spring of limited force. What the lip must carry is the object's weight and
+inertial force, less what else bears it (Newton, Euler); beyond ``suction.lip_load`` of 1 it lets go, as in the trial.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sapien
+from sapien import physx
+
+from manitwin.geometry.poses import inverse, transform, transform_points
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.world import RobotWorld
+from manitwin.physics.suction import lip_load, seal
+from manitwin.physics.trial import GRAVITY_M_S2, TrialSettings
+from manitwin.robots.grippers.suction import SuctionGripper
+
+# Of the sealed bellows: 1 kg hangs 1 mm lower, and turns by 1 degree with its weight 9 cm beside the lip.
+STIFFNESS_N_M, DAMPING_N_S_M = 1e4, 100.0
+TURN_STIFFNESS_NM_RAD, TURN_DAMPING_NM_S_RAD = 50.0, 1.0
+
+
+@dataclass
+class _Sealed:
+    """What hangs from the lip, by its number in the world; ``center_m`` and ``inward (3,)`` of the lip's plane in its frame."""
+
+    number: int
+    drive: physx.PhysxDriveComponent
+    center_m: np.ndarray
+    inward: np.ndarray
+    velocity_m_s: np.ndarray
+
+
+class CupControl:
+    """The cup of a robot; it is told whether its vacuum is on (1) or off (0), and is where its plunger is (m)."""
+
+    def __init__(self, world: RobotWorld, gripper: SuctionGripper, settings: TrialSettings):
+        """Take a robot whose vacuum is off."""
+        self._world, self._gripper, self._settings = world, gripper, settings
+        (self._lip_name,) = world.robot.robot.finger_links
+        self._on, self._pressure_n = False, 0.0
+        self._sealed: _Sealed | None = None
+        self._surfaces: dict[int, RayCaster] = {}
+
+    @property
+    def told(self) -> np.ndarray:
+        """Whether the vacuum is on."""
+        return np.array([float(self._on)])
+
+    @property
+    def state(self) -> np.ndarray:
+        """How far the plunger is out (m)."""
+        return self._world.robot.hand_positions()
+
+    @property
+    def presses(self) -> bool:
+        """Whether it has sealed."""
+        return self._sealed is not None
+
+    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
+        """Stay as it is."""
+        return iter(())
+
+    def squeeze(self) -> None:
+        """Switch the vacuum on."""
+        self._on = True
+
+    def closing_empty(self) -> Iterator[None]:
+        """Stay as it is: only jaws are used as a tool."""
+        return iter(())
+
+    def opening(self) -> Iterator[None]:
+        """Switch the vacuum off."""
+        self._on = False
+        self._let_go()
+        yield
+
+    def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
+        """Seal on what the lip touches, or let go of what is too much for it."""
+        if self._sealed is not None:
+            self._bear(self._sealed, contacts)
+        elif self._on:
+            placed = self._world.placed[self._world.target]
+            if self._world.contacts.push(contacts, placed.name, frozenset({self._lip_name})) is not None:
+                self._try_to_seal(self._world.target)
+
+    def touches(self, touches: Touches) -> Touches:
+        """Return how hard the lip presses on the target: the vacuum's force less what pulls at it; 0 where it is not sealed."""
+        return Touches((self._pressure_n, self._pressure_n), touches.on_support)
+
+    def _try_to_seal(self, number: int) -> None:
+        lip_to_world = self._world.robot.gripper_pose() @ transform(translation=np.array([0, 0, self.state[0]]))
+        object_to_world = self._world.object_to_world(number)
+        found = seal(self._gripper, (inverse(object_to_world) @ lip_to_world)[None], self._surface(number))
+        if not found.sealed[0]:
+            return
+        body = self._world.bodies[number]
+        drive = physx.PhysxDriveComponent(body)
+        drive.parent = lip = self._world.robot.links[self._lip_name]
+        drive.pose_in_parent, drive.pose_in_child = lip.entity_pose.inv() * body.entity_pose, sapien.Pose()
+        vacuum_n = self._settings.force_n
+        for set_property in (drive.set_drive_property_x, drive.set_drive_property_y, drive.set_drive_property_z):
+            set_property(STIFFNESS_N_M, DAMPING_N_S_M, vacuum_n, "force")
+        turn_limit_nm = vacuum_n * self._gripper.lip_radius_m
+        drive.set_drive_property_slerp(TURN_STIFFNESS_NM_RAD, TURN_DAMPING_NM_S_RAD, turn_limit_nm, "force")
+        body.entity.add_component(drive)
+        velocity_m_s = np.array(body.linear_velocity, float)
+        self._sealed = _Sealed(number, drive, found.center_m[0], found.inward[0], velocity_m_s)
+        self._pressure_n = vacuum_n
+        self._world.robot.block_plunger(True)
+
+    def _bear(self, held: _Sealed, contacts: Sequence[physx.PhysxContact]) -> None:
+        """Take down how the lip is loaded, and let go where it is too much."""
+        placed, body = self._world.placed[held.number], self._world.bodies[held.number]
+        object_to_world = self._world.object_to_world(held.number)
+        rotation, velocity_m_s = object_to_world[:3, :3], np.array(body.linear_velocity, float)
+        acceleration = (velocity_m_s - held.velocity_m_s) / self._settings.timestep_s
+        held.velocity_m_s = velocity_m_s
+        names = frozenset(name for name in self._world.contacts.names if name != placed.name)
+        push = self._world.contacts.push(contacts, placed.name, names)
+        borne_n = np.zeros(3) if push is None else push.force_n
+        force_n = placed.body.mass_kg * (np.array([0, 0, -GRAVITY_M_S2]) - acceleration) + borne_n
+        center_m, lip_m = transform_points(object_to_world, np.array([placed.body.center_of_mass_m, held.center_m]))
+        inward = rotation @ held.inward
+        share = lip_load(
+            force_n,
+            center_m - lip_m,
+            inward,
+            vacuum_force_n=self._settings.force_n,
+            friction=(self._settings.finger_friction + placed.body.friction_static) / 2,
+            lip_radius_m=self._gripper.lip_radius_m,
+        )
+        self._pressure_n = max(0.0, self._settings.force_n - float(force_n @ inward))
+        if share > 1:
+            self._let_go()
+
+    def _let_go(self) -> None:
+        if self._sealed is not None:
+            self._sealed.drive.entity.remove_component(self._sealed.drive)
+            self._world.robot.block_plunger(False)
+        self._sealed, self._pressure_n = None, 0.0
+
+    def _surface(self, number: int) -> RayCaster:
+        if number not in self._surfaces:
+            body = self._world.placed[number].body
+            self._surfaces[number] = RayCaster.of_hulls(body.hulls) if body.surface is None else body.surface
+        return self._surfaces[number]

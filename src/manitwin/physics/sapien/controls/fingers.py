@@ -1,0 +1,89 @@
+"""Fingers with joints of their own: each closes along its line of joints, as in the trial of the grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from sapien import physx
+
+from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.fingers import FingerClosing
+from manitwin.physics.sapien.world import RobotWorld
+from manitwin.physics.trial import TrialSettings
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
+
+
+class FingersControl:
+    """The fingers of a robot; what they are told, and what they are, are the positions of the hand's joints (rad)."""
+
+    def __init__(self, world: RobotWorld, gripper: MultiFingerGripper, settings: TrialSettings):
+        """Take a world whose robot's hand is open."""
+        self._world, self._gripper, self._settings = world, gripper, settings
+        self._told = self._before = world.robot.robot.open_hand
+        self._goal: np.ndarray | None = None
+        self._closing: FingerClosing | None = None
+
+    @property
+    def told(self) -> np.ndarray:
+        """The joints' targets ``(J,)``."""
+        return self._told
+
+    @property
+    def state(self) -> np.ndarray:
+        """The joints' positions ``(J,)``."""
+        return self._world.robot.hand_positions()
+
+    @property
+    def presses(self) -> bool:
+        """Whether every finger presses, or has come to the end of its way."""
+        return self._closing is not None and self._closing.all_press
+
+    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
+        """Move to the joints before closing; those to close to are kept for ``squeeze``."""
+        if grasp_joints_rad is None:
+            raise ValueError(f"a grasp of {self._gripper.name} needs its joints before closing and those to close to")
+        self._before, self._goal = grasp_joints_rad
+        self._closing = None
+        return self._to(self._before)
+
+    def squeeze(self) -> None:
+        """Move on the targets of all fingers that do not press yet."""
+        if self._closing is None:
+            assert self._goal is not None, "a hand closes on a grasp that it was shaped for"
+            self._closing = FingerClosing(
+                self._gripper,
+                self._before,
+                self._goal,
+                range(len(self._gripper.joints)),
+                strength=self._settings.force_n / self._gripper.force_n,
+                frame_s=self._settings.frame_s,
+            )
+        self._tell(self._closing.move_on(self._world.robot.hand_positions()))
+
+    def closing_empty(self) -> Iterator[None]:
+        """Stay as it is: only jaws are used as a tool."""
+        return iter(())
+
+    def opening(self) -> Iterator[None]:
+        """Go back to the joints before closing."""
+        self._closing = None
+        return self._to(self._before)
+
+    def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
+        """See nothing: fingers feel what they press on."""
+
+    def touches(self, touches: Touches) -> Touches:
+        """Return what the contacts tell."""
+        return touches
+
+    def _to(self, joints_rad: np.ndarray) -> Iterator[None]:
+        start, step_rad = self._told, self._gripper.drive.speed_rad_s * self._settings.frame_s
+        frames = int(np.ceil(np.abs(joints_rad - start).max() / step_rad))
+        for frame in range(1, frames + 1):
+            self._tell(start + frame / frames * (joints_rad - start))
+            yield
+
+    def _tell(self, joints_rad: np.ndarray) -> None:
+        self._told = joints_rad
+        self._world.robot.set_hand_targets(joints_rad)

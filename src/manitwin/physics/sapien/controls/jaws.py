@@ -1,0 +1,80 @@
+"""Two jaws with one target: they close until they press with the closing force, and go on pressing whatever gives way."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from sapien import physx
+
+from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.world import RobotWorld
+from manitwin.physics.trial import TrialSettings
+from manitwin.physics.trial_phases import SharedTarget
+
+PRESSING_SHARE = 0.98  # of the closing force, at which the target has come as far as it goes
+
+
+class JawsControl:
+    """The jaws of a robot; what they are told, and what they are, is the opening (m)."""
+
+    def __init__(self, world: RobotWorld, settings: TrialSettings):
+        """Take a world whose robot's jaws are open."""
+        self._world, self._settings = world, settings
+        self._full_m = self._target_m = world.robot.robot.gripper.opening_m
+        self._shared = SharedTarget(self._full_m, settings)
+
+    @property
+    def told(self) -> np.ndarray:
+        """The target opening."""
+        return np.array([self._target_m])
+
+    @property
+    def state(self) -> np.ndarray:
+        """The opening."""
+        return np.array([self._world.robot.opening_m()])
+
+    @property
+    def presses(self) -> bool:
+        """Whether the target is so far within what is between the jaws."""
+        pressing_n = (self._world.robot.opening_m() - self._target_m) / 2 * self._settings.finger_stiffness_n_m
+        return pressing_n > PRESSING_SHARE * self._settings.force_n
+
+    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
+        """Stay open."""
+        return iter(())
+
+    def squeeze(self) -> None:
+        """Move the target on by one frame."""
+        self._tell(2 * self._shared.move_on(self._world.robot.opening_m() / 2))
+
+    def closing_empty(self) -> Iterator[None]:
+        """Close at the closing speed; what they do not hold they do not press."""
+        target_m = self._target_m
+        while target_m > 0:
+            target_m = max(0.0, target_m - self._way_m)
+            self._tell(target_m)
+            yield
+
+    def opening(self) -> Iterator[None]:
+        """Open at the closing speed."""
+        target_m = max(self._target_m, 0.0)
+        while target_m < self._full_m:
+            target_m = min(self._full_m, target_m + self._way_m)
+            self._tell(target_m)
+            yield
+
+    def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
+        """See nothing: jaws feel what they press on."""
+
+    def touches(self, touches: Touches) -> Touches:
+        """Return what the contacts tell."""
+        return touches
+
+    @property
+    def _way_m(self) -> float:
+        return 2 * self._settings.close_speed_m_s * self._settings.frame_s
+
+    def _tell(self, opening_m: float) -> None:
+        self._target_m = opening_m
+        self._world.robot.set_opening_target(opening_m)
