@@ -220,9 +220,12 @@ def rederived(question: dict[str, Any], view: SecondView) -> bool:
     for name, words in called.items():
         if (words in question["question"] or words in question["options"]) and view.meant(words) != [name]:
             return False
-    text = question["question"]
-    asked = sorted((text.lower().index(words), name) for name, words in called.items() if words in text.lower())
-    return _CHECKS[question["family"]](question, view, scene, [name for _, name in asked])
+    text, asked = question["question"].lower(), []
+    for name, words in sorted(called.items(), key=lambda item: -len(item[1])):  # "the can opener" before "the can"
+        if words in text:
+            asked.append((text.index(words), name))
+            text = text.replace(words, "#" * len(words))
+    return _CHECKS[question["family"]](question, view, scene, [name for _, name in sorted(asked)])
 
 
 def _option_objects(question: dict[str, Any], view: SecondView) -> dict[str, str | None]:
@@ -324,6 +327,11 @@ def _side_picture(q, v, s, asked):
 
 
 def _gap(q, v, s, asked):
+    measured, corners = q["evidence"]["measured"], s.corners(q["evidence"]["measured"])
+    said = re.match(r"The (.+) is (\d+) cm at its longest\. ", q["question"])
+    apart = max(np.linalg.norm(corners - corner, axis=1).max() for corner in corners)
+    if v.meant(said[1]) != [measured] or abs(int(said[2]) / 100 - apart) > 0.006:
+        return False
     return abs(s.gap(*asked) - float(q["answer"].split()[0]) / 100) < 0.0015
 
 

@@ -7,10 +7,13 @@ from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from manitwin.scenes.scene_files import scene_files
+from manitwin.scenes.vqa.functional_planning import ALL_ROUND
 from manitwin.scenes.vqa.question import YES_NO, Question
+from manitwin.scenes.vqa.references import region
 from manitwin.scenes.vqa.templates import FAMILIES
 from manitwin.scenes.vqa.write import ask_scenes
 from scene_answers import SecondScene, SecondView, rederived
@@ -63,6 +66,35 @@ def test_no_answer_of_a_yes_no_family_is_common(questions: list[Question]) -> No
     for family in families:
         answers = Counter(each.answer for each in questions if each.family == family)
         assert max(answers.values()) <= 0.55 * answers.total()
+
+
+def test_a_place_near_the_border_of_two_regions_is_in_neither() -> None:
+    assert [region(0.5, y) for y in (0.3, 0.31, 0.36, 0.37)] == ["top center", None, None, "center"]
+    assert region(0.68, 0.5) is None and region(0.9, 0.1) == "top right"
+
+
+def test_a_thing_is_said_to_be_where_its_middle_is_too(
+    questions: list[Question], views: dict[tuple[str, str], SecondView]
+) -> None:
+    asked = [each for each in questions if each.family == "locate_and_grasp"]
+    assert asked
+    for each in asked:
+        view = views[each.scene_id, each.camera]
+        rows, columns = np.nonzero(view.mask(next(iter(each.evidence["objects"]))))
+        middle = (columns.min() + columns.max() + 1) / 2 / view.width, (rows.min() + rows.max() + 1) / 2 / view.height
+        assert region(*middle) == each.answer.split(";")[0]
+
+
+def test_points_are_asked_about_where_their_words_mean_one_place(questions: list[Question]) -> None:
+    labels = {each.evidence["label"] for each in questions if each.family == "interaction_point_occluded"}
+    assert not labels & ALL_ROUND
+
+
+def test_heights_are_not_compared_from_right_above(
+    questions: list[Question], views: dict[tuple[str, str], SecondView]
+) -> None:
+    asked = {(each.scene_id, each.camera) for each in questions if each.family == "taller"}
+    assert asked and all(abs(views[place].to_world[2, 2]) <= np.sin(np.radians(60)) for place in asked)
 
 
 def test_held_out_wordings_are_asked_in_val_only(scenes: Path) -> None:

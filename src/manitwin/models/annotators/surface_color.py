@@ -58,6 +58,7 @@ UNTEXTURED = "unknown color (untextured)"
 _SAMPLES = 3000
 _CLUSTERS = 8
 _SAME_COLOR = 16.0  # CIELAB distance under which clusters are shades of one colour
+_NEAR = 25.0  # CIELAB distance of shades that one may be taken for the other: dark grey and black, white and light grey
 _LIGHTNESS = 0.5  # how much a difference in lightness counts of one in tint
 _LEAST_OPEN = 1 / 3  # of the surroundings: the bottom of a mug sees less, and hardly anybody sees it
 _LEAST_SEEN = 1 / 4
@@ -91,6 +92,20 @@ def color_name(lab: np.ndarray, *, metallic: bool = True) -> str:
     if name != "gold" or metallic:
         return name
     return "dark yellow" if np.arctan2(lab[2], lab[1]) > _YELLOW_HUE_RAD else "orange"
+
+
+def are_near(name: str, other: str) -> bool:
+    """Tell whether two colour names are shades of one colour, or have shades that lie near each other in CIELAB."""
+    if _family(name) == _family(other):
+        return True
+    one, two = (_LAB[[each == color for each in _NAMES]] for color in (name, other))
+    if not len(one) or not len(two):  # a name without shades of its own: nothing says that it is far
+        return True
+    return bool(np.linalg.norm(one[:, None] - two[None], axis=-1).min() < _NEAR)
+
+
+def _family(name: str) -> str:
+    return _FAMILIES.get(name, name)
 
 
 @dataclass(frozen=True)
@@ -143,11 +158,16 @@ def _base_colors(
     part: trimesh.Trimesh, count: int, rng: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the base colour (sRGB in 0..1), place and outward normal, ``(count, 3)`` each, spread evenly over the part."""
+    points, normals, faces = sample_surface(part, count, rng)
+    return base_colors_at(part, faces, points), points, normals
+
+
+def base_colors_at(part: trimesh.Trimesh, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return the base colour (sRGB in 0..1) ``(N, 3)`` of a part at points ``(N, 3)`` of its faces ``(N,)``."""
     material, uv = material_of(part), uv_of(part)
     factor = np.asarray(material.baseColorFactor, dtype=float)[:3] / 255  # linear, as glTF has it
-    points, normals, faces = sample_surface(part, count, rng)
     if material.baseColorTexture is None or uv is None:
-        return np.repeat(linear_to_srgb(factor)[None], count, axis=0), points, normals
+        return np.repeat(linear_to_srgb(factor)[None], len(points), axis=0)
     corners = trimesh.triangles.points_to_barycentric(part.triangles[faces], points)
     at = np.einsum("ni,nij->nj", corners, uv[part.faces[faces]])
     image = np.asarray(material.baseColorTexture.convert("RGB"))
@@ -156,7 +176,7 @@ def _base_colors(
     row = np.floor(((1.0 - at[:, 1]) % 1.0) * height).astype(int) % height
     texture = image[row, column] / 255
     linear = np.where(texture <= 0.04045, texture / 12.92, ((texture + 0.055) / 1.055) ** 2.4)
-    return np.clip(linear_to_srgb(linear * factor), 0, 1), points, normals
+    return np.clip(linear_to_srgb(linear * factor), 0, 1)
 
 
 def named_colors(lab: np.ndarray, metallic: bool) -> list[ColorShare]:

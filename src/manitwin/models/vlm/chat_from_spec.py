@@ -22,6 +22,22 @@ KEY_OF_HOST = {
 }
 KEY_OF_OTHERS = "MANITWIN_VLM_KEY"
 
+NO_CHAT = "none"
+
+
+def chat_of(spec: str, use: str) -> ChatClient | None:
+    """Return the model of a whole spec (``openai:MODEL@URL``), None for ``none``; ``use`` says what it is to do.
+
+    Raises ConfigError for a spec that names no model, and as ``openai_from_spec``.
+    """
+    name, _, argument = spec.partition(":")
+    made = {"openai": openai_from_spec, "anthropic": anthropic_from_spec, "replay": replay_from_spec}
+    if spec == NO_CHAT:
+        return None
+    if name not in made:
+        raise ConfigError(f"vlm {spec!r}: cannot {use}; give openai:MODEL@URL, anthropic:MODEL, replay:FILE or none")
+    return made[name](argument, BuildConfig())
+
 
 def openai_from_spec(argument: str, config: BuildConfig) -> ChatClient:
     """Return the model of ``MODEL`` or ``MODEL@URL`` behind the chat completions API.

@@ -14,11 +14,13 @@ from manitwin.scenes.perception.classes import Classes
 from manitwin.scenes.perception.coco import write_coco, write_panoptic
 from manitwin.scenes.perception.output import Output
 from manitwin.scenes.perception.point_clouds import POINTS, write_point_clouds
+from manitwin.scenes.perception.report import segmentation_page
 from manitwin.scenes.perception.scene_truth import SceneTruth, read_scene_truth
 from manitwin.scenes.scene_files import dataset_of, scene_files
 from manitwin.twin.loaded_twin import TwinSource
 
 VALIDATION_SHARE = 0.1
+REPORT = "report.html"
 
 
 @dataclass(frozen=True)
@@ -89,6 +91,7 @@ def write_segmentation(
     with new_folder(Path(out)) as folder:
         written = Output(folder)
         FORMATS[form](read, classes, written, _Asked(validation_share, points, source.folder))
+        written.write_bytes(REPORT, segmentation_page(read, classes, form, validation_share))
         count = written.written
     pictures = sum(len(scene.pictures) for scene in read)
     return Segmented(len(files), pictures, len(classes.categories), len(classes.parts), count)

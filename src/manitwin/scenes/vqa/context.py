@@ -55,6 +55,11 @@ class Context:
         return [*picture_directions(camera), *robot_directions(camera, self.things[0].center_m)]
 
     @property
+    def looks_down_rad(self) -> float:
+        """The angle between the camera's viewing axis and the level."""
+        return float(np.arcsin(np.clip(self.view.camera.camera_to_object[2, 2], -1, 1)))  # its axis is -z (OpenGL)
+
+    @property
     def surface(self) -> str:
         """The words for what the objects stand on: its material as it is drawn, and ``surface``."""
         return f"{self.scene.record.furniture.boxes[0].material} surface"

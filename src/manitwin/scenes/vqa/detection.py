@@ -97,4 +97,4 @@ def _lists(asked: Context) -> Iterator[Draft]:
 
 
 def _described(seen: Seen) -> str:
-    return a_or_an(one_of(seen.thing.category, seen.thing.color))
+    return a_or_an(one_of(seen.thing.category, seen.color))

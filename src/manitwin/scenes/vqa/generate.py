@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import zlib
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,6 +17,7 @@ from manitwin.scenes.vqa.functional_planning import functional_planning
 from manitwin.scenes.vqa.language_grounding import language_grounding
 from manitwin.scenes.vqa.question import CHOICE, YES_NO, Draft, Question
 from manitwin.scenes.vqa.references import references
+from manitwin.scenes.vqa.rephrasing import filled
 from manitwin.scenes.vqa.scene_understanding import scene_understanding
 from manitwin.scenes.vqa.selection import chosen
 from manitwin.scenes.vqa.task_planning import task_planning
@@ -65,31 +66,50 @@ def _thinned(drafts: Sequence[Draft], rng: random.Random) -> list[Draft]:
 
 
 def questions_of(
-    scene_ids: Sequence[str], drafts: Sequence[Sequence[Draft]], *, per_scene: int, validation_share: float, seed: int
+    scene_ids: Sequence[str],
+    drafts: Sequence[Sequence[Draft]],
+    *,
+    per_scene: int,
+    validation_share: float,
+    seed: int,
+    wordings_for: Callable[[Sequence[str]], Mapping[str, Sequence[str]]] = lambda families: {},
 ) -> list[Question]:
-    """Choose among the drafts of scenes and put them into words: in the split ``val`` into the paraphrases that are held out."""
+    """Choose among the drafts of scenes and put them into words: in the split ``val`` into the paraphrases that are held out.
+
+    ``wordings_for`` returns further wordings of the families that are asked, for the other split.
+    """
     picked = chosen(drafts, per_scene, random.Random(_seed(seed, "chosen")))
+    asked = {draft.family for of_scene in picked for draft in of_scene}
+    wordings = wordings_for([family for family in FAMILIES if family in asked])
     found = []
     for scene_id, of_scene in zip(scene_ids, picked, strict=True):
         rng = random.Random(_seed(seed, scene_id, "words"))
         split = split_of(scene_id, validation_share)
         order = sorted(range(len(of_scene)), key=lambda place: (of_scene[place].camera, place))
         for number, place in enumerate(order):
-            found.append(_worded(of_scene[place], f"{scene_id}_{number:04d}", scene_id, split, rng))
+            draft = of_scene[place]
+            more = wordings.get(draft.family, ())
+            found.append(_worded(draft, f"{scene_id}_{number:04d}", scene_id, split, rng, more))
     return found
 
 
-def _worded(draft: Draft, question_id: str, scene_id: str, split: str, rng: random.Random) -> Question:
+def _worded(
+    draft: Draft, question_id: str, scene_id: str, split: str, rng: random.Random, more: Sequence[str]
+) -> Question:
     family = FAMILIES[draft.family]
     held_out = split == VALIDATION
-    template = len(family.paraphrases) - 1 if held_out else rng.randrange(len(family.paraphrases) - 1)
-    text = family.paraphrases[template].format(**draft.slots)
+    last = len(family.paraphrases) - 1
+    template = last if held_out else rng.randrange(last + len(more))
+    if not held_out and template >= last:
+        template += 1  # behind the one that is held out
+    wordings = (*family.paraphrases, *more)
+    text = filled(wordings[template], draft.slots)
     draft = _shuffled(draft, rng)
     return Question(
         question_id=question_id, scene_id=scene_id, camera=draft.camera, split=split, category=family.category,
         family=draft.family, kind=draft.kind, template=template, held_out=held_out, question=text,
         answer=draft.answer, response=draft.response, options=draft.options, points=draft.points, boxes=draft.boxes,
-        evidence=draft.evidence,
+        evidence=draft.evidence, rephrased=template > last,
     )  # fmt: skip
 
 

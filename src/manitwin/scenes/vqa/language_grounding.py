@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from manitwin.models.annotators.surface_color import are_near
 from manitwin.scenes.vqa.context import Context, sentence
 from manitwin.scenes.vqa.grasp_types import GRASP_WORDS, best_grasp
-from manitwin.scenes.vqa.question import CHOICE, POINT, TEXT, Draft
-from manitwin.scenes.vqa.references import region
-from manitwin.scenes.vqa.things import main_word
+from manitwin.scenes.vqa.question import CHOICE, POINT, TEXT, Draft, Point
+from manitwin.scenes.vqa.references import REGION_MARGIN, region
+from manitwin.scenes.vqa.things import Seen
 
 MOST_OPTIONS = 4
-REGION_MARGIN = 0.03
-"""How far from the border of two regions (share of the picture) what is said to lie in one is."""
 QUARTERS = ("top left", "top right", "bottom left", "bottom right")
 
 
@@ -49,10 +48,10 @@ def _objects_at_points(asked: Context) -> Iterator[Draft]:
 
 
 def _by_color(asked: Context) -> Iterator[Draft]:
-    marked = [(seen, point) for seen, point in asked.pointed if seen.thing.color]
+    marked = [(seen, point) for seen, point in asked.pointed if seen.color]
     for seen, _ in marked:
-        color = seen.thing.color or ""
-        others = [each for each in marked if main_word(each[0].thing.color or "") != main_word(color)]
+        color = seen.color or ""
+        others = [each for each in marked if not are_near(each[0].color or "", color)]
         if len(others) < 2:
             continue
         chosen = asked.rng.sample(others, min(len(others), MOST_OPTIONS - 1))
@@ -61,7 +60,7 @@ def _by_color(asked: Context) -> Iterator[Draft]:
             "object_by_color", asked.view.name, CHOICE, {"color": color}, f"<p{len(chosen) - 1}>",
             sentence(f"the one at <p{len(chosen) - 1}>: {asked.called(seen)}"),
             {"objects": asked.names(*(each for each, _ in chosen)), "answer": seen.thing.name,
-             "colors": {each.thing.name: each.thing.color for each, _ in chosen}},
+             "colors": {each.thing.name: each.color for each, _ in chosen}},
             tuple(f"<p{place}>" for place in range(len(chosen))), tuple(point for _, point in chosen),
         )  # fmt: skip
 
@@ -87,12 +86,22 @@ def _regions(asked: Context) -> Iterator[Draft]:
         )  # fmt: skip
 
 
+def _place(asked: Context, seen: Seen, point: Point) -> str | None:
+    """Return the ninth of the picture that holds an object's point and the middle of its box; None where they differ."""
+    box, camera = seen.view.visible_box, asked.view.camera
+    if box is None:
+        return None
+    middle = region((box[0] + box[2] / 2) / camera.width_px, (box[1] + box[3] / 2) / camera.height_px)
+    return middle if middle == region(*point) else None
+
+
 def _locate_and_grasp(asked: Context) -> Iterator[Draft]:
     for seen, point in asked.pointed:
         grasp = best_grasp(seen.thing)
-        if seen.thing.name not in asked.words or grasp is None:
+        where = _place(asked, seen, point)
+        if seen.thing.name not in asked.words or grasp is None or where is None:
             continue
-        where, words = region(*point), asked.words_of(seen)
+        words = asked.words_of(seen)
         place = f"{'in' if where == 'center' else 'at'} the {where} of the picture"
         yield Draft(
             "locate_and_grasp", asked.view.name, TEXT, {"a": words}, f"{where}; {GRASP_WORDS[grasp[0]]}; <p0>",

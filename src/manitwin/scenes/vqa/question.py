@@ -47,7 +47,10 @@ class Draft:
 
 @dataclass(frozen=True)
 class Question:
-    """A question with its words; ``template`` counts the family's paraphrases, ``held_out`` is one that only ``val`` has."""
+    """A question with its words; ``template`` counts the family's paraphrases, ``held_out`` is one that only ``val`` has.
+
+    ``rephrased``: its words are a model's; the answer never is.
+    """
 
     question_id: str
     scene_id: str
@@ -65,6 +68,7 @@ class Question:
     points: tuple[Point, ...] = ()
     boxes: tuple[Box, ...] = ()
     evidence: Mapping[str, Any] = field(default_factory=dict)
+    rephrased: bool = False
 
     @property
     def picture(self) -> str:

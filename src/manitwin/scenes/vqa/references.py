@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import random
 
-from manitwin.scenes.vqa.things import Seen, View, main_word
+from manitwin.models.annotators.surface_color import are_near
+from manitwin.scenes.vqa.things import Seen, View
 
 MARGIN_PX = 40
 """How far the outermost of some objects is beyond the next (px of a picture 512 wide)."""
@@ -21,6 +22,9 @@ PAIRS = frozenset(
 """Nouns that are plural, of which one is a pair."""
 _GENERAL = {"container": (*CONTAINERS, *OTHER_VESSELS)}
 """Nouns that are also true of other nouns."""
+
+REGION_MARGIN = 0.03
+"""How far from the border of two regions (share of the picture) what is said to lie in one is."""
 
 
 def references(view: View, rng: random.Random) -> dict[str, str]:
@@ -47,10 +51,10 @@ def _words(seen: Seen, rivals: list[Seen], rng: random.Random, margin_px: float)
     thing = seen.thing
     with_color = rng.random() < 0.5
     if not rivals:
-        return f"the {one_of(thing.category, thing.color if with_color else None)}"
-    colors = [each.thing.color for each in rivals]
-    if thing.color and all(color and main_word(color) != main_word(thing.color) for color in colors):
-        return f"the {one_of(thing.category, thing.color)}"
+        return f"the {one_of(thing.category, seen.color if with_color else None)}"
+    colors = [each.color for each in rivals]
+    if seen.color and all(color and not are_near(color, seen.color) for color in colors):
+        return f"the {one_of(thing.category, seen.color)}"
     if not all(each.is_clear and each.thing.head == thing.head for each in rivals):
         return None
     columns = [each.column for each in rivals]
@@ -61,8 +65,13 @@ def _words(seen: Seen, rivals: list[Seen], rng: random.Random, margin_px: float)
     return None
 
 
-def region(x: float, y: float) -> str:
-    """Return which ninth of the picture a point lies in, in words; ``x`` and ``y`` in shares of its size."""
+def region(x: float, y: float) -> str | None:
+    """Return which ninth of the picture a point lies in, in words; ``x`` and ``y`` in shares of its size.
+
+    None for a point within ``REGION_MARGIN`` of a border, of which the eye cannot tell.
+    """
+    if any(abs(place - border) < REGION_MARGIN for place in (x, y) for border in (1 / 3, 2 / 3)):
+        return None
     row = "top" if y < 1 / 3 else "bottom" if y > 2 / 3 else "middle"
     column = "left" if x < 1 / 3 else "right" if x > 2 / 3 else "center"
     return "center" if (row, column) == ("middle", "center") else f"{row} {column}"

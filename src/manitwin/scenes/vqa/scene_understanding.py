@@ -16,6 +16,12 @@ from manitwin.scenes.vqa.things import Shape
 SIDE_M, SIDE_PX = 0.06, 50
 """How far apart two objects are whose sides are asked."""
 NEARER_M, TALLER_M = 0.02, 0.015
+STEEPEST_RAD = np.radians(60)
+"""A camera that looks down more steeply does not show which of two things rises higher."""
+FLATTEST_RAD = np.radians(45)
+"""A camera that looks down less steeply foreshortens gaps by more than 30 %."""
+WHOLE_SHARE = 0.95
+"""What gives a picture its scale is seen by so much."""
 LEAST_TOLERANCE_CM, TOLERANCE_SHARE = 1.0, 0.2
 """A gap is right within the larger of these."""
 FARTHEST_GAP_M = 0.40
@@ -41,7 +47,8 @@ def _sides(asked: Context) -> Iterator[Draft]:
     for a, b in permutations(asked.named, 2):
         slots = {"a": asked.words_of(a), "b": asked.words_of(b)}
         left_m = float(a.thing.center_m[1] - b.thing.center_m[1])
-        if robot is not None and abs(left_m) > SIDE_M:
+        spans_m = [(each.thing.placed.bounds[0][1], each.thing.placed.bounds[1][1]) for each in (a, b)]
+        if robot is not None and abs(left_m) > SIDE_M and sides_are_apart(spans_m[0], spans_m[1]):
             side = "left" if left_m > 0 else "right"
             yield Draft(
                 "side_for_robot", asked.view.name, CHOICE, {**slots, "robot": robot}, side,
@@ -49,7 +56,7 @@ def _sides(asked: Context) -> Iterator[Draft]:
                 {"objects": asked.names(a, b), "frame": "robot", "left_m": round(left_m, 4)}, ("left", "right"),
             )  # fmt: skip
         left_px = b.column - a.column
-        if abs(left_px) > least_px:
+        if abs(left_px) > least_px and sides_are_apart(a.columns, b.columns):
             side = "left" if left_px > 0 else "right"
             yield Draft(
                 "side_in_picture", asked.view.name, CHOICE, slots, side,
@@ -58,18 +65,32 @@ def _sides(asked: Context) -> Iterator[Draft]:
             )  # fmt: skip
 
 
+def sides_are_apart(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    """Whether neither of two spans holds the middle of the other: of what reaches beyond another the side is in doubt."""
+    middles = sum(one) / 2, sum(other) / 2
+    return not one[0] <= middles[1] <= one[1] and not other[0] <= middles[0] <= other[1]
+
+
 def _gaps(asked: Context) -> Iterator[Draft]:
+    if asked.looks_down_rad < FLATTEST_RAD:
+        return
     for a, b in combinations(asked.named, 2):
         if asked.rng.random() < 0.5:
             a, b = b, a
+        measured = a if a.view.visible_share >= WHOLE_SHARE else b
+        if measured.view.visible_share < WHOLE_SHARE:
+            continue
         gap_m = asked.gap_m(a.thing, b.thing)
         if gap_m > FARTHEST_GAP_M or a.thing.name == b.thing.placed_as.supported_by or gap_m < 0.005:
             continue
         tolerance_cm = max(LEAST_TOLERANCE_CM, TOLERANCE_SHARE * 100 * gap_m)
+        longest_m = measured.thing.longest_m
+        size = sentence(f"{asked.words_of(measured)} is {100 * longest_m:.0f} cm at its longest") + " "
         yield Draft(
-            "gap", asked.view.name, NUMBER, {"a": asked.words_of(a), "b": asked.words_of(b)}, f"{100 * gap_m:.1f} cm",
-            sentence(f"about {100 * gap_m:.0f} cm" if gap_m >= 0.01 else "less than 1 cm"),
-            {"objects": asked.names(a, b), "gap_m": round(gap_m, 4), "tolerance_cm": round(tolerance_cm, 2)},
+            "gap", asked.view.name, NUMBER, {"a": asked.words_of(a), "b": asked.words_of(b), "size": size},
+            f"{100 * gap_m:.1f} cm", sentence(f"about {100 * gap_m:.0f} cm" if gap_m >= 0.01 else "less than 1 cm"),
+            {"objects": asked.names(a, b), "gap_m": round(gap_m, 4), "tolerance_cm": round(tolerance_cm, 2),
+             "measured": measured.thing.name, "longest_m": round(longest_m, 4)},
         )  # fmt: skip
 
 
@@ -141,6 +162,8 @@ def _in_the_way(asked: Context, way: Way, cm: int) -> tuple[str | None, dict[str
 
 
 def _heights(asked: Context) -> Iterator[Draft]:
+    if asked.looks_down_rad > STEEPEST_RAD:
+        return
     for (a, p), (b, q) in permutations(asked.pointed, 2):
         top_m = float(a.thing.placed.bounds[1][2]), float(b.thing.placed.bounds[1][2])
         if abs(top_m[0] - top_m[1]) < TALLER_M:

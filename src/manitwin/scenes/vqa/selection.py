@@ -131,12 +131,15 @@ def _balanced_numbers(found: list[tuple[int, Draft]], rng: random.Random) -> lis
 def _round_robin(
     families: dict[str, list[Draft]], per_scene: int, rng: random.Random
 ) -> tuple[list[Draft], list[Draft]]:
-    """Take from the categories in turn, and in each from its families; returns those taken, and what may fill gaps.
+    """Take from the categories in turn, and in each from the family that has been taken from least.
 
+    So a family of which a scene has few questions comes before more of the common ones. Returns those taken, and what may
+    fill gaps.
     Yes/no questions fill none: which of them are asked was balanced over the whole set.
     """
     most = max(1, round(MOST_OF_A_FAMILY * per_scene))
     by_category: dict[str, list[list[Draft]]] = defaultdict(list)
+    counts: Counter[str] = Counter()
     late: list[Draft] = []
     for family, drafts in families.items():
         by_category[FAMILIES[family].category].append(list(drafts[:most]))
@@ -147,8 +150,10 @@ def _round_robin(
         for of_category in by_category.values():
             open_ones = [drafts for drafts in of_category if drafts]
             if open_ones and len(taken) < per_scene:
-                fullest = max(len(drafts) for drafts in open_ones)
-                taken.append(rng.choice([drafts for drafts in open_ones if len(drafts) == fullest]).pop())
+                least = min(counts[drafts[0].family] for drafts in open_ones)
+                draft = rng.choice([drafts for drafts in open_ones if counts[drafts[0].family] == least]).pop()
+                counts[draft.family] += 1
+                taken.append(draft)
     rng.shuffle(late)
     return taken, late
 

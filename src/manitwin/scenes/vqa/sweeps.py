@@ -16,9 +16,13 @@ from manitwin.scenes.vqa.things import Thing
 TOUCH_M = 0.0005
 """Two bodies nearer than this touch."""
 DEEP_M = 0.002
-"""How deep one body must have come into the other, a margin after they touched."""
-MARGIN_M = 0.010
-"""What misses by less, or is met in less before the end of the way, is not asked."""
+"""How deep one body must have come into the other, soon after they touched."""
+MARGIN_M = 0.020
+"""What misses by less, or is met in less before the end of the way, is not asked: the eye does not tell it from a hit."""
+FURTHER_M = 0.010
+"""How much farther than where they touch the depth of a hit is measured."""
+LEVEL_M = 0.010
+"""How far from a piece of furniture's top the foot of what stands on it is, at most."""
 LONGEST_M = 0.20
 
 
@@ -73,7 +77,7 @@ def obstacles_of(thing: Thing, things: Sequence[Thing], record: SceneRecord) -> 
     foot = thing.placed.bounds[0][2]
     found = {other.name: other.placed for other in things if other is not thing}
     for box in furniture_boxes(record.furniture):
-        if box.box_to_world[2, 3] + box.half_extents_m[2] > foot + MARGIN_M / 2:
+        if box.box_to_world[2, 3] + box.half_extents_m[2] > foot + LEVEL_M / 2:
             found[box.name] = ConvexParts.of_box(box).at(box.box_to_world)
     return found
 
@@ -130,11 +134,11 @@ def sweep(
 def _is_deep(
     thing: Thing, obstacle: PlacedParts, start: np.ndarray, direction: tuple[float, float], met: Meeting
 ) -> bool:
-    """Whether an object is well inside of another a margin after they touch: what only grazes is not sure to be hit."""
+    """Whether an object is well inside of another soon after they touch: what only grazes is not sure to be hit."""
     if not np.isfinite(met.touch_m):
         return False
     pose = thing.pose.copy()
-    pose[:3, 3] += start + (met.touch_m + MARGIN_M) * np.array([*direction, 0.0])
+    pose[:3, 3] += start + (met.touch_m + FURTHER_M) * np.array([*direction, 0.0])
     return overlap_depth(thing.shape.hulls.at(pose), obstacle) >= DEEP_M
 
 
@@ -150,7 +154,7 @@ def _leaves(thing: Thing, record: SceneRecord, start: np.ndarray, unit: np.ndarr
     ends = [0.0]
     for box in record.furniture.boxes:
         center, half = np.array(box.center_m), np.array(box.half_extents_m)
-        if abs(center[2] + half[2] - foot) > MARGIN_M or (np.abs(middle - center[:2]) > half[:2]).any():
+        if abs(center[2] + half[2] - foot) > LEVEL_M or (np.abs(middle - center[:2]) > half[:2]).any():
             continue
         way = np.inf
         for axis in range(2):

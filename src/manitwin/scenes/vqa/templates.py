@@ -60,8 +60,8 @@ FAMILIES: Mapping[str, Family] = {
         "Seen from this camera, is something in front of the interaction point at the {part} of {a}?",
     )),
     "part_visible": Family(FUNCTION, (
-        "Is the {part} of {a} visible in this picture?",
-        "Can this camera see the {part} of {a}?",
+        "Can the {part} of {a} be seen in this picture?",
+        "Does this camera see the {part} of {a}?",
         "Does the picture show the {part} of {a}?",
         "Is any of the {part} of {a} in view?",
     )),
@@ -90,10 +90,10 @@ FAMILIES: Mapping[str, Family] = {
         "Looking at the picture, does {a} come left or right of {b}?",
     )),
     "gap": Family(SCENE, (
-        "How wide is the gap between {a} and {b}, in centimetres?",
-        "How many centimetres of free space are between {a} and {b}?",
-        "Estimate the least distance between {a} and {b} in centimetres.",
-        "What distance, in centimetres, separates {a} from {b}?",
+        "{size}How wide is the gap between {a} and {b}, in centimetres?",
+        "{size}How many centimetres of free space are between {a} and {b}?",
+        "{size}Estimate the least distance between {a} and {b} in centimetres.",
+        "{size}What distance, in centimetres, separates {a} from {b}?",
     )),
     "nearest_object": Family(SCENE, (
         "Which object is nearest to {a}?",
@@ -144,7 +144,7 @@ FAMILIES: Mapping[str, Family] = {
         "{robot}{A} is pushed {cm} cm {d}. Which object is struck first?",
     )),
     "blocked_direction": Family(TASK, (
-        "{robot}{A} can be slid {cm} cm in three of these directions without a collision. Which one is blocked?",
+        "{robot}{A} can be slid {cm} cm in all but one of these directions without a collision. Which one is blocked?",
         "{robot}In which direction does {a} collide if it is slid {cm} cm?",
         "{robot}The robot wants to slide {a} by {cm} cm. Which direction must it avoid?",
         "{robot}Which of these ways is not free for sliding {a} {cm} cm?",
@@ -176,7 +176,7 @@ FAMILIES: Mapping[str, Family] = {
     "list_objects": Family(DETECTION, (
         "Enumerate and identify all objects on the {surface}.",
         "List every object on the {surface}.",
-        "Which objects are on the {surface}? Name them from left to right in the picture.",
+        "Which objects are on the {surface}? Name them from left to right in the picture, by their middles.",
         "Name all the things on the {surface}.",
     )),
     "list_containers": Family(DETECTION, (

@@ -11,6 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import trimesh
+from scipy.spatial.distance import pdist
 
 from manitwin.geometry.hull_distance import ConvexParts, PlacedParts
 from manitwin.geometry.poses import inverse, transform_points
@@ -22,6 +23,7 @@ from manitwin.scenes.perception.object_views import ObjectView
 from manitwin.scenes.perception.scene_truth import PictureTruth, SceneTruth
 from manitwin.scenes.scene import SceneObject
 from manitwin.scenes.vqa.question import Point
+from manitwin.scenes.vqa.seen_colors import leading, shows_color
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import Part
 
@@ -30,9 +32,6 @@ NAMED_SHARE, NAMED_PX = 0.40, 150
 HIDDEN_PX = 20
 """What is seen less of is not in the picture; between the two an object is doubtful."""
 REFERENCE_PX = 512
-SURE_COLOR_PERCENT, SURE_GREY_PERCENT, COLOR_LEAD_PERCENT = 50, 80, 10
-"""A colour is named where it covers so much of the surface, and so much more than the next; greys catch the eye less."""
-GREYS = ("white", "grey", "black")
 
 _SHARE = re.compile(r"^(?P<word>[a-z ]+?)(?: \((?P<percent>\d+) %\))?$")
 
@@ -54,6 +53,11 @@ class Shape:
     def caster(self) -> RayCaster:
         """Rays at the whole visual surface."""
         return RayCaster(merged(self.twin.visual))
+
+    @cached_property
+    def longest_m(self) -> float:
+        """The distance of the two points that are farthest apart."""
+        return float(pdist(self.hulls.whole).max())
 
     @cached_property
     def part_casters(self) -> dict[str, tuple[RayCaster, np.ndarray]]:
@@ -107,6 +111,11 @@ class Thing:
         low, high = self.placed.bounds
         return np.asarray((low + high) / 2)
 
+    @property
+    def longest_m(self) -> float:
+        """The distance of the two points of it that are farthest apart."""
+        return self.shape.longest_m
+
 
 @dataclass(frozen=True)
 class Seen:
@@ -127,9 +136,24 @@ class Seen:
         return float(np.nonzero(self.mask)[1].mean() + 0.5)
 
     @cached_property
+    def columns(self) -> tuple[float, float]:
+        """The first and the last column of its visible pixels."""
+        columns = np.flatnonzero(self.mask.any(0))
+        return float(columns[0]), float(columns[-1])
+
+    @cached_property
     def inner(self) -> tuple[Point, float]:
         """The point of the picture deepest inside of its visible pixels, and how deep (px)."""
         return inner_point(self.mask)
+
+    @cached_property
+    def color(self) -> str | None:
+        """The object's colour word, where it also leads on what the picture shows; else None."""
+        shape, camera = self.thing.shape, self.picture.camera
+        color = self.thing.color
+        if color is None or not self.mask.any():
+            return None
+        return color if shows_color(color, shape.twin, shape.caster, self.thing.pose, camera, self.mask) else None
 
     @property
     def scale(self) -> float:
@@ -210,22 +234,13 @@ def sure_color(twin: Twin) -> str | None:
     """Return the one colour word of a twin, such as ``dark green``; None where it has none that leads."""
     if twin.record.language is None:
         return None
-    found: list[tuple[str, int]] = []
+    found: list[tuple[str, float]] = []
     for text in twin.record.language.color.split(", "):
         match = _SHARE.match(text)
         if match is None or "unknown" in text:
             return None
         found.append((match["word"], int(match["percent"] or 100)))
-    next_percent = max((percent for _, percent in found[1:]), default=0)
-    least_percent = SURE_GREY_PERCENT if main_word(found[0][0]) in GREYS else SURE_COLOR_PERCENT
-    if found[0][1] < least_percent or found[0][1] - next_percent < COLOR_LEAD_PERCENT:
-        return None
-    return found[0][0]
-
-
-def main_word(color: str) -> str:
-    """Return ``green`` of ``dark green``."""
-    return color.split()[-1]
+    return leading(found)
 
 
 def inner_point(mask: np.ndarray) -> tuple[Point, float]:

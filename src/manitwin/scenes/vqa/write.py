@@ -13,6 +13,7 @@ from PIL import Image
 
 from manitwin.errors import UsageError, choose_from
 from manitwin.formats.output_folder import new_folder
+from manitwin.models.vlm.chat_from_spec import NO_CHAT, chat_of
 from manitwin.scenes.perception.output import JPEG_QUALITY, Output
 from manitwin.scenes.perception.scene_truth import PictureTruth, read_scene_truth
 from manitwin.scenes.perception.segmentation import VALIDATION_SHARE
@@ -20,6 +21,7 @@ from manitwin.scenes.scene_files import dataset_of, scene_files
 from manitwin.scenes.vqa.formats import FORMATS, Pictures
 from manitwin.scenes.vqa.generate import drafts_of, questions_of
 from manitwin.scenes.vqa.question import Draft, Question
+from manitwin.scenes.vqa.rephrasing import Rephrasing, kept_wordings, rephrasings, rephrasings_json
 from manitwin.scenes.vqa.report import vqa_page
 from manitwin.scenes.vqa.things import Shape
 from manitwin.scenes.vqa.wording import CONVENTIONS
@@ -28,6 +30,7 @@ from manitwin.twin.loaded_twin import TwinSource
 PER_SCENE = 80
 QUESTIONS = "questions.jsonl"
 REPORT = "report.html"
+REPHRASINGS = "rephrasings.json"
 _PICTURES_KEPT = 8
 
 
@@ -40,6 +43,7 @@ class Asked:
     questions: int
     families: int
     files: int
+    rephrased: int
 
 
 def ask_scenes(
@@ -49,8 +53,12 @@ def ask_scenes(
     per_scene: int = PER_SCENE,
     validation_share: float = VALIDATION_SHARE,
     seed: int = 7,
+    wordings_for: Callable[[Sequence[str]], Mapping[str, Sequence[str]]] = lambda families: {},
 ) -> tuple[list[Question], dict[str, PictureTruth]]:
-    """Return the questions about drawn scenes, and their pictures by name; raises UsageError, TwinError."""
+    """Return the questions about drawn scenes, and their pictures by name; raises UsageError, TwinError.
+
+    ``wordings_for`` returns further wordings of families.
+    """
     source = TwinSource(dataset if dataset is not None else dataset_of(files[0]))
     shapes: dict[str, Shape] = {}
 
@@ -69,7 +77,9 @@ def ask_scenes(
         drafts.append(drafts_of(scene, shape_of, categories, seed))
         # copies without what was read of them: a thousand scenes' labels do not fit into memory
         pictures |= {f"{scene.record.scene_id}_{each.name}.jpg": replace(each) for each in scene.pictures}
-    questions = questions_of(ids, drafts, per_scene=per_scene, validation_share=validation_share, seed=seed)
+    questions = questions_of(
+        ids, drafts, per_scene=per_scene, validation_share=validation_share, seed=seed, wordings_for=wordings_for
+    )
     return questions, pictures
 
 
@@ -83,13 +93,15 @@ def write_vqa(
     points: str = "unit",
     validation_share: float = VALIDATION_SHARE,
     seed: int = 7,
+    vlm: str = NO_CHAT,
 ) -> Asked:
     """Write questions about drawn scenes with computed answers, whole or not at all.
 
     ``scenes`` is what ``manitwin layout --pictures`` wrote, or one scene of it; ``dataset`` is where its twins are, by default
     where it says. ``points`` is the convention of places. ``questions.jsonl`` holds the questions with their evidence,
-    ``report.html`` samples and balance; the rest is of the format. Raises UsageError for an unknown format or convention, scenes
-    that were not drawn or give no question, or an ``out`` that is not empty.
+    ``report.html`` samples and balance; the rest is of the format. ``vlm`` is a model that words the questions of the split
+    ``train`` in other ways too (``openai:MODEL@URL``); what it gave is in ``rephrasings.json``. Raises UsageError for an
+    unknown format or convention, scenes that were not drawn or give no question, or an ``out`` that is not empty.
     """
     if form not in FORMATS:
         raise UsageError(choose_from("format", form, FORMATS))
@@ -102,9 +114,22 @@ def write_vqa(
     files = scene_files(Path(scenes))
     if not files:
         raise UsageError(f"{scenes}: no scene there; `manitwin layout DATASET -o {scenes} --pictures` makes some")
+    chat = chat_of(vlm, "word questions")
+    given: list[Rephrasing] = []
+
+    def wordings_for(families: Sequence[str]) -> Mapping[str, Sequence[str]]:
+        if chat is not None:
+            given.extend(rephrasings(families, chat))
+        return kept_wordings(given)
+
     with new_folder(Path(out)) as folder:
         questions, pictures = ask_scenes(
-            files, dataset=dataset, per_scene=per_scene, validation_share=validation_share, seed=seed
+            files,
+            dataset=dataset,
+            per_scene=per_scene,
+            validation_share=validation_share,
+            seed=seed,
+            wordings_for=wordings_for,
         )
         if not questions:
             raise UsageError(
@@ -113,13 +138,17 @@ def write_vqa(
         written = Output(folder)
         lines = "".join(json.dumps(each.to_json(), sort_keys=True, ensure_ascii=False) + "\n" for each in questions)
         written.write_bytes(QUESTIONS, lines.encode())
+        if chat is not None:
+            told = rephrasings_json(given, chat.model)
+            written.write_bytes(REPHRASINGS, json.dumps(told, indent=1, ensure_ascii=False).encode() + b"\n")
         sizes = {name: (each.camera.width_px, each.camera.height_px) for name, each in pictures.items()}
         FORMATS[form](questions, Pictures(_jpegs(pictures), sizes), points, written)
         shown = vqa_page(questions, lambda each: replace(pictures[each.picture]).rgb, points, len(files))
         written.write_bytes(REPORT, shown)
         count = written.written
     families = len({each.family for each in questions})
-    return Asked(len(files), len({each.picture for each in questions}), len(questions), families, count)
+    rephrased = sum(each.rephrased for each in questions)
+    return Asked(len(files), len({each.picture for each in questions}), len(questions), families, count, rephrased)
 
 
 def _jpegs(pictures: Mapping[str, PictureTruth]) -> Callable[[str], bytes]:

@@ -1,0 +1,47 @@
+"""Which drafts are asked."""
+
+from __future__ import annotations
+
+import random
+
+import numpy as np
+import pytest
+
+from manitwin.scenes.vqa.question import BOX, POINT, Draft
+from manitwin.scenes.vqa.scene_understanding import sides_are_apart
+from manitwin.scenes.vqa.selection import chosen
+from manitwin.scenes.vqa.sweeps import Meeting, Way
+
+
+def drafts(family: str, kind: str, count: int) -> list[Draft]:
+    return [Draft(family, "front", kind, {}, f"{number}", "", {"objects": {}}) for number in range(count)]
+
+
+def test_a_family_of_which_a_scene_has_few_questions_is_asked_beside_the_common_ones() -> None:
+    common = [
+        *drafts("point_at_object", POINT, 30),
+        *drafts("box_of_object", BOX, 30),
+        *drafts("touch_point", POINT, 30),
+    ]
+    rare = drafts("locate_and_grasp", POINT, 1)
+    asked = chosen([[*common, *rare]], 9, random.Random(1))[0]
+    assert [each.family for each in asked].count("locate_and_grasp") == 1
+
+
+def test_a_slide_that_misses_or_hits_by_less_than_the_eye_sees_is_not_asked() -> None:
+    def way(near_m: float, touch_m: float) -> Way:
+        return Way({"can": Meeting(near_m, touch_m)}, 1.0)
+
+    assert way(0.101, np.inf).verdict(0.1) is False and way(0.099, np.inf).verdict(0.1) is None
+    assert way(0.05, 0.079).verdict(0.1) is True and way(0.05, 0.085).verdict(0.1) is None
+    two = {"can": Meeting(0.02, 0.04), "box": Meeting(0.03, 0.055)}
+    assert not Way(two, 1.0).order_is_sure() and Way({**two, "box": Meeting(0.04, 0.061)}, 1.0).order_is_sure()
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "apart"), [((0, 2), (3, 5), True), ((0, 4), (3, 6), True), ((0, 6), (2, 3), False)]
+)
+def test_a_side_is_in_doubt_where_one_thing_reaches_over_the_middle_of_the_other(
+    one: tuple[float, float], other: tuple[float, float], apart: bool
+) -> None:
+    assert sides_are_apart(one, other) is apart and sides_are_apart(other, one) is apart
