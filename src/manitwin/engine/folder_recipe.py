@@ -83,13 +83,18 @@ class FolderRecipe(ABC, Generic[RecordT]):
     def folder_of(self, item_id: str) -> str:
         """Return the name of an item's finished folder below the data set's root."""
 
-    def ending_of(self, record: bytes) -> Ending | None:
-        """Return how a finished folder ended; None where it cannot be read, or this recipe would make another one."""
+    def amended_sha256(self, record: RecordT) -> str | None:
+        """Return the digest of the amendments that a folder was made with; None: of none."""
+        return None
+
+    def ending_of(self, record: bytes, amended_sha256: str | None = None) -> Ending | None:
+        """Return how a finished folder ended; None where it cannot be read, or this recipe or amendment makes another one."""
         try:
             read = self.parse(record)
         except (ValueError, ManiTwinError):
             return None
-        return self.ending(read) if self.is_current(read) else None
+        current = self.is_current(read) and self.amended_sha256(read) == amended_sha256
+        return self.ending(read) if current else None
 
     def seal(self, fresh: Path, said: dict[str, Any], *, decided_by: Any = None) -> RecordT:
         """Write the record last: what is said of the folder, and its revision, by ``decided_by`` as well where that is given."""

@@ -116,6 +116,6 @@ class Recipe(Protocol):
         """Return what is wrong with a finished folder, by what costs next to nothing to look at; None where nothing is."""
         ...
 
-    def ending_of(self, record: bytes) -> Ending | None:
-        """Return how a finished folder says that its item ended; None where this recipe would make another one."""
+    def ending_of(self, record: bytes, amended_sha256: str | None = None) -> Ending | None:
+        """Return how a finished folder says that its item ended; None where recipe or amendment make another one."""
         ...

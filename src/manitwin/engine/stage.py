@@ -39,6 +39,7 @@ class Draft(Generic[PayloadT]):
 
     ``jobs`` remembers what was asked of services that are paid by the job. ``rehearsed`` are the stages, among those whose
     results are here and those that these were made of, whose backend was a rehearsal server (``manitwin fake``).
+    ``amendments`` is what people have put right, by stage; a stage that runs has its own alone.
     """
 
     item_id: str
@@ -49,6 +50,7 @@ class Draft(Generic[PayloadT]):
     digests: dict[str, str] = dataclass_field(default_factory=dict)
     jobs: JobMemory = dataclass_field(default_factory=NoMemory)
     rehearsed: set[str] = dataclass_field(default_factory=set)
+    amendments: dict[str, dict[str, Any]] = dataclass_field(default_factory=dict)
 
     def names(self) -> set[str]:
         """Return the names of all artifacts that are there."""

@@ -72,6 +72,8 @@ def stage_key(stage: Stage, draft: Draft) -> str:
         "seed": draft.seed,
         "reads": {name: _digest(name, draft) for name in present_reads(stage, draft.names())},
     }
+    if draft.amendments.get(stage.name):
+        decides["amendment"] = draft.amendments[stage.name]
     return sha256_of_json(decides)[:24]
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 
 from manitwin.config import Resource
+from manitwin.engine.amendments import AMENDMENTS, Amendments, amendments_sha256, read_amendments
 from manitwin.engine.charges import counted
 from manitwin.engine.job_memory import RootJobMemory
 from manitwin.engine.jobs import (
@@ -53,6 +54,7 @@ class Worker:
     def __init__(self, setup: WorkerSetup):
         self.setup, self.root = setup, DatasetRoot(setup.root_url)
         self._stages: dict[str, list[Stage]] = {}
+        self._amends = self.root.exists(AMENDMENTS)
 
     def do(self, job: Job) -> Reply:
         """Return the job's answer; never raises but for what ends a process."""
@@ -125,7 +127,8 @@ class Worker:
         recipe = self.setup.recipe
         name = f"{recipe.folder_of(item_id)}/{recipe.record}"
         try:
-            return recipe.ending_of(self.root.read_bytes(name)) if self.root.exists(name) else None
+            amended = amendments_sha256(self._draft_amendments(item_id))
+            return recipe.ending_of(self.root.read_bytes(name), amended) if self.root.exists(name) else None
         except TwinError:  # no file that is read: what is made takes its place
             return None
 
@@ -136,6 +139,7 @@ class Worker:
             self._work(job.task.item_id),
             self._draft(job.task.item_id, job.task.payload),
         )
+        draft.amendments = {name: each for name, each in draft.amendments.items() if name == stage.name}
         work.sweep()  # of a worker that died at it
         wanted = {name.removesuffix("?") for name in stage.reads}
         writers = {s.name for s in stages if wanted & set(s.writes)}
@@ -199,7 +203,11 @@ class Worker:
 
     def _draft(self, item_id: str, payload: Payload) -> Draft:
         jobs = RootJobMemory(self.root, f"{WORK}/{item_id}/{JOBS}")
-        return Draft(item_id, payload, self.setup.recipe.seed, jobs=jobs)
+        amendments = self._draft_amendments(item_id)
+        return Draft(item_id, payload, self.setup.recipe.seed, jobs=jobs, amendments=amendments)
+
+    def _draft_amendments(self, item_id: str) -> Amendments:
+        return read_amendments(self.root, item_id) if self._amends else {}
 
 
 def _nothing() -> None:

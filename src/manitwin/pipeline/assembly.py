@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from manitwin.engine.amendments import amendments_sha256
 from manitwin.engine.stage import Draft, Stage
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import Rejected
@@ -74,6 +75,7 @@ def assemble(
             "config_sha256": config_sha256,
             "seed": draft.seed,
             "stages": {s.name: _provenance(s, draft) for s in stages},
+            "amendments_sha256": amendments_sha256(draft.amendments),
         },
         "quality": {"checks": _checks_so_far(draft)},
     }

@@ -10,6 +10,7 @@ import numpy as np
 from manitwin.config import NO_SETTINGS, Resource
 from manitwin.engine.stage import Draft
 from manitwin.models.annotators.protocol import Annotator
+from manitwin.pipeline.human_corrections import corrected_language
 from manitwin.pipeline.object_state import read_scaled_subject
 
 
@@ -45,4 +46,4 @@ class CaptionStage:
         physical = draft.field("physical")
         subject = read_scaled_subject(draft, known_as=draft.field("called"))
         language = self._annotator.describe(subject, physical["material"], np.array(physical["extents_m"]))
-        return {"language": language.model_dump()}
+        return {"language": corrected_language(language, draft).model_dump()}

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal, cast, get_args
 
@@ -33,6 +34,7 @@ _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e\u2066
 """What changes a terminal or the order of what is read, and lone surrogates; a tab and an end of line do not."""
 _LINES = re.compile(r"[\r\n\t\u2028\u2029]")
 COLUMNS = ("file", "text", "name", "units", "up", "license", "attribution", "group", "turn_deg")
+_KNOWN = frozenset(COLUMNS)
 
 Units = Literal["m", "cm", "mm", "auto"]
 Up = Literal["y", "z", "auto"]
@@ -86,7 +88,8 @@ def iterate_items(
     for item in _given_items(inputs, defaults, notes, texts, strict, refusal):
         if item.file is not None and count > 1:
             raise UsageError(f"{item.title}: count makes variations of texts, and this is a file; build it by itself")
-        yield from (replace(item, variation=number) for number in range(count))
+        yield item
+        yield from (replace(item, variation=number) for number in range(1, count))
 
 
 def _one_of_views(
@@ -166,9 +169,10 @@ def _manifest_items(
 ) -> Iterator[Item]:
     unknown: dict[str, str] = {}
     groups = PhotoGroups(path)
+    _real_folder.cache_clear()  # a link may lead elsewhere than at the last reading
     line = None
     for line, row in _rows(path):
-        for column in sorted(map(str, row.keys() - set(COLUMNS) - unknown.keys())):
+        for column in sorted(map(str, row.keys() - _KNOWN - unknown.keys())):
             shown = printable_line(column, max_characters=_SHOWN_CHARACTERS)
             near = get_close_matches(shown.lower().strip(), COLUMNS, n=1, cutoff=0.6)
             unknown[column] = f"{shown!r} (did you mean {near[0]!r}?)" if near else repr(shown)
@@ -224,15 +228,13 @@ def _item(
         columns = f"; its unknown columns: {_listed(unknown)}" if unknown else ""
         raise UsageError(f"{where}: a row has either 'file' or 'text'{columns}")
     if file is not None:
-        path = Path(file) if Path(file).is_absolute() else folder / file
-        if os.path.isdir(path) and is_imported(path):
-            return _imported_item(path.resolve(), values)
+        path = os.path.join(folder, file.rstrip("/") or file)
         if not os.path.isfile(path):
+            if os.path.isdir(path) and is_imported(Path(path)):
+                return _imported_item(Path(path).resolve(), values)
             what = "no file" if os.path.exists(path) else "not there"
-            raise UsageError(
-                f"{where}: {shortened(str(path))} is {what}; paths are absolute or relative to the manifest"
-            )
-        file = str(path.resolve())
+            raise UsageError(f"{where}: {shortened(path)} is {what}; paths are absolute or relative to the manifest")
+        file = _resolved(path)
     for key, kind in (("units", Units), ("up", Up)):
         if values[key] not in get_args(kind):
             raise UsageError(f"{where}: {choose_from(key, str(values[key]), get_args(kind))}")
@@ -245,6 +247,17 @@ def _item(
         license=values["license"],
         attribution=values["attribution"],
     )
+
+
+def _resolved(path: str) -> str:
+    """Return the real path of a file: that of its folder is asked for once, since a manifest names many in few folders."""
+    place = os.path.join(_real_folder(os.path.dirname(path)), os.path.basename(path))
+    return os.path.realpath(place) if os.path.islink(place) else place
+
+
+@lru_cache(maxsize=4096)
+def _real_folder(path: str) -> str:
+    return os.path.realpath(path)
 
 
 def unusable(key: str, value: str) -> str | None:

@@ -16,6 +16,7 @@ from manitwin.geometry.poses import OBJECT_TO_GLTF
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.models.annotators.protocol import PhysicalEstimates, SelectedPoints, Subject
+from manitwin.pipeline.human_corrections import corrected_category
 from manitwin.pipeline.item import Item
 from manitwin.render.cameras import Camera
 from manitwin.twin.grasp_table import JOINTS
@@ -104,8 +105,12 @@ def read_given(draft: Draft[Item]) -> ImportRecord | None:
 def object_name(draft: Draft[Item]) -> str | None:
     """Return what the object is called; None: nobody says.
 
-    The user's word counts first, then that of a generator that knows what it made, then a classifier's.
+    The word of whoever has reviewed the twin counts first, then the user's, then that of a generator that knows what it made,
+    then a classifier's.
     """
+    corrected = corrected_category(draft)
+    if corrected is not None:
+        return corrected
     if draft.payload.name is not None:
         return draft.payload.name
     known = _known(draft)

@@ -17,6 +17,7 @@ from manitwin.geometry.boxes import oriented_bounding_box, upright_extents
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
 from manitwin.models.annotators.priors import Interval, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
+from manitwin.pipeline.human_corrections import corrected_estimates, is_human
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.mass_by_parts import mass_by_parts
 from manitwin.pipeline.object_state import findings_of, object_name, read_subject
@@ -63,6 +64,7 @@ class PhysicalStage:
         metric = bool(draft.field("geometry")["metric"])
         subject = read_subject(draft, solid="canonical.npz", visual="canonical.glb", metric=metric)
         estimates = self._annotator.estimate_physical(subject)
+        estimates = corrected_estimates(estimates, draft.amendments.get(self.name, {}))
         obb_extents, obb_to_object = oriented_bounding_box(subject.solid.vertices)
         longest = float(upright_extents(subject.solid.vertices).max())
         scale = size_scale(subject, estimates, longest)
@@ -95,7 +97,8 @@ class PhysicalStage:
             inertia_kg_m2=properties.inertia_kg_m2.tolist(),
             mass_distribution=_distribution(estimates, by_parts),
         )
-        said = None if metric or estimates.longest_axis_m is None else estimates.longest_axis_m.model_dump()
+        given = estimates.longest_axis_m
+        said = None if given is None or (metric and not is_human(given.source)) else given.model_dump()
         return {
             "physical": physical.model_dump(),
             "physical_findings": findings_of(estimates),
@@ -114,7 +117,7 @@ class PhysicalStage:
 
     def _check_size(self, name: str | None, longest_m: float, said: Estimate | None) -> None:
         prior = lookup(name)
-        if prior is None or (said is not None and said.source in CONFIRMED):
+        if prior is None or (said is not None and _is_confirmed(said)):
             return
         if not _within(longest_m, prior.longest_axis_m, self.settings.size_margin):
             raise Rejected(
@@ -124,7 +127,7 @@ class PhysicalStage:
             )
 
     def _check_mass(self, name: str | None, mass: Estimate, volume_m3: float) -> None:
-        if mass.source in CONFIRMED:
+        if _is_confirmed(mass):
             return
         prior = lookup(name)
         if prior is not None and not _within(mass.value, prior.mass_kg, self.settings.mass_margin):
@@ -142,14 +145,15 @@ class PhysicalStage:
 
 
 def size_scale(subject: Subject, estimates: PhysicalEstimates, longest: float) -> float:
-    """Return the factor to true size by the ``longest`` extent of the object as it stands; 1 for a metric mesh.
+    """Return the factor to true size by the ``longest`` extent of the object as it stands; 1 for a metric mesh nobody corrects.
 
     The paper scales by the longest axis of the oriented box, which of a teapot is the diagonal from its spout to its foot: by
     a length of 0.24 m the pot would become 0.32 m long.
     """
-    if subject.metric or estimates.longest_axis_m is None:
+    said = estimates.longest_axis_m
+    if said is None or (subject.metric and not is_human(said.source)):
         return 1.0
-    return estimates.longest_axis_m.value / longest
+    return said.value / longest
 
 
 def mass_estimate(estimates: PhysicalEstimates, volume_m3: float) -> Estimate:
@@ -205,6 +209,10 @@ def _write_meshes(
     unscaled = draft.path("canonical.glb").read_bytes() if scale == 1.0 else None
     (folder / "visual.glb").write_bytes(unscaled or write_glb(parts, max_texture_size=max_texture_size))
     np.savez(folder / "solid.npz", vertices=np.asarray(solid.vertices), faces=np.asarray(solid.faces, dtype=np.int64))
+
+
+def _is_confirmed(said: Estimate) -> bool:
+    return said.source in CONFIRMED or is_human(said.source)
 
 
 def _within(value: float, interval: Interval, margin: float) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -16,6 +16,7 @@ from manitwin.geometry.frames.feature import FramedMesh
 from manitwin.models.annotators.point_rules import spare_grasp_points
 from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints, Subject
 from manitwin.pipeline.frames import with_frames
+from manitwin.pipeline.human_corrections import corrected_points
 from manitwin.pipeline.object_state import findings_of, pictures, read_scaled_subject
 from manitwin.pipeline.refinement import refined_points
 from manitwin.render.raycast import merged, seen_tolerance_m
@@ -65,14 +66,14 @@ class PointsStage:
             center_of_mass_m=np.array(physical["center_of_mass_m"]),
             max_opening_m=self._gripper.opening_m,
         )
-        selected = self._annotator.select_points(request)
+        amendment = draft.amendments.get(self.name, {})
+        selected = corrected_points(self._annotator.select_points(request), request, amendment)
         check_selection(selected, request.positions_m)
         surface = FramedMesh(request.subject.solid, request.center_of_mass_m, draft.seed)
         spares = _spares(selected, request)
         framed, missing = with_frames(selected.functional, surface)
-        functional, refined = refined_points(
-            framed, surface, {point.candidate for point in (*selected.grasp, *spares)}, _on(request.subject)
-        )
+        taken = {point.candidate for point in (*selected.grasp, *spares)} | _moved(framed)
+        functional, refined = refined_points(framed, surface, taken, _on(request.subject))
         return {
             "points": {
                 "functional": [point.model_dump() for point in functional],
@@ -90,6 +91,11 @@ def _spares(selected: SelectedPoints, request: PointsRequest) -> list[GraspPoint
     taken = [point.candidate for point in (*selected.grasp, *selected.spare)]
     missing = max(0, GRASP[1] - len(selected.spare))
     return [*selected.spare, *(spare_grasp_points(request, taken)[:missing] if missing else ())]
+
+
+def _moved(points: Iterable[FunctionalPoint]) -> set[int]:
+    """Return the candidates at which a person has put points: these stay where they are."""
+    return {point.candidate for point in points if point.source is not None}
 
 
 def _on(subject: Subject) -> Callable[[np.ndarray], bool]:

@@ -255,6 +255,10 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
         """Tell whether this recipe would make the same twin."""
         return is_current(record, self.config)
 
+    def amended_sha256(self, record: TwinRecord) -> str | None:
+        """Return the digest of the amendments that a twin was made with."""
+        return record.provenance.amendments_sha256
+
     def ending(self, record: TwinRecord) -> Ending:
         """Return how a twin's record says that its item ended."""
         return ending_of(record)

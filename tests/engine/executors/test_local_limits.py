@@ -67,6 +67,7 @@ def test_what_needs_more_memory_than_a_worker_may_take_is_too_large(tmp_path: Pa
         assert isinstance(wait(executor)[0][1], StageRun), "the run goes on"
 
 
+@pytest.mark.slow
 def test_without_a_limit_nothing_is_too_large(tmp_path: Path) -> None:
     with LocalExecutor(setup(tmp_path), RunConfig(cpu=1)) as executor:
         executor.submit(1, job("eat:a:2"))
@@ -109,7 +110,7 @@ def test_a_stage_that_does_not_end_is_cut_off(tmp_path: Path, text: str) -> None
         assert isinstance(wait(executor)[0][1], StageRun)
 
 
-@pytest.mark.parametrize("jump_s", [-86_400.0, 86_400.0])
+@pytest.mark.parametrize("jump_s", [pytest.param(-86_400.0, marks=pytest.mark.slow), 86_400.0])
 def test_a_clock_that_is_set_ends_no_stage_and_spares_none(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, jump_s: float
 ) -> None:

@@ -1,0 +1,51 @@
+"""The schema of the store of reviews as numbered steps; ``PRAGMA user_version`` says how many a file has taken."""
+
+from __future__ import annotations
+
+import sqlite3
+
+from manitwin.errors import UsageError
+
+MIGRATIONS = (
+    """
+    CREATE TABLE events (
+        number INTEGER PRIMARY KEY,
+        kind TEXT NOT NULL CHECK (kind IN ('review', 'undo', 'sample')),
+        annotator TEXT,
+        twin_id TEXT,
+        revision TEXT,
+        undoes INTEGER UNIQUE REFERENCES events (number),
+        request TEXT UNIQUE,                 -- the sender's own id: sent again, it is the same event
+        at REAL NOT NULL,                    -- seconds since the epoch
+        body TEXT NOT NULL                   -- JSON
+    ) STRICT;
+    CREATE INDEX events_by_twin ON events (twin_id, annotator);
+    CREATE INDEX events_by_annotator ON events (annotator, kind);
+    CREATE TRIGGER no_update BEFORE UPDATE ON events BEGIN SELECT RAISE (ABORT, 'events are only appended'); END;
+    CREATE TRIGGER no_delete BEFORE DELETE ON events BEGIN SELECT RAISE (ABORT, 'events are only appended'); END;
+
+    CREATE TABLE annotators (
+        name TEXT PRIMARY KEY,
+        at REAL NOT NULL
+    ) STRICT, WITHOUT ROWID;
+
+    CREATE TABLE drafts (
+        annotator TEXT NOT NULL,
+        twin_id TEXT NOT NULL,
+        at REAL NOT NULL,
+        body TEXT NOT NULL,
+        PRIMARY KEY (annotator, twin_id)
+    ) STRICT, WITHOUT ROWID;
+    """,
+)
+
+
+def migrate(connection: sqlite3.Connection, path: str) -> None:
+    """Bring a store to the newest schema; raises UsageError for one of a newer version of this package."""
+    (version,) = connection.execute("PRAGMA user_version").fetchone()
+    if version > len(MIGRATIONS):
+        raise UsageError(
+            f"{path}: of schema {version}, this version reads up to {len(MIGRATIONS)}; use the version that wrote it"
+        )
+    for number, script in enumerate(MIGRATIONS[version:], version + 1):
+        connection.executescript(f"BEGIN IMMEDIATE; {script}; PRAGMA user_version = {number}; COMMIT;")

@@ -1,0 +1,104 @@
+"""What annotators do while a server runs: the next twin, a draft, a confirmed review, one taken back. Threads may share it."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from manitwin.dataset.index.query import Index
+from manitwin.dataset.review.plan import require_annotator
+from manitwin.dataset.review.queues import Plan, queue_of, share_of
+from manitwin.dataset.review.store import ReviewStore, Stored
+from manitwin.dataset.review.twins_seen import check_corrections, prompts_of, revisions
+from manitwin.dataset.review.verdicts import Review, reason_of
+from manitwin.errors import UsageError
+from manitwin.twin.record import TwinRecord
+
+FRESH_S = 10.0
+"""So long a list of revisions is taken as it is: a twin that is built anew meanwhile enters the queue that much later."""
+
+
+class Said(BaseModel):
+    """What a page sends when a review is confirmed; ``request`` is an id of the page's own, sent again with the same review."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    request: str = Field(min_length=8, max_length=64, pattern=r"^[0-9a-f-]+$")
+    revision: str = Field(max_length=128)
+    answers: dict[str, str]
+    corrections: dict[str, Any] = Field(default_factory=dict)
+    note: str = ""
+    seconds: float | None = None
+
+
+@dataclass(frozen=True)
+class Progress:
+    """An annotator's progress: reviews of the sample that stand, and twins left of their share, then of others'."""
+
+    reviewed: int
+    left: int
+
+
+class ReviewSession:
+    """The annotators, the sample and the store of one server."""
+
+    def __init__(self, store: ReviewStore, index: Index, plan: Plan, annotators: Sequence[str], *, blind: bool = False):
+        self.store, self.plan, self.blind = store, plan, blind
+        self.annotators = [require_annotator(name) for name in annotators]
+        self._index, self._lock = index, threading.Lock()
+        self._now: tuple[float, Mapping[str, str]] = (float("-inf"), {})
+        for name in self.annotators:
+            store.add_annotator(name)
+
+    def next_twin(self, annotator: str, after: str | None = None) -> str | None:
+        """Return the id of the next twin in an annotator's queue, with ``after`` behind that one; None: nothing is left."""
+        queue = self._queue(annotator)
+        if after in queue:
+            place = queue.index(after) + 1
+            queue = queue[place:] + queue[:place]
+        return queue[0] if queue else None
+
+    def progress(self, annotator: str) -> Progress:
+        """Return an annotator's progress."""
+        now, judged = self._revisions(), self.store.judged()
+        done = sum(annotator in judged.get(twin_id, {}).get(now.get(twin_id, ""), ()) for twin_id in self.plan.twins)
+        return Progress(done, len(self._queue(annotator, share_of)))
+
+    def confirm(self, annotator: str, record: TwinRecord, body: Mapping[str, Any]) -> None:
+        """Keep a review; raises UsageError for what is none, or is of a twin that was built anew since it was shown."""
+        try:
+            said = Said.model_validate(body)
+            if said.revision != record.revision:
+                raise UsageError(f"{record.twin_id} was built anew since it was shown; load the page again")
+            review = Review.model_validate(
+                {
+                    **said.model_dump(exclude={"request"}), "annotator": annotator, "twin_id": record.twin_id,
+                    "blind": self.blind, "prompts": prompts_of(record),
+                }
+            )  # fmt: skip
+        except ValidationError as error:
+            raise UsageError(reason_of(error)) from error
+        check_corrections(record, review.corrections)
+        self.store.add([review], [f"{annotator}:{said.request}"])
+
+    def undo(self, annotator: str, request: str) -> Stored | None:
+        """Take back the last review of an annotator; None: there is none."""
+        return self.store.undo(annotator, f"{annotator}:{request[:64]}")
+
+    def _queue(self, annotator: str, of: Callable[..., list[str]] = queue_of) -> list[str]:
+        now, judged = self._revisions(), self.store.judged()
+        names = sorted({*self.annotators, *self.store.annotators()})
+        there = Plan(tuple(t for t in self.plan.twins if t in now), self.plan.seed, self.plan.overlap, self.plan.raters)
+        done = {twin_id: judged.get(twin_id, {}).get(now[twin_id], set()) for twin_id in there.twins}
+        return of(annotator, there, names, done)
+
+    def _revisions(self, clock: Callable[[], float] = time.monotonic) -> Mapping[str, str]:
+        with self._lock:
+            if clock() - self._now[0] > FRESH_S:
+                self._now = (clock(), revisions(self._index))
+            return self._now[1]

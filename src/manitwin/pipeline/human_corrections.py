@@ -1,0 +1,89 @@
+"""What people have put right of a twin takes the place of what was estimated or chosen: ``source`` human:<annotator>."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+from manitwin.engine.stage import Draft
+from manitwin.errors import BadReply
+from manitwin.models.annotators.protocol import PhysicalEstimates, PointsRequest, SelectedPoints
+from manitwin.pipeline.item import Item
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint
+from manitwin.twin.record import Language
+from manitwin.twin.record_values import Estimate
+
+HUMAN = "human:"
+CATEGORY, MASS, SIZE, MOVES = "category", "mass_kg", "longest_side_m", "moves"
+"""Keys of a stage's amendment: a name, two Estimates, and ``{point id: {candidate, label, source}}``."""
+STAGES = {
+    CATEGORY: ("physical", "caption", "points", "parts", "finish"),
+    MASS: ("physical",),
+    SIZE: ("physical",),
+    MOVES: ("points",),
+}
+"""The stages that a correction concerns: the category is a name, as the user's is, of all that comes after the mesh."""
+
+
+def is_human(source: str) -> bool:
+    """Tell whether a person has said it."""
+    return source.startswith(HUMAN)
+
+
+def corrected_category(draft: Draft[Item]) -> str | None:
+    """Return the category that a person has given, as far as the stage that runs is concerned."""
+    return next((str(each[CATEGORY]) for each in draft.amendments.values() if CATEGORY in each), None)
+
+
+def corrected_estimates(estimates: PhysicalEstimates, amendment: Mapping[str, Any]) -> PhysicalEstimates:
+    """Return the estimates with the mass (kg) and longest side (m) that a person has given."""
+    mass, size = amendment.get(MASS), amendment.get(SIZE)
+    return replace(
+        estimates,
+        mass_kg=estimates.mass_kg if mass is None else Estimate.model_validate(mass),
+        longest_axis_m=estimates.longest_axis_m if size is None else Estimate.model_validate(size),
+    )
+
+
+def corrected_language(language: Language, draft: Draft[Item]) -> Language:
+    """Return the words under the category that a person has given."""
+    category = corrected_category(draft)
+    return language if category is None else language.model_copy(update={"category": category})
+
+
+def corrected_points(selected: SelectedPoints, request: PointsRequest, amendment: Mapping[str, Any]) -> SelectedPoints:
+    """Return the points, those that a person has moved at their candidates.
+
+    A correction is of the point with its id and label; where the annotator has since chosen others, of the only one with the
+    label. Raises BadReply where there is none: the twin has to be looked at again.
+    """
+    functional, grasp = list(selected.functional), list(selected.grasp)
+    for point_id, move in sorted(amendment.get(MOVES, {}).items()):
+        if point_id.startswith("f"):
+            place = _place_of(functional, point_id, move)
+            functional[place] = _moved(functional[place], request, move)
+        else:
+            place = _place_of(grasp, point_id, move)
+            grasp[place] = _moved(grasp[place], request, move)
+    return replace(selected, functional=tuple(functional), grasp=tuple(grasp))
+
+
+def _place_of(points: list[FunctionalPoint] | list[GraspPoint], point_id: str, move: Mapping[str, Any]) -> int:
+    there: list[tuple[str, str | None]] = [(point.id, point.label) for point in points]
+    alike = [place for place, (_, label) in enumerate(there) if label == move["label"]]
+    own = [place for place in alike if there[place][0] == point_id]
+    if not own and len(alike) != 1:
+        raise BadReply(
+            f"{point_id} ({move['label']}) was moved by {move['source']}, and is no point now; review the twin again, or remove"
+            " its amendment"
+        )
+    return (own or alike)[0]
+
+
+def _moved(point: Any, request: PointsRequest, move: Mapping[str, Any]) -> Any:
+    candidate = int(move["candidate"])
+    if candidate >= len(request.positions_m):
+        raise BadReply(f"{point.id} was moved to candidate {candidate}, of {len(request.positions_m)}; review it again")
+    said = f"moved from candidate {point.candidate}"
+    return point.model_copy(update={**request.place(candidate), "source": move["source"], "rationale": said})
