@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -93,6 +94,41 @@ def test_parts_are_rows_of_shapenetpart(dataset: Path, written: Path) -> None:
     }
     assert set(lists) == {f"shuffled_{split}_file_list" for split in ("train", "val", "test")}
     assert lists[f"shuffled_{split_of(twin.record.twin_id)}_file_list"] == [f"shape_data/can/{twin.record.twin_id}"]
+
+
+def test_parts_are_read_by_the_toolkit_of_partnext(dataset: Path, written: Path) -> None:
+    from partnext import PartNeXtDataset
+
+    twin, _ = of(dataset, written, "can")
+    read = PartNeXtDataset(str(written / "partnext" / "data"), str(written / "partnext" / "PartNeXt"))
+    assert list(read.get_object_ids()) == [twin.record.twin_id]
+    thing = read.load_object(twin.record.twin_id)
+    (tree,) = thing.get_hierarchy()
+    assert tree["name"] == "can" and [leaf["name"] for leaf in tree["children"]] == ["base", "lid"]
+    parts = thing.get_all_parts()
+    faces = np.concatenate([mesh.triangles for mesh in twin.visual])
+    for leaf, part in zip(tree["children"], twin.record.parts, strict=True):
+        found, known = parts[str(leaf["maskId"])], faces[twin.face_parts() == leaf["maskId"]]
+        assert len(found.faces) == part.faces
+        assert np.allclose(turned(found.triangles), known, atol=1e-6), "the same faces in the same order"
+
+
+def turned(triangles: np.ndarray) -> np.ndarray:
+    """Return triangles of glTF's frame, whose y is up, in the object's."""
+    return np.stack([triangles[..., 0], -triangles[..., 2], triangles[..., 1]], -1)
+
+
+def test_a_category_that_is_a_path_stays_below_the_folder(dataset: Path, tmp_path: Path) -> None:
+    copied = tmp_path / "set"
+    shutil.copytree(dataset, copied)
+    folder = copied / twin_name(twin_id(0))
+    record = json.loads((folder / RECORD).read_bytes())
+    record["language"]["category"] = "../../../away/ca n"
+    del record["revision"], record["files"]
+    seal(folder, record)
+    write_affordances(copied, tmp_path / "deep" / "out", points=60, trials=3)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["deep", "set"]
+    assert (tmp_path / "deep" / "out" / "parts" / "away_ca_n").is_dir()
 
 
 def test_the_page_shows_the_twins_and_asks_for_nothing(written: Path) -> None:

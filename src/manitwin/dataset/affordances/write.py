@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import re
 from collections import defaultdict
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from manitwin.dataset.affordances.maps import SurfaceMaps, has_parts, surface_maps
+from manitwin.dataset.affordances.partnext import PartNextFolder
 from manitwin.dataset.affordances.report import affordances_page, sample_picture
 from manitwin.dataset.report_page import Picture
 from manitwin.errors import TwinError, UsageError
@@ -61,9 +63,9 @@ def write_affordances(
 ) -> Affordances:
     """Write the maps of all accepted twins of a local data set below ``out``, whole or not at all.
 
-    ``maps/<twin>.npz`` has 3D AffordanceNet's fields; ``parts/`` is laid out as ShapeNetPart, of the twins whose parts are
-    known; ``affordances.json`` lists all, ``report.html`` shows some. Raises UsageError for a data set
-    without twins and an ``out`` that is not empty.
+    ``maps/<twin>.npz`` has 3D AffordanceNet's fields; ``parts/`` is laid out as ShapeNetPart and ``partnext/`` as PartNeXt, of
+    the twins whose parts are known; ``affordances.json`` lists all, ``report.html`` shows some. Raises UsageError for a data
+    set without twins and an ``out`` that is not empty.
     """
     root = DatasetRoot(dataset)
     if root.local is None:
@@ -81,7 +83,7 @@ def write_affordances(
     left_out: dict[str, str] = {}
     samples: list[Picture] = []
     in_splits: dict[str, list[str]] = defaultdict(list)
-    with new_folder(Path(out)) as folder:
+    with new_folder(Path(out)) as folder, PartNextFolder(folder / "partnext") as partnext:
         for twin in twins:
             try:
                 maps = surface_maps(twin, points=points, trials=trials, seed=seed)
@@ -91,13 +93,14 @@ def write_affordances(
             on_twin(maps)
             _write(folder / "maps" / f"{twin.record.twin_id}.npz", maps_file(maps))
             if has_parts(maps):
-                category, name = _category(twin).replace(" ", "_"), twin.record.twin_id
+                category, name = category_folder(_category(twin)), twin.record.twin_id
                 _write(folder / "parts" / category / f"{name}.txt", parts_file(maps, part_ids))
                 in_splits[split_of(name)].append(f"shape_data/{category}/{name}")
+                partnext.add(twin, category)
             rows.append(_row(maps))
             if len(samples) < SHOWN:
                 samples.append(sample_picture(maps))
-        _write_part_lists(folder / "parts", sorted({_category(twin).replace(" ", "_") for twin in twins}), in_splits)
+        _write_part_lists(folder / "parts", sorted({category_folder(_category(twin)) for twin in twins}), in_splits)
         listed = {
             "points": points,
             "trials": trials,
@@ -145,6 +148,11 @@ def maps_file(maps: SurfaceMaps) -> bytes:
     stream = io.BytesIO()
     np.savez_compressed(stream, **arrays)
     return stream.getvalue()
+
+
+def category_folder(category: str) -> str:
+    """Return a category as the name of a folder: letters, digits and underscores, whatever words a twin says."""
+    return re.sub(r"[^\w]+", "_", category)[:60].strip("_") or "object"
 
 
 def parts_file(maps: SurfaceMaps, part_ids: dict[str, int]) -> bytes:

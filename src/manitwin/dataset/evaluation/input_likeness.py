@@ -1,0 +1,163 @@
+"""How like its input each twin is, and how like another twin's input: the control without which a figure says nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from manitwin.dataset.evaluation.source_picture import Source, best_outline, look, source_of
+from manitwin.dataset.evaluation.thirty_views import View, thirty_views
+from manitwin.geometry.sampling import sample_surface
+from manitwin.models.embedders.clip import ClipFolder
+from manitwin.render.raycast import merged
+from manitwin.twin.loaded_twin import Twin
+
+ULIP, CLIP_NORMALS, CLIP_COLORS = "ULIP", "CLIP(N-I/T)", "CLIP(I-I/T)"
+LOOK_MEAN, LOOK_BEST, OUTLINE = "EfficientNet-Lite0 cosine", "EfficientNet-Lite0 cosine, best view", "silhouette IoU"
+METRICS = (ULIP, CLIP_NORMALS, CLIP_COLORS, LOOK_MEAN, LOOK_BEST, OUTLINE)
+OF_PICTURES = (LOOK_MEAN, LOOK_BEST, OUTLINE)
+"""What a text has no value of."""
+
+
+@dataclass(frozen=True)
+class Models:
+    """The models that a person named; without one its metrics are not measured."""
+
+    clip: ClipFolder | None = None
+    ulip: ClipFolder | None = None
+
+    def said(self) -> dict[str, dict[str, Any] | None]:
+        """Return the name and the files' sha256 of each; None where none was named."""
+        given = {"clip": self.clip, "ulip": self.ulip}
+        return {
+            name: None if each is None else {"name": each.name, "sha256": each.sha256} for name, each in given.items()
+        }
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """A twin's values by metric for its own input, and for that of the twin ``shuffled_with``.
+
+    ``picture``: input, the view of the most like outline, and its normals, side by side.
+    """
+
+    twin_id: str
+    name: str
+    category: str
+    source: Source
+    own: dict[str, float] = field(default_factory=dict)
+    shuffled: dict[str, float] = field(default_factory=dict)
+    shuffled_with: str | None = None
+    picture: np.ndarray | None = None
+
+
+def likeness_of_twins(
+    twins: Iterable[Twin], models: Models, *, seed: int = 0, on_twin: Callable[[str], None] = lambda twin_id: None
+) -> list[Likeness]:
+    """Return the likeness of each twin that was made of an image or a text to it.
+
+    The other input is that of a twin drawn by chance of the same kind whose input has other bytes; None where there is none.
+    Raises Unavailable without EfficientNet's weights, RendererMissing where nothing renders.
+    """
+    made = [(twin, source) for twin in twins if (source := source_of(twin)) is not None]
+    inputs = [_Input.of(source, models) for _, source in made]
+    others = partners([source for _, source in made], np.random.default_rng(seed))
+    found = []
+    for place, (twin, source) in enumerate(made):
+        on_twin(twin.record.twin_id)
+        found.append(
+            _likeness(
+                twin,
+                source,
+                inputs[place],
+                None if (o := others[place]) is None else (made[o][0].record.twin_id, inputs[o]),
+                models,
+            )
+        )
+    return found
+
+
+def partners(sources: Sequence[Source], rng: np.random.Generator) -> list[int | None]:
+    """Return the place of another input of the same kind for each, each taken about as often; None where all are the same."""
+    chosen: list[int | None] = [None] * len(sources)
+    for kind in ("image", "text"):
+        order = rng.permutation(
+            [place for place, each in enumerate(sources) if each.kind == kind and not each.left_out]
+        )
+        for rank, place in enumerate(order):
+            following = (int(order[(rank + step) % len(order)]) for step in range(1, len(order)))
+            chosen[int(place)] = next((o for o in following if _differ(sources[o], sources[int(place)])), None)
+    return chosen
+
+
+def _differ(one: Source, other: Source) -> bool:
+    return one.text != other.text if one.kind == "text" else one.sha256 != other.sha256
+
+
+@dataclass(frozen=True)
+class _Input:
+    """An input as vectors: of EfficientNet, and of the models that were named."""
+
+    source: Source
+    look: np.ndarray | None
+    clip: np.ndarray | None
+    ulip: np.ndarray | None
+
+    @classmethod
+    def of(cls, source: Source, models: Models) -> _Input:
+        if source.left_out:
+            return cls(source, None, None, None)
+        vectors = [None if model is None else _embedded(model, source) for model in (models.clip, models.ulip)]
+        if source.rgb is None or source.mask is None:
+            return cls(source, None, *vectors)
+        return cls(source, look(source.rgb, source.mask), *vectors)
+
+
+def _embedded(model: ClipFolder, source: Source) -> np.ndarray:
+    found = model.texts([source.text]) if source.kind == "text" else model.pictures([source.on_white])
+    return np.asarray(found[0])
+
+
+def _likeness(twin: Twin, source: Source, own: _Input, other: tuple[str, _Input] | None, models: Models) -> Likeness:
+    language = twin.record.language
+    said = (twin.record.twin_id, twin.record.name or "", language.category if language else "", source)
+    if source.left_out or (source.kind == "text" and models.clip is None and models.ulip is None):
+        return Likeness(*said)
+    drawn = source.kind == "image" or models.clip is not None
+    views = thirty_views(twin) if drawn else []
+    looks = np.array([look(view.grey, view.coverage) for view in views]) if source.kind == "image" else None
+    vectors = {}
+    if models.clip is not None:
+        vectors[CLIP_NORMALS] = models.clip.pictures([view.normals for view in views])
+        vectors[CLIP_COLORS] = models.clip.pictures([view.rgb for view in views])
+    if models.ulip is not None:
+        points, _, _ = sample_surface(merged(twin.visual), models.ulip.point_count, np.random.default_rng(0))
+        vectors[ULIP] = models.ulip.points(points)[None]
+    values, best = _values(own, views, looks, vectors)
+    shuffled = _values(other[1], views, looks, vectors)[0] if other is not None else {}
+    picture = _picture(source, views[best]) if source.kind == "image" else None
+    return Likeness(*said, values, shuffled, None if other is None else other[0], picture)
+
+
+def _values(
+    given: _Input, views: Sequence[View], looks: np.ndarray | None, vectors: dict[str, np.ndarray]
+) -> tuple[dict[str, float], int]:
+    """Return the values by metric of views against an input, and the place of the view whose outline is the most like."""
+    values = {}
+    for name, of_twin in vectors.items():
+        of_input = given.ulip if name == ULIP else given.clip
+        assert of_input is not None
+        values[name] = float((of_twin @ of_input).mean())
+    best = 0
+    if looks is not None and given.look is not None and given.source.mask is not None:
+        cosines = looks @ given.look
+        values |= {LOOK_MEAN: float(cosines.mean()), LOOK_BEST: float(cosines.max())}
+        values[OUTLINE], best = best_outline(given.source.mask, views)
+    return values, best
+
+
+def _picture(source: Source, view: View) -> np.ndarray:
+    return np.concatenate([source.on_white, view.rgb, view.normals], axis=1)

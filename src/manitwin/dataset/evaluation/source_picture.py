@@ -1,0 +1,105 @@
+"""What a twin was made of, and how like it the twin is: the photo cut out, or the text; outlines and features compared."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from manitwin.config import MattingConfig
+from manitwin.dataset.evaluation.thirty_views import SIDE_PX, WHITE, View
+from manitwin.errors import InputError, Rejected
+from manitwin.formats.image_file import read_image
+from manitwin.models.classifiers.efficientnet_lite import features
+from manitwin.models.embedders.looks import MARGIN, NETWORK, centered
+from manitwin.models.matting import matte_photo
+from manitwin.twin.loaded_twin import Twin
+
+OUTLINE_PX, OUTLINE_RADIUS = 96, 20.0
+"""Outlines are compared as if each had the area of a disc of this radius, in squares of this side."""
+TURNS = 24
+"""In the picture's plane: nobody says which way up a thing lies that is seen from above."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a twin was made of: an ``image`` with the cut-out's ``rgb`` and ``mask``, or a ``text``.
+
+    ``left_out`` says why an image is compared with nothing.
+    """
+
+    kind: str
+    sha256: str
+    text: str = ""
+    rgb: np.ndarray | None = None
+    mask: np.ndarray | None = None
+    left_out: str = ""
+
+    @property
+    def on_white(self) -> np.ndarray:
+        """Return the thing on white in a square ``(224, 224, 3) uint8``, centred, as large as in the views."""
+        assert self.rgb is not None and self.mask is not None
+        rows, columns = np.flatnonzero((self.mask > 0.5).any(1)), np.flatnonzero((self.mask > 0.5).any(0))
+        middle = (columns[0] + columns[-1] + 1) / 2, (rows[0] + rows[-1] + 1) / 2
+        side = (1 + 2 * MARGIN) * max(columns[-1] + 1 - columns[0], rows[-1] + 1 - rows[0])
+        scale = SIDE_PX / side
+        move = np.array([[scale, 0, SIDE_PX / 2 - scale * middle[0]], [0, scale, SIDE_PX / 2 - scale * middle[1]]])
+        share = self.mask.astype(np.float32)[..., None]
+        bare = (self.rgb * share + WHITE * (1 - share)).astype(np.float32)
+        if scale < 0.5:  # a warp takes single pixels
+            bare = np.asarray(cv2.blur(bare, (max(1, round(1 / scale)),) * 2), np.float32)
+        shown = cv2.warpAffine(bare, move, (SIDE_PX, SIDE_PX), borderValue=(WHITE,) * 3)
+        return np.rint(np.clip(shown, 0, 255)).astype(np.uint8)
+
+
+def source_of(twin: Twin) -> Source | None:
+    """Return what a twin was generated of; None for a mesh, of which nothing is generated.
+
+    A photo is cut out anew, as a build does by default.
+    """
+    source = twin.record.source
+    if source.kind == "text":
+        return Source("text", source.sha256, text=source.prompt or "")
+    if source.kind == "photos":
+        return Source("image", source.sha256, left_out="several photos in one archive: none is the input")
+    if source.kind != "image":
+        return None
+    settings = MattingConfig()
+    try:
+        photo = read_image(twin.folder / source.file, max_side_px=settings.photo_side_px)
+        rgba = matte_photo(photo.pixels, source.file, working_side_px=settings.working_side_px).rgba
+    except (Rejected, InputError) as error:
+        return Source("image", source.sha256, left_out=f"its photo cannot be cut out by default settings: {error}")
+    return Source("image", source.sha256, rgb=rgba[..., :3], mask=rgba[..., 3].astype(np.float32) / 255)
+
+
+def look(rgb: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Return the unit vector ``(1280,)`` of EfficientNet-Lite0's features of a thing on grey; raises Unavailable."""
+    vector = features(centered(rgb, mask)[0][None])[0, -NETWORK:].astype(np.float64)
+    return np.asarray(vector / max(float(np.linalg.norm(vector)), 1e-9))
+
+
+def outline(mask: np.ndarray, turn_rad: float = 0.0) -> np.ndarray:
+    """Return a mask ``(H, W)``, 0..1, as ``(96, 96) bool``: its centroid in the middle, its area that of one disc, turned."""
+    inside = (mask > 0.5).astype(np.float32)
+    area = float(inside.sum())
+    rows, columns = np.nonzero(inside)
+    scale = OUTLINE_RADIUS * np.sqrt(np.pi / area)
+    cosine, sine = scale * np.cos(turn_rad), scale * np.sin(turn_rad)
+    linear = np.array([[cosine, -sine], [sine, cosine]])
+    middle = np.array([OUTLINE_PX / 2 - 0.5] * 2) - linear @ np.array([columns.mean(), rows.mean()])
+    if scale < 0.5:
+        inside = np.asarray(cv2.blur(inside, (max(1, round(1 / scale)),) * 2), np.float32)
+    return np.asarray(cv2.warpAffine(inside, np.column_stack([linear, middle]), (OUTLINE_PX, OUTLINE_PX)) > 0.5)
+
+
+def best_outline(mask: np.ndarray, views: Sequence[View]) -> tuple[float, int]:
+    """Return the largest intersection over union of a mask's outline with those of views, over turns, and the view's place."""
+    turned = np.array([outline(mask, 2 * np.pi * turn / TURNS).ravel() for turn in range(TURNS)], np.float32)
+    seen = np.array([outline(view.coverage).ravel() for view in views], np.float32)
+    both = turned @ seen.T
+    shares = both / (turned.sum(1)[:, None] + seen.sum(1)[None] - both)
+    best = shares.max(0)
+    return float(best.max()), int(best.argmax())
