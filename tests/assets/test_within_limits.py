@@ -67,7 +67,7 @@ def end_processes() -> None:
         isolated._workers.pop(number).end()
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_an_asset_that_hangs_swells_or_crashes_is_a_finding_of_its_own(
     assets: tuple[Path, dict[str, str]], jobs: int
 ) -> None:

@@ -186,7 +186,8 @@ def test_no_rule_complains_of_the_mug() -> None:
 
 
 def test_every_rule_has_its_broken_mug() -> None:
-    assert set(BROKEN) | ON_DISK == set(RULES_BY_CODE)
+    running = {code for code in RULES_BY_CODE if code.startswith("RUN")}  # test_engine_runs.py
+    assert set(BROKEN) | ON_DISK | running == set(RULES_BY_CODE)
 
 
 @pytest.mark.parametrize("code", BROKEN)

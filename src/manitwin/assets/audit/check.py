@@ -17,29 +17,34 @@ STOPS = ("FIL005", "FIL006")
 """Where one of these holds there is nothing to measure."""
 
 
-def audit_asset(asset: Asset, rules: Sequence[Rule]) -> list[Finding]:
-    """Hold rules against an asset, in their order; one whose geometry cannot be measured gets that finding only."""
-    measured = MeasuredAsset(asset)
+def audit_asset(asset: Asset, rules: Sequence[Rule], engines: Sequence[str] = ()) -> list[Finding]:
+    """Hold rules against an asset, in their order, and run it in engines.
+
+    One whose geometry cannot be measured gets that finding only.
+    """
+    measured = MeasuredAsset(asset, tuple(engines))
     broken = [code for code in STOPS if measured.complaints(RULES_BY_CODE[code].check)]
     if broken:
         rules = [rule for rule in rules if rule.code in broken]
     return [_finding(rule, asset.path, complaint) for rule in rules for complaint in measured.complaints(rule.check)]
 
 
-def audit_path(path: Path, rules: Sequence[Rule], fix: bool = False, root: Path | None = None) -> Audited:
+def audit_path(
+    path: Path, rules: Sequence[Rule], fix: bool = False, root: Path | None = None, engines: Sequence[str] = ()
+) -> Audited:
     """Read an asset below a ``root`` and hold rules against it; with ``fix``, mend what is safe first.
 
     Never raises for an asset's sake.
     """
     try:
         asset = read_asset(path, root=root)
-        findings = audit_asset(asset, rules)
+        findings = audit_asset(asset, rules, engines)
         done: list[str] = []
         if fix:
             done = _mend(asset, findings)
             if done:
                 asset = read_asset(path, root=root)
-                findings = audit_asset(asset, rules)
+                findings = audit_asset(asset, rules, engines)
     except AssetError as error:
         return _unread(path, str(error), rules)
     except MemoryError:
@@ -75,6 +80,8 @@ def _finding(rule: Rule, path: Path, complaint: Complaint) -> Finding:
     return Finding(rule.code, rule.severity, str(path), complaint.message, complaint.file, complaint.values)
 
 
-def audit_by_codes(path: Path, codes: Sequence[str], fix: bool, root: Path | None = None) -> Audited:
+def audit_by_codes(
+    path: Path, codes: Sequence[str], fix: bool, root: Path | None = None, engines: Sequence[str] = ()
+) -> Audited:
     """Audit an asset in a process with limits, to which rules go by their codes."""
-    return audit_path(path, [RULES_BY_CODE[code] for code in codes], fix, root)
+    return audit_path(path, [RULES_BY_CODE[code] for code in codes], fix, root, engines)

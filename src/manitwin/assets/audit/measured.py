@@ -56,9 +56,10 @@ class SurfaceIntegrals:
 
 @dataclass
 class MeasuredAsset:
-    """Measurements of one asset, in its own axes and metres."""
+    """Measurements of one asset, in its own axes and metres; ``engines`` are those that it is to be run in."""
 
     asset: Asset
+    engines: tuple[str, ...] = ()
     _kept: dict[Callable[..., Any], Any] = field(default_factory=dict)
 
     def once(self, measure: Callable[[MeasuredAsset], Measure]) -> Measure:

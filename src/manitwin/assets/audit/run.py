@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,8 @@ from manitwin.formats.isolated import ProcessCrashed, called, limit_address_spac
 
 if TYPE_CHECKING:
     from pebble import ProcessPool
+
+ENGINES = ("mujoco", "sapien", "pybullet")
 
 AHEAD = 4
 """Assets handed to every process in advance."""
@@ -48,6 +51,17 @@ def rules_selected(select: Iterable[str] = (), ignore: Iterable[str] = ()) -> tu
     return rules
 
 
+def check_engines(engines: Iterable[str]) -> tuple[str, ...]:
+    """Return the engines, each once; raises UsageError for one that is not known or not installed."""
+    chosen = tuple(dict.fromkeys(engines))
+    for engine in chosen:
+        if engine not in ENGINES:
+            raise UsageError(f"no engine is called {engine!r}; valid are {', '.join(ENGINES)}")
+        if find_spec(engine) is None:
+            raise UsageError(f"{engine} is not installed; pip install {engine}, or leave it out of --engines")
+    return chosen
+
+
 def audit_all(
     paths: Sequence[Path],
     rules: Sequence[RuleText],
@@ -55,25 +69,28 @@ def audit_all(
     jobs: int = 1,
     fix: bool = False,
     named: Sequence[Path] = (),
+    engines: Sequence[str] = (),
 ) -> Iterator[Audited]:
     """Audit assets in ``jobs`` processes and yield what was found in the order of the paths.
 
+    ``engines`` are those that each is run in (``check_engines``).
     ``named`` are the folders that the user gave: what an asset names is read below them (``root_of``).
     One that brings its process down, hangs or takes too much memory costs itself alone: it is a finding of it.
     """
     if jobs > 1 and len(paths) > 1:
         with _one_thread_each():
-            yield from _in_processes(paths, rules, jobs, fix, named)
+            yield from _in_processes(paths, rules, jobs, fix, named, engines)
         return
     for path in paths:
         with _one_thread_each():  # another process is started after a crash
-            audited = _audited(path, rules, fix, root_of(path, named))
+            audited = _audited(path, rules, fix, root_of(path, named), engines)
         yield audited
 
 
-def _audited(path: Path, rules: Sequence[RuleText], fix: bool, root: Path) -> Audited:
+def _audited(path: Path, rules: Sequence[RuleText], fix: bool, root: Path, engines: Sequence[str]) -> Audited:
     try:
-        found: Audited = run_isolated(AUDIT, path, tuple(rule.code for rule in rules), fix, root, limits=LIMITS)
+        codes = tuple(rule.code for rule in rules)
+        found: Audited = run_isolated(AUDIT, path, codes, fix, root, tuple(engines), limits=LIMITS)
     except (ProcessCrashed, MemoryError) as error:
         return _unread(path, why_ended(error), rules)
     return found
@@ -101,7 +118,12 @@ def _one_thread_each() -> Iterator[None]:
 
 
 def _in_processes(
-    paths: Sequence[Path], rules: Sequence[RuleText], jobs: int, fix: bool, named: Sequence[Path]
+    paths: Sequence[Path],
+    rules: Sequence[RuleText],
+    jobs: int,
+    fix: bool,
+    named: Sequence[Path],
+    engines: Sequence[str],
 ) -> Iterator[Audited]:
     from pebble import ProcessPool
 
@@ -115,7 +137,7 @@ def _in_processes(
             initargs=(LIMITS.memory_bytes,),
         )
         try:
-            yield from _from_pool(pool, paths, rules, jobs, fix, named)
+            yield from _from_pool(pool, paths, rules, jobs, fix, named, engines)
         finally:
             pool.stop()
             pool.join()
@@ -128,12 +150,18 @@ def _begin(memory_bytes: int) -> None:
 
 
 def _from_pool(
-    pool: ProcessPool, paths: Sequence[Path], rules: Sequence[RuleText], jobs: int, fix: bool, named: Sequence[Path]
+    pool: ProcessPool,
+    paths: Sequence[Path],
+    rules: Sequence[RuleText],
+    jobs: int,
+    fix: bool,
+    named: Sequence[Path],
+    engines: Sequence[str],
 ) -> Iterator[Audited]:
     codes = tuple(rule.code for rule in rules)
     waiting: deque[tuple[Path, Any]] = deque()
     for path in paths:
-        arguments = (path, codes, fix, root_of(path, named))
+        arguments = (path, codes, fix, root_of(path, named), tuple(engines))
         waiting.append((path, pool.schedule(called, args=(AUDIT, arguments), timeout=LIMITS.seconds)))
         if len(waiting) >= AHEAD * jobs:
             yield _result(*waiting.popleft(), rules)
@@ -159,8 +187,13 @@ def audit_assets(
     ignore: Iterable[str] = (),
     jobs: int = 1,
     fix: bool = False,
+    engines: Iterable[str] = (),
 ) -> list[Audited]:
-    """Audit every asset at or below paths and return what was found of each; raises UsageError for a wrong path or code."""
+    """Audit every asset at or below paths and return what was found of each.
+
+    ``engines`` (mujoco, sapien, pybullet) also run it. Raises UsageError for a wrong path, code or engine.
+    """
+    run_in = check_engines(engines)
     rules = rules_selected(select, ignore)
     given = [Path(path) for path in paths]
-    return list(audit_all(find_all(given), rules, jobs=jobs, fix=fix, named=given))
+    return list(audit_all(find_all(given), rules, jobs=jobs, fix=fix, named=given, engines=run_in))

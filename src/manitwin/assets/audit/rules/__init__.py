@@ -15,13 +15,15 @@ from manitwin.assets.audit.rules import (
     licence,
     mass,
     placement,
+    running,
     scale,
     textures,
     twin,
 )
 
 MODULES = (
-    files, mass, inertia, center_of_mass, collision, scale, friction, frames, contacts, grasps, placement, licence, textures, twin
+    files, mass, inertia, center_of_mass, collision, scale, friction, frames, contacts, grasps, placement, licence, textures,
+    twin, running
 )  # fmt: skip
 
 RULES: tuple[Rule, ...] = tuple(rule for module in MODULES for rule in module.RULES)

@@ -1,0 +1,87 @@
+"""Drop a rigid body on a plane in PyBullet."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import tempfile
+from contextlib import redirect_stderr
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from manitwin.geometry.poses import inverse, quaternion_wxyz, transform, transform_points
+from manitwin.geometry.rigid_body import RigidBody, principal_frame
+
+GRAVITY_M_S2 = 9.81
+STILL_M_S, STILL_RAD_S = 2e-3, 2e-2
+
+
+def drop_in_pybullet(
+    body: RigidBody, start: np.ndarray, drop_m: float, seconds: float, timestep_s: float
+) -> tuple[np.ndarray, bool]:
+    """Release a body above the plane z = 0 and return its pose ``(4, 4)``, and whether it rests.
+
+    Poses go in and out by the centre of mass, which is what PyBullet's base position is of a body with an inertial frame of
+    its own (PyBullet Quickstart Guide, ``resetBasePositionAndOrientation``).
+    """
+    pybullet = _quiet_import()
+    moments, axes = principal_frame(body.inertia_kg_m2)
+    principal_to_object = transform(axes, body.center_of_mass_m)
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        pybullet.setGravity(0, 0, -GRAVITY_M_S2, physicsClientId=client)
+        pybullet.setTimeStep(timestep_s, physicsClientId=client)
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+        floor = pybullet.createMultiBody(0, plane, physicsClientId=client)
+        number = _thing(pybullet, client, body, principal_to_object)
+        pybullet.changeDynamics(floor, -1, lateralFriction=1.0, physicsClientId=client)  # friction is their product
+        pybullet.changeDynamics(
+            number, -1, mass=body.mass_kg, localInertiaDiagonal=moments.tolist(), lateralFriction=body.friction_static,
+            linearDamping=0.0, angularDamping=0.0, physicsClientId=client,
+        )  # fmt: skip
+        lifted = start.copy()
+        lifted[2, 3] += drop_m
+        pose = lifted @ principal_to_object
+        pybullet.resetBasePositionAndOrientation(number, pose[:3, 3], _xyzw(pose), physicsClientId=client)
+        for _ in range(round(seconds / timestep_s)):
+            pybullet.stepSimulation(physicsClientId=client)
+        position, xyzw = pybullet.getBasePositionAndOrientation(number, physicsClientId=client)
+        linear, angular = pybullet.getBaseVelocity(number, physicsClientId=client)
+    finally:
+        pybullet.disconnect(client)
+    turn = np.asarray(pybullet.getMatrixFromQuaternion(xyzw)).reshape(3, 3)
+    end = transform(turn, np.asarray(position)) @ inverse(principal_to_object)
+    rests = bool(np.linalg.norm(linear) < STILL_M_S and np.linalg.norm(angular) < STILL_RAD_S)
+    return end, rests
+
+
+def _quiet_import() -> Any:
+    """Import PyBullet without the line that it writes to standard error."""
+    with redirect_stderr(io.StringIO()):
+        return importlib.import_module("pybullet")
+
+
+def _thing(pybullet: Any, client: int, body: RigidBody, principal_to_object: np.ndarray) -> int:
+    """Add a body whose shapes stand in its principal frame; PyBullet takes the hull of each group of an OBJ file."""
+    object_to_principal = inverse(principal_to_object)
+    lines, count = [], 0
+    for index, hull in enumerate(body.hulls):
+        mesh = trimesh.convex.convex_hull(transform_points(object_to_principal, hull))
+        lines.append(f"o hull_{index}")
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + count + 1).tolist()]
+        count += len(mesh.vertices)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "hulls.obj"
+        file.write_text("\n".join(lines) + "\n")
+        shape = pybullet.createCollisionShape(pybullet.GEOM_MESH, fileName=str(file), physicsClientId=client)
+        if shape < 0:
+            raise RuntimeError("PyBullet cannot make its collision shapes")
+        return int(pybullet.createMultiBody(body.mass_kg, shape, physicsClientId=client))
+
+
+def _xyzw(pose: np.ndarray) -> np.ndarray:
+    return np.asarray(np.roll(quaternion_wxyz(pose[:3, :3]), -1))
