@@ -1,0 +1,140 @@
+"""One row of a list that others wrote (CSV, JSONL): what it names and says, or why it cannot become a row."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+from manitwin.dataset.collect.facts import UNKNOWN
+from manitwin.errors import UsageError
+from manitwin.formats.csv_file import read_csv, read_lines
+from manitwin.formats.json_file import parse_json
+from manitwin.formats.printable import printable_line
+from manitwin.pipeline.manifest import unusable
+
+COLUMNS = ("file", "url", "name", "source", "license", "attribution", "size_m")
+"""What is read of a row; ``path``, ``category`` and ``licence`` are other names of file, name and license."""
+OTHER_NAMES = {"path": "file", "category": "name", "licence": "license"}
+LONGEST_URL = 2048
+LARGEST_SIZE_M = 100.0
+_UNSAID = frozenset({"", "none", "null", "n/a", "todo", "?", UNKNOWN})
+
+
+class Unreadable(Exception):
+    """An entry that becomes no row: one cause, in words that entries share."""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """What a row says: a ``file`` as it is written there, or a ``url``; None is what it leaves open."""
+
+    file: str | None
+    url: str | None
+    name: str | None
+    source: str | None
+    licence: str | None
+    attribution: str | None
+    size_m: float | None
+
+
+def read_list(path: Path) -> Iterator[tuple[int, Listed | Unreadable]]:
+    """Yield the rows of a list with their lines; raises UsageError where the file as a whole is none.
+
+    A wrong line of JSON costs that row; a CSV whose quotes are not closed has no rows that could be trusted behind it.
+    """
+    for line, row in _rows(path):
+        try:
+            if isinstance(row, Unreadable):
+                raise row
+            yield line, _listed(row)
+        except Unreadable as cause:
+            yield line, cause
+
+
+def _rows(path: Path) -> Iterator[tuple[int, Mapping[str, Any] | Unreadable]]:
+    if path.suffix.lower() == ".csv":
+        yield from read_csv(path, UsageError)
+        return
+    for number, line in enumerate(read_lines(path, UsageError), 1):
+        if not line.strip():
+            continue
+        try:
+            row = parse_json(line, "row", Unreadable)
+        except Unreadable:
+            yield number, Unreadable("the line is no JSON that can be read")
+            continue
+        yield number, row if isinstance(row, dict) else Unreadable("the line is no JSON object")
+
+
+def _listed(row: Mapping[str, Any]) -> Listed:
+    values = {column: _text(row, column) for column in COLUMNS if column != "size_m"}
+    file, url = values["file"], values["url"]
+    if (file is None) == (url is None):
+        raise Unreadable("has neither a file nor a url" if file is None else "has both a file and a url")
+    if url is not None:
+        _check_url(url)
+    return Listed(
+        file=file,
+        url=url,
+        name=values["name"],
+        source=values["source"],
+        licence=licence_or_none(values["license"]),
+        attribution=values["attribution"],
+        size_m=_size(row.get("size_m")),
+    )
+
+
+def licence_or_none(text: str | None) -> str | None:
+    """Return a licence as it is written, or None for words that say nothing."""
+    return None if text is None or text.strip().lower() in _UNSAID else text.strip()
+
+
+def _text(row: Mapping[str, Any], column: str) -> str | None:
+    names = (column, *(other for other, meant in OTHER_NAMES.items() if meant == column))
+    value = next((row[name] for name in names if row.get(name) not in (None, "")), None)
+    if value is None:
+        return None
+    if not isinstance(value, str):
+        raise Unreadable(f"{column} is no text")
+    text = value.strip()
+    if column != "url" and (why := unusable(column if column != "source" else "name", text)):
+        raise Unreadable(f"{column} {'is too long' if 'characters; give at most' in why else 'has control characters'}")
+    return text or None
+
+
+def _check_url(url: str) -> None:
+    if len(url) > LONGEST_URL:
+        raise Unreadable("url is too long")
+    if not url.isascii() or not url.isprintable() or " " in url:
+        raise Unreadable("url has characters that none has; write them as %XX")
+    try:
+        parts = urlsplit(url)
+        wrong = parts.scheme not in ("http", "https") or not parts.hostname
+        secret = parts.username is not None or parts.password is not None
+    except ValueError:
+        wrong, secret = True, False
+    if wrong:
+        raise Unreadable("url is none of http or https")
+    if secret:
+        raise Unreadable("url has a user name or password in it")
+
+
+def _size(value: Any) -> float | None:
+    if value is None or value == "":
+        return None
+    try:
+        size = math.nan if isinstance(value, bool) or not isinstance(value, str | int | float) else float(value)
+    except (ValueError, OverflowError):
+        size = math.nan
+    if not 0 < size <= LARGEST_SIZE_M:
+        raise Unreadable(f"size_m is no length in metres, above 0 and at most {LARGEST_SIZE_M:g}")
+    return size
+
+
+def example_of(path: Path, line: int) -> str:
+    """Return where an entry stands, for a person."""
+    return printable_line(f"{path}:{line}", max_characters=200)

@@ -1,0 +1,21 @@
+"""What a catalogue takes inputs from, a folder or a list: checked by the arguments alone, before anything is read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from manitwin.errors import UsageError
+
+LIST_SUFFIXES = frozenset({".csv", ".jsonl"})
+
+
+def require_place(place: Path, source: str | None, root: Path | None) -> None:
+    """Raise UsageError where a place is neither, a folder is of no named source, or a root is given for a folder."""
+    if not place.is_dir():
+        if place.suffix.lower() not in LIST_SUFFIXES:
+            raise UsageError(f"{place}: is no folder and no list; give a folder, or a .csv or .jsonl file")
+        return
+    if root is not None:
+        raise UsageError("--root: is of a list, and this is a folder; leave it out")
+    if not source:
+        raise UsageError("--source: missing; say whence the files of this folder are, such as --source 'my photos'")

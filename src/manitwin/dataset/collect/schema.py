@@ -1,0 +1,41 @@
+"""The schema of a catalogue as numbered steps; ``PRAGMA user_version`` says how many a file has taken."""
+
+from __future__ import annotations
+
+APPLICATION = 0x4D54434C
+"""``PRAGMA application_id``, which tells a catalogue from another program's SQLite file: the letters MTCL."""
+
+MIGRATIONS = (
+    """
+    CREATE TABLE inputs (
+        number INTEGER PRIMARY KEY,          -- in the order in which they came
+        place TEXT NOT NULL UNIQUE,          -- absolute path, or URL
+        kind TEXT NOT NULL CHECK (kind IN ('image', 'mesh', 'asset', 'url')),
+        source TEXT NOT NULL,
+        licence TEXT NOT NULL,               -- SPDX, or 'unknown'
+        attribution TEXT,
+        name TEXT,                           -- as it was given
+        category TEXT NOT NULL,              -- of the priors, or 'unknown'
+        grp TEXT NOT NULL,
+        size_m REAL,                         -- longest axis
+        size_source TEXT,
+        size_band TEXT NOT NULL,
+        sha256 TEXT,
+        bytes INTEGER,
+        modified_ns INTEGER,
+        status TEXT NOT NULL CHECK (status IN ('ready', 'listed', 'duplicate', 'unreadable')),
+        cause TEXT,                          -- why it is unreadable
+        duplicate_of INTEGER REFERENCES inputs (number)
+    ) STRICT;
+    CREATE INDEX inputs_by_counted ON inputs (grp, status, licence, source, size_band);
+    CREATE INDEX inputs_by_digest ON inputs (sha256, number) WHERE sha256 IS NOT NULL;
+
+    CREATE TABLE refused (
+        list TEXT NOT NULL,                  -- absolute path of what was added
+        cause TEXT NOT NULL,
+        count INTEGER NOT NULL,
+        example TEXT NOT NULL,               -- the first: a line, or a file
+        PRIMARY KEY (list, cause)
+    ) STRICT, WITHOUT ROWID;
+    """,
+)

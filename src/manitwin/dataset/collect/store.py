@@ -1,0 +1,206 @@
+"""The catalogue: one SQLite file of inputs, in which a row is one place, and what was committed is on the disk."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from manitwin.dataset.collect.schema import APPLICATION, MIGRATIONS
+from manitwin.errors import UsageError
+from manitwin.formats.bounded_file import open_regular
+from manitwin.formats.printable import printable_line
+
+Kind = Literal["image", "mesh", "asset", "url"]
+Status = Literal["ready", "listed", "duplicate", "unreadable"]
+BUSY_S = 30.0
+COUNTED = ("group", "status", "licence", "source", "size_band")
+"""What the rows are counted by."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One input: ``status`` ready (a file that was read), listed (a URL), or unreadable, with its ``cause``."""
+
+    place: str
+    kind: Kind
+    source: str
+    licence: str
+    attribution: str | None
+    name: str | None
+    category: str
+    grp: str
+    size_m: float | None
+    size_source: str | None
+    size_band: str
+    sha256: str | None
+    bytes: int | None
+    modified_ns: int | None
+    status: Status
+    cause: str | None
+
+
+@dataclass(frozen=True)
+class Refused:
+    """How many entries of a list became no row for one cause, and the first of them."""
+
+    list: str
+    cause: str
+    count: int
+    example: str
+
+
+_COLUMNS = tuple(Row.__dataclass_fields__)
+_UPSERT = (
+    f"INSERT INTO inputs ({', '.join(_COLUMNS)}) VALUES ({', '.join(f':{name}' for name in _COLUMNS)})"
+    f" ON CONFLICT (place) DO UPDATE SET {', '.join(f'{name} = excluded.{name}' for name in _COLUMNS)}, duplicate_of = NULL"
+)
+
+
+class Catalogue:
+    """One catalogue, open; raises UsageError where there is none and ``make`` is False, and for a file that is none."""
+
+    def __init__(self, path: Path, *, make: bool = False):
+        self.path = path
+        if not make and not os.path.lexists(path):
+            raise UsageError(f"{path}: no catalogue yet; `manitwin collect add {path} FOLDER --source NAME` makes one")
+        fresh = not os.path.lexists(path)
+        if not fresh:
+            with open_regular(path, UsageError, name=str(path)) as stream:
+                fresh = os.fstat(stream.fileno()).st_size == 0
+        with self._sound():
+            self._connection = sqlite3.connect(path, isolation_level=None, timeout=BUSY_S)
+            try:
+                self._open(fresh and make)
+            except BaseException:
+                self._connection.close()
+                raise
+
+    def _open(self, fresh: bool) -> None:
+        run = self._connection.execute
+        run("PRAGMA trusted_schema = OFF")
+        if fresh:
+            run(f"PRAGMA application_id = {APPLICATION}")
+        (application,), (version,) = run("PRAGMA application_id").fetchone(), run("PRAGMA user_version").fetchone()
+        if application != APPLICATION:
+            raise UsageError(f"{self.path}: is no catalogue; give one that `manitwin collect add` made, or a new name")
+        if version > len(MIGRATIONS):
+            raise UsageError(
+                f"{self.path}: of schema {version}, this version reads up to {len(MIGRATIONS)}; use the version that wrote it"
+            )
+        for number, script in enumerate(MIGRATIONS[version:], version + 1):
+            self._connection.executescript(f"BEGIN IMMEDIATE; {script}; PRAGMA user_version = {number}; COMMIT;")
+
+    def __enter__(self) -> Catalogue:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._connection.close()
+
+    def known(self, places: Iterable[str]) -> dict[str, Row]:
+        """Return the rows that are there of some places; a duplicate comes back as ready, which it is too."""
+        found = {}
+        for place in places:
+            with self._sound():
+                row = self._connection.execute(
+                    f"SELECT {', '.join(_COLUMNS)} FROM inputs WHERE place = ?", (place,)
+                ).fetchone()
+            if row is not None:
+                said = dict(zip(_COLUMNS, row, strict=True))
+                found[place] = Row(**{**said, "status": "ready" if said["status"] == "duplicate" else said["status"]})
+        return found
+
+    def put(self, rows: Iterable[Row]) -> None:
+        """Add rows in one transaction; of a place that is there already the row keeps its number and says what is new."""
+        with self._writing() as connection:
+            connection.executemany(_UPSERT, [asdict(row) for row in rows])
+
+    def finish(self, list_: str, refused: Iterable[Refused]) -> None:
+        """Keep what a list had that became no row, in place of what was kept of it, and mark files of the same bytes.
+
+        Of equal files the first that came stays ready; the others are duplicates and say of whom.
+        """
+        with self._writing() as connection:
+            connection.execute("DELETE FROM refused WHERE list = ?", (list_,))
+            connection.executemany(
+                "INSERT INTO refused VALUES (?, ?, ?, ?)", [(r.list, r.cause, r.count, r.example) for r in refused]
+            )
+            connection.execute(
+                "UPDATE inputs SET status = 'ready', duplicate_of = NULL WHERE status = 'duplicate' AND number ="
+                " (SELECT min(number) FROM inputs AS same WHERE same.sha256 = inputs.sha256)"
+            )
+            connection.execute(
+                "UPDATE inputs SET status = 'duplicate', duplicate_of = first FROM"
+                " (SELECT sha256 AS digest, min(number) AS first FROM inputs WHERE sha256 IS NOT NULL"
+                " GROUP BY sha256 HAVING count(*) > 1)"
+                " WHERE sha256 = digest AND number > first AND duplicate_of IS NOT first"
+            )
+
+    def ready(self) -> Iterator[Row]:
+        """Yield the rows that can be used, addresses too, in the order in which they came."""
+        with self._sound():
+            cursor = self._connection.execute(
+                f"SELECT {', '.join(_COLUMNS)} FROM inputs WHERE status IN ('ready', 'listed') ORDER BY number"
+            )
+            for values in cursor:
+                row: tuple[Any, ...] = values
+                yield Row(*row)
+
+    def counts(self) -> list[tuple[tuple[str, ...], int]]:
+        """Return how many rows there are of each combination of ``COUNTED``, by those names in their order."""
+        with self._sound():
+            rows = self._connection.execute(
+                "SELECT grp, status, licence, source, size_band, count(*) FROM inputs GROUP BY 1, 2, 3, 4, 5"
+            ).fetchall()
+        return [(row[:-1], row[-1]) for row in rows]
+
+    def causes(self) -> dict[str, int]:
+        """Return how many rows cannot be read, by cause."""
+        return self._pairs(
+            "SELECT cause, count(*) FROM inputs WHERE status = 'unreadable' GROUP BY 1 ORDER BY 2 DESC, 1"
+        )
+
+    def refused(self) -> list[Refused]:
+        """Return what the lists had that became no row, by list and cause."""
+        with self._sound():
+            rows = self._connection.execute("SELECT * FROM refused ORDER BY list, count DESC, cause").fetchall()
+        return [Refused(*row) for row in rows]
+
+    def _pairs(self, sql: str) -> dict[str, int]:
+        with self._sound():
+            return dict(self._connection.execute(sql).fetchall())
+
+    @contextmanager
+    def _writing(self) -> Iterator[sqlite3.Connection]:
+        with self._sound():
+            self._connection.execute("BEGIN IMMEDIATE")
+            try:
+                yield self._connection
+                self._connection.execute("COMMIT")
+            except BaseException:
+                if self._connection.in_transaction:
+                    self._connection.execute("ROLLBACK")
+                raise
+
+    @contextmanager
+    def _sound(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.OperationalError as error:
+            raise UsageError(f"{self.path}: {error}; mend the disk or its permissions, and try again") from error
+        except sqlite3.DatabaseError as error:
+            said = printable_line(str(error), max_characters=120)
+            raise UsageError(f"{self.path}: is no catalogue that can be read ({said}); give another") from error
+
+
+def by_each(counts: Iterable[tuple[tuple[str, ...], int]]) -> Mapping[str, dict[str, int]]:
+    """Return how many rows have each value of each of ``COUNTED``."""
+    found: dict[str, dict[str, Any]] = {name: {} for name in COUNTED}
+    for values, count in counts:
+        for name, value in zip(COUNTED, values, strict=True):
+            found[name][value] = found[name].get(value, 0) + count
+    return found
