@@ -1,0 +1,79 @@
+"""Make the pictures of docs/view.md beside this file: pages of a data set in a Chromium, for who has one (``make browser``).
+
+    manitwin view DATASET --no-browser
+    python docs/make_view_pictures.py LINK TWIN_ID
+
+``LINK`` is the link of one use that the command prints.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import shutil
+from pathlib import Path
+from typing import Any
+
+from PIL import Image
+from playwright.sync_api import sync_playwright
+
+FOLDER = Path(__file__).resolve().parent
+BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
+WIDE, NARROW = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+WITHOUT_GPU = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
+
+
+def shown(page: Any, address: str, size: dict[str, int], scheme: str) -> Image.Image:
+    """Return what a page looks like on a screen."""
+    page.set_viewport_size(size)
+    page.emulate_media(color_scheme=scheme)
+    page.goto("about:blank")
+    page.goto(address, wait_until="networkidle")
+    if "/twin/" in address:
+        page.wait_for_selector("#viewer[data-ready]")
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
+def beside(pictures: list[Image.Image]) -> Image.Image:
+    """Return pictures of one height beside each other."""
+    together = Image.new(
+        "RGB", (sum(each.width for each in pictures) + 12 * (len(pictures) - 1), pictures[0].height), "grey"
+    )
+    left = 0
+    for each in pictures:
+        together.paste(each, (left, 0))
+        left += each.width + 12
+    return together
+
+
+def main() -> None:
+    """Make the pictures."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("link")
+    parser.add_argument("twin_id")
+    given = parser.parse_args()
+    address = given.link.split("/enter")[0]
+    twin = f"{address}/twin/{given.twin_id}"
+    closer = f"{twin}#layers=hulls candidate functional grasp grasps cube&count=30&grasp=0&placement=0"
+    with sync_playwright() as playwright:
+        path = next(found for name in BROWSERS if (found := shutil.which(name)))
+        page = playwright.chromium.launch(executable_path=path, args=WITHOUT_GPU).new_page()
+        page.goto(given.link)
+        pictures = {
+            "view_gallery": shown(page, f"{address}/", WIDE, "light"),
+            "view_twin": shown(page, twin, WIDE, "light"),
+            "view_dark": shown(page, closer, WIDE, "dark"),
+            "view_narrow": beside(
+                [
+                    shown(page, f"{address}/", NARROW, "light"),
+                    shown(page, twin, NARROW, "light"),
+                    shown(page, twin, NARROW, "dark"),
+                ]
+            ),
+        }
+    for name, picture in pictures.items():
+        picture.save(FOLDER / f"{name}.webp", quality=82, method=6)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,249 @@
+"""Who may ask the server for anything: the address it is called by, the page that asks, and a cookie in place of a link.
+
+A server on 127.0.0.1 can be reached by every page that is open in the same browser. Three things are asked of each request,
+of HTTP and of a WebSocket alike, before any of it reaches the pages:
+
+1. ``Host`` is a name of this server, so that no other name that leads here (DNS rebinding) is answered;
+2. ``Origin``, where there is one, is the server's own; a WebSocket, and whatever changes something, must have one;
+3. the cookie holds a secret that was given for a link of one use.
+
+Nothing here is written to a log.
+"""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import secrets
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs, urlsplit
+
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+ENTER = "/enter"
+"""The path of a link: ``/enter?token=...&next=/...``."""
+PERSON = "manitwin.person"
+"""The key of the ASGI scope that says who asks."""
+LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
+MOST_LINKS = 64
+"""Links that were made and not used: the oldest are forgotten."""
+_READING = frozenset({"GET", "HEAD"})
+
+CONTENT_SECURITY_POLICY = "; ".join(
+    (
+        "default-src 'none'",
+        "script-src 'self'",
+        "style-src 'self'",
+        "img-src 'self' blob: data:",  # blob: a GLB's textures
+        "connect-src 'self' blob:",
+        "form-action 'self'",
+        "base-uri 'none'",
+        "frame-ancestors 'none'",
+    )
+)
+HEADERS = {
+    "content-security-policy": CONTENT_SECURITY_POLICY,
+    "x-content-type-options": "nosniff",
+    "x-frame-options": "DENY",
+    "referrer-policy": "same-origin",  # no-referrer would make the Origin of a form's POST null
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+}
+"""Of every answer. Scripts and styles come from files of this server alone; no inline text is run, whatever a caption holds."""
+
+
+@dataclass
+class Tokens:
+    """Links of one use, and the secrets of those who used one. A person is any name; nothing of it is written down."""
+
+    _links: dict[str, str] = field(default_factory=dict)
+    _secrets: dict[str, str] = field(default_factory=dict)
+
+    def link(self, person: str = "") -> str:
+        """Return the token of a new link for a person."""
+        token = secrets.token_urlsafe(32)
+        self._links[token] = person
+        while len(self._links) > MOST_LINKS:
+            del self._links[next(iter(self._links))]
+        return token
+
+    def redeem(self, token: str) -> str | None:
+        """Return the secret of a person for the token of a link, which ends with it; None for one that is not valid."""
+        found = _equal(token, self._links)
+        if found is None:
+            return None
+        person = self._links.pop(found)
+        secret = secrets.token_urlsafe(32)
+        self._secrets[secret] = person
+        return secret
+
+    def person(self, secret: str) -> str | None:
+        """Return who has this secret, or None."""
+        found = _equal(secret, self._secrets)
+        return None if found is None else self._secrets[found]
+
+
+def _equal(given: str, known: Iterable[str]) -> str | None:
+    """Return the known text that equals the given one; each comparison takes as long, however much of it is right."""
+    found = None
+    for each in known:
+        if hmac.compare_digest(given.encode(errors="replace"), each.encode()):
+            found = each
+    return found
+
+
+@dataclass(frozen=True)
+class Names:
+    """The names by which a server is called: those of its own machine, and the host that was asked for.
+
+    ``open``: it listens beyond this machine. It then answers to any address in digits as well, which no DNS can turn elsewhere.
+    """
+
+    hosts: frozenset[str]
+    port: int
+    open: bool = False
+
+    @classmethod
+    def of(cls, host: str, port: int) -> Names:
+        """Return the names of a server that listens on a host."""
+        bare = host.strip("[]")
+        try:
+            local = ipaddress.ip_address(bare).is_loopback
+        except ValueError:
+            local = bare == "localhost"
+        written = f"[{bare}]" if ":" in bare else bare
+        return cls(frozenset({*LOOPBACK_NAMES, written.lower()}), port, open=not local)
+
+    def known(self, host: str) -> bool:
+        """Tell whether the content of a ``Host`` header is one of them."""
+        try:
+            parts = urlsplit(f"//{host}")
+            name, port = parts.hostname or "", parts.port or 80
+        except ValueError:
+            return False
+        if parts.netloc != host or parts.username is not None or parts.path or port != self.port:
+            return False
+        written = f"[{name}]" if ":" in name else name
+        return written in self.hosts or (self.open and _is_address(name))
+
+    def own_origin(self, origin: str, host: str) -> bool:
+        """Tell whether an ``Origin`` is that of the pages that this server gave under the name it is called by."""
+        return origin.lower() == f"http://{host.lower()}"
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+class Guard:
+    """ASGI middleware around an application: refuses what ``access`` says, and adds ``HEADERS`` to every answer."""
+
+    def __init__(self, app: ASGIApp, names: Names, tokens: Tokens, used_link: Callable[[], None] | None = None):
+        self.app, self.names, self.tokens = app, names, tokens
+        self.cookie = f"manitwin_{names.port}"  # cookies know no ports: one server must not end another's
+        self._used_link = used_link
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer, or hand on."""
+        if scope["type"] == "lifespan":
+            await self.app(scope, receive, send)
+            return
+        if scope["type"] not in ("http", "websocket"):
+            return
+        headers = _Headers(scope)
+        refused = self._refusal(scope, headers)
+        if refused is None and scope["type"] == "http" and scope["path"] == ENTER:
+            await self._enter(scope, send)
+            return
+        person = None if refused else self.tokens.person(_cookie(headers.all("cookie"), self.cookie))
+        if refused is None and person is None:
+            refused = "open the link that the command printed; it is for this browser alone"
+        if refused is not None:
+            await _refuse(scope, receive, send, refused)
+            return
+        scope[PERSON] = person
+        await self.app(scope, receive, _with_headers(send) if scope["type"] == "http" else send)
+
+    def _refusal(self, scope: Scope, headers: _Headers) -> str | None:
+        hosts, origins = headers.all("host"), headers.all("origin")
+        if len(hosts) != 1 or not self.names.known(hosts[0]):
+            return "this server is not called so"
+        reads = scope["type"] == "http" and scope["method"] in _READING
+        if len(origins) > 1 or (not origins and not reads):
+            return "asked by no page of this server"
+        if origins and not self.names.own_origin(origins[0], hosts[0]):
+            return "asked by a page of another site"
+        foreign = headers.one("sec-fetch-site") in ("cross-site", "same-site")
+        if foreign and headers.one("sec-fetch-mode") != "navigate":
+            return "asked by a page of another site"
+        return None
+
+    async def _enter(self, scope: Scope, send: Send) -> None:
+        asked = parse_qs(scope["query_string"].decode("latin-1"))
+        token, onward = asked.get("token", [""])[0], asked.get("next", ["/"])[0]
+        secret = self.tokens.redeem(token) if scope["method"] == "GET" else None  # a look ahead (HEAD) uses no link up
+        if secret is None:
+            if self._used_link is not None:
+                self._used_link()
+            await _answer(send, 403, "This link was used, or is not of this server; the command has printed a new one.")
+            return
+        inside = onward.startswith("/") and not onward.startswith(("//", "/\\")) and onward.isprintable()
+        cookie = f"{self.cookie}={secret}; Path=/; HttpOnly; SameSite=Lax"
+        more = [("set-cookie", cookie), ("location", onward if inside and onward.isascii() else "/")]
+        await _answer(send, 303, "", more)
+
+
+class _Headers:
+    def __init__(self, scope: Scope):
+        self._all = [(name.decode("latin-1").lower(), value.decode("latin-1")) for name, value in scope["headers"]]
+
+    def all(self, name: str) -> list[str]:
+        return [value for each, value in self._all if each == name]
+
+    def one(self, name: str) -> str:
+        return (self.all(name) or [""])[0]
+
+
+def _cookie(headers: list[str], name: str) -> str:
+    for header in headers:
+        try:
+            found = SimpleCookie(header).get(name)
+        except CookieError:
+            continue
+        if found is not None:
+            return found.value
+    return ""
+
+
+def _with_headers(send: Send) -> Send:
+    async def guarded(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            own = [(name.encode(), value.encode()) for name, value in HEADERS.items()]
+            others = [pair for pair in message.get("headers", []) if pair[0].decode("latin-1").lower() not in HEADERS]
+            message = {**message, "headers": [*others, *own]}
+        await send(message)
+
+    return guarded
+
+
+async def _refuse(scope: Scope, receive: Receive, send: Send, reason: str) -> None:
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.close", "code": 1008, "reason": reason})
+        return
+    await _answer(send, 403, f"Refused: {reason}.")
+
+
+async def _answer(send: Send, status: int, text: str, headers: Iterable[tuple[str, str]] = ()) -> None:
+    body = f"{text}\n".encode()
+    told = {"content-type": "text/plain; charset=utf-8", "content-length": str(len(body)), "cache-control": "no-store"}
+    pairs = [*told.items(), *headers]
+    written = [(name.encode(), value.encode("latin-1")) for name, value in pairs]
+    await _with_headers(send)({"type": "http.response.start", "status": status, "headers": written})
+    await send({"type": "http.response.body", "body": body})

@@ -1,0 +1,113 @@
+"""The server's pages: gallery, twin, and the files that they name. They read; nothing here writes or changes anything."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, RedirectResponse, Response, StreamingResponse
+from starlette.routing import Route
+from starlette.types import Receive, Scope, Send
+
+from manitwin.errors import ManiTwinError, UsageError
+from manitwin.web.gallery_page import gallery_page
+from manitwin.web.gallery_query import Gallery, View
+from manitwin.web.html import page, text
+from manitwin.web.links import ServerLinks
+from manitwin.web.package_files import KINDS, package_file
+from manitwin.web.served_files import ServedFile, TwinFolders, open_file
+from manitwin.web.twin_document import DOCUMENT, document_bytes, twin_document
+from manitwin.web.twin_page import twin_page
+
+LINKS = ServerLinks()
+_KEPT = {"cache-control": "private, max-age=86400"}
+"""Of files whose address has the revision in it."""
+_NOT_KEPT = {"cache-control": "no-store"}
+
+
+def application(gallery: Gallery | None, twins: TwinFolders, title: str) -> Starlette:
+    """Return the pages of a data set, or of one twin (``gallery`` None), without the guard that belongs before them."""
+
+    async def show_gallery(request: Request) -> Response:
+        if gallery is None:
+            assert twins.only is not None
+            return RedirectResponse(LINKS.twin(twins.only.record.twin_id), 303)
+        return await _answered(lambda: _gallery(gallery, dict(request.query_params), title))
+
+    async def show_twin(request: Request) -> Response:
+        twin_id = request.path_params["twin_id"]
+        return await _answered(lambda: _twin(twins, twin_id, gallery is not None))
+
+    async def give_document(request: Request) -> Response:
+        twin_id = request.path_params["twin_id"]
+        return await _answered(
+            lambda: Response(
+                document_bytes(twin_document(twins.twin(twin_id))), media_type="application/json", headers=_NOT_KEPT
+            )
+        )
+
+    async def give_file(request: Request) -> Response:
+        twin_id, name = request.path_params["twin_id"], request.path_params["name"]
+        return await _answered(lambda: _FileResponse(open_file(twins.folder(twin_id), name)))
+
+    async def give_package_file(request: Request) -> Response:
+        name = request.path_params["name"]
+        if name not in KINDS:
+            return _message(404, "There is no file of this name.")
+        return Response(package_file(name), headers={"content-type": KINDS[name], "cache-control": "no-cache"})
+
+    return Starlette(
+        routes=[
+            Route("/", show_gallery),
+            Route("/twin/{twin_id}", show_twin),
+            Route(f"/twin/{{twin_id}}/{DOCUMENT}", give_document),
+            Route("/twin/{twin_id}/{name:path}", give_file),
+            Route("/static/{name}", give_package_file),
+        ]
+    )
+
+
+async def _answered(work: Callable[[], Response]) -> Response:
+    """Answer from a thread; what a person can mend is said in words, and a broken twin ends nothing but its own page."""
+    try:
+        return await run_in_threadpool(work)
+    except UsageError as error:
+        return _message(404, str(error))
+    except ManiTwinError as error:
+        return _message(422, str(error))
+
+
+def _gallery(gallery: Gallery, asked: dict[str, str], title: str) -> Response:
+    try:
+        view = View.of(asked)
+        return HTMLResponse(gallery_page(gallery.find(view), title, LINKS), headers=_NOT_KEPT)
+    except UsageError as error:  # a condition that cannot be used: all twins, and what is wrong
+        status = asked.get("status", "accepted")
+        shown = gallery.find(View(status=status if status in ("accepted", "rejected") else "accepted"))
+        return HTMLResponse(gallery_page(shown, title, LINKS, error=str(error)), 400, headers=_NOT_KEPT)
+
+
+def _twin(twins: TwinFolders, twin_id: str, with_gallery: bool) -> Response:
+    return HTMLResponse(twin_page(twins.twin(twin_id), LINKS, with_gallery=with_gallery), headers=_NOT_KEPT)
+
+
+class _FileResponse(StreamingResponse):
+    """Streams a file, and closes it also where whoever asked has gone before its end."""
+
+    def __init__(self, file: ServedFile):
+        headers = {"content-type": file.content_type, "content-length": str(file.size_bytes), **_KEPT}
+        super().__init__(file.chunks(), headers=headers)
+        self._file = file
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            self._file.stream.close()
+
+
+def _message(status: int, said: str) -> Response:
+    body = f'<main class="message"><p role="alert">{text(said)}</p><p><a href="{LINKS.gallery()}">All twins</a></p></main>\n'
+    return HTMLResponse(page(str(status), body, LINKS), status, headers=_NOT_KEPT)

@@ -1,0 +1,101 @@
+"""The cards of a gallery in memory: what is searched, sorted and shown of the index's rows, without a file being read again.
+
+A page out of 100,000 Parquet rows takes DuckDB 0.3 to 1 s where it looks at texts or sorts; of tables in memory 0.05 s (two busy
+cores). They take 60 MB.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import duckdb
+import pyarrow as pa
+
+from manitwin.dataset.index.query import Index
+
+TABLES = {"accepted": "twins", "rejected": "rejections"}
+"""The table of the index for each status."""
+SHOWN = {
+    "accepted": (
+        "twin_id", "revision", "name", "category", "material", "longest_m", "mass_kg", "simulated", "verified",
+        "robustness_median",
+    ),
+    "rejected": ("twin_id", "revision", "name", "stage", "reason", "detail"),
+}  # fmt: skip
+"""The columns of a card."""
+SEARCHED = {
+    "accepted": ("twin_id", "name", "category", "color", "material", "caption"),
+    "rejected": ("twin_id", "name", "detail"),
+}
+WORDS = "words"
+"""The column with all that is searched, in lower case."""
+_CHOSEN = "chosen"
+
+
+class CardTables:
+    """The cards of accepted and rejected twins, sorted by twin; not for several threads at once."""
+
+    def __init__(self, index: Index):
+        self._connection = duckdb.connect(config={"enable_external_access": False, "python_enable_replacements": False})
+        for status, table in TABLES.items():
+            columns = [*dict.fromkeys((*SHOWN[status], *SEARCHED[status]))]
+            rows = index.select(table, columns=columns)  # sorted by twin
+            self._connection.register("rows", rows)
+            texts = ", ".join(SEARCHED[status])
+            self._connection.execute(
+                f"CREATE TABLE {status} AS SELECT {', '.join(SHOWN[status])}, lower(concat_ws(' ', {texts})) AS {WORDS} FROM rows"
+            )
+            self._connection.unregister("rows")
+
+    def counted(self, status: str, column: str) -> dict[str, int]:
+        """Return how often each value of a column occurs, the most frequent first."""
+        sql = f"SELECT {column}, count(*) FROM {status} WHERE {column} <> '' GROUP BY ALL ORDER BY ALL"
+        found = [(str(value), int(count)) for value, count in self._connection.execute(sql).fetchall()]
+        return dict(sorted(found, key=lambda pair: -pair[1]))
+
+    def count(self, status: str, conditions: Sequence[str] = (), among: pa.Table | None = None) -> int:
+        """Return how many rows satisfy all conditions; with ``among``, of those twins (column ``twin_id``)."""
+        [(count,)] = self._asked(f"SELECT count(*) FROM {status} {_where(conditions, among)}", among)
+        return int(count)
+
+    def rows(
+        self,
+        status: str,
+        conditions: Sequence[str] = (),
+        *,
+        sort: str = "",
+        limit: int | None = None,
+        offset: int = 0,
+        among: pa.Table | None = None,
+    ) -> list[dict[str, Any]]:
+        """Return the cards of rows, by a column (from the largest down with ``-``, those without a value last), then by twin."""
+        by = f'"{sort.removeprefix("-")}" {"DESC" if sort[0] == "-" else "ASC"} NULLS LAST, ' if sort else ""
+        some = "" if limit is None else f" LIMIT {limit} OFFSET {offset}"
+        # places first, their columns after: what is sorted is narrow
+        places = [
+            place
+            for (place,) in self._asked(
+                f"SELECT rowid FROM {status} {_where(conditions, among)} ORDER BY {by}rowid{some}", among
+            )
+        ]
+        if not places:
+            return []
+        listed = ", ".join(map(str, places))
+        sql = f"SELECT rowid, {', '.join(SHOWN[status])} FROM {status} WHERE rowid IN ({listed})"
+        found = {place: values for place, *values in self._connection.execute(sql).fetchall()}
+        return [dict(zip(SHOWN[status], found[place], strict=True)) for place in places]
+
+    def _asked(self, sql: str, among: pa.Table | None) -> list[tuple[Any, ...]]:
+        if among is not None:
+            self._connection.register(_CHOSEN, among)
+        try:
+            return self._connection.execute(sql).fetchall()
+        finally:
+            if among is not None:
+                self._connection.unregister(_CHOSEN)
+
+
+def _where(conditions: Sequence[str], among: pa.Table | None) -> str:
+    every = [*conditions, *([f"twin_id IN (SELECT twin_id FROM {_CHOSEN})"] if among is not None else [])]
+    return f"WHERE {' AND '.join(every)}" if every else ""

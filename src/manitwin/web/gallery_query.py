@@ -1,0 +1,202 @@
+"""What a gallery's address asks for, and the rows of the index that answer it: DuckDB, one page at a time."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+from urllib.parse import urlencode
+
+import pyarrow as pa
+
+from manitwin.dataset.index.conditions import sql_text
+from manitwin.dataset.index.part_list import PARTS
+from manitwin.dataset.index.query import Index
+from manitwin.errors import UsageError, choose_from
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.web.card_tables import TABLES, WORDS, CardTables
+
+PAGE_CARDS = 48
+"""Divides by 2, 3, 4 and 6: rows of cards are full at most widths."""
+TIMEOUT_S, MEMORY_GB = 10.0, 0.25
+"""Of a condition in SQL; a person who waits longer than that has gone."""
+MOST_WORDS = 12
+LONGEST_TEXT = 2_000
+"""Characters of one field of an address."""
+
+SORTS = {
+    "accepted": (
+        "name",
+        "category",
+        "-verified",
+        "-robustness_median",
+        "-longest_m",
+        "longest_m",
+        "-mass_kg",
+        "mass_kg",
+    ),
+    "rejected": ("name", "stage", "reason"),
+}
+_BOUNDS = {
+    "longest_min": ("longest_m", ">="), "longest_max": ("longest_m", "<="), "mass_min": ("mass_kg", ">="),
+    "mass_max": ("mass_kg", "<="), "verified_min": ("verified", ">="), "robustness_min": ("robustness_median", ">="),
+}  # fmt: skip
+"""Fields of an address that hold a number: the column and how it is compared. Metres, kilograms, grasps, a share."""
+
+
+@dataclass(frozen=True)
+class View:
+    """A view of the gallery, as its address says it: ``of`` reads one, ``query`` writes it.
+
+    ``q`` are words that all have to occur; ``where`` is a condition as of ``manitwin query``; ``sort`` a column, from the largest
+    down with ``-``; ``page`` counts from 1. Bounds are None where there is none.
+    """
+
+    status: str = "accepted"
+    q: str = ""
+    category: str = ""
+    stage: str = ""
+    reason: str = ""
+    longest_min: float | None = None
+    longest_max: float | None = None
+    mass_min: float | None = None
+    mass_max: float | None = None
+    verified_min: float | None = None
+    robustness_min: float | None = None
+    where: str = ""
+    sort: str = ""
+    page: int = 1
+
+    @classmethod
+    def of(cls, asked: Mapping[str, str]) -> View:
+        """Return the view of an address's fields; raises UsageError for one that there is not, or that cannot be meant."""
+        given: dict[str, Any] = {}
+        names = [each.name for each in fields(cls)]
+        for name, value in asked.items():
+            if name not in names:
+                raise UsageError(choose_from("filter", name, names))
+            if len(value) > LONGEST_TEXT:
+                raise UsageError(f"{name}: {len(value)} characters; give at most {LONGEST_TEXT}")
+            if value.strip():
+                given[name] = _number(name, value) if name in _BOUNDS or name == "page" else value.strip()
+        view = cls(**{**given, "page": int(given.get("page", 1))})
+        if view.status not in TABLES:
+            raise UsageError(choose_from("status", view.status, TABLES))
+        if view.sort and view.sort not in SORTS[view.status]:
+            raise UsageError(choose_from("order", view.sort, SORTS[view.status]))
+        if not 1 <= view.page <= 10**6:
+            raise UsageError(f"page is {view.page}; give 1 or more")
+        return view
+
+    def query(self, **changes: Any) -> str:
+        """Return the address's fields of this view, or of a changed one: what is not as by default, in a fixed order."""
+        view = replace(self, **changes)
+        said = [
+            (each.name, getattr(view, each.name)) for each in fields(view) if getattr(view, each.name) != each.default
+        ]
+        return urlencode([(name, f"{value:g}" if isinstance(value, float) else value) for name, value in said])
+
+    def conditions(self) -> list[str]:
+        """Return the conditions on the view's cards (``CardTables``), in SQL; ``where`` is not among them."""
+        found = [f"contains({WORDS}, {sql_text(word.lower())})" for word in self.q.split()[:MOST_WORDS]]
+        if self.status == "accepted":
+            found += [f"category = {sql_text(self.category)}"] if self.category else []
+            bounds = ((column, sign, getattr(self, name)) for name, (column, sign) in _BOUNDS.items())
+            return found + [f"{column} {sign} {value!r}" for column, sign, value in bounds if value is not None]
+        return found + [
+            f"{name} = {sql_text(getattr(self, name))}" for name in ("stage", "reason") if getattr(self, name)
+        ]
+
+
+def _number(name: str, value: str) -> float:
+    try:
+        number = float(value)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise UsageError(f"{name}: {value[:40]!r} is no number; give one such as 0.25")
+    return number
+
+
+@dataclass(frozen=True)
+class Found:
+    """The cards of one page, how many there are on all, and what could be asked for instead.
+
+    ``counts`` are all twins by status; ``categories``, ``stages`` and ``reasons`` how many of each there are, the most first.
+    """
+
+    view: View
+    rows: list[dict[str, Any]]
+    total: int
+    counts: dict[str, int]
+    categories: dict[str, int]
+    stages: dict[str, int]
+    reasons: dict[str, int]
+
+    @property
+    def pages(self) -> int:
+        """The number of pages, at least 1."""
+        return max(1, math.ceil(self.total / PAGE_CARDS))
+
+
+class Gallery:
+    """The index of a data set, asked page by page; threads wait for each other. An index that was written anew is opened anew.
+
+    Raises UsageError where there is none.
+    """
+
+    def __init__(self, root: DatasetRoot):
+        self.root = root
+        self._lock = threading.Lock()
+        self._stamp: tuple[int, int] | None = None
+        self._opened()
+
+    def find(self, view: View) -> Found:
+        """Return a page of the view; raises UsageError for a condition that cannot be used."""
+        with self._lock:
+            cards, among = self._opened(), self._among(view)
+            rows = cards.rows(
+                view.status,
+                view.conditions(),
+                sort=view.sort,
+                limit=PAGE_CARDS,
+                offset=PAGE_CARDS * (view.page - 1),
+                among=among,
+            )
+            return Found(view, rows, cards.count(view.status, view.conditions(), among), **self._facets)
+
+    def chosen(self, view: View) -> list[dict[str, Any]]:
+        """Return all rows of the view."""
+        with self._lock:
+            cards, among = self._opened(), self._among(view)
+            return cards.rows(view.status, view.conditions(), sort=view.sort, among=among)
+
+    def _among(self, view: View) -> pa.Table | None:
+        """Return the twins of a condition in SQL, which the index answers: it may read all of its tables."""
+        return self._index.select(TABLES[view.status], view.where, columns=["twin_id"]) if view.where else None
+
+    def _opened(self) -> CardTables:
+        stamp = self._index_stamp()
+        if self._stamp is None or stamp != self._stamp:
+            self._index = Index(self.root, timeout_s=TIMEOUT_S, memory_gb=MEMORY_GB)
+            self._cards = CardTables(self._index)
+            self._facets: dict[str, Any] = {
+                "counts": {status: self._cards.count(status) for status in TABLES},
+                "categories": self._cards.counted("accepted", "category"),
+                "stages": self._cards.counted("rejected", "stage"),
+                "reasons": self._cards.counted("rejected", "reason"),
+            }
+            self._stamp = stamp
+        return self._cards
+
+    def _index_stamp(self) -> tuple[int, int]:
+        if self.root.local is None:
+            return (0, 0)  # of a data set at a URL, the index of when the server began
+        try:
+            about = os.stat(self.root.full(PARTS))
+        except OSError:
+            return (0, 0)
+        return (about.st_mtime_ns, about.st_size)

@@ -1,0 +1,81 @@
+"""The addresses on a page: of a server, or relative ones of plain files. A page is the same in both but for these."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+from urllib.parse import quote
+
+THUMBNAIL = "views/rgb_00.webp"
+
+
+class Links(Protocol):
+    """Addresses as one page needs them."""
+
+    @property
+    def live(self) -> bool:
+        """Tell whether a server answers, which can search and read files when they are asked for."""
+        ...
+
+    def gallery(self, query: str = "") -> str:
+        """Return the gallery, with the fields of a view."""
+        ...
+
+    def twin(self, twin_id: str) -> str:
+        """Return a twin's page."""
+        ...
+
+    def file(self, twin_id: str, name: str, revision: str) -> str:
+        """Return a file of a twin; the revision keeps an older one in a cache from being shown."""
+        ...
+
+    def asset(self, name: str) -> str:
+        """Return a style or script of this package."""
+        ...
+
+
+@dataclass(frozen=True)
+class ServerLinks:
+    """The addresses of the server."""
+
+    live = True
+
+    def gallery(self, query: str = "") -> str:
+        """Return the gallery, with the fields of a view."""
+        return f"/?{query}" if query else "/"
+
+    def twin(self, twin_id: str) -> str:
+        """Return a twin's page."""
+        return f"/twin/{quote(twin_id, safe='')}"
+
+    def file(self, twin_id: str, name: str, revision: str) -> str:
+        """Return a file of a twin."""
+        return f"{self.twin(twin_id)}/{quote(name)}?r={quote(revision[:16], safe='')}"
+
+    def asset(self, name: str) -> str:
+        """Return a style or script of this package."""
+        return f"/static/{name}"
+
+
+@dataclass(frozen=True)
+class FileLinks:
+    """Relative addresses of plain files; ``up`` leads from the page to the folder of the gallery."""
+
+    up: str = ""
+    live = False
+
+    def gallery(self, query: str = "") -> str:
+        """Return the gallery: all cards are on one page."""
+        return f"{self.up}index.html"
+
+    def twin(self, twin_id: str) -> str:
+        """Return a twin's page."""
+        return f"{self.up}twins/{quote(twin_id, safe='')}/index.html"
+
+    def file(self, twin_id: str, name: str, revision: str) -> str:
+        """Return a file of a twin."""
+        return f"{self.up}twins/{quote(twin_id, safe='')}/{quote(name)}"
+
+    def asset(self, name: str) -> str:
+        """Return a style or script of this package."""
+        return f"{self.up}static/{name}"

@@ -1,0 +1,61 @@
+"""Styles and scripts of the pages: files of this package, and three.js out of NiceGUI's wheel."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from importlib import resources
+from importlib.util import find_spec
+from pathlib import Path
+
+from manitwin.errors import Unavailable
+from manitwin.formats.bounded_file import read_text
+from manitwin.web.html import GALLERY, REVIEW, STYLE, THREE, VIEWER
+
+KINDS = {
+    STYLE: "text/css; charset=utf-8",
+    **dict.fromkeys((THREE, VIEWER, GALLERY, REVIEW), "text/javascript; charset=utf-8"),
+}
+"""All there are, and their types."""
+LICENSE = "three.LICENSE.txt"
+_BUNDLE = ("elements", "scene", "dist", "index.js")
+_MOST_BYTES = 16 << 20
+_WANTED = ("THREE", "GLTFLoader", "OrbitControls")
+_EXPORTS = re.compile(r"export\s*\{([^{}]*)\};?\s*(?://# sourceMappingURL=\S*\s*)?\Z")
+
+
+@cache
+def package_file(name: str) -> bytes:
+    """Return a file of ``KINDS``, or ``LICENSE``; raises KeyError for another name, Unavailable where three.js is not there."""
+    if name == THREE:
+        return classic_script(_bundle()).encode()
+    if name not in KINDS and name != LICENSE:
+        raise KeyError(name)
+    return resources.files("manitwin.web").joinpath("static", name).read_bytes()
+
+
+def classic_script(module: str) -> str:
+    """Return NiceGUI's bundle, an ES module, as a script that sets ``threeBundle``.
+
+    Browsers load no module from a file's address, and pages on a disk are to be the same as those of the server. Raises
+    Unavailable where it does not end in one list of exports with what is wanted.
+    """
+    found = _EXPORTS.search(module)
+    pairs = [part.split() for part in found[1].split(",") if part.strip()] if found else []
+    exported = {words[-1]: words[0] for words in pairs if len(words) in (1, 3)}
+    if found is None or not set(_WANTED) <= set(exported):
+        raise Unavailable(
+            "nicegui: its bundle of three.js is not in the form of the version that was locked; install the packages of"
+            " requirements.lock"
+        )
+    wanted = ",".join(f"{name}:{exported[name]}" for name in _WANTED)
+    return f'(()=>{{"use strict";\n{module[: found.start()]}\nglobalThis.threeBundle={{{wanted}}};\n}})();\n'
+
+
+def _bundle() -> str:
+    spec = find_spec("nicegui")  # found, not imported: of that package, this file alone is used
+    if spec is None or spec.origin is None:
+        raise Unavailable(
+            "nicegui: is not installed, and three.js lies in it; install the packages of requirements.lock"
+        )
+    return read_text(Path(spec.origin).parent.joinpath(*_BUNDLE), _MOST_BYTES, Unavailable, name="three.js of nicegui")

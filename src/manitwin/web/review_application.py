@@ -1,0 +1,155 @@
+"""The server's pages of a review: they are an annotator's own, whom the guard knows by their cookie."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+from urllib.parse import quote
+
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from manitwin.dataset.review.session import ReviewSession
+from manitwin.errors import ManiTwinError, UsageError
+from manitwin.formats.json_file import parse_json_object
+from manitwin.twin.loaded_twin import Twin
+from manitwin.web.access import PERSON
+from manitwin.web.application import LINKS
+from manitwin.web.review_page import PATH, done_page, review_page
+from manitwin.web.served_files import VIEWS, TwinFolders
+from manitwin.web.twin_document import DOCUMENT
+
+MOST_BODY_BYTES = 64 << 10
+_NOT_KEPT = {"cache-control": "no-store"}
+
+
+def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSession) -> Starlette:
+    """Return the pages of a review before those of ``application``, of which a blind one has pictures and shapes alone."""
+
+    async def onward(request: Request) -> Response:
+        return await _answered(lambda: _onward(session, _person(request), request.query_params.get("after")))
+
+    async def show(request: Request) -> Response:
+        person, twin_id = _person(request), request.path_params["twin_id"]
+        return await _answered(lambda: _page(session, twins.twin(twin_id), person))
+
+    async def confirm(request: Request) -> Response:
+        person, twin_id, body = _person(request), request.path_params["twin_id"], await _body(request)
+
+        def work() -> Response:
+            session.confirm(
+                person, _accepted(twins.twin(twin_id)).record, parse_json_object(body, "review", UsageError)
+            )
+            return JSONResponse({"next": PATH}, headers=_NOT_KEPT)
+
+        return await _answered(work, as_json=True)
+
+    async def draft(request: Request) -> Response:
+        person, twin_id, body = _person(request), request.path_params["twin_id"], await _body(request)
+
+        def work() -> Response:
+            said = parse_json_object(body, "draft", UsageError)
+            session.store.put_draft(person, _accepted(twins.twin(twin_id)).record.twin_id, said)
+            return JSONResponse({}, headers=_NOT_KEPT)
+
+        return await _answered(work, as_json=True)
+
+    async def undo(request: Request) -> Response:
+        person, body = _person(request), await _body(request)
+
+        def work() -> Response:
+            undone = session.undo(person, str(parse_json_object(body, "undo", UsageError).get("request", "")))
+            twin_id = None if undone is None else quote(undone.review.twin_id, safe="")
+            return JSONResponse({"next": None if twin_id is None else f"{PATH}/{twin_id}"}, headers=_NOT_KEPT)
+
+        return await _answered(work, as_json=True)
+
+    return Starlette(
+        routes=[
+            Route("/", lambda request: RedirectResponse(PATH, 303)),
+            Route(PATH, onward),
+            Route(f"{PATH}/undo", undo, methods=["POST"]),
+            Route(f"{PATH}/{{twin_id}}", show),
+            Route(f"{PATH}/{{twin_id}}", confirm, methods=["POST"]),
+            Route(f"{PATH}/{{twin_id}}/draft", draft, methods=["POST"]),
+            Mount("/", _Blind(pages) if session.blind else pages),
+        ]
+    )
+
+
+class _Blind:
+    """Gives shapes and pictures, and no page or record that says who chose what, and how sure they were."""
+
+    def __init__(self, pages: ASGIApp):
+        self._pages = pages
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        name = scope["path"].split("/", 3)[-1] if scope["path"].count("/") > 2 else ""
+        shown = name in (DOCUMENT, "visual.glb") or VIEWS.fullmatch(name) or scope["path"].startswith("/static/")
+        if shown:
+            await self._pages(scope, receive, send)
+        else:
+            await Response("Not shown in a blind review.\n", 404, media_type="text/plain")(scope, receive, send)
+
+
+def _person(request: Request) -> str:
+    return str(request.scope.get(PERSON) or "")
+
+
+def _onward(session: ReviewSession, person: str, after: str | None) -> Response:
+    _require_known(session, person)
+    twin_id = session.next_twin(person, after)
+    if twin_id is None:
+        return HTMLResponse(done_page(LINKS, person, session.progress(person)), headers=_NOT_KEPT)
+    return RedirectResponse(f"{PATH}/{quote(twin_id, safe='')}", 303, headers=_NOT_KEPT)
+
+
+def _page(session: ReviewSession, twin: Twin, person: str) -> Response:
+    _require_known(session, person)
+    twin_id = _accepted(twin).record.twin_id
+    draft = session.store.draft(person, twin_id)
+    if draft is None:
+        stored = session.store.of_twin(twin_id, person)
+        draft = None if stored is None else stored.review.model_dump(mode="json")
+    if draft is not None and draft.get("revision") != twin.record.revision:
+        draft = None  # said of another twin, whose points may lie elsewhere
+    page = review_page(twin, LINKS, person, session.progress(person), draft, blind=session.blind)
+    return HTMLResponse(page, headers=_NOT_KEPT)
+
+
+def _accepted(twin: Twin) -> Twin:
+    if twin.record.status != "accepted":
+        raise UsageError(f"{twin.record.twin_id} was rejected, and only accepted twins are reviewed")
+    return twin
+
+
+def _require_known(session: ReviewSession, person: str) -> None:
+    if person not in session.annotators:
+        raise UsageError("this link is nobody's who reviews; open the one with your name")
+
+
+async def _body(request: Request) -> bytes:
+    """Return what was sent, of which more than the limit is left unread and makes no JSON."""
+    parts, size = [], 0
+    async for part in request.stream():
+        size += len(part)
+        if size > MOST_BODY_BYTES:
+            return b""
+        parts.append(part)
+    return b"".join(parts)
+
+
+async def _answered(work: Callable[[], Response], *, as_json: bool = False) -> Response:
+    """Answer from a thread; what a person can mend is said in words."""
+    try:
+        return await run_in_threadpool(work)
+    except ManiTwinError as error:
+        said: Any = {"error": str(error)}
+        status = 400 if isinstance(error, UsageError) else 422
+        if as_json:
+            return JSONResponse(said, status, headers=_NOT_KEPT)
+        return Response(f"{error}\n", status, media_type="text/plain", headers=_NOT_KEPT)

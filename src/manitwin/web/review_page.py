@@ -1,0 +1,145 @@
+"""The page on which a person judges a twin: the 3D view, what the twin says in each dimension, answers and corrections."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from manitwin.dataset.review.session import Progress
+from manitwin.dataset.review.twins_seen import said_of
+from manitwin.dataset.review.verdicts import ANSWERS, DIMENSIONS, MOST_NAME_CHARACTERS, MOST_NOTE_CHARACTERS, Dimension
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.record import TwinRecord
+from manitwin.web.html import REVIEW, THREE, VIEWER, number, page, text
+from manitwin.web.links import Links
+from manitwin.web.twin_facts import fact_tables
+from manitwin.web.twin_page import pictures, viewer
+
+QUESTIONS: dict[Dimension, str] = {
+    "category": "Is this what it is?",
+    "language": "Are colour, material, shape, function and caption true?",
+    "functional": "Is each functional point on what its label names?",
+    "physical": "Are size, mass and material plausible?",
+    "grasp": "Would one hold it at each grasp point?",
+    "mesh": "Is it one whole object, without severe faults?",
+    "simulation": "Do the grasps that held look as if they would?",
+}
+KEYS = (
+    ("yes", "y", "yes, and on to the next"),
+    ("no", "n", "no"),
+    ("unsure", "u", "unsure, and on"),
+    ("next", "j", "next dimension"),
+    ("previous", "k", "previous dimension"),
+    ("correct", "c", "what is true instead"),
+    ("note", "t", "note"),
+    ("confirm", "Enter", "confirm, and the next twin"),
+    ("undo", "Backspace", "take the last review back"),
+    ("later", "s", "leave it for later"),
+)
+"""What a key does at first: action, key, words. Digits lead to dimensions, Escape out of a field."""
+SHORT = tuple((action, key, words.split(",")[0]) for action, key, words in KEYS)
+PATH = "/review"
+
+
+def review_page(twin: Twin, links: Links, annotator: str, progress: Progress, draft: Any, *, blind: bool) -> str:
+    """Return the page of an accepted twin; ``blind`` leaves out who says so, how sure they are, and why."""
+    record = twin.record
+    fields = "".join(_dimension(record, place, dimension) for place, dimension in enumerate(DIMENSIONS, 1))
+    body = (
+        f"{_head(annotator, progress)}"
+        f'<div class="twin">\n{viewer(record, links)}<main id="main">\n'
+        f'<form id="review" data-twin="{text(record.twin_id)}" data-revision="{text(record.revision)}"'
+        f' data-path="{PATH}" data-draft="{text(json.dumps(draft)) if draft else ""}" autocomplete="off">\n{_strip()}{fields}'
+        f'<label class="note"><span>Note <kbd data-key="note"></kbd></span>'
+        f'<textarea name="note" rows="2" maxlength="{MOST_NOTE_CHARACTERS}"></textarea></label>\n'
+        '<p class="buttons"><button type="button" data-act="confirm">Confirm <kbd data-key="confirm"></kbd></button>'
+        '<button type="button" data-act="undo">Take back <kbd data-key="undo"></kbd></button>'
+        '<button type="button" data-act="later">Later <kbd data-key="later"></kbd></button></p>\n'
+        f'<p class="said" id="saved" role="status" aria-live="polite"></p>\n</form>\n{_keys()}'
+        f"{'' if blind else fact_tables(record)}</main>\n</div>\n{pictures(twin, links)}"
+    )
+    return page(f"Review {record.twin_id}", body, links, scripts=[THREE, VIEWER, REVIEW])
+
+
+def done_page(links: Links, annotator: str, progress: Progress) -> str:
+    """Return the page of somebody whose queue is empty."""
+    body = (
+        f'{_head(annotator, progress)}<main id="main" class="message"><p>Nothing is left in your queue.</p>\n'
+        f'<form id="review" data-path="{PATH}"><p class="buttons">'
+        '<button type="button" data-act="undo">Take back <kbd data-key="undo"></kbd></button></p>\n'
+        f'<p class="said" id="saved" role="status" aria-live="polite"></p></form>\n{_keys()}</main>\n'
+    )
+    return page("Review", body, links, scripts=[REVIEW])
+
+
+def _head(annotator: str, progress: Progress) -> str:
+    total = progress.reviewed + progress.left
+    return (
+        f'<header class="top"><h1>Review</h1><p class="caption" id="progress">{text(annotator)}: {progress.reviewed} reviewed,'
+        f' {progress.left} left <progress value="{progress.reviewed}" max="{max(total, 1)}"></progress></p></header>\n'
+    )
+
+
+def _dimension(record: TwinRecord, place: int, dimension: Dimension) -> str:
+    answers = "".join(
+        f'<label><input type="radio" name="{dimension}" value="{answer}"> {answer}</label>' for answer in ANSWERS
+    )
+    return (
+        f'<fieldset data-dimension="{dimension}"><legend><kbd>{place}</kbd> {dimension}'
+        f' <span class="question">{text(QUESTIONS[dimension])}</span></legend>\n'
+        f'<p class="given">{text(said_of(record, dimension))}</p>\n'
+        f'<div class="answers" role="radiogroup" aria-label="{dimension}">{answers}</div>{_fix(record, dimension)}</fieldset>\n'
+    )
+
+
+def _fix(record: TwinRecord, dimension: Dimension) -> str:
+    physical, points = record.physical, record.points
+    if dimension == "category":
+        return _hidden(f'<label>it is <input data-fix="category" maxlength="{MOST_NAME_CHARACTERS}"></label>')
+    if dimension == "physical" and physical is not None:
+        rows = []
+        for name, words, unit, value in (
+            ("mass_kg", "mass", "kg", physical.mass_kg.value),
+            ("longest_side_m", "longest side", "m", max(physical.extents_m)),
+        ):
+            ends = "".join(
+                f'<input data-fix="{name}.{end}" type="number" step="any" min="0" placeholder="{shown}"'
+                f' aria-label="{words}, {end}">'
+                for end, shown in (("value", number(value)), ("low", "at least"), ("high", "at most"))
+            )
+            rows.append(f"<span>{words} {ends} {unit}</span>")
+        return _hidden("".join(rows))
+    if dimension in ("functional", "grasp") and points is not None:
+        kind = dimension[0]
+        named = [(p.id, p.label, p.candidate) for p in points.functional] if kind == "f" else []
+        named += [(p.id, p.label or p.type, p.candidate) for p in points.grasp] if kind == "g" else []
+        most = len(points.candidates.positions_m) - 1
+        fields = "".join(
+            f'<label>{text(name)} {text(label)} belongs to candidate <input data-point="{text(name)}" type="number" min="0"'
+            f' max="{most}" step="1" placeholder="{candidate}"></label>'
+            for name, label, candidate in named
+        )
+        return _hidden(f'{fields}<span class="note">click a candidate in the 3D view to put it in</span>')
+    return ""
+
+
+def _hidden(fields: str) -> str:
+    return f'<div class="fix" hidden>{fields}</div>'
+
+
+def _strip() -> str:
+    shown = "".join(f'<span><kbd data-key="{action}">{key}</kbd> {short}</span>' for action, key, short in SHORT)
+    return f'<p class="strip">{shown}</p>\n'
+
+
+def _keys() -> str:
+    rows = "".join(
+        f'<label>{text(words)} <input data-map="{action}" data-default="{key}" size="9" readonly value="{key}"></label>'
+        for action, key, words in KEYS
+    )
+    return (
+        f'<details class="keys" id="keys"><summary>Change the keys</summary><div class="keymap">{rows}'
+        "<p>1 to 7: to a dimension. Shift Enter: confirm with dimensions left out. Escape: out of a field."
+        " To change a key, choose its field and press another. "
+        '<button type="button" data-act="reset">As at first</button></p></div></details>\n'
+    )

@@ -1,0 +1,152 @@
+"""Serve the pages of a data set or a twin on this machine until interrupted."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import socket
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from urllib.parse import quote
+
+import uvicorn
+from starlette.types import ASGIApp
+
+from manitwin.dataset.review.session import ReviewSession
+from manitwin.errors import UsageError
+from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.web.access import ENTER, Guard, Names, Tokens
+from manitwin.web.application import application
+from manitwin.web.gallery_query import Gallery
+from manitwin.web.review_application import review_application
+from manitwin.web.served_files import TwinFolders
+
+MOST_REQUESTS = 256
+"""At once; more are told to come again (503)."""
+KEEP_ALIVE_S = 20
+CLOSING_S = 2
+"""What open requests are waited for at the end."""
+_BETWEEN_LINKS_S = 2.0
+
+
+def bound_socket(host: str, port: int) -> socket.socket:
+    """Return a socket that listens on a host and port (0: one that is free); raises UsageError where it cannot."""
+    bare = host.strip("[]")
+    try:
+        found = socket.getaddrinfo(bare, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
+        family, kind, protocol, _, address = found[0]
+        bound = socket.socket(family, kind, protocol)
+    except (OSError, UnicodeError) as error:
+        raise UsageError(
+            f"--host {host}: is no address of this machine ({error}); give 127.0.0.1 or 0.0.0.0"
+        ) from error
+    try:
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind(address)
+        bound.listen(128)
+    except OSError as error:
+        bound.close()
+        if error.errno == errno.EADDRINUSE:
+            raise UsageError(
+                f"--port {port}: is taken by another program; give another, or 0 for any that is free"
+            ) from error
+        raise UsageError(
+            f"--host {host} --port {port}: cannot be listened on ({error.strerror or error}); give another host or port"
+        ) from error
+    return bound
+
+
+class _Server(uvicorn.Server):
+    """Leaves signals to the command, which ends it in order; uvicorn would raise them again afterwards."""
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        yield
+
+
+class PageServer:
+    """A server of pages behind the guard: ``link`` makes a link of one use, ``run`` serves until ``stop`` or an interrupt.
+
+    ``on_new_link`` is told a new link when somebody came with one that was used; at most one in two seconds.
+    """
+
+    def __init__(self, app: ASGIApp, host: str, port: int, on_new_link: Callable[[str], None] | None = None):
+        self.socket = bound_socket(host, port)
+        self.host, self.port = host.strip("[]"), int(self.socket.getsockname()[1])
+        self.names, self.tokens = Names.of(host, self.port), Tokens()
+        self._on_new_link, self._told = on_new_link, float("-inf")
+        guard = Guard(app, self.names, self.tokens, self._used)
+        # no log of requests: their addresses have tokens in them
+        config = uvicorn.Config(
+            guard, log_config=None, access_log=False, lifespan="off", server_header=False, limit_concurrency=MOST_REQUESTS,
+            timeout_keep_alive=KEEP_ALIVE_S, timeout_graceful_shutdown=CLOSING_S, ws="none",
+        )  # fmt: skip
+        self._server = _Server(config)
+
+    def address(self) -> str:
+        """Return the address of the first page."""
+        shown = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(self.host, self.host)
+        return f"http://{f'[{shown}]' if ':' in shown else shown}:{self.port}"
+
+    def link(self, onward: str = "/", person: str = "") -> str:
+        """Return a link of one use that leads to a page."""
+        return f"{self.address()}{ENTER}?token={self.tokens.link(person)}&next={quote(onward, safe='/')}"
+
+    def run(self) -> None:
+        """Serve until ``stop``, or an interrupt, which is raised as KeyboardInterrupt."""
+        asyncio.run(self._server.serve(sockets=[self.socket]))
+
+    def stop(self) -> None:
+        """End what is served."""
+        self._server.should_exit = True
+
+    def _used(self) -> None:
+        now = asyncio.get_running_loop().time()
+        if self._on_new_link is not None and now - self._told >= _BETWEEN_LINKS_S:
+            self._told = now
+            self._on_new_link(self.link())
+
+
+def pages_of(place: str, cache: Path) -> ASGIApp:
+    """Return the pages of a data set, or of a twin's folder; raises UsageError where it is neither or has no index."""
+    twins = TwinFolders(place, cache if "://" in place else None)
+    if twins.only is not None:
+        return application(None, twins, twins.only.record.name or twins.only.record.twin_id)
+    root = DatasetRoot(place)
+    return application(Gallery(root), twins, Path(root.path).name or "twins")
+
+
+def review(
+    place: str,
+    session: ReviewSession,
+    host: str,
+    port: int,
+    on_ready: Callable[[PageServer], None],
+    on_used_link: Callable[[PageServer], None],
+) -> None:
+    """Serve the pages of a review until interrupted; ``on_used_link`` is called when somebody came with a link that was used."""
+    running: list[PageServer] = []
+    pages = application(None, twins := TwinFolders(place), "review")
+    app = review_application(pages, twins, session)
+    server = PageServer(app, host, port, lambda _: on_used_link(running[0]))
+    running.append(server)
+    try:
+        on_ready(server)
+        server.run()
+    finally:
+        server.socket.close()
+
+
+def serve(
+    place: str, host: str, port: int, on_ready: Callable[[PageServer], None], on_new_link: Callable[[str], None]
+) -> None:
+    """Serve the pages of a data set or a twin until interrupted; ``on_ready`` is called when it listens."""
+    with tempfile.TemporaryDirectory(prefix="manitwin-view-") as cache:
+        server = PageServer(pages_of(place, Path(cache)), host, port, on_new_link)
+        try:
+            on_ready(server)
+            server.run()
+        finally:
+            server.socket.close()

@@ -1,0 +1,96 @@
+"""Fixtures of the pages' tests: a data set to look at, a server of it in a process of its own, a real browser."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from viewed_twins import write_viewed
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
+
+
+@pytest.fixture(scope="session")
+def viewed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[str]]:
+    """A data set and the ids of its twins; nothing may write there."""
+    root = tmp_path_factory.mktemp("viewed") / "set"
+    return root, write_viewed(root)
+
+
+class Served:
+    """A running ``manitwin view``: its link of one use, its address, and what else it printed."""
+
+    def __init__(self, process: subprocess.Popen[str]):
+        self.process = process
+        assert process.stdout is not None
+        self.link = self.next_link()
+        self.address = self.link.split("/enter")[0]
+
+    def next_link(self) -> str:
+        """Return the next link that it prints."""
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            if found := re.search(r"http://\S+/enter\?\S+", line):
+                return found[0]
+        raise AssertionError("it ended without a link")
+
+
+@contextmanager
+def serving(place: Path, *more: str) -> Iterator[Served]:
+    """Serve a data set or a twin; it must end in order when it is interrupted."""
+    command = [sys.executable, "-m", "manitwin", "view", str(place), "--no-browser", *more]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=dict(os.environ)) as process:
+        try:
+            yield Served(process)
+            process.send_signal(signal.SIGINT)
+            assert process.wait(20) == 0
+        finally:
+            process.kill()
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """A real Chromium; skips where none is installed, fails there with BROWSER_REQUIRED."""
+    path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if path is None:
+        if os.environ.get("BROWSER_REQUIRED"):
+            pytest.fail("no Chromium is installed; run make browser")
+        pytest.skip("no Chromium is installed: make browser")
+    from playwright.sync_api import sync_playwright
+
+    drawn = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]  # WebGL without a GPU
+    rebound = ["--host-resolver-rules=MAP evil.example 127.0.0.1"]
+    sandbox = ["--no-sandbox"] if os.geteuid() == 0 else []
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=[*drawn, *rebound, *sandbox])
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def visitor(chromium: Any) -> Iterator[Callable[..., Any]]:
+    """Return a new visitor's page by a call, which notes in ``requests`` and ``errors`` what it asks for and what fails."""
+    contexts = []
+
+    def come(**how: Any) -> Any:
+        context = chromium.new_context(**{"viewport": {"width": 1280, "height": 900}, **how})
+        contexts.append(context)
+        page = context.new_page()
+        page.requests, page.errors = [], []
+        context.on("request", lambda request: page.requests.append(request.url))
+        page.on("pageerror", lambda error: page.errors.append(str(error)))
+        page.on("console", lambda said: page.errors.append(said.text) if said.type == "error" else None)
+        return page
+
+    yield come
+    for context in contexts:
+        context.close()
