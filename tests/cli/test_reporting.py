@@ -72,14 +72,21 @@ def test_every_command_that_makes_something_takes_the_options() -> None:
         assert {"--verbose", "-v", "--quiet", "-q", "--log"} <= taken, name
 
 
-@pytest.mark.parametrize("words", [("layout", "-q"), ("-q", "layout"), ("layout", "--quiet")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("layout", "-q"),
+        pytest.param(("-q", "layout"), marks=pytest.mark.slow),
+        pytest.param(("layout", "--quiet"), marks=pytest.mark.slow),
+    ],
+)
 def test_quiet_says_errors_alone(tmp_path: Path, words: tuple[str, ...]) -> None:
     done = rehearse(tmp_path, *words)
     assert (done.stdout, done.stderr) == ("", "one of them failed\n")
     assert "a result" in (tmp_path / "data" / "run.log").read_text(), "the log has it all the same"
 
 
-@pytest.mark.parametrize("words", [("layout", "-v"), ("-v", "layout")])
+@pytest.mark.parametrize("words", [("layout", "-v"), pytest.param(("-v", "layout"), marks=pytest.mark.slow)])
 def test_verbose_says_stages_and_their_seconds(tmp_path: Path, words: tuple[str, ...]) -> None:
     done = rehearse(tmp_path, *words)
     assert re.search(r"^a of 'good' \(\w+\) done in \d+\.\d\d s$", done.stderr, re.MULTILINE), done.stderr

@@ -84,10 +84,10 @@ PAGES: dict[str, Arrangement] = {
     ),
     "docs/affordances.md": Arrangement(slow=(r"manitwin affordances",)),
     "docs/audit.md": Arrangement(
-        exits={r"PATH\.\.\.": 1, "--fix": 1}
+        exits={r"PATH\.\.\.": 1, "--fix": 1, "--engines": 1}, slow=(r"--fix", r"baseline", r"--engines")
     ),  # the mug there is wrong: its collision shape fills it
     "docs/audit_in_ci.md": Arrangement(blocks={"^repos:": "hooks", "^on: ": "workflow"}),
-    "docs/backends.md": Arrangement(blocks={"entry-points": "entry_point"}),
+    "docs/backends.md": Arrangement(blocks={"entry-points": "entry_point"}, slow=(DOCTOR,)),
     "docs/build.md": Arrangement(
         blocks={"^file,name,units": "manifest", "^file,name,group": "manifest", "^things: ": "account things"}
     ),
@@ -96,9 +96,12 @@ PAGES: dict[str, Arrangement] = {
         rewritten={r" --address auto": ""},  # without one, it starts a cluster on this machine
         not_run={r"^pip install": NO_NETWORK},
     ),
+    "docs/collect.md": Arrangement(rewritten={r"products\.csv": "list.csv"}),
+    "docs/dataset.md": Arrangement(slow=(r"--timeout", r"manitwin index", r"truncate", r"mass_kg < 0\.4\"")),
     "docs/episodes.md": Arrangement(
         not_run={r"^from lerobot": "LeRobot has an environment of its own: make lerobot-real reads such a set with it"},
     ),
+    "docs/evaluation.md": Arrangement(slow=(r"evaluate generation",)),
     "docs/export.md": Arrangement(),
     "docs/generators.md": Arrangement(
         rewritten=TRIPOSR,
@@ -139,6 +142,7 @@ PAGES: dict[str, Arrangement] = {
         slow=(r"\bDATASET\b",),
         blocks={"^DATASET/": "tree DATASET"},
     ),
+    "docs/review.md": Arrangement(slow=(r"manitwin review (apply|tune|import|report|DATASET)", r"--form")),
     "docs/search.md": Arrangement(
         slow=(r"manitwin search DATASET --image",),
     ),
@@ -148,6 +152,9 @@ PAGES: dict[str, Arrangement] = {
         slow=(r".",),
     ),
     "docs/twin.md": Arrangement(blocks={"^<twin_id>/": "tree twins/twins/*/*"}),
+    "docs/view.md": Arrangement(
+        rewritten={r"view TWIN": "view $(ls -d DATASET/twins/*/* | head -1)"}, slow=(r"manitwin view",)
+    ),
     "docs/vqa.md": Arrangement(slow=(r"manitwin (layout|vqa)",)),
     "docs/vlm.md": Arrangement(not_run=MODEL_SERVERS, blocks={"services": "settings run.toml"}),
 }

@@ -23,6 +23,7 @@ from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD, seal
 from scene_twins import bowl, can, slab, write_thing
 from seen_solids import seen_from
+from tiny_clip import write_tiny_clip
 from twin_folders import tried_as_built, twin_id
 
 SMALL = """\
@@ -121,6 +122,12 @@ class Folders:
             (page / "LABELS.csv").write_text(
                 f"twin_id,category,plausible_mass_low_kg,plausible_mass_high_kg\n{record},mug,0.1,1\n"
             )
+        if "--clip CLIP" in said:
+            write_tiny_clip(page / "CLIP")
+        if "verdicts.csv" in said:
+            ids = [record.name for record in sorted(self.dataset.glob("twins/*/*"))]
+            rows = "".join(f"{twin_id},ada,category,yes\n{twin_id},ben,category,no\n" for twin_id in ids)
+            (page / "verdicts.csv").write_text(f"twin_id,annotator,dimension,answer\n{rows}")
         if "--depth D.png" in said:
             self._view(page)
         kinds: dict[str, Callable[[], Path]] = {

@@ -59,7 +59,7 @@ class Shell:
             assert process.stdout is not None
             for line in process.stdout:
                 said += line
-                if line.startswith("manitwin build "):
+                if line.startswith(("manitwin build ", "http://127.0.0.1:")):
                     break
             else:
                 raise AssertionError(f"it ended:\n$ {command}\n{said}")

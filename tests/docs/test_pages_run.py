@@ -94,7 +94,7 @@ class Reader:
         page, text = arranged(step.page), rewritten(step)
         if step.language == "python":
             exec(compile(text, f"{step.page}:{step.line}", "exec"), self.names)
-        elif step.language == "sh" and re.match(r"manitwin fake (?!--list)", text):
+        elif step.language == "sh" and re.match(r"manitwin (fake (?!--list)|view (?!.*--static)|review DATASET)", text):
             self.shell.serve(text.split(" #")[0])
         elif step.language == "sh":
             self.shell.run(text, next((status for what, status in page.exits.items() if re.search(what, step.text)), 0))

@@ -61,6 +61,8 @@ SIGNS = {
     "BSD-2-Clause": "redistributions in binary form must reproduce|bsd 2-clause license|license: freebsd",
     "BSD-3-Clause": "endorse or promote products|bsd 3-clause",
     "LGPL-3.0-only": "gnu lesser general public license version 3",
+    "MIT": "permission is hereby granted, free of charge",
+    "PSF-2.0": "python software foundation license version 2",
     "LicenseRef-BSD": "license :: osi approved :: bsd license",
     "LicenseRef-Public-Domain": "public domain",
     "LicenseRef-matplotlib": "license agreement for matplotlib",

@@ -6,7 +6,7 @@ import os
 from typing import Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from manitwin.errors import UsageError
 
@@ -33,6 +33,14 @@ PLACES = frozenset(
         "mask",
         "camera",
         "cloud",
+        "verdicts",
+        "export",
+        "form",
+        "static",
+        "catalogue",
+        "root",
+        "clip",
+        "ulip",
     }
 )
 """The parameters, of whatever command, that name files, folders or URLs."""
@@ -54,6 +62,15 @@ class CheckedCommand(TyperCommand):
                 if isinstance(value, str):
                     check_text(_called(parameter), value, place=parameter.name in PLACES)
         return super().parse_args(ctx, args)
+
+
+class CommandWords(TyperGroup):
+    """Commands of which some are called by two words: ``review report`` is one, and so is ``review``."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command that the first words name, and the arguments behind them."""
+        both = " ".join(args[:2])
+        return super().resolve_command(ctx, [both, *args[2:]] if len(args) > 1 and both in self.commands else args)
 
 
 def check_text(called: str, value: str, *, place: bool) -> None:

@@ -90,7 +90,7 @@ def _shipped(folder: str) -> Callable[[], Iterable[str]]:
 
 
 UNITS = Choices("units", _of("m", "cm", "mm", "auto"))
-EVALUATIONS = Choices("evaluation", _of("annotations"))
+EVALUATIONS = Choices("evaluation", _of("annotations", "generation", "grasps"))
 UP = Choices("up", _of("y", "z", "auto"))
 EXECUTORS = Choices("executor", _of("local", "ray", "inline"))
 ANNOTATORS = Choices("annotator", _backends("annotator"), spec=True)
@@ -119,6 +119,9 @@ SKILLS = Choices(
         "strike",
         "push",
         "stir",
+        "wipe",
+        "cut_motion",
+        "aim",
     ),
 )
 SURFACES = Choices("surface", _of("table", "shelf", "tray"))
@@ -134,6 +137,7 @@ SEGMENTATION_FORMATS = Choices("format", _of("coco", "coco-panoptic", "cityscape
 VQA_FORMATS = Choices("format", _of("llava", "parquet", "webdataset"))
 POINT_CONVENTIONS = Choices("convention of points", _of("unit", "robopoint", "roborefer", "pixel", "thousand"))
 AUDIT_FORMATS = Choices("format", _of("text", "json", "sarif"))
+AUDIT_ENGINES = Choices("engine", _of("mujoco", "sapien", "pybullet"), listed=True)
 QUERY_FORMATS = Choices("format", _of("table", "csv", "json", "ids"))
 TABLES = Choices("table", _of("twins", "points", "grasps", "placements", "rejections", "stages"))
 ENDED_STATES = Choices("state", _of("failed", "rejected"))

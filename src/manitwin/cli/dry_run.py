@@ -13,6 +13,7 @@ from typing import Literal, get_args
 from manitwin.cli.console import err_console, out_console
 from manitwin.cli.documents import plan_document, print_document
 from manitwin.config import BuildConfig
+from manitwin.engine.amendments import amendments_sha256, read_amendments
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.engine.ledger.location import copy_ledger
 from manitwin.engine.recipe import Recipe
@@ -118,7 +119,7 @@ def plan_build(items: Iterable[Item], root: DatasetRoot, config: BuildConfig, re
             given, _ = ledger.add_items(items)
             rates = {kind: own_rate(ledger, kind, recipe.sha256) or measured_rate(config) for kind in usd}
             ledger.begin_run(recipe.sha256, given)  # opens again what a run would open again
-            return Plan(_planned_by(ledger, _Planner(recipe, config, record_of)), rates, usd, remarks)
+            return Plan(_planned_by(ledger, _Planner(recipe, config, record_of, root)), rates, usd, remarks)
         finally:
             ledger.close()
 
@@ -162,8 +163,8 @@ def own_rate(ledger: Ledger, kind: str, recipe_sha256: str) -> Rate | None:
 class _Planner:
     """Says of one input after the other what would be made of it; ``seen`` are the ids of twins that have their item."""
 
-    def __init__(self, recipe: Recipe, config: BuildConfig, record_of: RecordOf):
-        self._recipe, self._config, self._record_of = recipe, config, record_of
+    def __init__(self, recipe: Recipe, config: BuildConfig, record_of: RecordOf, root: DatasetRoot):
+        self._recipe, self._config, self._record_of, self._root = recipe, config, record_of, root
         self.seen: set[str] = set()
 
     def plan(self, item: Item) -> PlannedItem:
@@ -176,13 +177,16 @@ class _Planner:
             return PlannedItem(item, twin_id, kind, "duplicate", "the same input as another one")
         self.seen.add(twin_id)
         record = self._record_of(twin_id)
-        ending = None if record is None else self._recipe.ending_of(record)
+        ending = None if record is None else self._recipe.ending_of(record, self._amended(twin_id))
         if ending is not None:
             detail = f"{ending.reason}: {ending.detail}" if ending.reason else ending.detail
             return PlannedItem(item, twin_id, kind, ending.status, detail)
         refused = identity.rejected or by_header
         state: PlannedState = "to_build" if refused is None else "would_be_rejected"
         return PlannedItem(item, twin_id, kind, state, "" if refused is None else str(refused))
+
+    def _amended(self, twin_id: str) -> str | None:
+        return amendments_sha256(read_amendments(self._root, twin_id))
 
 
 def print_plan(plan: Plan, place: str, *, as_json: bool) -> None:

@@ -16,7 +16,7 @@ from functools import cache
 from types import FrameType
 from typing import NoReturn
 
-RESUMABLE = frozenset({"build", "run", "layout", "trajectories", "render", "publish", "import"})
+RESUMABLE = frozenset({"build", "run", "layout", "trajectories", "render", "publish", "import", "collect add"})
 """Commands that go on where they stopped."""
 RESUMABLE_STATUS = 4
 INTERRUPTED_STATUS = 130

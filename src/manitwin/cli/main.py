@@ -17,13 +17,14 @@ import typer
 from typer.completion import completion_init, get_completion_script
 
 from manitwin.cli import options
-from manitwin.cli.arguments import CheckedCommand, register
+from manitwin.cli.arguments import CheckedCommand, CommandWords, register
 from manitwin.cli.choices import SHELLS
 from manitwin.cli.commands.affordances import affordances
 from manitwin.cli.commands.audit import audit
 from manitwin.cli.commands.build import build, run
 from manitwin.cli.commands.carve import carve
 from manitwin.cli.commands.catalog import catalog
+from manitwin.cli.commands.collect import collect_add, collect_plan, collect_status
 from manitwin.cli.commands.doctor import doctor
 from manitwin.cli.commands.evaluate import evaluate
 from manitwin.cli.commands.export import export
@@ -37,12 +38,14 @@ from manitwin.cli.commands.prompts import prompts
 from manitwin.cli.commands.publish import publish
 from manitwin.cli.commands.query import query
 from manitwin.cli.commands.render import render
+from manitwin.cli.commands.review import review, review_apply, review_import, review_report, review_sample, review_tune
 from manitwin.cli.commands.search import search
 from manitwin.cli.commands.segmentation import segmentation
 from manitwin.cli.commands.stats import stats
 from manitwin.cli.commands.status import status
 from manitwin.cli.commands.tasks import tasks
 from manitwin.cli.commands.trajectories import trajectories
+from manitwin.cli.commands.view import view
 from manitwin.cli.commands.vqa import vqa
 from manitwin.cli.console import error_console, out_console, write_text
 from manitwin.cli.documents import CommandLineError, Json, asked_for_json, print_document, print_failure
@@ -66,7 +69,7 @@ LASTING_CAUSES = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM,
 """What ails the machine and not the command: what is done stays, and the same command goes on from there."""
 
 _interrupts = Interrupts()
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(cls=CommandWords, add_completion=False, pretty_exceptions_enable=False)
 
 
 def _print_version(wanted: bool) -> None:
@@ -97,8 +100,19 @@ register(app, reported(run, own_log=True), "run", hidden=True)
 for making in (index, stats, publish, export, segmentation, affordances, catalog, vqa):
     register(app, reported(making))
 register(app, reported(import_), "import")
-for other in (status, retry, check, query, search, doctor, models, fake, prompts, audit, carve, evaluate, locate):
+for other in (status, retry, check, query, search, doctor, models, fake, prompts, audit, carve, evaluate, locate, view):
     register(app, other)
+register(app, review)
+for name, reviewing in (
+    ("sample", review_sample),
+    ("import", review_import),
+    ("report", review_report),
+    ("apply", review_apply),
+    ("tune", review_tune),
+):
+    register(app, reviewing, f"review {name}")
+for name, collecting in (("add", collect_add), ("status", collect_status), ("plan", collect_plan)):
+    register(app, collecting, f"collect {name}")
 
 
 @app.command(cls=CheckedCommand)

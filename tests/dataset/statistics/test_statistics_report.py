@@ -206,6 +206,7 @@ def test_near_duplicates_are_listed_the_nearest_first_with_the_call_that_finds_t
     assert kept["nearest"][0] == {"first": "aaaa", "second": "b001", "shape_distance": 0.001, "size_ratio": 1.01}
 
 
+@pytest.mark.slow
 def test_users_settings_of_matplotlib_change_nothing(report: Path, tmp_path: Path) -> None:
     import matplotlib
 

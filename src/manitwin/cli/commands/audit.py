@@ -27,6 +27,10 @@ def audit(
     format: Annotated[
         str, choices.AUDIT_FORMATS.option("--format", "-f", help="text, json or sarif.", metavar="FORMAT")
     ] = "text",
+    engines: Annotated[
+        str | None,
+        choices.AUDIT_ENGINES.option(help="Also drop each asset in these: mujoco, sapien, pybullet.", metavar="A,B"),
+    ] = None,
     fix: Annotated[bool, typer.Option("--fix", help="Mend what is safe; old files stay beside as .orig.")] = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, max=options.MOST_JOBS, help="Processes.")] = 1,
     baseline: Annotated[
@@ -43,7 +47,7 @@ def audit(
     if explain is None and not paths:
         raise UsageError("no PATH given: name assets or folders of them, or --explain CODE")
     from manitwin.assets.audit.report import explanation
-    from manitwin.assets.audit.run import audit_all, find_all, rules_selected
+    from manitwin.assets.audit.run import audit_all, check_engines, find_all, rules_selected
     from manitwin.assets.read import VALID_ASSETS
 
     if explain is not None:
@@ -59,12 +63,13 @@ def audit(
     rules = rules_selected((select or "").split(","), (ignore or "").split(","))
     if not rules:
         raise UsageError("--select and --ignore leave no rule; leave one of them out")
+    run_in = check_engines((engines or "").split(",") if engines else ())
     fragments: list[Path] = []
     assets = find_all(paths or [], fragments)
     if not assets:
         raise UsageError(f"{', '.join(map(str, paths or []))}: holds no asset of a known format; {VALID_ASSETS}")
     audited = []
-    for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths or []):
+    for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths or [], engines=run_in):
         each = each if known is None else known.without_known(each)
         audited.append(each)
         if format == "text":

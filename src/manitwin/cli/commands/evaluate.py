@@ -1,34 +1,72 @@
-"""``manitwin evaluate``: a data set against truth that somebody wrote down."""
+"""``manitwin evaluate``: a data set beside the paper's tables, and against truth that somebody wrote down."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from manitwin.cli import choices, options
-from manitwin.cli.console import out_console
+from manitwin.cli.console import error_console, out_console
 from manitwin.cli.documents import Json, print_document
+
+if TYPE_CHECKING:
+    from manitwin.dataset.evaluation.tables import EvaluationReport
+
+OPTIONS = {"annotations": {"--labels"}, "generation": {"--clip", "--ulip", "--out"}, "grasps": {"--out"}}
+"""What each evaluation takes besides the data set."""
+
+
+def _model(help: str) -> Any:
+    return typer.Option(help=help, metavar="FOLDER", callback=choices.must_exist("a model's folder of ONNX files"))
 
 
 def evaluate(
-    what: Annotated[str, choices.EVALUATIONS.argument(help="annotations.", metavar="WHAT")],
+    what: Annotated[str, choices.EVALUATIONS.argument(help="annotations, generation or grasps.", metavar="WHAT")],
     dataset: Annotated[
         str, options.existing("A data set, or a folder of twins.", "DATASET", "a data set, or a folder of twins")
     ],
     labels: Annotated[
-        Path,
+        Path | None,
         typer.Option(
             "--labels",
-            help="Truth labels, a row an object (docs/evaluation.md).",
+            help="annotations: truth labels, a row an object (docs/evaluation.md).",
             metavar="LABELS.csv",
             callback=choices.must_exist("a CSV file of labels"),
         ),
-    ],
+    ] = None,
+    clip: Annotated[Path | None, _model("generation: a CLIP, for CLIP(N-I/T) and CLIP(I-I/T).")] = None,
+    ulip: Annotated[Path | None, _model("generation: a ULIP, with a network of points, for ULIP-I/T.")] = None,
+    out: Annotated[Path | None, options.output_folder("A new folder for tables (CSV, Parquet) and a page.")] = None,
+    seed: Annotated[int, typer.Option(help="The seed of shuffled pairs.", min=0, max=options.LARGEST_SEED)] = 0,
     json: Json = False,
 ) -> None:
-    """Score annotations against labels: category, words, functional points, physics and grasp points, with intervals."""
+    """Print the paper's tables beside a data set's, or score its annotations against labels, with intervals."""
+    from manitwin.errors import UsageError
+
+    given = {"--labels": labels, "--clip": clip, "--ulip": ulip, "--out": out}
+    unused = [name for name, value in given.items() if value is not None and name not in OPTIONS[what]]
+    if unused:
+        raise UsageError(f"{', '.join(unused)}: not of evaluate {what}, which takes {', '.join(sorted(OPTIONS[what]))}")
+    if what == "annotations":
+        if labels is None:
+            raise UsageError("--labels: missing; give a CSV file of labels (docs/evaluation.md)")
+        _annotations(dataset, labels, json)
+        return
+    report = _report(what, dataset, clip, ulip, seed)
+    if out is not None:
+        from manitwin.dataset.evaluation.tables import write_evaluation
+
+        write_evaluation(out, report)
+    if json:
+        print_document(report.document())
+        return
+    for line in report.lines():
+        out_console.print(line, markup=False, soft_wrap=True)
+
+
+def _annotations(dataset: str, labels: Path, json: bool) -> None:
     from manitwin.cli.documents import annotations_document
     from manitwin.dataset.evaluation.annotations import evaluate_annotations
 
@@ -37,3 +75,18 @@ def evaluate(
         out_console.print(line)
     if json:
         print_document(annotations_document(report))
+
+
+def _report(what: str, dataset: str, clip: Path | None, ulip: Path | None, seed: int) -> EvaluationReport:
+    if what == "grasps":
+        from manitwin.dataset.evaluation.grasps import evaluate_grasps
+
+        return evaluate_grasps(dataset)
+    from manitwin.dataset.evaluation.generation import evaluate_generation
+    from manitwin.dataset.evaluation.input_likeness import Models
+    from manitwin.models.embedders.clip import ClipFolder
+
+    models = Models(None if clip is None else ClipFolder(clip), None if ulip is None else ClipFolder(ulip, points=True))
+    return evaluate_generation(
+        dataset, models, seed=seed, on_twin=lambda twin_id: error_console.print(f"{twin_id}: compared with its input")
+    )

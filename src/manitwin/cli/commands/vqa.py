@@ -47,6 +47,13 @@ def vqa(
         ),
     ] = 0.1,
     seed: Annotated[int, typer.Option(help="Seed of everything random.", min=0, max=options.LARGEST_SEED)] = 7,
+    vlm: Annotated[
+        str,
+        choices.PROPOSERS.option(
+            help="Who words the questions in other ways too: openai:MODEL@URL, anthropic:MODEL, replay:FILE, or none.",
+            metavar="SPEC",
+        ),
+    ] = "none",
 ) -> None:
     """Write questions about drawn scenes whose answers are computed, with the evidence beside them."""
     from manitwin.scenes.vqa.write import write_vqa
@@ -60,8 +67,13 @@ def vqa(
         points=points,
         validation_share=validation_share,
         seed=seed,
+        vlm=vlm,
     )
     out_console.print(
         f"{done.questions:,} questions of {done.families} families about {done.pictures:,} pictures of {done.scenes:,}"
         f" scenes: {done.files:,} files in {out}"
     )
+    if vlm != "none":
+        out_console.print(
+            f"{done.rephrased:,} questions in the model's words; what it gave is in {out / 'rephrasings.json'}"
+        )

@@ -1,0 +1,116 @@
+"""``manitwin collect``: a catalogue of what could be made into twins, and what it has."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import error_console, out_console
+from manitwin.cli.documents import Json, print_document
+
+_CAUSES_SHOWN = 20
+
+
+def collect_add(
+    catalogue: Annotated[
+        Path, typer.Argument(help="The catalogue, an SQLite file; made where there is none.", metavar="CATALOGUE")
+    ],
+    inputs: Annotated[
+        list[Path],
+        options.existing(
+            "Folders of photos and meshes, and lists of files and URLs.",
+            "FOLDER|LIST.csv|LIST.jsonl...",
+            "a folder, or a .csv or .jsonl list",
+        ),
+    ],
+    source: Annotated[str | None, typer.Option(help="Whence the inputs are.", metavar="NAME")] = None,
+    licence: Annotated[
+        str | None, typer.Option("--licence", "--license", help="Their licence (SPDX), where a list says none.")
+    ] = None,
+    attribution: Annotated[str | None, typer.Option(help="Whom to credit, where a list says nobody.")] = None,
+    category: Annotated[str | None, typer.Option(help="What the things are, where a list does not say.")] = None,
+    root: Annotated[
+        Path | None,
+        typer.Option(help="The folder that files of a list lie in; default: the list's own.", metavar="FOLDER"),
+    ] = None,
+) -> None:
+    """Add photos, meshes and URLs to a catalogue, each once; what cannot be read is told with its cause and count."""
+    from manitwin.dataset.collect.places import require_place
+
+    for place in inputs:
+        require_place(place, source, root)
+    from manitwin.dataset.collect.intake import Given, add
+
+    given = Given(source=source, licence=licence, attribution=attribution, name=category)
+    for place in inputs:
+        done = add(catalogue, place, given, root)
+        told = f"{place}: {done.entries:,} entries: {done.new:,} new, {done.changed:,} changed, {done.unchanged:,} as before"
+        told += f", {done.repeated:,} named twice" if done.repeated else ""
+        told += f"; {done.parts:,} files are parts of meshes" if done.parts else ""
+        out_console.print(told, markup=False, soft_wrap=True)
+        lines = [f"{count:,} cannot be read: {cause}" for cause, count in sorted(done.unreadable.items())]
+        lines += [f"{each.count:,} not added: {each.cause} (the first: {each.example})" for each in done.refused]
+        for line in lines[:_CAUSES_SHOWN]:
+            error_console.print(f"  {line}", markup=False, soft_wrap=True, style="yellow")
+        if len(lines) > _CAUSES_SHOWN:
+            error_console.print(
+                f"  and {len(lines) - _CAUSES_SHOWN} more causes: `manitwin collect status {catalogue}`"
+            )
+
+
+def collect_status(
+    catalogue: Annotated[Path, options.existing("A catalogue.", "CATALOGUE", "a catalogue that collect add made")],
+    json_: Json = False,
+) -> None:
+    """Say what a catalogue has: rows by group, status, licence, source and size, and what could not be read."""
+    from manitwin.dataset.collect.status import catalogue_status
+
+    status = catalogue_status(catalogue)
+    if json_:
+        print_document(status.document())
+        return
+    for line in status.lines():
+        out_console.print(line, markup=False, soft_wrap=True)
+
+
+def collect_plan(
+    catalogue: Annotated[Path, options.existing("A catalogue.", "CATALOGUE", "a catalogue that collect add made")],
+    out: Annotated[Path, options.output_folder("The folder to write the plan into.")],
+    items: Annotated[
+        int, typer.Option(help="Twins to build.", callback=choices.count_of("--items", 10_000_000), metavar="N")
+    ] = 1000,
+    seed: Annotated[int, typer.Option(help="The seed of the choice.", min=0, max=options.LARGEST_SEED)] = 1,
+    license: Annotated[
+        list[str] | None,
+        typer.Option("--licence", "--license", help="Only inputs of this licence; may be repeated.", metavar="SPDX"),
+    ] = None,
+    json_: Json = False,
+) -> None:
+    """Choose inputs evenly over groups, sizes and categories, as manifests for build; prompts for what is short."""
+    from manitwin.dataset.collect.store import Catalogue
+
+    with Catalogue(catalogue) as opened:
+        from manitwin.dataset.collect.plan_files import MANIFEST, PROMPTS, write_plan
+        from manitwin.dataset.collect.planning import plan_inputs
+
+        plan = plan_inputs(opened.ready(), items, seed=seed, licenses=license)
+    write_plan(plan, out)
+    if json_:
+        print_document(
+            {
+                "items": plan.items,
+                "chosen": len(plan.chosen),
+                "prompts": len(plan.prompts),
+                "groups": {name: {"wanted": plan.wanted[name], "there": plan.there[name]} for name in plan.wanted},
+                "left_out": plan.left_out,
+            }
+        )
+        return
+    for name, wanted in plan.wanted.items():
+        out_console.print(f"{name}: {plan.there[name]} of {wanted}")
+    for cause, count in plan.left_out.items():
+        out_console.print(f"left out, {cause}: {count}")
+    out_console.print(f"{out / MANIFEST}: {len(plan.chosen)} inputs; {out / PROMPTS}: {len(plan.prompts)} texts")

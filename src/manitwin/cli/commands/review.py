@@ -1,0 +1,225 @@
+"""``manitwin review``: people judge a sample of twins, and what their verdicts add up to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import error_console, out_console, print_error
+from manitwin.cli.documents import Json, print_document
+
+if TYPE_CHECKING:
+    from manitwin.web.serve import PageServer
+
+SAMPLED = 500
+"""As many as the paper's annotators judged."""
+
+Dataset = Annotated[
+    str, options.existing("A data set: a folder with an index.", "DATASET", "a data set that manitwin build made")
+]
+Sample = Annotated[
+    int, typer.Option("--sample", help="Twins to review.", callback=choices.count_of("--sample", 1_000_000))
+]
+Overlap = Annotated[
+    float,
+    typer.Option(
+        help="The share of the sample that two annotators judge independently, for their agreement.", min=0.0, max=1.0
+    ),
+]
+SampleSeed = Annotated[int, typer.Option("--seed", help="The seed of the sample.", min=0, max=options.LARGEST_SEED)]
+
+
+Annotators = Annotated[
+    list[str] | None,
+    typer.Option("--annotator", help="Who reviews; several share the sample.", metavar="NAME"),
+]
+Given = Annotated[
+    int | None, typer.Option("--sample", help="Twins to review.", callback=choices.count_of("--sample", 1_000_000))
+]
+
+
+def review(
+    dataset: Dataset,
+    sample: Given = None,
+    seed: SampleSeed = 1,
+    overlap: Overlap = 0.2,
+    annotator: Annotators = None,
+    blind: Annotated[
+        bool, typer.Option("--blind", help="Show neither who gave what is judged, nor how sure they were, nor why.")
+    ] = False,
+    port: Annotated[int, typer.Option(help="The port; 0: any that is free.", min=0, max=65535)] = 0,
+    host: Annotated[
+        str, typer.Option(help="The address to listen on; 0.0.0.0: all, for others to review.", metavar="ADDRESS")
+    ] = "127.0.0.1",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+) -> None:
+    """Judge a sample of twins in the browser, by keyboard, until interrupted; without --sample the last one that was drawn."""
+    import webbrowser
+
+    from manitwin.cli.commands.view import has_screen, interruptible, tell_link
+    from manitwin.dataset.index.query import Index
+    from manitwin.dataset.review.plan import draw_plan, require_annotator
+    from manitwin.dataset.review.session import ReviewSession
+    from manitwin.dataset.review.store import ReviewStore, reviews_path
+    from manitwin.twin.dataset_root import DatasetRoot
+    from manitwin.web.review_page import PATH
+    from manitwin.web.serve import review as serve_review
+
+    names = [require_annotator(name) for name in annotator or ["me"]]
+    root = DatasetRoot(dataset)
+    if sample is not None:
+        draw_plan(dataset, sample, seed, overlap)
+    with ReviewStore(reviews_path(root)) as store, interruptible() as ends_with:
+        kept = store.plan()
+        plan = kept if kept is not None else draw_plan(dataset, SAMPLED, seed, overlap)[0]
+        session = ReviewSession(store, Index(root), plan, names, blind=blind)
+
+        def ready(server: PageServer) -> None:
+            ends_with(server)
+            if server.names.open:
+                error_console.print(
+                    "it listens beyond this machine, and what it sends is not encrypted", style="yellow"
+                )
+            tell(server)
+            if browser and has_screen():
+                webbrowser.open(server.link(PATH, names[0]))
+
+        def tell(server: PageServer) -> None:
+            for name in names:
+                left = session.progress(name).left
+                tell_link(server.link(PATH, name), f"for {name} alone, {left} twins; until interrupted (Ctrl-C)")
+
+        serve_review(dataset, session, host, port, ready, tell)
+        out_console.print(f"`manitwin review report {dataset}` says what the verdicts tell")
+        out_console.print("stopped")
+
+
+def review_sample(
+    dataset: Dataset,
+    sample: Sample = SAMPLED,
+    seed: SampleSeed = 1,
+    overlap: Overlap = 0.2,
+    form: Annotated[
+        Path | None,
+        typer.Option(help="Write the rows to be filled in: an answer a dimension.", metavar="FILE.csv", dir_okay=False),
+    ] = None,
+    annotator: Annotators = None,
+) -> None:
+    """Draw a sample that is stratified by category, size and origin, and write a form for verdicts made elsewhere."""
+    from manitwin.errors import UsageError
+
+    if (form is None) != (not annotator):
+        raise UsageError("a form is somebody's: give --form FILE.csv and --annotator NAME together")
+    from manitwin.dataset.review.plan import draw_plan, write_forms
+
+    plan, strata = draw_plan(dataset, sample, seed, overlap)
+    twice = sum(plan.wanted(twin_id) > 1 for twin_id in plan.twins)
+    out_console.print(f"{len(plan.twins)} twins of {len(strata)} categories, {twice} of them for two annotators")
+    for file, rows in write_forms(dataset, plan, form, annotator or []):
+        out_console.print(f"{file}: {rows} rows to fill in; `manitwin review import {dataset} {file}` reads them")
+
+
+def review_import(
+    dataset: Dataset,
+    verdicts: Annotated[
+        Path,
+        options.existing(
+            "Verdicts, a row an answer (docs/review.md).", "FILE.csv|FILE.jsonl", "a CSV or JSONL file of verdicts"
+        ),
+    ],
+) -> None:
+    """Take up verdicts that were made elsewhere: all of a file or none, and those that are there already once."""
+    from manitwin.dataset.review.store import ReviewStore, reviews_path
+    from manitwin.dataset.review.verdict_files import read_verdicts
+    from manitwin.twin.dataset_root import DatasetRoot
+
+    root = DatasetRoot(dataset)
+    path, read = reviews_path(root), read_verdicts(verdicts, root)
+    with ReviewStore(path) as store:
+        added = store.add((review for review, _ in read), (request for _, request in read))
+    there = f", {len(read) - added} were there already" if added < len(read) else ""
+    out_console.print(f"{added} reviews taken up{there}; `manitwin review report {dataset}` says what they tell")
+
+
+def review_apply(
+    dataset: Dataset,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would be put right and what is disputed; write nothing.")
+    ] = False,
+    jobs: options.Jobs = None,
+) -> None:
+    """Write the corrections that nobody contradicts into the twins, and make again what follows from them."""
+    from manitwin.cli.progress import WatchedRun
+    from manitwin.dataset.review.apply import apply_reviews
+
+    if dry_run:
+        done = apply_reviews(dataset, dry_run=True)
+    else:
+        with WatchedRun("twins", dataset) as watched:
+            done = apply_reviews(dataset, jobs=jobs, **watched.callbacks)
+    for each in done.corrections:
+        out_console.print(f"{each.twin_id} {each.name}: {_said(each.value)} ({each.source})")
+    for conflict in done.conflicts:
+        said = ", ".join(f"{name} says {_said(value)}" for name, value in conflict.said.items())
+        out_console.print(f"not applied: {conflict.twin_id} {conflict.name}: {said}")
+    for twin_id, reason in done.left.items():
+        out_console.print(f"not applied: {twin_id}: {reason}")
+    verb = "would be" if dry_run else "are"
+    out_console.print(f"{len(done.corrections)} corrections {verb} applied, {len(done.conflicts)} are disputed")
+    unfinished = done.run is not None and (done.run.open or done.run.counts_of_given.get("failed"))
+    if unfinished:
+        print_error(f"twins are not all made again; `manitwin status {dataset}` says why")
+    raise typer.Exit(4 if unfinished else 3 if done.conflicts or done.left else 0)
+
+
+def _said(value: object) -> str:
+    if isinstance(value, dict):
+        return f"{value['value']:g} ({value['low']:g} to {value['high']:g})"
+    return str(value)
+
+
+def review_report(
+    dataset: Dataset,
+    export: Annotated[
+        Path | None,
+        typer.Option(help="Write all verdicts as .parquet, .csv or .jsonl, too.", metavar="FILE", dir_okay=False),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Print accuracy by dimension beside the paper's, agreement, progress, and what is disputed or wrong."""
+    from manitwin.dataset.review.report import export_verdicts, review_report
+
+    report = review_report(dataset)
+    for line in report.lines():
+        out_console.print(line)
+    if export is not None:
+        out_console.print(f"{export}: {export_verdicts(dataset, export)} verdicts")
+    if json:
+        print_document(report.document())
+
+
+def review_tune(
+    dataset: Dataset,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", "-o", help="Write what is proposed as a configuration.", metavar="FILE.toml", dir_okay=False
+        ),
+    ] = None,
+) -> None:
+    """Propose thresholds that would have agreed better with the verdicts, where that holds on twins they were not chosen on."""
+    from manitwin.dataset.review.tuning import toml_of, tune_dataset
+    from manitwin.twin.store import write_bytes_atomically
+
+    tuned = tune_dataset(dataset)
+    for each in tuned:
+        out_console.print(each.line())
+    proposed = toml_of(tuned)
+    if not proposed:
+        out_console.print("nothing is proposed")
+    elif out is not None:
+        write_bytes_atomically(out, proposed.encode())
+        out_console.print(f"{out}: read it, then give it to `manitwin build --config {out}`")

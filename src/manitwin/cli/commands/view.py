@@ -1,0 +1,115 @@
+"""``manitwin view``: a data set's gallery and its twins' pages, in the browser."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import webbrowser
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import err_console, out_console
+
+if TYPE_CHECKING:
+    from manitwin.web.serve import PageServer
+
+
+def view(
+    source: Annotated[
+        str,
+        options.existing("A data set with an index, or one twin.", "DATASET|TWIN", "a data set's or a twin's folder"),
+    ],
+    port: Annotated[int, typer.Option(help="The port; 0: any that is free.", min=0, max=65535)] = 0,
+    host: Annotated[
+        str, typer.Option(help="The address to listen on; 0.0.0.0: all, for others to see.", metavar="ADDRESS")
+    ] = "127.0.0.1",
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    static: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the pages as plain files into this new folder instead.",
+            metavar="OUT",
+            callback=choices.folder_to_write,
+        ),
+    ] = None,
+    sample: Annotated[
+        int | None, typer.Option(help="Of --static: so many twins, drawn.", callback=choices.count_of("sample"))
+    ] = None,
+    seed: Annotated[
+        int, typer.Option(help="Of --sample: the seed of what is drawn.", min=0, max=options.LARGEST_SEED)
+    ] = 0,
+    where: Annotated[
+        str | None, typer.Option(help="Of --static: the twins of a condition, as of manitwin query.", metavar="SQL")
+    ] = None,
+) -> None:
+    """Show a gallery of a data set and a page of each twin in the browser, until interrupted; or write them as plain files."""
+    from manitwin.errors import UsageError
+
+    if static is not None:
+        _write(source, static, sample, seed, where or "")
+        return
+    if sample is not None or where is not None:
+        raise UsageError("--sample and --where choose the twins of --static; the gallery has filters of its own")
+    from manitwin.web.serve import serve
+
+    def ready(server: PageServer) -> None:
+        ends_with(server)
+        if server.names.open:
+            err_console.print("it listens beyond this machine, and what it sends is not encrypted", style="yellow")
+        tell_link(server.link(), "until interrupted (Ctrl-C)")
+        if browser and has_screen():
+            webbrowser.open(server.link())
+
+    with interruptible() as ends_with:
+        serve(source, host, port, ready, lambda link: tell_link(link, "a new link, as one that was used came again"))
+        out_console.print("stopped")
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[PageServer], None]]:
+    """Give a function that has the first interrupt end a server in order; a second one ends what does not stop."""
+    running: list[PageServer] = []
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def interrupted(number: int, frame: object) -> None:
+        signal.signal(number, before[signal.Signals(number)])
+        for server in running:
+            server.stop()
+
+    def ends(server: PageServer) -> None:
+        running.append(server)
+        for number in before:
+            signal.signal(number, interrupted)
+
+    try:
+        yield ends
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _write(source: str, out: Path, sample: int | None, seed: int, where: str) -> None:
+    from manitwin.web.plain_files import write_plain_files
+
+    done = write_plain_files(source, out, sample=sample, seed=seed, where=where)
+    for twin_id, reason in done.left_out.items():
+        err_console.print(f"{twin_id} is left out: {reason}")
+    out_console.print(f"{done.twins:,} twins, {done.size_bytes / 1e6:,.1f} MB, in {out}; open {out / 'index.html'}")
+    raise typer.Exit(3 if done.left_out else 0)
+
+
+def tell_link(link: str, remark: str) -> None:
+    """Print a link, and write it to no log: it opens the pages to whoever has it first."""
+    out_console.print(f"{link}  ({remark})", logged=False)
+    sys.stdout.flush()
+
+
+def has_screen() -> bool:
+    """Tell whether a browser has a screen to open on: in a bare terminal a text browser would take the terminal."""
+    return sys.platform in ("darwin", "win32") or any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
