@@ -2,6 +2,8 @@
 
     manitwin view DATASET --no-browser
     python docs/make_view_pictures.py LINK TWIN_ID
+    manitwin view SCENES --no-browser
+    python docs/make_view_pictures.py LINK SCENE_ID --scene
 
 ``LINK`` is the link of one use that the command prints.
 """
@@ -19,7 +21,7 @@ from playwright.sync_api import sync_playwright
 
 FOLDER = Path(__file__).resolve().parent
 BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
-WIDE, NARROW = {"width": 1280, "height": 900}, {"width": 390, "height": 844}
+WIDE, NARROW, SCENE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}, {"width": 1280, "height": 720}
 WITHOUT_GPU = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 
 
@@ -29,7 +31,7 @@ def shown(page: Any, address: str, size: dict[str, int], scheme: str) -> Image.I
     page.emulate_media(color_scheme=scheme)
     page.goto("about:blank")
     page.goto(address, wait_until="networkidle")
-    if "/twin/" in address:
+    if "/twin/" in address or "/scene/" in address:
         page.wait_for_selector("#viewer[data-ready]")
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
@@ -50,27 +52,32 @@ def main() -> None:
     """Make the pictures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("link")
-    parser.add_argument("twin_id")
+    parser.add_argument("id", help="of a twin, or with --scene of a scene")
+    parser.add_argument("--scene", action="store_true", help="the picture of a scene's page alone")
     given = parser.parse_args()
     address = given.link.split("/enter")[0]
-    twin = f"{address}/twin/{given.twin_id}"
+    twin = f"{address}/twin/{given.id}"
     closer = f"{twin}#layers=hulls candidate functional grasp grasps cube&count=30&grasp=0&placement=0"
     with sync_playwright() as playwright:
         path = next(found for name in BROWSERS if (found := shutil.which(name)))
         page = playwright.chromium.launch(executable_path=path, args=WITHOUT_GPU).new_page()
         page.goto(given.link)
-        pictures = {
-            "view_gallery": shown(page, f"{address}/", WIDE, "light"),
-            "view_twin": shown(page, twin, WIDE, "light"),
-            "view_dark": shown(page, closer, WIDE, "dark"),
-            "view_narrow": beside(
-                [
-                    shown(page, f"{address}/", NARROW, "light"),
-                    shown(page, twin, NARROW, "light"),
-                    shown(page, twin, NARROW, "dark"),
-                ]
-            ),
-        }
+        pictures = (
+            {"view_scene": shown(page, f"{address}/scene/{given.id}", SCENE, "light")}
+            if given.scene
+            else {
+                "view_gallery": shown(page, f"{address}/", WIDE, "light"),
+                "view_twin": shown(page, twin, WIDE, "light"),
+                "view_dark": shown(page, closer, WIDE, "dark"),
+                "view_narrow": beside(
+                    [
+                        shown(page, f"{address}/", NARROW, "light"),
+                        shown(page, twin, NARROW, "light"),
+                        shown(page, twin, NARROW, "dark"),
+                    ]
+                ),
+            }
+        )
     for name, picture in pictures.items():
         picture.save(FOLDER / f"{name}.webp", quality=82, method=6)
 

@@ -20,7 +20,7 @@ from manitwin.scenes.scene import (
     SceneRecord,
     SurfaceBox,
 )
-from manitwin.scenes.scene_files import CONFIG, scene_name, write_scene
+from manitwin.scenes.scene_files import CONFIG, read_scene, scene_files, scene_name, write_scene
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.part_records import FACE_PARTS
@@ -38,15 +38,22 @@ PLACES = (
 
 def write_drawn_scenes(root: Path) -> Path:
     """Write a data set at ``root/set`` and two drawn scenes of it at ``root/scenes``, which is returned."""
+    scenes = write_scenes(root)
+    for file in scene_files(scenes):
+        pictures = file.parent / PICTURES_FOLDER
+        write_previews(read_scene(file), lambda each: root / "set" / twin_name(each), pictures, size_px=SIZE_PX)
+    return scenes
+
+
+def write_scenes(root: Path) -> Path:
+    """Write the data set and the two scenes without their pictures; returns ``root/scenes``."""
     dataset, scenes = root / "set", root / "scenes"
     things = (slab("box", 0.12, 0.08, 0.06, 0.3), can(), bowl())
     twins = {thing.category: write_thing(dataset, number, thing) for number, thing in enumerate(things)}
     add_parts(dataset / twin_name(twins["can"]), ("base", "lid"))
     for number, places in enumerate(PLACES):
         record = _record(number, places, twins)
-        folder = scenes / scene_name(record.scene_id)
-        write_scene(record, folder)
-        write_previews(record, lambda each: dataset / twin_name(each), folder / PICTURES_FOLDER, size_px=SIZE_PX)
+        write_scene(record, scenes / scene_name(record.scene_id))
     (scenes / CONFIG).write_text(json.dumps({"kind": "layouts", "dataset": str(dataset)}))
     return scenes
 

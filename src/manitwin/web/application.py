@@ -24,7 +24,7 @@ from manitwin.web.twin_page import twin_page
 LINKS = ServerLinks()
 _KEPT = {"cache-control": "private, max-age=86400"}
 """Of files whose address has the revision in it."""
-_NOT_KEPT = {"cache-control": "no-store"}
+NOT_KEPT = {"cache-control": "no-store"}
 
 
 def application(gallery: Gallery | None, twins: TwinFolders, title: str) -> Starlette:
@@ -34,23 +34,23 @@ def application(gallery: Gallery | None, twins: TwinFolders, title: str) -> Star
         if gallery is None:
             assert twins.only is not None
             return RedirectResponse(LINKS.twin(twins.only.record.twin_id), 303)
-        return await _answered(lambda: _gallery(gallery, dict(request.query_params), title))
+        return await answered(lambda: _gallery(gallery, dict(request.query_params), title))
 
     async def show_twin(request: Request) -> Response:
         twin_id = request.path_params["twin_id"]
-        return await _answered(lambda: _twin(twins, twin_id, gallery is not None))
+        return await answered(lambda: _twin(twins, twin_id, gallery is not None))
 
     async def give_document(request: Request) -> Response:
         twin_id = request.path_params["twin_id"]
-        return await _answered(
+        return await answered(
             lambda: Response(
-                document_bytes(twin_document(twins.twin(twin_id))), media_type="application/json", headers=_NOT_KEPT
+                document_bytes(twin_document(twins.twin(twin_id))), media_type="application/json", headers=NOT_KEPT
             )
         )
 
     async def give_file(request: Request) -> Response:
         twin_id, name = request.path_params["twin_id"], request.path_params["name"]
-        return await _answered(lambda: _FileResponse(open_file(twins.folder(twin_id), name)))
+        return await answered(lambda: _FileResponse(open_file(twins.folder(twin_id), name)))
 
     async def give_package_file(request: Request) -> Response:
         name = request.path_params["name"]
@@ -69,7 +69,7 @@ def application(gallery: Gallery | None, twins: TwinFolders, title: str) -> Star
     )
 
 
-async def _answered(work: Callable[[], Response]) -> Response:
+async def answered(work: Callable[[], Response]) -> Response:
     """Answer from a thread; what a person can mend is said in words, and a broken twin ends nothing but its own page."""
     try:
         return await run_in_threadpool(work)
@@ -82,15 +82,15 @@ async def _answered(work: Callable[[], Response]) -> Response:
 def _gallery(gallery: Gallery, asked: dict[str, str], title: str) -> Response:
     try:
         view = View.of(asked)
-        return HTMLResponse(gallery_page(gallery.find(view), title, LINKS), headers=_NOT_KEPT)
+        return HTMLResponse(gallery_page(gallery.find(view), title, LINKS), headers=NOT_KEPT)
     except UsageError as error:  # a condition that cannot be used: all twins, and what is wrong
         status = asked.get("status", "accepted")
         shown = gallery.find(View(status=status if status in ("accepted", "rejected") else "accepted"))
-        return HTMLResponse(gallery_page(shown, title, LINKS, error=str(error)), 400, headers=_NOT_KEPT)
+        return HTMLResponse(gallery_page(shown, title, LINKS, error=str(error)), 400, headers=NOT_KEPT)
 
 
 def _twin(twins: TwinFolders, twin_id: str, with_gallery: bool) -> Response:
-    return HTMLResponse(twin_page(twins.twin(twin_id), LINKS, with_gallery=with_gallery), headers=_NOT_KEPT)
+    return HTMLResponse(twin_page(twins.twin(twin_id), LINKS, with_gallery=with_gallery), headers=NOT_KEPT)
 
 
 class _FileResponse(StreamingResponse):
@@ -110,4 +110,4 @@ class _FileResponse(StreamingResponse):
 
 def _message(status: int, said: str) -> Response:
     body = f'<main class="message"><p role="alert">{text(said)}</p><p><a href="{LINKS.gallery()}">All twins</a></p></main>\n'
-    return HTMLResponse(page(str(status), body, LINKS), status, headers=_NOT_KEPT)
+    return HTMLResponse(page(str(status), body, LINKS), status, headers=NOT_KEPT)

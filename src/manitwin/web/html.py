@@ -10,6 +10,7 @@ from manitwin.formats.printable import printable
 from manitwin.web.links import Links
 
 STYLE, THREE, VIEWER, GALLERY, REVIEW = "manitwin.css", "three.js", "twin_viewer.js", "gallery.js", "review.js"
+STAGE, SCENE_VIEWER = "stage.js", "scene_viewer.js"
 """The styles and scripts of the pages, by the names under which they are served and written."""
 
 

@@ -48,6 +48,14 @@ class ServerLinks:
         """Return a twin's page."""
         return f"/twin/{quote(twin_id, safe='')}"
 
+    def scenes(self, start: int = 0) -> str:
+        """Return the list of scenes, from one on."""
+        return f"/?from={start}" if start else "/"
+
+    def scene(self, scene_id: str) -> str:
+        """Return a scene's page."""
+        return f"/scene/{quote(scene_id, safe='')}"
+
     def file(self, twin_id: str, name: str, revision: str) -> str:
         """Return a file of a twin."""
         return f"{self.twin(twin_id)}/{quote(name)}?r={quote(revision[:16], safe='')}"

@@ -21,6 +21,8 @@ from manitwin.web.access import ENTER, Guard, Names, Tokens
 from manitwin.web.application import application
 from manitwin.web.gallery_query import Gallery
 from manitwin.web.review_application import review_application
+from manitwin.web.scene_application import scene_application
+from manitwin.web.scene_folders import SceneFolders, is_scenes
 from manitwin.web.served_files import TwinFolders
 
 MOST_REQUESTS = 256
@@ -110,7 +112,11 @@ class PageServer:
 
 
 def pages_of(place: str, cache: Path) -> ASGIApp:
-    """Return the pages of a data set, or of a twin's folder; raises UsageError where it is neither or has no index."""
+    """Return the pages of a data set, a twin's folder, or scenes; raises UsageError where it is none, or has no index."""
+    if is_scenes(place):
+        scenes = SceneFolders(place, cache)
+        title = Path(place).resolve().name
+        return scene_application(application(None, scenes.twins, title), scenes, title)
     twins = TwinFolders(place, cache if "://" in place else None)
     if twins.only is not None:
         return application(None, twins, twins.only.record.name or twins.only.record.twin_id)

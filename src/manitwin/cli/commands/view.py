@@ -1,4 +1,4 @@
-"""``manitwin view``: a data set's gallery and its twins' pages, in the browser."""
+"""``manitwin view``: a data set's gallery, its twins' pages and scenes of them, in the browser."""
 
 from __future__ import annotations
 
@@ -23,7 +23,11 @@ if TYPE_CHECKING:
 def view(
     source: Annotated[
         str,
-        options.existing("A data set with an index, or one twin.", "DATASET|TWIN", "a data set's or a twin's folder"),
+        options.existing(
+            "A data set with an index, one twin, or scenes.",
+            "DATASET|TWIN|SCENES",
+            "a data set's, a twin's or scenes' folder",
+        ),
     ],
     port: Annotated[int, typer.Option(help="The port; 0: any that is free.", min=0, max=65535)] = 0,
     host: Annotated[
@@ -48,7 +52,7 @@ def view(
         str | None, typer.Option(help="Of --static: the twins of a condition, as of manitwin query.", metavar="SQL")
     ] = None,
 ) -> None:
-    """Show a gallery of a data set and a page of each twin in the browser, until interrupted; or write them as plain files."""
+    """Show a gallery of a data set and a page of each twin, or scenes in 3D, in the browser; or write them as plain files."""
     from manitwin.errors import UsageError
 
     if static is not None:

@@ -1,0 +1,42 @@
+"""The scenes of a run that a page may show, by their ids, and the twins that stand in them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from manitwin.errors import UsageError
+from manitwin.scenes.scene import SceneRecord
+from manitwin.scenes.scene_files import dataset_of, read_scene, scene_files
+from manitwin.web.served_files import TwinFolders
+
+
+def is_scenes(place: str) -> bool:
+    """Tell whether a place holds scenes: a run of ``manitwin layout``, a scene's folder or its file."""
+    return "://" not in place and bool(scene_files(Path(place)))
+
+
+class SceneFolders:
+    """The scenes at a place in the order of their ids, and ``twins`` of the data set that they were sampled from.
+
+    ``cache`` takes the twins of a data set at a URL. Raises UsageError where there are no scenes, or no data set of theirs.
+    """
+
+    def __init__(self, place: str, cache: Path):
+        files = scene_files(Path(place))
+        if not files:
+            raise UsageError(f"{place}: no scene there; `manitwin layout DATASET -o {place}` makes some")
+        self._files = {file.parent.name: file for file in files}
+        self.ids = sorted(self._files)
+        dataset = dataset_of(files[0])
+        self.twins = TwinFolders(dataset, cache if "://" in dataset else None)
+
+    def scene(self, scene_id: str) -> SceneRecord:
+        """Return a scene; raises UsageError where there is none of this id, or it cannot be read."""
+        if scene_id not in self._files:
+            raise UsageError("there is no scene of this name")
+        return read_scene(self._files[scene_id])
+
+    def beside(self, scene_id: str) -> tuple[str | None, str | None]:
+        """Return the ids before and after one."""
+        at = self.ids.index(scene_id)
+        return (self.ids[at - 1] if at else None), (self.ids[at + 1] if at + 1 < len(self.ids) else None)
