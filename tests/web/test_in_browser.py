@@ -5,6 +5,7 @@ from __future__ import annotations
 import http.server
 import shutil
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ import pytest
 from conftest import Served, serving
 from manitwin.twin.dataset_root import twin_name
 from manitwin.web.plain_files import write_plain_files
+from manitwin.web.serve import BETWEEN_LINKS_S
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser]
 Visitor = Callable[..., Any]
@@ -32,6 +34,7 @@ def inside(served: Served, visitor: Visitor) -> Visitor:
 
     def come(**how: Any) -> Any:
         page = visitor(**how)
+        time.sleep(BETWEEN_LINKS_S + 0.1)  # a link that comes again sooner gets no new one, and the test would wait for ever
         served.link = served.link if page.goto(served.link).status == 200 else served.next_link()
         if page.url.rstrip("/") != served.address:
             assert page.goto(served.link).status == 200

@@ -30,7 +30,7 @@ MOST_REQUESTS = 256
 KEEP_ALIVE_S = 20
 CLOSING_S = 2
 """What open requests are waited for at the end."""
-_BETWEEN_LINKS_S = 2.0
+BETWEEN_LINKS_S = 2.0
 
 
 def bound_socket(host: str, port: int) -> socket.socket:
@@ -106,7 +106,7 @@ class PageServer:
 
     def _used(self) -> None:
         now = asyncio.get_running_loop().time()
-        if self._on_new_link is not None and now - self._told >= _BETWEEN_LINKS_S:
+        if self._on_new_link is not None and now - self._told >= BETWEEN_LINKS_S:
             self._told = now
             self._on_new_link(self.link())
 
