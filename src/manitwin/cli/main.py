@@ -34,6 +34,7 @@ from manitwin.cli.commands.layout import layout
 from manitwin.cli.commands.locate import locate
 from manitwin.cli.commands.maintenance import check, index, retry
 from manitwin.cli.commands.models import models
+from manitwin.cli.commands.plan import plan
 from manitwin.cli.commands.prompts import prompts
 from manitwin.cli.commands.publish import publish
 from manitwin.cli.commands.query import query
@@ -100,7 +101,9 @@ register(app, reported(run, own_log=True), "run", hidden=True)
 for making in (index, stats, publish, export, segmentation, affordances, catalog, vqa):
     register(app, reported(making))
 register(app, reported(import_), "import")
-for other in (status, retry, check, query, search, doctor, models, fake, prompts, audit, carve, evaluate, locate, view):
+for other in (
+    status, retry, check, query, search, plan, doctor, models, fake, prompts, audit, carve, evaluate, locate, view,
+):  # fmt: skip
     register(app, other)
 register(app, review)
 for name, reviewing in (

@@ -1,0 +1,155 @@
+"""What so many inputs would cost, from what a data set's own inputs cost: CPU time, service costs, twins and disk.
+
+Inputs are taken as drawn from one population, those of the data set and those to come. An interval is that of a mean over the
+inputs by the percentile bootstrap (Efron 1979), of a share Wilson's (1927); what was not measured is None, never guessed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from manitwin.dataset.evaluation.annotation_scores import wilson_interval
+from manitwin.dataset.index.query import Index
+from manitwin.errors import TwinError, UsageError
+from manitwin.twin.dataset_root import DatasetRoot
+
+LEAST_INPUTS = 5
+"""Of fewer, one that is out of the ordinary decides everything."""
+MOST_SIZED = 200
+"""Inputs whose folders are looked at for their size, drawn by the seed."""
+RESAMPLES = 1000
+MOST_RESAMPLED = 5_000
+"""Inputs beyond which so many, drawn by the seed, stand for all in the interval: wider than it need be, never narrower."""
+LARGEST_MEMORY_GB = 1e6
+WORK = ".work"
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A figure for all inputs to come, with its interval (95 %)."""
+
+    value: float
+    low: float
+    high: float
+
+    def times(self, factor: float) -> Amount:
+        """Return the amount times a factor."""
+        return Amount(self.value * factor, self.low * factor, self.high * factor)
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What ``items`` inputs would take; ``measured`` inputs are what it is told from.
+
+    ``hours`` are those of ``cores`` that are always busy: no run is faster. ``usd`` is None without the price of a core's
+    hour. ``work_bytes`` are results of stages, which may be removed once all is done; None where none are kept.
+    ``memory_bytes`` is the limit of all workers together, not what they use, which is not recorded.
+    """
+
+    items: int
+    cores: int
+    measured: int
+    accepted: Amount
+    cpu_hours: Amount
+    hours: Amount
+    slowest_cpu_s: float
+    services_usd: Amount
+    usd: Amount | None
+    twins_bytes: Amount
+    work_bytes: Amount | None
+    index_bytes: float
+    ledger_bytes: float
+    memory_bytes: float | None
+    stages: dict[str, float]
+
+    def document(self) -> dict[str, Any]:
+        """Return it as plain values."""
+        plain = dict(vars(self))
+        return {name: dict(vars(value)) if isinstance(value, Amount) else value for name, value in plain.items()}
+
+
+def forecast(
+    root: DatasetRoot, items: int, cores: int, *, core_hour_usd: float | None = None, seed: int = 0
+) -> Forecast:
+    """Tell what ``items`` inputs would take on ``cores`` cores; raises UsageError where too little was measured."""
+    index = Index(root)
+    status = index.select("twins", columns=["twin_id"]).to_pydict()["twin_id"]
+    rejected = index.select("rejections", columns=["twin_id"]).to_pydict()["twin_id"]
+    ids = sorted({*status, *rejected})
+    if len(ids) < LEAST_INPUTS:
+        raise UsageError(
+            f"{root.path}: {len(ids)} inputs were built, {LEAST_INPUTS} at least tell what others cost; build more first"
+        )
+    place = {twin_id: number for number, twin_id in enumerate(ids)}
+    rows = index.select("stages", columns=["twin_id", "stage", "cpu_seconds", "cost_usd"]).to_pydict()
+    cpu_s, usd, stages = np.zeros(len(ids)), np.zeros(len(ids)), dict[str, float]()
+    for twin_id, stage, seconds, cost in zip(*(rows[name] for name in rows), strict=True):
+        cpu_s[place[twin_id]] += seconds or 0.0
+        usd[place[twin_id]] += cost or 0.0
+        stages[stage] = stages.get(stage, 0.0) + (seconds or 0.0)
+    if not cpu_s.any():
+        raise UsageError(
+            f"{root.path}: no CPU time of its stages is recorded; `manitwin index {root.path}` and try again"
+        )
+    rng = np.random.default_rng(seed)
+    cpu_hours = _for_all(cpu_s / 3600, items, rng)
+    accepted = len(set(status) - set(rejected))
+    low, high = wilson_interval(accepted, len(ids))
+    services = _for_all(usd, items, rng)
+    drawn = [ids[i] for i in sorted(rng.choice(len(ids), min(len(ids), MOST_SIZED), replace=False))]
+    work = np.array([_bytes_below(root, f"{WORK}/{each}") for each in drawn])
+    return Forecast(
+        items=items,
+        cores=cores,
+        measured=len(ids),
+        accepted=Amount(items * accepted / len(ids), items * low, items * high),
+        cpu_hours=cpu_hours,
+        hours=cpu_hours.times(1 / cores),
+        slowest_cpu_s=float(cpu_s.max()),
+        services_usd=services,
+        usd=None
+        if core_hour_usd is None
+        else Amount(*(c * core_hour_usd + s for c, s in zip(_of(cpu_hours), _of(services), strict=True))),
+        twins_bytes=_for_all(np.array([_bytes_below(root, root.twin_name(each)) for each in drawn]), items, rng),
+        work_bytes=_for_all(work, items, rng) if work.any() else None,
+        index_bytes=_bytes_below(root, "index") / len(ids) * items,
+        ledger_bytes=_bytes_of(root, "ledger.sqlite") / len(ids) * items,
+        memory_bytes=_memory_bytes(root, cores),
+        stages={name: seconds / cpu_s.sum() for name, seconds in sorted(stages.items(), key=lambda each: -each[1])},
+    )
+
+
+def _of(amount: Amount) -> tuple[float, float, float]:
+    return amount.value, amount.low, amount.high
+
+
+def _for_all(each: np.ndarray, items: int, rng: np.random.Generator) -> Amount:
+    """Return the sum over ``items`` inputs of which ``each`` (N,) are a sample, with the bootstrap's interval of the mean."""
+    kept = each if len(each) <= MOST_RESAMPLED else rng.choice(each, MOST_RESAMPLED, replace=False)
+    counts = rng.multinomial(len(kept), np.full(len(kept), 1 / len(kept)), size=RESAMPLES)
+    low, high = np.percentile(counts @ kept / len(kept), [2.5, 97.5])
+    mean = float(each.mean())
+    return Amount(items * mean, items * min(float(low), mean), items * max(float(high), mean))
+
+
+def _bytes_below(root: DatasetRoot, folder: str) -> float:
+    return float(sum(size or 0 for size in root.sizes_below(folder).values()))
+
+
+def _bytes_of(root: DatasetRoot, name: str) -> float:
+    return float(root.fs.size(root.full(name)) or 0) if root.exists(name) else 0.0
+
+
+def _memory_bytes(root: DatasetRoot, cores: int) -> float | None:
+    """Return the memory limit of so many workers, by the data set's configuration; None where it is not told."""
+    try:
+        run = root.read_json("config.json").get("run")
+    except (TwinError, FileNotFoundError):
+        return None
+    limit_gb = run.get("memory_gb") if isinstance(run, dict) else None
+    if not isinstance(limit_gb, (int, float)) or not 0 < limit_gb <= LARGEST_MEMORY_GB:
+        return None
+    return float(limit_gb * 2**30 * cores)
