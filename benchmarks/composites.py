@@ -23,7 +23,7 @@ from manitwin.render.cameras import Camera, framing_camera
 from manitwin.render.procedural_textures import periodic_noise, procedural_texture
 from manitwin.render.renderer import shared_renderer
 
-Part = Literal["tuning", "held-out", "calibration"]
+Part = Literal["tuning", "held-out", "calibration", "training"]
 Kind = Literal["single", "cut", "several"]
 
 WIDTH_PX, HEIGHT_PX = 640, 512
@@ -34,8 +34,13 @@ GROUNDS: dict[Part, tuple[str, ...]] = {
         *("plain", "plain", "plain", "paper", "wood", "cloth", "concrete"),
         *("terrazzo", "linen", "leather", "checks"),
     ),
+    "training": (
+        *("plain", "plain", "plain", "paper", "wood", "cloth", "concrete"),
+        *("terrazzo", "linen", "leather", "checks"),
+    ),
 }
-SEEDS: dict[Part, int] = {"tuning": 0, "held-out": 1, "calibration": 2}
+SEEDS: dict[Part, int] = {"tuning": 0, "held-out": 1, "calibration": 2, "training": 3}
+UNSEEN = 4  # one of so many categories is in no picture of the training part
 FLAT = 0.3  # height over footprint, below which a thing lies and is photographed from above
 CLEAR = ("glass", "wine glass", "glass bottle", "jar", "vase", "bottle", "water bottle", "measuring cup")
 
@@ -72,12 +77,12 @@ def composite(part: Part, number: int) -> Composite:
     rng = np.random.default_rng([number, SEEDS[part]])
     drawn = rng.random()
     kind: Kind = "single" if drawn < 0.72 else "cut" if drawn < 0.86 else "several"
-    things = [_thing(rng, None)]
+    things = [_thing(rng, None, part)]
     main = things[0]
     placements = [_placement(rng, main, kind)]
     if kind == "several":
         for _ in range(int(rng.integers(1, 3))):
-            other = _thing(rng, main)
+            other = _thing(rng, main, part)
             places = [_placement(rng, other, "single", scale=float(rng.uniform(0.35, 0.5))) for _ in range(30)]
             apart = [p for p in places if not _overlap(things, placements, other, p)]
             if apart:
@@ -103,9 +108,14 @@ def composite(part: Part, number: int) -> Composite:
     return Composite(_photographed(rng, light), truth, kind, main.category, setting)
 
 
-def _thing(rng: np.random.Generator, beside: _Thing | None) -> _Thing:
+def is_unseen(category: str) -> bool:
+    """Return whether a category is kept out of the training part."""
+    return sorted(load_templates()).index(category) % UNSEEN == 0
+
+
+def _thing(rng: np.random.Generator, beside: _Thing | None, part: Part) -> _Thing:
     templates = load_templates()
-    names = sorted(templates)
+    names = [name for name in sorted(templates) if part != "training" or not is_unseen(name)]
     while True:
         category = names[int(rng.integers(len(names)))]
         wish = Wish(rgb=tuple(rng.uniform(0.03, 0.97, 3))) if rng.random() < 0.3 else Wish()  # type: ignore[arg-type]
@@ -230,7 +240,7 @@ def _ground(rng: np.random.Generator, part: Part, thing: _Thing, placement: np.n
             picture = picture * line + wall * (1 - line)
     if rng.random() < 0.08:
         setting += ", clutter"
-        picture = _cluttered(rng, picture)
+        picture = _cluttered(rng, picture, part)
     return (picture * _falloff(rng)).astype(np.float32), setting
 
 
@@ -297,11 +307,11 @@ def _noise_of(rng: np.random.Generator, family: str) -> np.ndarray:
     return tiles
 
 
-def _cluttered(rng: np.random.Generator, picture: np.ndarray) -> np.ndarray:
+def _cluttered(rng: np.random.Generator, picture: np.ndarray, part: Part) -> np.ndarray:
     """Put other things, far out of focus, behind."""
     layer = picture.copy()
     for _ in range(int(rng.integers(2, 5))):
-        other = _thing(rng, None)
+        other = _thing(rng, None, part)
         moved = np.array([[0.5, 0, rng.uniform(-0.2, 0.8) * WIDTH_PX], [0, 0.5, rng.uniform(-0.4, 0.1) * HEIGHT_PX]])
         rgb, coverage = (cv2.warpAffine(x, moved, (WIDTH_PX, HEIGHT_PX)) for x in (other.rgb, other.coverage))
         layer = layer * (1 - coverage[..., None]) + rgb

@@ -11,8 +11,8 @@ import numpy as np
 
 IR_VERSION, OPSET = 8, 13
 _FLOAT, _INT64 = 1, 7  # TensorProto.DataType
-_ATTRIBUTE_FLOAT, _ATTRIBUTE_INT, _ATTRIBUTE_INTS = 1, 2, 7  # AttributeProto.AttributeType
-Attribute = float | int | list[int]
+_ATTRIBUTE_FLOAT, _ATTRIBUTE_INT, _ATTRIBUTE_STRING, _ATTRIBUTE_INTS = 1, 2, 3, 7  # AttributeProto.AttributeType
+Attribute = float | int | str | list[int]
 
 
 @dataclass
@@ -61,6 +61,8 @@ def _value(name: str, shape: tuple[int, ...], element: int = _FLOAT) -> bytes:
 def _attribute(name: str, value: Attribute) -> bytes:
     if isinstance(value, list):
         return _text(1, name) + b"".join(_number(8, number) for number in value) + _number(20, _ATTRIBUTE_INTS)
+    if isinstance(value, str):
+        return _text(1, name) + _text(4, value) + _number(20, _ATTRIBUTE_STRING)
     if isinstance(value, float):
         return _text(1, name) + _key(2, 5) + np.float32(value).tobytes() + _number(20, _ATTRIBUTE_FLOAT)
     return _text(1, name) + _number(3, value) + _number(20, _ATTRIBUTE_INT)
