@@ -34,9 +34,7 @@ def inside(served: Served, visitor: Visitor) -> Visitor:
 
     def come(**how: Any) -> Any:
         page = visitor(**how)
-        time.sleep(
-            BETWEEN_LINKS_S + 0.1
-        )  # a link that comes again sooner gets no new one, and the test would wait for ever
+        time.sleep(BETWEEN_LINKS_S + 0.1)  # for one that comes again sooner there is no new link
         served.link = served.link if page.goto(served.link).status == 200 else served.next_link()
         if page.url.rstrip("/") != served.address:
             assert page.goto(served.link).status == 200
