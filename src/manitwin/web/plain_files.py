@@ -17,7 +17,7 @@ from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
 from manitwin.web.gallery_page import plain_gallery_page
 from manitwin.web.gallery_query import Gallery, View
-from manitwin.web.html import GALLERY, STYLE, THREE, VIEWER
+from manitwin.web.html import GALLERY, STAGE, STYLE, THREE, VIEWER
 from manitwin.web.links import FileLinks
 from manitwin.web.package_files import LICENSE, package_file
 from manitwin.web.served_files import CARD, MODEL, VIEWS, TwinFolders, open_file
@@ -91,7 +91,7 @@ def _written(
         said = f"{len(written):,} accepted twins" + (f" of {title}" if twins.only is None else "")
         page = plain_gallery_page(written, "accepted", title, said, FileLinks())
         done.size_bytes += _write(fresh / "index.html", page.encode())
-        for name in (STYLE, GALLERY, THREE, VIEWER, LICENSE):
+        for name in (STYLE, GALLERY, THREE, STAGE, VIEWER, LICENSE):
             done.size_bytes += _write(fresh / "static" / name, package_file(name))
     done.twins = len(written)
     return done

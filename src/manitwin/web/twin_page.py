@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import TwinRecord
-from manitwin.web.html import THREE, VIEWER, page, text
+from manitwin.web.html import STAGE, THREE, VIEWER, page, text
 from manitwin.web.links import Links
 from manitwin.web.served_files import CARD, INPUTS, MODEL, VIEWS
 from manitwin.web.twin_document import DOCUMENT
@@ -47,7 +47,7 @@ def twin_page(twin: Twin, links: Links, *, with_gallery: bool = True) -> str:
         f'<div class="twin">\n{viewer(record, links)}<main id="main">\n{_words(record)}{fact_tables(record)}'
         f"{_downloads(record, links)}</main>\n</div>\n{pictures(twin, links)}"
     )
-    return page(name, body, links, scripts=[THREE, VIEWER], data=own)
+    return page(name, body, links, scripts=[THREE, STAGE, VIEWER], data=own)
 
 
 def viewer(record: TwinRecord, links: Links) -> str:

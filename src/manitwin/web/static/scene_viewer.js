@@ -2,11 +2,13 @@
 "use strict";
 (() => {
   const viewer = document.getElementById("viewer");
-  const view = viewer && globalThis.manitwinStage(viewer);
-  if (!view) return;
-  const { THREE, scene, report, fail, given, quaternion, vector, draw } = view;
-  const document_ = given(viewer.dataset.document, "json");
+  if (!viewer) return;
+  const given = globalThis.manitwinGiven;
+  const document_ = given(viewer.dataset.document, "json"); // the server works while the browser sets up WebGL
   document_.catch(() => {}); // told below
+  const view = globalThis.manitwinStage(viewer);
+  if (!view) return;
+  const { THREE, scene, report, fail, quaternion, vector, draw } = view;
   const layers = {};
   for (const box of viewer.querySelectorAll("[data-layer]")) scene.add((layers[box.dataset.layer] = new THREE.Group()));
   const box = (name) => viewer.querySelector(`[data-layer="${name}"]`);

@@ -1,7 +1,13 @@
 // What 3D views share: the renderer and its camera, turned by mouse and keys, and names on hover. Metres, +Z up, quaternions wxyz.
 // Texts are only ever set as textContent.
 "use strict";
-globalThis.manitwinStage = (viewer) => {
+globalThis.manitwinGiven = async (address, how) => {
+  const answer = await fetch(address);
+  if (answer.ok) return answer[how]();
+  const told = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("[role=alert]");
+  throw new Error(told ? told.textContent : `the server answers ${answer.status}`);
+};
+globalThis.manitwinStage = (viewer, near = 0.01, far = 100) => {
   const stage = viewer.querySelector(".stage");
   const tip = viewer.querySelector(".tip");
   const said = viewer.querySelector(".said");
@@ -14,30 +20,25 @@ globalThis.manitwinStage = (viewer) => {
     problems.push(text);
     report(problems.join(" · "), true);
   }
-  async function given(address, how) {
-    const answer = await fetch(address);
-    if (answer.ok) return answer[how]();
-    const told = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("[role=alert]");
-    throw new Error(told ? told.textContent : `the server answers ${answer.status}`);
-  }
   const { THREE, GLTFLoader, OrbitControls } = globalThis.threeBundle || {};
   let renderer;
   try {
     renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
   } catch (error) {
-    fail("This browser cannot draw in 3D (WebGL is off or missing): the numbers are all here.");
+    fail("This browser cannot draw in 3D (WebGL is off or missing): all else is here.");
     return null;
   }
   renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   stage.prepend(renderer.domElement);
   const scene = new THREE.Scene();
-  const camera = new THREE.PerspectiveCamera(35, 1, 0.01, 100);
+  const camera = new THREE.PerspectiveCamera(35, 1, near, far);
   camera.up.set(0, 0, 1);
   const orbit = new OrbitControls(camera, renderer.domElement);
   const light = new THREE.DirectionalLight(0xffffff, 2.2);
   scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa0aa, 2.6), light);
   const quaternion = (q) => new THREE.Quaternion(q[1], q[2], q[3], q[0]);
   const vector = (v, at = 0) => new THREE.Vector3(v[at], v[at + 1], v[at + 2]);
+  const ray = new THREE.Raycaster();
   let asked = false;
   let home = [1, -1, 1, 0, 0, 0];
   let remember = () => {};
@@ -98,15 +99,27 @@ globalThis.manitwinStage = (viewer) => {
       }
     });
   }
-  function labelOf(object) {
-    for (let each = object; each; each = each.parent) if (each.userData.label) return each.userData.label;
-    return null;
+  // what is under the pointer with something of a name among its own or its parents' user data, and what that is
+  function under(event, name, targets) {
+    const area = stage.getBoundingClientRect();
+    const x = event.clientX - area.left;
+    const y = event.clientY - area.top;
+    ray.setFromCamera(new THREE.Vector2((2 * x) / area.width - 1, 1 - (2 * y) / area.height), camera);
+    for (const hit of ray.intersectObjects(targets(), true)) {
+      const found = ofOne(hit.object, name);
+      if (found !== undefined) return { told: typeof found === "function" ? found(hit.instanceId) : found, area, x, y };
+    }
+    return { area, x, y };
   }
-  function isShown(object) {
-    for (let each = object; each; each = each.parent) if (!each.visible) return false;
-    return true;
+  function ofOne(object, name) {
+    let found;
+    for (let each = object; each; each = each.parent) {
+      if (!each.visible) return undefined;
+      found ??= each.userData[name];
+    }
+    return found;
   }
-  function listen(keys) {
+  function listen(keys, targets = () => scene.children) {
     const all = {
       ArrowLeft: () => turn(-0.15, 0), ArrowRight: () => turn(0.15, 0), ArrowUp: () => turn(0, -0.12), ArrowDown: () => turn(0, 0.12),
       "+": () => turn(0, 0, 0.85), "=": () => turn(0, 0, 0.85), "-": () => turn(0, 0, 1.18), "−": () => turn(0, 0, 1.18),
@@ -120,17 +133,16 @@ globalThis.manitwinStage = (viewer) => {
     });
     orbit.addEventListener("change", draw);
     orbit.addEventListener("end", () => remember());
-    const ray = new THREE.Raycaster();
     stage.addEventListener("pointerleave", () => (tip.hidden = true));
+    stage.addEventListener("click", (event) => {
+      const { told } = under(event, "pick", targets); // a page that moves points listens
+      if (told !== undefined) stage.dispatchEvent(new CustomEvent("twin:picked", { bubbles: true, detail: told }));
+    });
     stage.addEventListener("pointermove", (event) => {
-      const area = stage.getBoundingClientRect();
-      const x = event.clientX - area.left;
-      const y = event.clientY - area.top;
-      ray.setFromCamera(new THREE.Vector2((2 * x) / area.width - 1, 1 - (2 * y) / area.height), camera);
-      const hit = ray.intersectObjects(scene.children, true).find((each) => isShown(each.object) && labelOf(each.object));
-      tip.hidden = !hit;
-      if (!hit) return;
-      tip.textContent = labelOf(hit.object);
+      const { told, area, x, y } = under(event, "label", targets);
+      tip.hidden = told === undefined;
+      if (tip.hidden) return;
+      tip.textContent = told;
       tip.style.left = `${Math.min(x + 12, area.width - tip.offsetWidth - 4)}px`;
       tip.style.top = `${Math.min(y + 12, area.height - tip.offsetHeight - 4)}px`;
     });
@@ -151,7 +163,7 @@ globalThis.manitwinStage = (viewer) => {
     };
   }
   return {
-    THREE, scene, viewer, stage, problems, report, fail, given, quaternion, vector, draw, listen, kept, parsed,
+    THREE, scene, stage, problems, report, fail, quaternion, vector, draw, listen, kept, parsed,
     remember: () => remember(),
     setHome: (numbers) => (home = numbers),
   };

@@ -4,54 +4,22 @@
 (() => {
   const viewer = document.getElementById("viewer");
   if (!viewer) return;
-  const stage = viewer.querySelector(".stage");
-  const tip = viewer.querySelector(".tip");
-  const said = viewer.querySelector(".said");
   const control = (name) => viewer.querySelector(`[data-control="${name}"]`);
   const COLORS = {
     held: 0x228833, slips: 0xccbb44, drops: 0xee6677, misses: 0xaa3377, collides: 0x4477aa, unstable: 0x66ccee,
     penetrates: 0x994455, unreachable: 0xbbbbbb,
   }; // Tol's bright scheme
   const POINTS = { candidate: [0x7c858f, 0.009], functional: [0xd62728, 0.013], grasp: [0x1f77b4, 0.013] };
-  const problems = [];
-
-  function report(text, isError) {
-    said.textContent = text;
-    said.classList.toggle("error", Boolean(isError));
-  }
-  function fail(text) {
-    problems.push(text);
-    report(problems.join(" · "), true);
-  }
-
-  async function given(name, how) {
-    const answer = await fetch(viewer.dataset[name]);
-    if (answer.ok) return answer[how]();
-    const told = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("[role=alert]");
-    throw new Error(told ? told.textContent : `the server answers ${answer.status}`);
-  }
   // asked for at once: the server works while the browser sets up WebGL
   const plain = globalThis.manitwinTwin;
+  const given = (name, how) => globalThis.manitwinGiven(viewer.dataset[name], how);
   const document_ = plain ? Promise.resolve(plain) : given("document", "json");
   const model = plain ? Promise.resolve().then(() => decoded(globalThis.manitwinModel)) : given("model", "arrayBuffer");
   for (const each of [document_, model]) each.catch(() => {}); // told below
 
-  const { THREE, GLTFLoader, OrbitControls } = globalThis.threeBundle || {};
-  let renderer;
-  try {
-    renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
-  } catch (error) {
-    fail("This browser cannot draw in 3D (WebGL is off or missing): the numbers and pictures are all here.");
-    return;
-  }
-  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-  stage.prepend(renderer.domElement);
-  const scene = new THREE.Scene();
-  const camera = new THREE.PerspectiveCamera(35, 1, 0.005, 50);
-  camera.up.set(0, 0, 1);
-  const orbit = new OrbitControls(camera, renderer.domElement);
-  const light = new THREE.DirectionalLight(0xffffff, 2.2);
-  scene.add(new THREE.HemisphereLight(0xffffff, 0x9aa0aa, 2.6), light);
+  const view = globalThis.manitwinStage(viewer, 0.005, 50);
+  if (!view) return;
+  const { THREE, scene, report, fail, quaternion, vector, draw } = view;
   const object = new THREE.Group(); // what a placement moves
   scene.add(object);
   const layers = {};
@@ -60,54 +28,15 @@
   }
   scene.add((layers.cube = new THREE.Group()));
 
-  let asked = false;
   let twin;
-  let home = [];
   let forks = null; // the one instanced mesh of a gripper's grasps
   let shown = []; // the grasps that are drawn, as places in their columns
   let chosen = -1;
   const hidden = new Set(); // outcomes
 
-  function draw() {
-    if (asked) return;
-    asked = true;
-    requestAnimationFrame(() => {
-      asked = false;
-      light.position.copy(camera.position).add(new THREE.Vector3(0.2, 0.1, 0.6));
-      renderer.render(scene, camera);
-    });
-  }
-  const quaternion = (q) => new THREE.Quaternion(q[1], q[2], q[3], q[0]);
-  const vector = (v, at = 0) => new THREE.Vector3(v[at], v[at + 1], v[at + 2]);
   const solid = (color, more) => new THREE.MeshStandardMaterial({ color, roughness: 0.7, ...more });
 
   // ---- shapes
-  function addModel(buffer) {
-    const manager = new THREE.LoadingManager();
-    // a GLB holds all that it needs: nothing is fetched from where one points to
-    manager.setURLModifier((url) => (/^(blob|data):/.test(url) ? url : "data:,"));
-    return new Promise((resolve) => {
-      const broken = (error) => {
-        fail(`visual.glb cannot be shown: ${String((error && error.message) || error).slice(0, 200)}`);
-        resolve();
-      };
-      try {
-        new GLTFLoader(manager).parse(buffer, "", (gltf) => {
-          const model = gltf.scene;
-          model.rotation.x = Math.PI / 2; // GLB is Y-up
-          model.traverse((each) => {
-            for (const material of [].concat(each.material || [])) {
-              if (material.metalness > 0.4) material.metalness = 0.4; // there are no surroundings that it could mirror
-            }
-          });
-          layers.mesh.add(model);
-          resolve();
-        }, broken);
-      } catch (error) {
-        broken(error);
-      }
-    });
-  }
   function addWireframe() {
     if (layers.wireframe.children.length) return;
     const lines = new THREE.MeshBasicMaterial({ color: 0x5577aa, wireframe: true, transparent: true, opacity: 0.5 });
@@ -251,7 +180,7 @@
         if (box.checked) hidden.delete(outcome);
         else hidden.add(outcome);
         drawGrasps();
-        remember();
+        view.remember();
       });
       label.append(box, mark, ` ${outcome} ${columns.outcome.filter((each) => each === outcome).length}`);
       legend.append(label);
@@ -280,17 +209,6 @@
     report(graspLabel(columns, chosen));
     drawGrasps();
   }
-  function turn(azimuth, polar, zoom = 1) {
-    const offset = camera.position.clone().sub(orbit.target).multiplyScalar(zoom);
-    offset.applyAxisAngle(camera.up, azimuth);
-    const side = new THREE.Vector3().crossVectors(camera.up, offset).normalize();
-    const above = offset.clone().applyAxisAngle(side, polar);
-    if (above.angleTo(camera.up) > 0.05 && above.angleTo(camera.up) < 3.09 && above.dot(offset) > 0) offset.copy(above);
-    camera.position.copy(orbit.target).add(offset);
-    orbit.update();
-    draw();
-    remember();
-  }
   function step(name, by) {
     const field = control(name);
     if (name === "count") field.value = Math.max(0, Number(field.value) + by);
@@ -298,9 +216,7 @@
     field.dispatchEvent(new Event("input", { bubbles: true }));
   }
   const KEYS = {
-    ArrowLeft: () => turn(-0.15, 0), ArrowRight: () => turn(0.15, 0), ArrowUp: () => turn(0, -0.12), ArrowDown: () => turn(0, 0.12),
-    "+": () => turn(0, 0, 0.85), "=": () => turn(0, 0, 0.85), "-": () => turn(0, 0, 1.18), "−": () => turn(0, 0, 1.18),
-    0: () => look(home), "[": () => step("count", -5), "]": () => step("count", 5), n: () => choose(1), N: () => choose(-1),
+    "[": () => step("count", -5), "]": () => step("count", 5), n: () => choose(1), N: () => choose(-1),
     l: () => step("placement", 1), k: () => step("color", 1),
   };
   for (const box of viewer.querySelectorAll("[data-layer]")) {
@@ -310,13 +226,7 @@
     };
   }
   function listen() {
-    stage.addEventListener("keydown", (event) => {
-      const act = event.ctrlKey || event.altKey || event.metaKey ? null : KEYS[event.key];
-      if (!act) return;
-      event.preventDefault();
-      act();
-    });
-    viewer.addEventListener("change", (event) => event.target.dataset.layer && (showLayers(), remember()));
+    viewer.addEventListener("change", (event) => event.target.dataset.layer && (showLayers(), view.remember()));
     viewer.addEventListener("input", (event) => {
       const name = event.target.dataset.control;
       if (name === "gripper") {
@@ -324,65 +234,22 @@
         fillGripper();
       } else if (name === "placement") place();
       else if (name) drawGrasps();
-      if (name) remember();
+      if (name) view.remember();
     });
-    orbit.addEventListener("change", draw);
-    orbit.addEventListener("end", remember);
-    const ray = new THREE.Raycaster();
-    stage.addEventListener("pointerleave", () => (tip.hidden = true));
-    const under = (event, wanted) => {
-      const area = stage.getBoundingClientRect();
-      const x = event.clientX - area.left;
-      const y = event.clientY - area.top;
-      ray.setFromCamera(new THREE.Vector2((2 * x) / area.width - 1, 1 - (2 * y) / area.height), camera);
-      const targets = [];
-      for (const group of Object.values(layers)) if (group.visible) targets.push(...group.children);
-      return [ray.intersectObjects(targets, false).find((each) => each.object.userData[wanted]), area, x, y];
-    };
-    stage.addEventListener("click", (event) => {
-      const [hit] = under(event, "pick"); // a page that moves points listens
-      if (hit) stage.dispatchEvent(new CustomEvent("twin:picked", { bubbles: true, detail: hit.object.userData.pick(hit.instanceId) }));
-    });
-    stage.addEventListener("pointermove", (event) => {
-      const [hit, area, x, y] = under(event, "label");
-      tip.hidden = !hit;
-      if (!hit) return;
-      tip.textContent = hit.object.userData.label(hit.instanceId);
-      tip.style.left = `${Math.min(x + 12, area.width - tip.offsetWidth - 4)}px`;
-      tip.style.top = `${Math.min(y + 12, area.height - tip.offsetHeight - 4)}px`;
-    });
-    renderer.domElement.addEventListener("webglcontextlost", () => fail("The browser has taken the 3D view's memory away: reload the page."));
-    new ResizeObserver(resize).observe(stage);
-  }
-  function resize() {
-    const { clientWidth, clientHeight } = stage;
-    if (!clientWidth || !clientHeight) return;
-    renderer.setSize(clientWidth, clientHeight, false);
-    renderer.domElement.style.width = `${clientWidth}px`;
-    renderer.domElement.style.height = `${clientHeight}px`;
-    camera.aspect = clientWidth / clientHeight;
-    camera.updateProjectionMatrix();
-    draw();
+    // the mesh has no name of its own, and its many triangles are not asked
+    view.listen(KEYS, () => Object.entries(layers).flatMap(([name, group]) => (name === "mesh" || name === "wireframe" ? [] : group.children)));
   }
 
   // ---- the view in the address
-  function look(numbers) {
-    camera.position.set(...numbers.slice(0, 3));
-    orbit.target.set(...numbers.slice(3));
-    orbit.update();
-    draw();
-  }
-  function remember() {
+  function remembered() {
     const state = new URLSearchParams();
     state.set("layers", Object.keys(layers).filter((name) => layerBox(name).checked).join(" "));
     for (const name of ["gripper", "count", "color", "placement"]) state.set(name, control(name).value);
     if (hidden.size) state.set("without", [...hidden].join(" "));
     if (chosen >= 0) state.set("grasp", chosen);
-    state.set("from", [...camera.position.toArray(), ...orbit.target.toArray()].map((each) => each.toFixed(3)).join(" "));
-    history.replaceState(null, "", `#${state}`);
+    return state;
   }
-  function recall() {
-    const state = new URLSearchParams(location.hash.slice(1));
+  function recall(state) {
     const on = state.get("layers");
     if (on !== null) for (const name of Object.keys(layers)) layerBox(name).checked = on.split(" ").includes(name);
     for (const name of ["gripper", "color", "placement"]) {
@@ -391,8 +258,6 @@
     }
     for (const outcome of (state.get("without") || "").split(" ")) if (outcome in COLORS) hidden.add(outcome);
     chosen = Number.parseInt(state.get("grasp") ?? "-1", 10);
-    const from = (state.get("from") || "").split(" ").map(Number);
-    look(from.length === 6 && from.every(Number.isFinite) ? from : home);
     fillGripper(state.has("count") ? Number(state.get("count")) || 0 : undefined);
     place();
     showLayers();
@@ -415,24 +280,31 @@
     const size = Math.max(...twin.extents_m);
     const height = twin.extents_m[2] / 2;
     const far = 2.4 * Math.hypot(...twin.extents_m) + 0.12;
-    home = [0.62 * far, -0.68 * far, height + 0.45 * far, 0, 0, height];
+    view.setHome([0.62 * far, -0.68 * far, height + 0.45 * far, 0, 0, height]);
     twin.unreadable.forEach(fail);
     addHulls();
     addPoints(size);
     addScale(size);
     fillControls();
+    view.kept(recall, remembered);
     listen();
-    resize();
-    recall();
+    let shape;
     try {
-      await addModel(await model);
+      shape = await model;
     } catch (error) {
       fail(`visual.glb: ${error.message}`);
+    }
+    if (shape) {
+      try {
+        layers.mesh.add(await view.parsed(shape));
+      } catch (error) {
+        fail(`visual.glb cannot be shown: ${String((error && error.message) || error).slice(0, 200)}`);
+      }
     }
     showLayers();
     requestAnimationFrame(() => requestAnimationFrame(() => {
       viewer.dataset.ready = String(Math.round(performance.now()));
-      if (!problems.length) report("Drag to turn, scroll for nearer; point at anything for its name.");
+      if (!view.problems.length) report("Drag to turn, scroll for nearer; point at anything for its name.");
     }));
   }
   begin();
