@@ -103,7 +103,7 @@ def test_drawings_are_those_of_the_code(make_pictures: ModuleType, name: str) ->
 def test_layouts_are_those_of_the_code(
     make_data_pictures: ModuleType, twins: list[manitwin.Twin], tmp_path: Path
 ) -> None:
-    picture, scenes = make_data_pictures.layouts(twins[0].folder.parent, tmp_path)
+    picture, scenes = make_data_pictures.layouts(twins[0].folder.parents[2], tmp_path)
     assert made_of("layouts.png") == scenes
     assert_same(picture, "layouts.png")
 
@@ -112,6 +112,6 @@ def test_layouts_are_those_of_the_code(
 def test_episode_is_that_of_the_code(
     make_data_pictures: ModuleType, twins: list[manitwin.Twin], tmp_path: Path
 ) -> None:
-    episode = make_data_pictures.an_episode(twins[0].folder.parent, tmp_path)
+    episode = make_data_pictures.an_episode(twins[0].folder.parents[2], tmp_path)
     assert made_of("episode.png") == {"episode": make_data_pictures.of_episode(episode)}
-    assert_same(make_data_pictures.episode_picture(episode, twins[0].folder.parent), "episode.png")
+    assert_same(make_data_pictures.episode_picture(episode, twins[0].folder.parents[2]), "episode.png")
