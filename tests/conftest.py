@@ -30,6 +30,19 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
 
 
 @pytest.fixture(scope="session", autouse=True)
+def own_folders_of_a_user(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Let nothing count that somebody keeps on this machine: added weights, cached answers, the places of ledgers."""
+    cache_home = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("MANITWIN_MODELS", raising=False)
+        if "MESA_SHADER_CACHE_DIR" not in os.environ:  # dear to compile, and the same for everybody
+            patch.setenv("MESA_SHADER_CACHE_DIR", cache_home)
+        for kind in ("DATA", "STATE", "CACHE"):
+            patch.setenv(f"XDG_{kind}_HOME", str(tmp_path_factory.mktemp(kind.lower())))
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
 def commands_built_once() -> Iterator[None]:
     """Build the command line once a process: typer evaluates the types of every option at each call, a program calls once."""
     with pytest.MonkeyPatch.context() as patch:

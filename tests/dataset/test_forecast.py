@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
@@ -82,6 +84,19 @@ def test_what_is_not_known_is_none_and_too_few_inputs_are_refused(tmp_path: Path
     rebuild(DatasetRoot(root), jobs=1)
     told = forecast(DatasetRoot(root), 10, 1)
     assert told.memory_bytes is None and told.ledger_bytes == 0
+
+
+def test_stages_of_a_twin_that_the_index_has_not_are_one_line(tmp_path: Path) -> None:
+    root = tmp_path / "set"
+    for number in range(ACCEPTED):
+        write_accepted(root, number)
+    rebuild(DatasetRoot(root), jobs=1)
+    [file] = (root / "index" / "stages").glob("*.parquet")
+    table = pq.read_table(file)
+    strangers = pa.array(["f" * 16] * len(table), table.schema.field("twin_id").type)
+    pq.write_table(table.set_column(table.schema.get_field_index("twin_id"), "twin_id", strangers), file)
+    with pytest.raises(UsageError, match="no twin and no rejection"):
+        forecast(DatasetRoot(root), 10, 1)
 
 
 def test_the_command_says_what_the_document_says(dataset: Path) -> None:

@@ -30,7 +30,7 @@ class Shell:
             "COLUMNS": "200",
             "PIP_NO_INDEX": "1",
             "PIP_TARGET": str(folder / ".installed"),  # what a page installs never gets into what runs the tests
-            **{f"XDG_{kind.upper()}_HOME": str(folder / f".{kind}") for kind in ("cache", "state")},
+            **{f"XDG_{kind.upper()}_HOME": str(folder / f".{kind}") for kind in ("cache", "data", "state")},
             **variables,
         }
         self._state = folder / ".shell"

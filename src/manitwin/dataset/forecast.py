@@ -14,6 +14,7 @@ import numpy as np
 from manitwin.dataset.evaluation.annotation_scores import wilson_interval
 from manitwin.dataset.index.query import Index
 from manitwin.errors import TwinError, UsageError
+from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
 
 LEAST_INPUTS = 5
@@ -87,6 +88,11 @@ def forecast(
     rows = index.select("stages", columns=["twin_id", "stage", "cpu_seconds", "cost_usd"]).to_pydict()
     cpu_s, usd, stages = np.zeros(len(ids)), np.zeros(len(ids)), dict[str, float]()
     for twin_id, stage, seconds, cost in zip(*(rows[name] for name in rows), strict=True):
+        if twin_id not in place:
+            raise UsageError(
+                f"{root.path}: its index has stages of {printable_line(twin_id)}, of which it has no twin and no rejection;"
+                f" `manitwin index {root.path}` makes it again"
+            )
         cpu_s[place[twin_id]] += seconds or 0.0
         usd[place[twin_id]] += cost or 0.0
         stages[stage] = stages.get(stage, 0.0) + (seconds or 0.0)
