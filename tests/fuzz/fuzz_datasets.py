@@ -35,9 +35,9 @@ def command(*arguments: object) -> int:
             return 2
 
 
-def dataset(folder: Path) -> None:
-    """Three twins and a rejected one, indexed in two parts, with a ledger of a finished run."""
-    ids = write_set(folder, accepted=3, rejected=1)
+def dataset(folder: Path, accepted: int = 3) -> None:
+    """Some twins and a rejected one, indexed in two parts, with a ledger of a finished run."""
+    ids = write_set(folder, accepted=accepted, rejected=1)
     root = DatasetRoot(folder)
     write_part(root, ids[::2])
     write_part(root, ids[1::2])

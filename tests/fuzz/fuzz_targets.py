@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fuzz_assets
+import fuzz_collections
 import fuzz_datasets
 import fuzz_episodes
 import fuzz_images
@@ -14,6 +15,7 @@ import fuzz_twins
 
 __all__ = [
     "fuzz_assets",
+    "fuzz_collections",
     "fuzz_datasets",
     "fuzz_episodes",
     "fuzz_images",
