@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from manitwin.errors import UsageError
-from manitwin.formats.csv_file import MAX_LINE_BYTES, read_csv
+from manitwin.formats.csv_file import MAX_COLUMNS, MAX_LINE_BYTES, read_csv
 from manitwin.formats.json_file import json_number, parse_json, read_json_object
 from manitwin.formats.printable import printable, printable_line
 from manitwin.formats.toml_file import parse_toml, read_toml
@@ -90,6 +90,10 @@ def test_toml_of_more_than_a_mebibyte_is_refused(tmp_path: Path) -> None:
     ("content", "cause"),
     [
         (b'file,name\na.obj,"never closed\n' * 3, "not CSV"),
+        (
+            b",".join(b"c%d" % number for number in range(MAX_COLUMNS + 1)) + b"\na.obj\n",
+            ":1: 513 columns; at most 512",
+        ),
         (b'file,name\na.obj,"never closed\nb.obj,box\n', "unexpected end of data"),
         (b"file,name\na.obj,b,c\n", ":2: more values than columns"),
         (b"file,name\na.obj," + b"x" * (MAX_LINE_BYTES + 1), ":2: a line of more than"),

@@ -31,6 +31,8 @@ FAILED_ONCE = {
     "asset-manitwin100k": (63,),
     "asset-own-urdf": (3,),
     "asset-robotwin": (38,),
+    "catalogue": (167, 1409, 1831, 3181),
+    "collect-list": (5476,),
     "gif": (105,),
     "gltf": (18, 23),
     "index": (0,),

@@ -11,17 +11,25 @@ from manitwin.formats.bounded_file import Refusal, open_regular
 from manitwin.formats.printable import printable_line
 
 MAX_LINE_BYTES = 1 << 20
+MAX_COLUMNS = 512
+"""Every row is as long as the header: one of 100,000 columns makes 20,000 short rows a matter of minutes."""
 
 
 def read_csv(path: Path, refuse: Refusal, *, name: str | None = None) -> Iterator[tuple[int, dict[str, Any]]]:
     """Yield the rows of a CSV file (RFC 4180) with a header, as the number of the line where each ends and its values.
 
     A row is read as it is asked for. Raises what ``refuse`` makes of one line that names file and line: not UTF-8, a quote
-    that is not closed, a value of more than csv's 128 KiB, a line of more than ``MAX_LINE_BYTES``, more values than columns.
+    that is not closed, a value of more than csv's 128 KiB, a line of more than ``MAX_LINE_BYTES``, more than ``MAX_COLUMNS``
+    columns, more values than columns.
     """
     called = name or str(path)
     reader = csv.DictReader(read_lines(path, refuse, name=called), strict=True)
     try:
+        columns = len(reader.fieldnames or ())
+        if columns > MAX_COLUMNS:
+            raise refuse(
+                f"{called}:{reader.line_num}: {columns:,} columns; at most {MAX_COLUMNS} are read: remove what is not needed"
+            )
         for row in reader:
             if None in row:
                 raise refuse(f"{called}:{reader.line_num}: more values than columns; quote values that hold a comma")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from hostile_schemas import ENDLESS
 from json_documents import check_keys
 from manitwin.dataset.collect.facts import BANDS, GROUP_OF_DOMAIN, GROUPS, band_of
 from manitwin.dataset.collect.intake import Added, Given, add
@@ -146,6 +147,18 @@ def test_a_broken_list_adds_nothing(photos: Path, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="not CSV"):
         add(tmp_path / "c.db", bad, MINE)
     assert not (tmp_path / "c.db").exists()
+
+
+@pytest.mark.parametrize("own", ENDLESS)
+def test_a_catalogue_with_a_schema_of_its_own_is_refused_before_it_is_asked(
+    own: str, photos: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "c.db"
+    add(path, photos, MINE)
+    with sqlite3.connect(path) as changed:
+        changed.executescript(own.replace("$NAME", "refused"))
+    with pytest.raises(UsageError, match="not those of a catalogue"):
+        catalogue_status(path)
 
 
 @pytest.mark.parametrize("kind", ["text", "pipe", "foreign"])

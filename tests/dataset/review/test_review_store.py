@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from hostile_schemas import ENDLESS
 from manitwin.dataset.review.queues import Plan
 from manitwin.dataset.review.store import ReviewStore
 from manitwin.dataset.review.verdicts import Review, reason_of
@@ -137,6 +138,14 @@ def test_what_is_no_store_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "link.sqlite").symlink_to("/etc/hostname")
     with pytest.raises(UsageError, match="leads out of its folder"):
         ReviewStore(tmp_path / "link.sqlite")
+
+
+@pytest.mark.parametrize("own", ENDLESS)
+def test_a_store_with_a_schema_of_its_own_is_refused_before_it_is_asked(own: str, store: ReviewStore) -> None:
+    with sqlite3.connect(store.path) as changed:
+        changed.executescript(own.replace("$NAME", "drafts"))
+    with pytest.raises(UsageError, match="not those of a store of reviews"):
+        ReviewStore(store.path)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sqlite3
+
 APPLICATION = 0x4D54434C
 """``PRAGMA application_id``, which tells a catalogue from another program's SQLite file: the letters MTCL."""
 
@@ -39,3 +41,9 @@ MIGRATIONS = (
     ) STRICT, WITHOUT ROWID;
     """,
 )
+
+
+def migrate(connection: sqlite3.Connection, version: int = 0) -> None:
+    """Bring a catalogue from a version to the newest schema, each step a transaction."""
+    for number, script in enumerate(MIGRATIONS[version:], version + 1):
+        connection.executescript(f"BEGIN IMMEDIATE; {script}; PRAGMA user_version = {number}; COMMIT;")

@@ -10,10 +10,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from manitwin.dataset.collect.schema import APPLICATION, MIGRATIONS
+from manitwin.dataset.collect.facts import BANDS, GROUPS, UNKNOWN
+from manitwin.dataset.collect.schema import APPLICATION, MIGRATIONS, migrate
 from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.printable import printable_line
+from manitwin.formats.sqlite_schema import has_schema
 
 Kind = Literal["image", "mesh", "asset", "url"]
 Status = Literal["ready", "listed", "duplicate", "unreadable"]
@@ -92,8 +94,12 @@ class Catalogue:
             raise UsageError(
                 f"{self.path}: of schema {version}, this version reads up to {len(MIGRATIONS)}; use the version that wrote it"
             )
-        for number, script in enumerate(MIGRATIONS[version:], version + 1):
-            self._connection.executescript(f"BEGIN IMMEDIATE; {script}; PRAGMA user_version = {number}; COMMIT;")
+        migrate(self._connection, version)
+        if not has_schema(self._connection, migrate):
+            raise self._damaged("its tables are not those of a catalogue")
+        (said,) = run("PRAGMA quick_check(1)").fetchone()
+        if said != "ok":
+            raise self._damaged(said)
 
     def __enter__(self) -> Catalogue:
         return self
@@ -147,8 +153,9 @@ class Catalogue:
                 f"SELECT {', '.join(_COLUMNS)} FROM inputs WHERE status IN ('ready', 'listed') ORDER BY number"
             )
             for values in cursor:
-                row: tuple[Any, ...] = values
-                yield Row(*row)
+                row = Row(*values)
+                self._require_known(row.grp, row.size_band)
+                yield row
 
     def counts(self) -> list[tuple[tuple[str, ...], int]]:
         """Return how many rows there are of each combination of ``COUNTED``, by those names in their order."""
@@ -156,7 +163,13 @@ class Catalogue:
             rows = self._connection.execute(
                 "SELECT grp, status, licence, source, size_band, count(*) FROM inputs GROUP BY 1, 2, 3, 4, 5"
             ).fetchall()
+        for grp, *_, size_band, _count in rows:
+            self._require_known(grp, size_band)
         return [(row[:-1], row[-1]) for row in rows]
+
+    def _require_known(self, group: str, band: str) -> None:
+        if group not in (*GROUPS, UNKNOWN) or band not in BANDS:
+            raise self._damaged(f"a row of group {group!r} and size {band!r}")
 
     def causes(self) -> dict[str, int]:
         """Return how many rows cannot be read, by cause."""
@@ -192,9 +205,12 @@ class Catalogue:
             yield
         except sqlite3.OperationalError as error:
             raise UsageError(f"{self.path}: {error}; mend the disk or its permissions, and try again") from error
-        except sqlite3.DatabaseError as error:
-            said = printable_line(str(error), max_characters=120)
-            raise UsageError(f"{self.path}: is no catalogue that can be read ({said}); give another") from error
+        except (sqlite3.DatabaseError, sqlite3.InterfaceError, UnicodeDecodeError) as error:
+            raise self._damaged(error) from error
+
+    def _damaged(self, cause: object) -> UsageError:
+        said = printable_line(str(cause), max_characters=120)
+        return UsageError(f"{self.path}: is no catalogue that can be read ({said}); give another")
 
 
 def by_each(counts: Iterable[tuple[tuple[str, ...], int]]) -> Mapping[str, dict[str, int]]:

@@ -27,6 +27,7 @@ from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
 from manitwin.formats.json_file import parse_json_object
 from manitwin.formats.printable import printable_line
+from manitwin.formats.sqlite_schema import has_schema
 from manitwin.twin.dataset_root import DatasetRoot
 
 REVIEWS = "reviews.sqlite"
@@ -71,7 +72,11 @@ class ReviewStore:
                 self._connection.execute("PRAGMA journal_mode = WAL")
                 self._connection.execute("PRAGMA synchronous = FULL")
                 migrate(self._connection, str(path))
-                self._connection.execute("SELECT number, kind, annotator, body FROM events LIMIT 1").fetchone()
+                if not has_schema(self._connection, lambda ours: migrate(ours, ":memory:")):
+                    raise self._damaged("its tables are not those of a store of reviews")
+                (said,) = self._connection.execute("PRAGMA quick_check(1)").fetchone()
+                if said != "ok":
+                    raise self._damaged(said)
             except BaseException:
                 self._connection.close()
                 raise
@@ -230,7 +235,7 @@ class ReviewStore:
             yield
         except sqlite3.OperationalError as error:
             raise UsageError(f"{self.path}: {error}; mend the disk or its permissions, and try again") from error
-        except sqlite3.DatabaseError as error:
+        except (sqlite3.DatabaseError, sqlite3.InterfaceError, UnicodeDecodeError) as error:
             raise self._damaged(error) from error
 
     def _damaged(self, cause: object) -> UsageError:
