@@ -160,3 +160,40 @@ def test_materials_of_which_one_part_has_none_are_not_guessed(tmp_path: Path) ->
     physical = run(hammer(), tmp_path, "hammer", annotator=Says(part_materials={"head": "steel"}))
     assert physical.mass_distribution == "solid"
     assert physical.center_of_mass_m == pytest.approx(hammer().center_mass, abs=1e-5)
+
+
+def bottle() -> trimesh.Trimesh:
+    return cylinder(0.035, 0.22)
+
+
+def test_a_bottle_says_what_it_weighs_empty_half_full_and_full(tmp_path: Path) -> None:
+    physical = run(bottle(), tmp_path, "water bottle")
+    assert physical.filling is not None and "full water bottle" in physical.filling.assumption
+    empty, half, full = physical.filling.states
+    assert [each.share for each in physical.filling.states] == [0.0, 0.5, 1.0]
+    prior = lookup("water bottle")
+    assert prior is not None and prior.bulk_density_kg_m3 is not None
+    volume = physical.mass_kg.value / physical.density_kg_m3
+    assert empty.mass_kg == pytest.approx(max(prior.bulk_density_kg_m3.low * volume, prior.mass_kg.low))
+    assert physical.mass_kg.low <= empty.mass_kg * 1.0001
+    assert half.mass_kg == pytest.approx((empty.mass_kg + full.mass_kg) / 2)
+    assert full.mass_kg == pytest.approx(physical.mass_kg.value)
+    assert full.center_of_mass_m == physical.center_of_mass_m and full.inertia_kg_m2 == physical.inertia_kg_m2
+    contents = half.mass_kg - empty.mass_kg
+    expected = (empty.mass_kg * empty.center_of_mass_m[2] + contents * 0.22 / 4) / half.mass_kg
+    assert half.center_of_mass_m[2] == pytest.approx(expected, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("name", "annotator"),
+    [
+        ("mug", Says()),  # open: its mesh has both walls
+        ("battery", Says()),
+        ("water bottle", Says(mass_kg=said(0.5, "measured"))),  # of one bottle, in a state that nobody told
+        ("water bottle", Says(mass_kg=said(0.015))),  # of an empty one
+        ("water bottle", Says(wall_thickness_m=0.0005)),  # said to be hollow
+    ],
+)
+def test_no_fill_states_where_nothing_is_known_of_them(name: str, annotator: RulesAnnotator, tmp_path: Path) -> None:
+    mesh = bottle() if name == "water bottle" else cylinder(0.007, 0.05) if name == "battery" else cup(0.04, 0.1, 0.003)
+    assert run(mesh, tmp_path, name, annotator=annotator).filling is None

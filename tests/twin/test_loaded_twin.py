@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import json
 import shutil
 from pathlib import Path
 
@@ -7,7 +8,9 @@ import fsspec
 import pytest
 
 from manitwin.errors import UsageError
-from manitwin.twin.loaded_twin import TwinSource
+from manitwin.twin.fill_records import Filling
+from manitwin.twin.loaded_twin import Twin, TwinSource
+from manitwin.twin.store import RECORD, canonical_json, revision_of
 from twin_folders import write_set
 
 
@@ -42,6 +45,42 @@ def test_twins_of_a_url_are_copied_once(tmp_path: Path) -> None:
             TwinSource("memory://twin-source")
     finally:
         memory.rm("/twin-source", recursive=True)
+
+
+def test_a_body_is_that_of_the_fill_state_asked_for(tmp_path: Path) -> None:
+    [twin_id] = write_set(tmp_path / "set", accepted=1, rejected=0)
+    folder = TwinSource(tmp_path / "set").folder(twin_id)
+    with pytest.raises(UsageError, match="has no fill states"):
+        Twin(folder).rigid_body(fill=0.5)
+    said = json.loads((folder / RECORD).read_text())
+    moments = [[1e-4, 0, 0], [0, 1e-4, 0], [0, 0, 1e-4]]
+    states = [
+        {
+            "share": share,
+            "mass_kg": 0.1 + share / 5,
+            "center_of_mass_m": [0, 0, 0.04 + share / 100],
+            "inertia_kg_m2": moments,
+        }
+        for share in (0.0, 0.5, 1.0)
+    ]
+    said["physical"]["filling"] = {"assumption": "level", "states": states}
+    said["revision"] = revision_of(said)
+    (folder / RECORD).write_text(canonical_json(said))
+    twin = Twin(folder)
+    half = twin.rigid_body(fill=0.5)
+    assert (half.mass_kg, half.center_of_mass_m.tolist()) == (pytest.approx(0.2), [0, 0, pytest.approx(0.045)])
+    assert twin.rigid_body().mass_kg == twin.physical.mass_kg.value
+    with pytest.raises(UsageError, match=r"unknown fill '0.3'.*0, 0.5, 1"):
+        twin.rigid_body(fill=0.3)
+
+
+@pytest.mark.parametrize("order", [(1.0, 0.5), (0.0,), ()])
+def test_fill_states_out_of_order_are_refused(order: tuple[float, ...]) -> None:
+    states = [
+        {"share": s, "mass_kg": 1 + s, "center_of_mass_m": [0] * 3, "inertia_kg_m2": [[0] * 3] * 3} for s in order
+    ]
+    with pytest.raises(ValueError):
+        Filling.model_validate({"assumption": "level", "states": states})
 
 
 def test_a_place_that_is_not_there_says_so(tmp_path: Path) -> None:

@@ -15,8 +15,9 @@ from manitwin.formats.glb import write_glb
 from manitwin.formats.meshes.textures import bake_transform
 from manitwin.geometry.boxes import oriented_bounding_box, upright_extents
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
-from manitwin.models.annotators.priors import Interval, lookup
+from manitwin.models.annotators.priors import Interval, Prior, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
+from manitwin.pipeline.fill_states import filling_of
 from manitwin.pipeline.human_corrections import corrected_estimates, is_human
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.mass_by_parts import mass_by_parts
@@ -40,7 +41,7 @@ class PhysicalStage:
     """Ask for size, mass and friction, scale the object, and compute the mass properties of its real shape."""
 
     name: ClassVar[str] = "physical"
-    version: ClassVar[str] = "6"
+    version: ClassVar[str] = "7"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings", "size", "called")
 
@@ -96,6 +97,9 @@ class PhysicalStage:
             center_of_mass_uncertainty_m=uncertainty,
             inertia_kg_m2=properties.inertia_kg_m2.tolist(),
             mass_distribution=_distribution(estimates, by_parts),
+            filling=None
+            if estimates.wall_thickness_m is not None
+            else filling_of(solid, mass, properties, _prior_of(draft, estimates), NOMINAL_WALL_M),
         )
         given = estimates.longest_axis_m
         said = None if given is None or (metric and not is_human(given.source)) else given.model_dump()
@@ -110,7 +114,7 @@ class PhysicalStage:
         self, draft: Draft[Item], solid: trimesh.Trimesh, mass_kg: float, estimates: PhysicalEstimates
     ) -> MassProperties | None:
         """Return the mass properties by parts of unlike matter; None where parts or their materials are not told."""
-        prior = lookup(object_name(draft)) or lookup(estimates.called)
+        prior = _prior_of(draft, estimates)
         if prior is None or not estimates.part_materials or estimates.wall_thickness_m is not None:
             return None
         return mass_by_parts(solid, mass_kg, estimates.part_materials, prior, draft.seed)
@@ -142,6 +146,11 @@ class PhysicalStage:
                 f"{mass.value:.4g} kg in {volume_m3 * 1e6:.4g} ml is {density:.4g} kg/m3, as no object has; "
                 "check units and name",
             )
+
+
+def _prior_of(draft: Draft[Item], estimates: PhysicalEstimates) -> Prior | None:
+    """Return the prior of what the object is called, else of what an annotator that looks took it for."""
+    return lookup(object_name(draft)) or lookup(estimates.called)
 
 
 def size_scale(subject: Subject, estimates: PhysicalEstimates, longest: float) -> float:

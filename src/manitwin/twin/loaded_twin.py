@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow as pa
 import trimesh
 
-from manitwin.errors import InputError, TwinError, UsageError
+from manitwin.errors import InputError, TwinError, UsageError, choose_from
 from manitwin.formats.bounded_file import open_regular, read_bytes
 from manitwin.formats.glb import read_glb
 from manitwin.formats.npy_file import MAX_LABEL_BYTES, parse_labels
@@ -21,6 +21,7 @@ from manitwin.formats.xml_file import MAX_NUMBER
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.twin.dataset_root import MAX_FILE_BYTES, DatasetRoot
+from manitwin.twin.fill_records import FillState
 from manitwin.twin.grasp_table import read_grasp_table
 from manitwin.twin.part_records import FACE_PARTS, NO_PART
 from manitwin.twin.record import Physical, TwinRecord
@@ -108,17 +109,32 @@ class Twin:
             self.folder / file, MAX_FILE_BYTES, TwinError, inside=self.folder, name=f"{self.folder}/{file}"
         )
 
-    def rigid_body(self) -> RigidBody:
-        """Return the hulls with the twin's mass properties and friction, as simulations take them."""
+    def rigid_body(self, fill: float | None = None) -> RigidBody:
+        """Return the hulls with the twin's mass properties and friction, as simulations take them.
+
+        ``fill``: those of a vessel that is filled to this share of its volume, of ``physical.filling``. Raises UsageError where
+        the twin has no such state.
+        """
         physical = self.physical
+        weighed = physical if fill is None else self._filled(fill)
         return RigidBody(
             hulls=tuple(np.asarray(hull.vertices) for hull in self.hulls),
-            mass_kg=physical.mass_kg.value,
-            center_of_mass_m=np.array(physical.center_of_mass_m),
-            inertia_kg_m2=np.array(physical.inertia_kg_m2),
+            mass_kg=weighed.mass_kg if isinstance(weighed, FillState) else weighed.mass_kg.value,
+            center_of_mass_m=np.array(weighed.center_of_mass_m),
+            inertia_kg_m2=np.array(weighed.inertia_kg_m2),
             friction_static=physical.friction_static.value,
             friction_dynamic=physical.friction_dynamic.value,
         )
+
+    def _filled(self, share: float) -> FillState:
+        filling = self.physical.filling
+        if filling is None:
+            raise UsageError(f"{self.folder}: has no fill states; they are told of bottles, cans and jars alone")
+        state = filling.at(share)
+        if state is None:
+            valid = [f"{each.share:g}" for each in filling.states]
+            raise UsageError(f"{self.folder}: {choose_from('fill', f'{share:g}', valid)}")
+        return state
 
     def grasp_table(self) -> pa.Table:
         """Return all rows of ``grasps.parquet`` (docs/grasps.md); raises TwinError where it cannot be read."""

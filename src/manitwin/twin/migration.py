@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 
 def migrated(record: dict[str, Any]) -> dict[str, Any]:
@@ -28,5 +28,10 @@ def _to_2(record: dict[str, Any]) -> dict[str, Any]:
     return {**record, "schema_version": 2}
 
 
-_STEPS: dict[int | None, Callable[[dict[str, Any]], dict[str, Any]]] = {1: _to_2}
+def _to_3(record: dict[str, Any]) -> dict[str, Any]:
+    """Version 3: closed vessels have fill states, which have a value for unsaid."""
+    return {**record, "schema_version": 3}
+
+
+_STEPS: dict[int | None, Callable[[dict[str, Any]], dict[str, Any]]] = {1: _to_2, 2: _to_3}
 """By the version that each step begins from."""

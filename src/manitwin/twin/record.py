@@ -9,6 +9,7 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
+from manitwin.twin.fill_records import Filling
 from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.migration import SCHEMA_VERSION
 from manitwin.twin.part_records import FACE_PARTS, NO_PART, Part
@@ -153,7 +154,7 @@ class OrientedBox(Record):
 
 
 class Physical(Record):
-    """Size, mass and contact properties."""
+    """Size, mass and contact properties; ``filling``: of a closed vessel, which weighs what it holds."""
 
     extents_m: Vector3
     obb: OrientedBox
@@ -168,6 +169,7 @@ class Physical(Record):
     center_of_mass_uncertainty_m: Finite
     inertia_kg_m2: Matrix3
     mass_distribution: Literal["solid", "shell", "parts"]
+    filling: Filling | None = None
 
     @model_validator(mode="after")
     def _possible(self) -> Physical:

@@ -29,6 +29,21 @@ def _estimate(name: str, estimate: Estimate, unit: str) -> tuple[Any, ...]:
     return (name, f"{number(estimate.value)}{unit}", interval, estimate.source)
 
 
+def _filled(physical: Physical) -> list[tuple[Any, ...]]:
+    """Return a row of each state of a closed vessel but the full one, which the twin is."""
+    if physical.filling is None:
+        return []
+    return [
+        (
+            f"filled to {number(100 * each.share)} %",
+            f"{number(each.mass_kg)} kg, centre of mass at z {number(1000 * each.center_of_mass_m[2])} mm",
+            None,
+            physical.filling.assumption,
+        )
+        for each in physical.filling.states[:-1]
+    ]
+
+
 def _physical(physical: Physical, stages: Any) -> str:
     along = [f"{number(100 * each)}" for each in physical.extents_m]
     box = [f"{number(100 * each)}" for each in physical.obb.extents_m]
@@ -45,6 +60,7 @@ def _physical(physical: Physical, stages: Any) -> str:
         ("oriented box", f"{' × '.join(box)} cm", None, FROM_MESH + scaled),
         _estimate("mass", physical.mass_kg, " kg"),
         ("density", f"{number(physical.density_kg_m3)} kg/m³", None, "mass by volume"),
+        *_filled(physical),
         _estimate("friction, static", physical.friction_static, ""),
         _estimate("friction, dynamic", physical.friction_dynamic, ""),
         _estimate("restitution", physical.restitution, ""),

@@ -122,6 +122,7 @@ def physics_of(twin: TwinContent) -> dict[str, Any]:
         "principal_moments_kg_m2": inertial.principal_moments_kg_m2.tolist(),
         "principal_axes_quaternion_wxyz": inertial.principal_axes_wxyz.tolist(),
         "mass_distribution": physical.mass_distribution,
+        "filling": None if physical.filling is None else physical.filling.model_dump(mode="json"),
     }
 
 

@@ -88,12 +88,16 @@ class Material(Record):
 
 
 class Form(Record):
-    """The shape, rest and parts that a family of categories shares; ``parts`` is the rule that tells them apart on a surface."""
+    """The shape, rest and parts that a family of categories shares; ``parts`` is the rule that tells them apart on a surface.
+
+    ``vessel``: closed, and weighs what it holds: its bulk densities are from empty to full.
+    """
 
     shape: str
     stands: bool | None = None
     container: bool
     mass_distribution: Distribution
+    vessel: bool = False
     wall_thickness_m: float | None = None
     head_end: HeadEnd = "wide"
     parts: PartRule | None = None
