@@ -204,7 +204,8 @@ class Catalogue:
         try:
             yield
         except sqlite3.OperationalError as error:
-            raise UsageError(f"{self.path}: {error}; mend the disk or its permissions, and try again") from error
+            said = printable_line(str(error), max_characters=120)
+            raise UsageError(f"{self.path}: {said}; mend the disk or its permissions, and try again") from error
         except (sqlite3.DatabaseError, sqlite3.InterfaceError, UnicodeDecodeError) as error:
             raise self._damaged(error) from error
 

@@ -19,6 +19,7 @@ from PIL import Image
 
 from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
 from manitwin.formats.json_file import json_number, json_vector, read_json_object
 from manitwin.formats.onnx_file import MAX_ONNX_BYTES, parse_onnx
 from manitwin.formats.printable import printable_line
@@ -31,6 +32,9 @@ PREPROCESSOR = "preprocessor_config.json"
 FLOAT, INT64 = 1, 7
 POINT_COUNT = 8192
 """Points of ULIP's backbones, where the network leaves the number open."""
+MOST_TOKENS, MOST_POINTS = 4096, 1 << 17
+LIMITS = Limits(seconds=300.0, memory_bytes=12 << 30)
+"""Of a network's trial, as of networks for cut-outs."""
 _FEW = "give a folder with vision_model.onnx, text_model.onnx, preprocessor_config.json, vocab.json and merges.txt"
 
 
@@ -41,6 +45,7 @@ class ClipFolder:
         """Look for the files that are needed, with ``points`` a network of points; raises UsageError for one not there."""
         self.folder = folder
         self._networks: dict[str, _Network] = {}
+        self._tried: set[str] = set()
         for name in (VISION, TEXT, *([POINTS] if points else [])):
             self._path(name)
         for name in (PREPROCESSOR, "vocab.json", "merges.txt"):
@@ -65,7 +70,10 @@ class ClipFolder:
 
     def texts(self, texts: Sequence[str]) -> np.ndarray:
         """Return the vectors ``(N, D)`` of texts."""
-        length = self._network(TEXT).shape[-1] or LENGTH
+        network = self._network(TEXT)
+        length = (network.shape[-1] if network.shape else None) or LENGTH
+        if not 2 <= length <= MOST_TOKENS:
+            raise UsageError(f"{network.path}: takes texts of {length} tokens; 2 to {MOST_TOKENS} are run")
         return self._unit([self._run(TEXT, self._tokens.encode(text, length)[None]) for text in texts])
 
     def points(self, points_m: np.ndarray) -> np.ndarray:
@@ -81,7 +89,10 @@ class ClipFolder:
         shape = self._network(POINTS).shape
         if len(shape) != 3 or shape[2] not in (3, None):
             raise UsageError(f"{POINTS}: takes {shape}, not (1, N, 3); give a network of points without colours")
-        return shape[1] or POINT_COUNT
+        count = shape[1] or POINT_COUNT
+        if not 1 <= count <= MOST_POINTS:
+            raise UsageError(f"{POINTS}: takes {count} points; at most {MOST_POINTS} are run")
+        return count
 
     @cached_property
     def _tokens(self) -> ClipTokens:
@@ -137,7 +148,24 @@ class ClipFolder:
         return self._networks[name]
 
     def _run(self, name: str, value: np.ndarray) -> np.ndarray:
+        if name not in self._tried:
+            _require_working(self._path(name), OUTPUTS[name], value)
+            self._tried.add(name)
         return self._network(name).run(value)
+
+
+def _require_working(path: Path, output: str, value: np.ndarray) -> None:
+    """Run a network once in a process of its own: OpenCV ends its process over some that are broken."""
+    try:
+        run_isolated("manitwin.models.embedders.clip:run_once", path, output, value, limits=LIMITS)
+    except (ProcessCrashed, MemoryError) as error:
+        cause = printable_line(str(error) or "more memory than it may take", max_characters=160)
+        raise UsageError(f"{path}: cannot be run here ({cause}); give another export of the network") from error
+
+
+def run_once(path: Path, output: str, value: np.ndarray) -> None:
+    """Load a network and run it on one input; raises UsageError where OpenCV cannot."""
+    _Network(path, output).run(value)
 
 
 class _Network:
@@ -155,10 +183,11 @@ class _Network:
                 f"{path}: takes {told or 'nothing'}; give a network of one input, exported with 32-bit floats and int64"
             )
         self.input, self.shape = rest[0].name, rest[0].shape
-        try:
-            self._net = cv2.dnn.readNetFromONNX(np.frombuffer(parsed.content, np.uint8))
-        except cv2.error as error:
-            raise self._refused(error) from error
+        self._content = parsed.content
+
+    @cached_property
+    def _net(self) -> cv2.dnn.Net:
+        return cv2.dnn.readNetFromONNX(np.frombuffer(self._content, np.uint8))
 
     def run(self, value: np.ndarray) -> np.ndarray:
         """Return the vector ``(D,)`` of one input; raises UsageError where OpenCV cannot run the network."""
