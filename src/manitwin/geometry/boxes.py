@@ -62,6 +62,23 @@ def upright_extents(points: np.ndarray) -> np.ndarray:
     return np.array([*sides, np.ptp(points[:, 2])])
 
 
+def longest_edges(points: np.ndarray) -> np.ndarray:
+    """Return the four parallel edges ``(4, 2, 3)`` of the box of ``upright_extents`` along its longest side."""
+    points = np.asarray(points, dtype=float)
+    _, along = _smallest_rectangle(points[:, :2])
+    axes = np.array([[*along, 0.0], [-along[1], along[0], 0.0], [0.0, 0.0, 1.0]])
+    local = points @ axes.T
+    low, high = local.min(0), local.max(0)
+    longest = int(np.argmax(high - low))
+    others = [axis for axis in range(3) if axis != longest]
+    edges = np.empty((4, 2, 3))
+    for number, corner in enumerate(product((0, 1), repeat=2)):
+        for end, side in enumerate((low, high)):
+            edges[number, end, longest] = side[longest]
+            edges[number, end, others] = np.where(corner, high[others], low[others])
+    return np.asarray(edges @ axes)
+
+
 def smallest_enclosing_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the smallest circle ``(center (2,), radius)`` that holds points ``(N, 2)``.
 

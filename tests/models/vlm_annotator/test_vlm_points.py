@@ -150,7 +150,11 @@ def test_numbers_are_drawn_at_their_candidates_and_clean_views_stay_clean(reques
     assert color == "red"
     pictures = [np.asarray(Image.open(io.BytesIO(part.png))) for part in parts if isinstance(part, Picture)]
     captions = [part for part in parts if isinstance(part, str)]
-    assert len(pictures) == 16 and captions[0] == "View 1 of 8, azimuth 300, elevation 20, clean:"
+    assert (
+        len(pictures) == 17
+        and "scale bar" in captions[-1]
+        and captions[0] == "View 1 of 8, azimuth 300, elevation 20, clean:"
+    )
     for view, camera in enumerate(request.subject.cameras):
         clean, marked = pictures[2 * view : 2 * view + 2]
         assert np.array_equal(clean, np.asarray(Image.open(request.subject.views[view]).convert("RGB")))

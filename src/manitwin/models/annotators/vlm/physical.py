@@ -13,7 +13,7 @@ from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.vlm.prompt_files import Prompt
 from manitwin.models.annotators.vlm.question_parts import extents_of, name_line, size_phrase
-from manitwin.models.annotators.vlm.view_pictures import clean_views
+from manitwin.models.annotators.vlm.view_pictures import clean_views, longest_extent_view
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.twin.record_values import Estimate
@@ -105,7 +105,7 @@ def physical_question(subject: Subject, prompt: Prompt) -> Question:
     A declared size is told, for the mass has to belong to it; proportions are not: the answer is checked against them.
     """
     values = {"count": str(len(subject.views)), "name": name_line(subject.name), "size": _size_said(subject)}
-    instructions, parts = prompt.filled(values, clean_views(subject))
+    instructions, parts = prompt.filled(values, [*clean_views(subject), *longest_extent_view(subject)])
     return Question("physical", instructions, parts, strict_schema(PhysicalAnswer))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from PIL import Image
 
 from manitwin.formats.image_file import png_of
+from manitwin.geometry.boxes import longest_edges
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.annotators.protocol import PointsRequest, Subject
 from manitwin.models.vlm.protocol import Picture
@@ -16,6 +17,7 @@ from manitwin.render.cameras import Camera, project
 from manitwin.render.grounds import ground_of_pixels, marker_color
 from manitwin.render.markers import draw_markers, font_px
 from manitwin.render.raycast import merged, silhouette
+from manitwin.render.scale_marks import best_camera, draw_dimension, draw_scale_bar
 
 _FILLED = 0.9  # of a picture's side by the object cut out of a photo
 
@@ -39,6 +41,23 @@ def clean_views(subject: Subject) -> list[str | Picture]:
     for number, (path, camera) in enumerate(zip(subject.views, subject.cameras, strict=True), 1):
         parts += [f"{view_caption(number, len(subject.views), camera)}:", Picture(png_of(read_picture(path)))]
     return parts
+
+
+def longest_extent_view(subject: Subject) -> list[str | Picture]:
+    """Return the view that shows the object's longest extent best, with that drawn into it, and its caption.
+
+    The line is labelled with its length where the metres are declared, else with the name that the answer has for it.
+    """
+    points = np.concatenate([part.vertices for part in subject.parts])
+    edges = longest_edges(points)
+    view, edge = best_camera(edges, subject.cameras)
+    clean, camera = read_picture(subject.views[view]), subject.cameras[view]
+    color = marker_color([clean])
+    length_m = float(np.linalg.norm(edges[edge, 1] - edges[edge, 0]))
+    label = f"{100 * length_m:.1f} cm" if subject.metric else "length_m"
+    drawn = draw_dimension(clean, edges[edge], camera, label, color.rgb)
+    caption = f"One of these views, with what length_m measures as a {color.name} line between two ticks:"
+    return [caption, Picture(png_of(drawn))]
 
 
 def photos_beside(subject: Subject, side_px: int) -> list[str | Picture]:
@@ -79,8 +98,9 @@ def marked_views(
 ) -> tuple[list[str | Picture], str]:
     """Return each view clean and with the candidates that it shows, and the word for the markers' colour.
 
-    Candidate ``i`` is marked by the number ``numbers[i]``. Source: set-of-mark prompting (Yang et al. 2023, arXiv
-    2310.11441): marks by number, kept off what they mark; only what a view shows is marked in it.
+    The last picture is the first view with a scale bar. Candidate ``i`` is marked by the number ``numbers[i]``.
+    Source: set-of-mark prompting (Yang et al. 2023, arXiv 2310.11441): marks by number, kept off what they mark; only what a
+    view shows is marked in it.
     """
     caster = RayCaster(merged(list(request.subject.parts)))
     color = marker_color(pictures)
@@ -102,4 +122,11 @@ def marked_views(
             font_px=font_px(camera.width_px, camera.height_px),
         )
         parts += [f"{caption}, with markers:", Picture(png_of(marked))]
-    return parts, color.name
+    return [*parts, *_scale_view(request.subject, pictures[0], cameras[0])], color.name
+
+
+def _scale_view(subject: Subject, clean: np.ndarray, camera: Camera) -> list[str | Picture]:
+    """Return a view with a scale bar, and its caption; an object has its size before its points are asked for."""
+    middle_m = np.mean([part.bounds for part in subject.parts], axis=(0, 1))
+    bar = draw_scale_bar(clean, camera, middle_m)
+    return ["The first view with a scale bar, which holds at the object's middle:", Picture(png_of(bar))]
