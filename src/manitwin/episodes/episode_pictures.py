@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, Unpack
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from manitwin.config import Resource
 from manitwin.engine.drive import RunOptions, RunReport, drive
@@ -27,6 +27,7 @@ from manitwin.episodes.batch import batch_name
 from manitwin.episodes.cameras import NamedCamera, named_cameras
 from manitwin.episodes.collect import LEROBOT, any_granules, batch_folders, stored_episodes
 from manitwin.episodes.configuration import read_configuration
+from manitwin.episodes.episode_room import episode_room, granules_of
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile
 from manitwin.episodes.lerobot.videos import CameraVideos, Clip
@@ -38,15 +39,11 @@ from manitwin.episodes.video import EpisodesVideo
 from manitwin.errors import EpisodesError, Rejected
 from manitwin.formats.json_file import read_json_object
 from manitwin.formats.printable import printable_line
-from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
-from manitwin.geometry.rigid_body import StaticBox
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.furniture_pictures import lighting_of
-from manitwin.scenes.scene import Furniture, Light, Name, Number
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import TwinSource
-from manitwin.twin.record_values import Quaternion
 from manitwin.twin.store import digests_below, sha256_of_json
 
 PICTURES_RECORD = "pictures.json"
@@ -70,45 +67,6 @@ class BatchDrawing(Payload):
     def from_json(cls, fields: Mapping[str, Any]) -> BatchDrawing:
         """Return the batch that a ledger keeps; those of earlier versions kept its id as a text."""
         return cls(fields["text"] if "text" in fields else fields["batch_id"])
-
-
-class _Box(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-    name: Name
-    half_extents_m: tuple[Number, Number, Number]
-    position_m: tuple[Number, Number, Number]
-    quaternion_wxyz: Quaternion
-
-
-class _Fixture(BaseModel):
-    model_config = ConfigDict(frozen=True)
-
-    boxes: tuple[_Box, ...]
-
-
-class _Room(BaseModel):
-    """What the facts of an episode say of its furniture, its light, and its fixtures, if any."""
-
-    model_config = ConfigDict(frozen=True)
-
-    furniture: Furniture
-    ambient: tuple[Number, Number, Number]
-    lights: tuple[Light, ...]
-    fixtures: tuple[_Fixture, ...] = ()
-
-    @property
-    def fixture_boxes(self) -> list[StaticBox]:
-        """The boxes of all fixtures."""
-        return [
-            StaticBox(
-                box.name,
-                np.array(box.half_extents_m),
-                transform(rotation_from_quaternion_wxyz(np.array(box.quaternion_wxyz)), np.array(box.position_m)),
-            )
-            for fixture in self.fixtures
-            for box in fixture.boxes
-        ]
 
 
 class PicturesRecord(FolderRecord):
@@ -159,14 +117,14 @@ class EpisodeFilmsStage:
         return EpisodesVideo(folder / f"{camera.name}.mp4", width_px=size, height_px=size, codec=self.settings.codec)
 
     def _frames(self, episode: StoredEpisode, cameras: list[NamedCamera]) -> list[list[np.ndarray]]:
-        room, size = _room(episode), self.settings.size_px
+        room, size = episode_room(episode), self.settings.size_px
         pictures: list[list[np.ndarray]] = [[] for _ in cameras]
         with EpisodeReplay(
             self._robot,
             [twin_drawable(self._source.folder(thing.twin_id)) for thing in episode.objects],
             furniture=room.furniture,
             fixtures=room.fixture_boxes,
-            granules=_granules(episode),
+            granules=granules_of(episode),
             lighting=lighting_of(room.ambient, room.lights),
             seed=episode.attempt.seed % 2**31,
         ) as replay:
@@ -177,17 +135,6 @@ class EpisodeFilmsStage:
                 self._drawn += 1
                 tell_part(self._drawn, self._to_draw, "frames")
         return pictures
-
-
-def _room(episode: StoredEpisode) -> _Room:
-    """Return where an episode took place; raises EpisodesError for facts that do not say so."""
-    try:
-        return _Room(**episode.facts)
-    except (ValidationError, TypeError) as error:
-        first = error.errors()[0] if isinstance(error, ValidationError) else {"loc": (), "msg": str(error)}
-        where = printable_line(".".join(map(str, ("facts", *first["loc"]))), max_characters=80)
-        said = f"episode {printable_line(episode.attempt.episode_id, max_characters=80)}: {where}: {first['msg']}"
-        raise EpisodesError(f"{said}; write the episodes again") from error
 
 
 @dataclass(frozen=True)
@@ -293,13 +240,3 @@ def _said(out: Path) -> dict[str, str]:
     if not os.path.lexists(out / CONFIG):
         raise EpisodesError(f"{out}/{CONFIG}: no episodes there; `manitwin trajectories` makes some")
     return read_configuration(out)
-
-
-def _granules(episode: StoredEpisode) -> tuple[int, float] | None:
-    """Return the number and radius of an episode's granules, if it has any."""
-    positions, radius_m = episode.recording.granule_positions_m, episode.facts.get("granule_radius_m")
-    if positions is None:
-        return None
-    if not isinstance(radius_m, float) or not 0 < radius_m < 1:
-        raise EpisodesError(f"episode {episode.attempt.episode_id}: no radius of its granules; make it again")
-    return positions.shape[1], radius_m

@@ -97,6 +97,12 @@ class Hdf5:
         with self._failures(path):
             return int(self._array(path).shape[0])
 
+    def size_bytes(self, path: str) -> int:
+        """Return what all arrays of a group take in memory, as ``group`` looks at them."""
+        found = self.group(path)
+        with self._failures(path):
+            return _bytes_below(found)
+
     def group(self, path: str) -> h5py.Group:
         """Return a group in which all is as this module reads it: it can be copied as it is."""
         with self._failures(path):
@@ -170,3 +176,7 @@ class Hdf5:
             raise self._refuse(
                 f"{self._called}: {where}no HDF5 file that can be read ({type(error).__name__}: {said}); {self._remedy}"
             ) from error
+
+
+def _bytes_below(group: h5py.Group) -> int:
+    return sum(each.nbytes if isinstance(each, h5py.Dataset) else _bytes_below(each) for each in group.values())

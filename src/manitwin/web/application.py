@@ -52,21 +52,26 @@ def application(gallery: Gallery | None, twins: TwinFolders, title: str) -> Star
         twin_id, name = request.path_params["twin_id"], request.path_params["name"]
         return await answered(lambda: _FileResponse(open_file(twins.folder(twin_id), name)))
 
-    async def give_package_file(request: Request) -> Response:
-        name = request.path_params["name"]
-        if name not in KINDS:
-            return _message(404, "There is no file of this name.")
-        return Response(package_file(name), headers={"content-type": KINDS[name], "cache-control": "no-cache"})
-
     return Starlette(
         routes=[
             Route("/", show_gallery),
             Route("/twin/{twin_id}", show_twin),
             Route(f"/twin/{{twin_id}}/{DOCUMENT}", give_document),
             Route("/twin/{twin_id}/{name:path}", give_file),
-            Route("/static/{name}", give_package_file),
+            PACKAGE_FILES,
         ]
     )
+
+
+async def _give_package_file(request: Request) -> Response:
+    name = request.path_params["name"]
+    if name not in KINDS:
+        return message(404, "There is no file of this name.")
+    return Response(package_file(name), headers={"content-type": KINDS[name], "cache-control": "no-cache"})
+
+
+PACKAGE_FILES = Route("/static/{name}", _give_package_file)
+"""The styles and scripts of all pages."""
 
 
 async def answered(work: Callable[[], Response]) -> Response:
@@ -74,9 +79,9 @@ async def answered(work: Callable[[], Response]) -> Response:
     try:
         return await run_in_threadpool(work)
     except UsageError as error:
-        return _message(404, str(error))
+        return message(404, str(error))
     except ManiTwinError as error:
-        return _message(422, str(error))
+        return message(422, str(error))
 
 
 def _gallery(gallery: Gallery, asked: dict[str, str], title: str) -> Response:
@@ -108,6 +113,7 @@ class _FileResponse(StreamingResponse):
             self._file.stream.close()
 
 
-def _message(status: int, said: str) -> Response:
+def message(status: int, said: str) -> Response:
+    """Return a page that says one thing."""
     body = f'<main class="message"><p role="alert">{text(said)}</p><p><a href="{LINKS.gallery()}">All twins</a></p></main>\n'
     return HTMLResponse(page(str(status), body, LINKS), status, headers=NOT_KEPT)

@@ -10,7 +10,8 @@ from manitwin.formats.printable import printable
 from manitwin.web.links import Links
 
 STYLE, THREE, VIEWER, GALLERY, REVIEW = "manitwin.css", "three.js", "twin_viewer.js", "gallery.js", "review.js"
-STAGE, SCENE_VIEWER = "stage.js", "scene_viewer.js"
+STAGE, SCENE_VIEWER, EPISODE_VIEWER = "stage.js", "scene_viewer.js", "episode_viewer.js"
+EPISODE_TIMELINE = "episode_timeline.js"
 """The styles and scripts of the pages, by the names under which they are served and written."""
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Protocol
-from urllib.parse import quote
+from urllib.parse import quote, urlencode
 
 THUMBNAIL = "views/rgb_00.webp"
 
@@ -55,6 +55,19 @@ class ServerLinks:
     def scene(self, scene_id: str) -> str:
         """Return a scene's page."""
         return f"/scene/{quote(scene_id, safe='')}"
+
+    def episodes(self, start: int = 0, outcome: str = "") -> str:
+        """Return the list of episodes, from one on, of one outcome or of all."""
+        asked = {**({"outcome": outcome} if outcome else {}), **({"from": start} if start else {})}
+        return f"/?{urlencode(asked)}" if asked else "/"
+
+    def episode(self, number: int) -> str:
+        """Return the page of a recorded episode."""
+        return f"/episode/{number}"
+
+    def robot(self, name: str) -> str:
+        """Return the looks of a robot's links."""
+        return f"/robot/{quote(name, safe='')}/links.glb"
 
     def file(self, twin_id: str, name: str, revision: str) -> str:
         """Return a file of a twin."""

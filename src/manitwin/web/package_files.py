@@ -10,11 +10,24 @@ from pathlib import Path
 
 from manitwin.errors import Unavailable
 from manitwin.formats.bounded_file import read_text
-from manitwin.web.html import GALLERY, REVIEW, SCENE_VIEWER, STAGE, STYLE, THREE, VIEWER
+from manitwin.web.html import (
+    EPISODE_TIMELINE,
+    EPISODE_VIEWER,
+    GALLERY,
+    REVIEW,
+    SCENE_VIEWER,
+    STAGE,
+    STYLE,
+    THREE,
+    VIEWER,
+)
 
 KINDS = {
     STYLE: "text/css; charset=utf-8",
-    **dict.fromkeys((THREE, VIEWER, GALLERY, REVIEW, STAGE, SCENE_VIEWER), "text/javascript; charset=utf-8"),
+    **dict.fromkeys(
+        (THREE, VIEWER, GALLERY, REVIEW, STAGE, SCENE_VIEWER, EPISODE_VIEWER, EPISODE_TIMELINE),
+        "text/javascript; charset=utf-8",
+    ),
 }
 """All there are, and their types."""
 LICENSE = "three.LICENSE.txt"

@@ -9,7 +9,7 @@ import numpy as np
 from manitwin.errors import ManiTwinError, TwinError, UsageError
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Workspace
-from manitwin.scenes.scene import SceneRecord
+from manitwin.scenes.scene import Furniture, SceneRecord
 from manitwin.twin.loaded_twin import Twin
 from manitwin.web.links import Links
 from manitwin.web.served_files import MODEL, TwinFolders
@@ -52,15 +52,7 @@ def scene_document(record: SceneRecord, twins: TwinFolders, links: Links) -> dic
     robot, problem = _robot(record.robot)
     return {
         "scene_id": record.scene_id,
-        "furniture": [
-            {
-                "name": box.name,
-                "center_m": list(box.center_m),
-                "half_extents_m": list(box.half_extents_m),
-                "color": COLORS.get(box.material, PLAIN),
-            }
-            for box in record.furniture.boxes
-        ],
+        "furniture": furniture_boxes(record.furniture),
         "supports": [
             {
                 "name": each.name,
@@ -74,6 +66,19 @@ def scene_document(record: SceneRecord, twins: TwinFolders, links: Links) -> dic
         "hulls": hulls,
         "unreadable": [*unreadable, *([problem] if problem else [])],
     }
+
+
+def furniture_boxes(furniture: Furniture) -> list[dict[str, Any]]:
+    """Return the boxes of furniture: middle and half extents, m, world frame, and a colour."""
+    return [
+        {
+            "name": box.name,
+            "center_m": list(box.center_m),
+            "half_extents_m": list(box.half_extents_m),
+            "color": COLORS.get(box.material, PLAIN),
+        }
+        for box in furniture.boxes
+    ]
 
 
 def _hulls(twin: Twin) -> list[dict[str, Any]]:

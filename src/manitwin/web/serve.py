@@ -19,6 +19,8 @@ from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.web.access import ENTER, Guard, Names, Tokens
 from manitwin.web.application import application
+from manitwin.web.episode_application import episode_application, no_twins
+from manitwin.web.episode_folders import EpisodeFolders, is_episodes
 from manitwin.web.gallery_query import Gallery
 from manitwin.web.review_application import review_application
 from manitwin.web.scene_application import scene_application
@@ -111,17 +113,27 @@ class PageServer:
             self._on_new_link(self.link())
 
 
-def pages_of(place: str, cache: Path) -> ASGIApp:
-    """Return the pages of a data set, a twin's folder, or scenes; raises UsageError where it is none, or has no index."""
+def pages_of(place: str, cache: Path, twins: str | None = None) -> ASGIApp:
+    """Return the pages of a data set, a twin's folder, scenes, or episodes, whose twins are in the data set ``twins``.
+
+    Raises UsageError where it is none of them, or has no index; EpisodesError for a file of episodes that cannot be read.
+    """
+    if is_episodes(place):
+        episodes = EpisodeFolders(place, cache, twins)
+        title = Path(place).resolve().name
+        shown = no_twins(episodes.without_twins) if episodes.twins is None else application(None, episodes.twins, title)
+        return episode_application(shown, episodes, title)
+    if twins is not None:
+        raise UsageError(f"{place}: --twins is for episodes, and there are none")
     if is_scenes(place):
         scenes = SceneFolders(place, cache)
         title = Path(place).resolve().name
         return scene_application(application(None, scenes.twins, title), scenes, title)
-    twins = TwinFolders(place, cache if "://" in place else None)
-    if twins.only is not None:
-        return application(None, twins, twins.only.record.name or twins.only.record.twin_id)
+    shown_twins = TwinFolders(place, cache if "://" in place else None)
+    if shown_twins.only is not None:
+        return application(None, shown_twins, shown_twins.only.record.name or shown_twins.only.record.twin_id)
     root = DatasetRoot(place)
-    return application(Gallery(root), twins, Path(root.path).name or "twins")
+    return application(Gallery(root), shown_twins, Path(root.path).name or "twins")
 
 
 def review(
@@ -146,11 +158,16 @@ def review(
 
 
 def serve(
-    place: str, host: str, port: int, on_ready: Callable[[PageServer], None], on_new_link: Callable[[str], None]
+    place: str,
+    host: str,
+    port: int,
+    on_ready: Callable[[PageServer], None],
+    on_new_link: Callable[[str], None],
+    twins: str | None = None,
 ) -> None:
-    """Serve the pages of a data set or a twin until interrupted; ``on_ready`` is called when it listens."""
+    """Serve the pages that ``pages_of`` gives until interrupted; ``on_ready`` is called when it listens."""
     with tempfile.TemporaryDirectory(prefix="manitwin-view-") as cache:
-        server = PageServer(pages_of(place, Path(cache)), host, port, on_new_link)
+        server = PageServer(pages_of(place, Path(cache), twins), host, port, on_new_link)
         try:
             on_ready(server)
             server.run()

@@ -1,4 +1,4 @@
-"""``manitwin view``: a data set's gallery, its twins' pages and scenes of them, in the browser."""
+"""``manitwin view``: a data set's gallery, its twins' pages, scenes and episodes of them, in the browser."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def view(
     source: Annotated[
         str,
         options.existing(
-            "A data set with an index, one twin, or scenes.",
-            "DATASET|TWIN|SCENES",
-            "a data set's, a twin's or scenes' folder",
+            "A data set with an index, one twin, scenes, or recorded episodes.",
+            "DATASET|TWIN|SCENES|EPISODES",
+            "a data set's, a twin's, scenes' or episodes' folder, or an HDF5 file of episodes",
         ),
     ],
     port: Annotated[int, typer.Option(help="The port; 0: any that is free.", min=0, max=65535)] = 0,
@@ -51,11 +51,14 @@ def view(
     where: Annotated[
         str | None, typer.Option(help="Of --static: the twins of a condition, as of manitwin query.", metavar="SQL")
     ] = None,
+    twins: options.Twins = None,
 ) -> None:
-    """Show a gallery of a data set and a page of each twin, or scenes in 3D, in the browser; or write them as plain files."""
+    """Show a gallery of a data set and a page of each twin, scenes, or episodes, in the browser; or write plain files."""
     from manitwin.errors import UsageError
 
     if static is not None:
+        if twins is not None:
+            raise UsageError("--twins is for episodes, which are not written as plain files")
         _write(source, static, sample, seed, where or "")
         return
     if sample is not None or where is not None:
@@ -71,7 +74,14 @@ def view(
             webbrowser.open(server.link())
 
     with interruptible() as ends_with:
-        serve(source, host, port, ready, lambda link: tell_link(link, "a new link, as one that was used came again"))
+        serve(
+            source,
+            host,
+            port,
+            ready,
+            lambda link: tell_link(link, "a new link, as one that was used came again"),
+            twins,
+        )
         out_console.print("stopped")
 
 

@@ -1,0 +1,100 @@
+"""The server's pages of recorded episodes: the list, each one in 3D, and the pages and files of the twins in them."""
+
+from __future__ import annotations
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.routing import Mount, Route
+from starlette.types import ASGIApp
+
+from manitwin.episodes.attempts import OUTCOMES
+from manitwin.errors import EpisodesError, UsageError
+from manitwin.web.application import LINKS, NOT_KEPT, PACKAGE_FILES, answered, message
+from manitwin.web.attempt_rows import AttemptRow
+from manitwin.web.episode_document import DOCUMENT, episode_document
+from manitwin.web.episode_folders import EpisodeFolders
+from manitwin.web.episode_pages import PAGE_EPISODES, EpisodeList, episode_page, list_page, recorded_row
+from manitwin.web.robot_model import robot_glb
+from manitwin.web.twin_document import document_bytes
+
+
+def episode_application(pages: ASGIApp, episodes: EpisodeFolders, title: str) -> Starlette:
+    """Return the pages of episodes before those of ``application``, which shows the twins, without the guard before them."""
+
+    async def show_list(request: Request) -> Response:
+        asked = request.query_params
+        return await answered(lambda: _list(episodes, asked.get("from", "0"), asked.get("outcome", ""), title))
+
+    async def show_episode(request: Request) -> Response:
+        return await answered(lambda: _episode(episodes, _number(request)))
+
+    async def give_document(request: Request) -> Response:
+        return await answered(lambda: _document(episodes, _number(request)))
+
+    async def give_robot(request: Request) -> Response:
+        name = request.path_params["name"]
+        return await answered(
+            lambda: Response(robot_glb(episodes.robot(name).urdf), media_type="model/gltf-binary", headers=NOT_KEPT)
+        )
+
+    return Starlette(
+        routes=[
+            Route("/", show_list),
+            Route("/episode/{number}", show_episode),
+            Route(f"/episode/{{number}}/{DOCUMENT}", give_document),
+            Route("/robot/{name}/links.glb", give_robot),
+            Mount("/", pages),
+        ]
+    )
+
+
+def no_twins(why: str) -> ASGIApp:
+    """Return what stands for the pages of twins where there are none: the scripts and styles, and a line that says why."""
+
+    async def tell(request: Request) -> Response:
+        return message(404, why)
+
+    return Starlette(routes=[PACKAGE_FILES, Route("/{path:path}", tell)])
+
+
+def _number(request: Request) -> int:
+    asked = request.path_params["number"]
+    if not (asked.isascii() and asked.isdigit() and len(asked) < 10):
+        raise UsageError("there is no episode of this number")
+    return int(asked)
+
+
+def _list(episodes: EpisodeFolders, start: str, outcome: str, title: str) -> Response:
+    outcome = outcome if outcome in OUTCOMES and episodes.attempts is not None else ""
+    count = len(episodes) if episodes.attempts is None else episodes.attempts.count(outcome)
+    place = int(start) if start.isascii() and start.isdigit() and len(start) < 10 else 0
+    place = place - place % PAGE_EPISODES if place < count else 0
+    rows: list[AttemptRow | str]
+    if episodes.attempts is None:
+        rows = [_read(episodes, number) for number in range(place, min(place + PAGE_EPISODES, count))]
+    else:
+        rows = list(episodes.attempts.page(place, PAGE_EPISODES, outcome))
+    shown = EpisodeList(
+        rows, place, count, len(episodes), outcome, episodes.attempts.outcomes if episodes.attempts else {}
+    )
+    return HTMLResponse(list_page(shown, title, episodes.without_attempts, LINKS), headers=NOT_KEPT)
+
+
+def _read(episodes: EpisodeFolders, number: int) -> AttemptRow | str:
+    try:
+        return recorded_row(episodes.said(number), number)
+    except EpisodesError as error:  # a broken episode ends nothing but its own line
+        return str(error)
+
+
+def _episode(episodes: EpisodeFolders, number: int) -> Response:
+    said = episodes.said(number)
+    count = len(episodes)
+    before, after = number - 1 if number else None, number + 1 if number + 1 < count else None
+    return HTMLResponse(episode_page(said, number, count, LINKS, before, after), headers=NOT_KEPT)
+
+
+def _document(episodes: EpisodeFolders, number: int) -> Response:
+    document = episode_document(episodes.episode(number), number, episodes, LINKS)
+    return Response(document_bytes(document), media_type="application/json", headers=NOT_KEPT)

@@ -1,0 +1,223 @@
+"""What the 3D view plays of a recorded episode, as one JSON document: where links and objects are, state by state."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from manitwin.episodes.episode_room import EpisodeRoom, episode_room, granules_of
+from manitwin.episodes.recording import RATE_HZ, Recording
+from manitwin.episodes.replay_pictures import link_poses
+from manitwin.episodes.stored_episode import StoredEpisode
+from manitwin.errors import EpisodesError, ManiTwinError
+from manitwin.formats.printable import printable_line
+from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.robots.robot import OPENING, Robot
+from manitwin.web.episode_events import happenings, literals, phases, span_json
+from manitwin.web.episode_folders import EpisodeFolders
+from manitwin.web.links import ServerLinks
+from manitwin.web.robot_model import shown_links
+from manitwin.web.scene_document import furniture_boxes
+from manitwin.web.served_files import MODEL
+
+DOCUMENT = "episode_view.json"
+MOST_STATES = 1_500
+"""Of a document: 75 s of every state that is recorded; of a longer episode every second one, and so on."""
+MOST_NUMBERS = 600_000
+"""Of all poses together: 4 MB of JSON."""
+MOST_OBJECTS, MOST_GRANULES = 200, 300
+_DECIMALS = 4
+"""A tenth of a millimetre; of a quaternion a hundredth of a degree."""
+_LONGEST_QUATERNION = 0.01
+"""How far from 1 the length of a recorded one may be."""
+_LENGTH_OF_POSE = 7
+
+
+def episode_document(
+    episode: StoredEpisode, number: int, folders: EpisodeFolders, links: ServerLinks
+) -> dict[str, Any]:
+    """Return the document: metres, world frame, quaternions wxyz, seconds; ``unreadable`` has a line for what cannot be shown.
+
+    Poses are rows of position and quaternion, one for each of ``time_s``, or one in all where it never changes. Forces are
+    the largest between two rows. Raises EpisodesError for rotations that are none, and for more than can be shown.
+    """
+    recording, unreadable = episode.recording, list[str]()
+    if len(episode.objects) > MOST_OBJECTS:
+        raise EpisodesError(f"{len(episode.objects)} objects are more than the {MOST_OBJECTS} that are shown")
+    try:
+        robot: Robot | None = folders.robot_of(episode.robot)
+        shown = shown_links(robot.urdf) if robot is not None else []
+    except ManiTwinError as error:
+        robot, shown = None, []
+        unreadable.append(str(error))
+    objects, called = _objects(episode, folders, links, unreadable)
+    states = shown_states(recording, len(shown) + len(episode.objects))
+    return {
+        "episode_id": episode.attempt.episode_id,
+        "number": number,
+        "time_s": [round(float(state) / RATE_HZ, _DECIMALS) for state in states],
+        "rate_hz": RATE_HZ,
+        "robot": None if robot is None else _robot(robot, shown, recording, states, links),
+        "objects": [
+            {**each, "poses": poses} for each, poses in zip(objects, _object_poses(recording, states), strict=True)
+        ],
+        "target": recording.target,
+        "tip": _poses(recording.tip_position_m[states], recording.tip_quaternion_wxyz[states]),
+        "granules": _granules(episode, states, unreadable),
+        **_room(episode, unreadable),
+        "goal": _goal(episode),
+        "hand": _hand(episode, states),
+        "forces_n": [
+            [round(float(each), 2) for each in side] for side in _largest(recording.finger_forces_n, states).T
+        ],
+        "phases": [span_json(each) for each in phases(recording)],
+        "literals": [span_json(each) for each in literals(episode)],
+        "happenings": [
+            {"time_s": each.time_s, "kind": each.kind, "label": printable_line(each.label, max_characters=200)}
+            for each in happenings(episode, called)
+        ],
+        "unreadable": [*unreadable, *([folders.without_twins] if folders.without_twins else [])],
+    }
+
+
+def shown_states(recording: Recording, things: int) -> np.ndarray:
+    """Return the numbers of the states that a document has: all, or every n-th and the last, as its limits allow.
+
+    ``things`` are so many poses a state. Raises EpisodesError where the limits leave no two of them.
+    """
+    count = recording.steps + 1
+    granules = (
+        0 if recording.granule_positions_m is None else min(recording.granule_positions_m.shape[1], MOST_GRANULES)
+    )
+    numbers = _LENGTH_OF_POSE * (things + 1) + 3 * granules
+    most = min(MOST_STATES, MOST_NUMBERS // numbers)
+    step = -(-count // max(1, most))
+    return np.unique(np.append(np.arange(0, count, step), count - 1))
+
+
+def _objects(
+    episode: StoredEpisode, folders: EpisodeFolders, links: ServerLinks, unreadable: list[str]
+) -> tuple[list[dict[str, Any]], Callable[[str], str]]:
+    """Return what is told of each object but its poses, and what gives an object's words for its name."""
+    known: dict[str, tuple[str, str]] = {}
+    twins = folders.twins
+    for twin_id in sorted({each.twin_id for each in episode.objects}):
+        if twins is None:
+            break
+        try:
+            record = twins.twin(twin_id).record
+        except ManiTwinError as error:
+            unreadable.append(str(error))
+            continue
+        category = record.language.category if record.language is not None else ""
+        known[twin_id] = (category, links.file(twin_id, MODEL, record.revision))
+    words = {
+        each.name: f"{each.name} ({known[each.twin_id][0]})" if known.get(each.twin_id, ("",))[0] else each.name
+        for each in episode.objects
+    }
+    told = [
+        {
+            "name": each.name,
+            "twin_id": each.twin_id,
+            "label": printable_line(words[each.name], max_characters=200),
+            "model": known[each.twin_id][1] if each.twin_id in known else None,
+        }
+        for each in episode.objects
+    ]
+    return told, lambda name: words.get(name, name.replace("_", " "))
+
+
+def _robot(
+    robot: Robot, shown: list[str], recording: Recording, states: np.ndarray, links: ServerLinks
+) -> dict[str, Any]:
+    rows = [link_poses(robot, recording.joint_positions_rad[state], recording.hand[state]) for state in states]
+    told = []
+    for name in shown:
+        poses = np.array([row[name] for row in rows])
+        told.append({"name": name, "poses": _poses(poses[:, :3, 3], quaternion_wxyz(poses[:, :3, :3]))})
+    return {"name": robot.name, "model": links.robot(robot.name), "links": told}
+
+
+def _object_poses(recording: Recording, states: np.ndarray) -> list[list[float]]:
+    positions, quaternions = recording.object_positions_m[states], recording.object_quaternions_wxyz[states]
+    return [_poses(positions[:, i], quaternions[:, i]) for i in range(positions.shape[1])]
+
+
+def _poses(positions_m: np.ndarray, quaternions_wxyz: np.ndarray) -> list[float]:
+    """Return rows ``(S, 7)`` in one list; one row where all are equal as they are written."""
+    lengths = np.linalg.norm(quaternions_wxyz, axis=1)
+    if not (np.abs(lengths - 1) < _LONGEST_QUATERNION).all():
+        raise EpisodesError("a recorded rotation is none: its quaternion is not of length 1; write the episodes again")
+    rows = np.round(np.hstack([positions_m, quaternions_wxyz]).astype(float), _DECIMALS)
+    return _plain(rows[:1] if (rows == rows[0]).all() else rows)
+
+
+def _plain(values: np.ndarray) -> list[float]:
+    return [float(each) for each in np.round(np.asarray(values, float), _DECIMALS).ravel()]
+
+
+def _granules(episode: StoredEpisode, states: np.ndarray, unreadable: list[str]) -> dict[str, Any] | None:
+    try:
+        found = granules_of(episode)
+    except EpisodesError as error:
+        unreadable.append(str(error))
+        return None
+    positions = episode.recording.granule_positions_m
+    if found is None or positions is None:
+        return None
+    chosen = np.arange(0, found[0], max(1, -(-found[0] // MOST_GRANULES)))
+    return {"radius_m": found[1], "count": len(chosen), "positions_m": _plain(positions[states][:, chosen])}
+
+
+def _room(episode: StoredEpisode, unreadable: list[str]) -> dict[str, Any]:
+    try:
+        room: EpisodeRoom = episode_room(episode)
+    except EpisodesError as error:
+        unreadable.append(str(error))
+        return {"furniture": [], "fixtures": []}
+    fixtures = [
+        {
+            "name": box.name,
+            "half_extents_m": list(box.half_extents_m),
+            "poses": [*box.position_m, *box.quaternion_wxyz],
+        }
+        for fixture in room.fixtures
+        for box in fixture.boxes
+    ]
+    return {"furniture": furniture_boxes(room.furniture), "fixtures": fixtures}
+
+
+def _goal(episode: StoredEpisode) -> list[float] | None:
+    """Return the pose that the target was to reach, of episodes without a goal in words."""
+    said = episode.facts.get("goal_object_to_world")
+    if episode.attempt.goal is not None or said is None:
+        return None
+    try:
+        pose = np.array(said, float)
+    except (TypeError, ValueError):
+        return None
+    if (
+        pose.shape != (4, 4)
+        or not np.isfinite(pose).all()
+        or abs(np.linalg.det(pose[:3, :3]) - 1) > _LONGEST_QUATERNION
+    ):
+        return None
+    return _plain(np.append(pose[:3, 3], quaternion_wxyz(pose[:3, :3])))
+
+
+def _hand(episode: StoredEpisode, states: np.ndarray) -> dict[str, Any]:
+    """Return the opening of jaws, m, or the first of a hand's joints, with its name."""
+    name = episode.robot.hand_state[0]
+    return {
+        "name": name,
+        "is_opening": name == OPENING,
+        "values": _plain(episode.recording.hand[states, 0]),
+    }
+
+
+def _largest(values: np.ndarray, states: np.ndarray) -> np.ndarray:
+    """Return the largest of ``(T + 1, 2)`` since the state before, for each of the states."""
+    starts = np.append(0, states[:-1] + 1)
+    return np.asarray(np.maximum.reduceat(values, starts, axis=0))

@@ -1,0 +1,188 @@
+"""What happens in a recorded episode, and when: phases, literals that are worked on, grasps, falls of granules, contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
+
+from manitwin.episodes.goals.goal import Literal
+from manitwin.episodes.goals.goal_text import parse_goal
+from manitwin.episodes.planning.problem import Phase
+from manitwin.episodes.recording import RATE_HZ, Recording
+from manitwin.episodes.stored_episode import StoredEpisode
+from manitwin.errors import EpisodesError, UsageError
+from manitwin.formats.printable import printable_line
+
+HELD_N = 0.5
+"""That both sides press with where a thing is held: what counts as a contact in the recording too (``unplanned_contact``)."""
+SHORT = 3
+"""States: what is interrupted for fewer goes on."""
+MOST_EVENTS = 200
+
+_UNITS = {
+    "force_n": "N",
+    "off_m": "m off",
+    "angle_rad": "rad",
+    "speed_m_s": "m/s",
+    "rise_m": "m of rise",
+}
+
+
+@dataclass(frozen=True)
+class Span:
+    """A state of things from one recorded state to the last one in which it lasts, both counted."""
+
+    first: int
+    last: int
+    label: str
+
+
+@dataclass(frozen=True)
+class Happening:
+    """Something that happened at a time of the recording, s."""
+
+    time_s: float
+    kind: str
+    label: str
+
+
+class _Event(BaseModel):
+    model_config = ConfigDict(extra="ignore")
+
+    kind: str = Field(max_length=64)
+    subject: str = Field(max_length=256)
+    second: str | None = Field(default=None, max_length=256)
+    values: dict[str, FiniteFloat] = Field(default={}, max_length=32)
+
+
+class _Events(BaseModel):
+    model_config = ConfigDict(extra="ignore")
+
+    events: list[_Event] = Field(default=[], max_length=MOST_EVENTS)
+
+
+def phases(recording: Recording) -> list[Span]:
+    """Return the phases in their order; the state after the last action belongs to the last one."""
+    known = {int(each): each.name.lower() for each in Phase}
+    return [
+        Span(first, last, known.get(value, f"phase {value}"))
+        for first, last, value in _runs(_of_states(recording.phase))
+    ]
+
+
+def literals(episode: StoredEpisode) -> list[Span]:
+    """Return the literals of the goal as they are worked on; none without a goal in words."""
+    said = goal_literals(episode.attempt.goal)
+    recording = episode.recording
+    if not said:
+        return []
+    if recording.active_literal is None:
+        return [Span(0, recording.steps, " and ".join(said))]
+    return [
+        Span(first, last, said[value] if value < len(said) else f"literal {value + 1}")
+        for first, last, value in _runs(_of_states(recording.active_literal))
+    ]
+
+
+def goal_literals(goal: str | None) -> list[str]:
+    """Return the literals of a goal that are to come true, the whole of it where it cannot be read; none without one."""
+    if not goal:
+        return []
+    try:
+        found: tuple[Literal, ...] = parse_goal(goal).literals
+    except UsageError:
+        return [printable_line(goal, max_characters=400)]
+    return [str(each) for each in found]
+
+
+def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
+    """Return what happened in the order of time; ``called`` gives the words for the name of an object.
+
+    Raises EpisodesError where the facts tell of events that are none.
+    """
+    recording = episode.recording
+    target = called(episode.objects[recording.target].name)
+    rate, last = float(RATE_HZ), recording.steps
+    held = _spans(recording.finger_forces_n.min(axis=1) > HELD_N)
+    found = [Happening(first / rate, "grasped", f"grasped {target}") for first, _ in held]
+    found += [Happening((end + 1) / rate, "released", f"released {target}") for _, end in held if end < last]
+    aloft = _spans(~recording.target_on_support.astype(bool))
+    found += [Happening(first / rate, "lifted", f"{target} leaves what it stood on") for first, _ in aloft if first]
+    found += [Happening((end + 1) / rate, "set_down", f"{target} is set down") for _, end in aloft if end < last]
+    for first, _ in _spans(recording.unplanned_contact.astype(bool)):
+        found.append(Happening(first / rate, "contact", "the robot touched what it should not"))
+    found += _granules(episode, called) + _told(episode, called)
+    found += [
+        Happening(span.first / rate, "literal", f"now: {span.label}") for span in literals(episode)[1:]
+    ]  # the first one begins with the episode
+    return sorted(found, key=lambda each: each.time_s)[:MOST_EVENTS]
+
+
+def _granules(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
+    counts = episode.recording.granules_in_objects
+    if counts is None:
+        return []
+    found = []
+    for column, thing in enumerate(episode.objects):
+        held = counts[:, column].astype(int)
+        more = np.flatnonzero(np.diff(held) > 0) + 1
+        if len(more) and held.max() > held[0]:
+            first, peak = int(more[0]), int(np.argmax(held))
+            found.append(Happening(first / RATE_HZ, "poured", f"the first granule in {called(thing.name)}"))
+            if peak > first:
+                said = f"{int(held[peak])} granules in {called(thing.name)}"
+                found.append(Happening(peak / RATE_HZ, "poured", said))
+    return found
+
+
+def _told(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
+    """Return the events that were latched as the episode ran; those without a time stand at its end."""
+    try:
+        events = _Events.model_validate(episode.facts).events
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = printable_line(".".join(map(str, first["loc"])), max_characters=80)
+        raise EpisodesError(f"facts: {where}: {first['msg']}; write the episodes again") from error
+    end_s = episode.recording.steps / RATE_HZ
+    found = []
+    for event in events:
+        second = f", {called(event.second)}" if event.second else ""
+        values = ", ".join(f"{event.values[name]:.3g} {unit}" for name, unit in _UNITS.items() if name in event.values)
+        label = f"{event.kind.replace('_', ' ')} {called(event.subject)}{second}{f' ({values})' if values else ''}"
+        time_s = min(max(event.values.get("time_s", end_s), 0.0), end_s)
+        found.append(Happening(time_s, "told", label))
+    return found
+
+
+def _of_states(of_actions: np.ndarray) -> np.ndarray:
+    """Return for ``(T + 1,)`` states what is told of ``(T,)`` actions: that of the action that follows, or the last one."""
+    return np.append(of_actions, of_actions[-1:])
+
+
+def _runs(values: np.ndarray) -> list[tuple[int, int, int]]:
+    """Return the first and last place and the value of each run of equal values."""
+    starts = np.flatnonzero(np.diff(values.astype(int), prepend=-1))
+    ends = [*(starts[1:] - 1), len(values) - 1]
+    return [(int(start), int(end), int(values[start])) for start, end in zip(starts, ends, strict=True)]
+
+
+def _spans(true: np.ndarray) -> list[tuple[int, int]]:
+    """Return where flags are true, first and last place; gaps shorter than ``SHORT`` are closed."""
+    found: list[tuple[int, int]] = []
+    for start, end, value in _runs(true):
+        if not value:
+            continue
+        if found and start - found[-1][1] <= SHORT:
+            found[-1] = (found[-1][0], end)
+        else:
+            found.append((start, end))
+    return found
+
+
+def span_json(span: Span) -> dict[str, Any]:
+    """Return a span as plain values, s."""
+    return {"from_s": span.first / RATE_HZ, "to_s": span.last / RATE_HZ, "label": span.label}

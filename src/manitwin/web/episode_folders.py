@@ -1,0 +1,198 @@
+"""The recorded episodes of a run that a page may show, by their numbers, with the twins and the robot that they are of."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from manitwin.engine.ledger.location import CONFIG
+from manitwin.episodes.attempts import ATTEMPTS
+from manitwin.episodes.batch import BATCHES
+from manitwin.episodes.collect import MANISKILL, batch_folders
+from manitwin.episodes.configuration import read_configuration
+from manitwin.episodes.episodes_stage import EPISODES
+from manitwin.episodes.hdf5_file import EpisodeFile, checked
+from manitwin.episodes.hdf5_merge import TRAJECTORIES
+from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode
+from manitwin.errors import ConfigError, EpisodesError, ManiTwinError, UsageError
+from manitwin.formats.printable import printable_line
+from manitwin.robots.load import load_robot, shipped_robots
+from manitwin.robots.robot import Robot
+from manitwin.web.attempt_rows import AttemptRows
+from manitwin.web.served_files import TwinFolders
+
+MOST_EPISODE_BYTES = 256 << 20
+"""Of the arrays of one episode, unpacked; one of a minute with 60 granules has 3 MB."""
+_SUFFIXES = (".h5", ".hdf5")
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where an episode lies; ``problem`` where its file cannot be read, which then counts as one."""
+
+    file: Path
+    number: int
+    problem: str | None = None
+
+
+def is_episodes(place: str) -> bool:
+    """Tell whether a place holds recorded episodes: a run of ``manitwin trajectories``, or an HDF5 file."""
+    if "://" in place:
+        return False
+    found = Path(place)
+    if found.is_file():
+        return found.suffix.lower() in _SUFFIXES
+    return _merged(found) is not None or (found / BATCHES).is_dir()
+
+
+class EpisodeFolders:
+    """The episodes at a place: those of the merged file, or, while a run goes on, those of its batches.
+
+    ``twins`` is None where it is not known, or not there, whose twins they are: ``without_twins`` says why. ``dataset`` names the
+    data set of the twins, None: where they were as the episodes were made. ``cache`` takes those of a data set at a URL.
+    Raises UsageError where there are no episodes, EpisodesError where the one file of them cannot be read.
+    """
+
+    def __init__(self, place: str, cache: Path, dataset: str | None = None):
+        self.root = Path(place)
+        self._places = _places(self.root)
+        if not self._places:
+            raise UsageError(f"{place}: no recorded episode there; `manitwin trajectories` makes some")
+        self._config = _configuration(self.root)
+        self.twins: TwinFolders | None = None
+        self.without_twins = ""
+        self._find_twins(dataset, cache)
+        self.attempts, self.without_attempts = self._attempts()
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def said(self, number: int) -> dict[str, Any]:
+        """Return what is no array of an episode; raises UsageError where there is none of this number, EpisodesError."""
+        place = self._place(number)
+        with EpisodeFile(place.file) as file:
+            return file.said(place.number)
+
+    def episode(self, number: int) -> StoredEpisode:
+        """Return an episode whose arrays fit together; raises UsageError for another number, EpisodesError for a broken one."""
+        place = self._place(number)
+        name = f"{place.file}: traj_{place.number}"
+        with EpisodeFile(place.file) as file:
+            file.said(place.number)
+            size = file.content.size_bytes(f"traj_{place.number}")
+            if size > MOST_EPISODE_BYTES:
+                raise EpisodesError(
+                    f"{name}: {size:,} bytes of arrays, {MOST_EPISODE_BYTES:,} at most are shown; load the file itself"
+                )
+            episode = file[place.number]
+        checked(episode)
+        return episode
+
+    def robot(self, name: str) -> Robot:
+        """Return a robot of the package, or the one that the run was made with.
+
+        Raises UsageError where it is neither; ConfigError and Unavailable as ``load_robot`` does.
+        """
+        if name in shipped_robots():
+            return load_robot(name)
+        made_with = self._config.get("robot")
+        if made_with is not None and made_with.endswith(".toml"):
+            robot = load_robot(made_with)
+            if robot.name == name:
+                return robot
+        raise UsageError(
+            f"the robot {printable_line(name, max_characters=80)} is none of the package, nor that of the run"
+        )
+
+    def robot_of(self, recorded: RecordedRobot) -> Robot:
+        """Return the robot of a recording; raises ConfigError where the one of its name has other joints."""
+        robot = self.robot(recorded.name)
+        if robot.arm_joints != recorded.arm_joints or robot.hand_state_names != recorded.hand_state:
+            raise ConfigError(f"the robot {robot.name} has other joints than it had as it was recorded")
+        return robot
+
+    def _place(self, number: int) -> _Place:
+        if not 0 <= number < len(self._places):
+            raise UsageError("there is no episode of this number")
+        place = self._places[number]
+        if place.problem is not None:
+            raise EpisodesError(place.problem)
+        return place
+
+    def _find_twins(self, dataset: str | None, cache: Path) -> None:
+        where = dataset or self._config.get("dataset")
+        if where is None:
+            self.without_twins = f"{self.root}: does not say whose twins it is of; name their data set (--twins)"
+            return
+        try:
+            self.twins = TwinFolders(where, cache if "://" in where else None)
+        except ManiTwinError as error:
+            if dataset is not None:
+                raise
+            self.without_twins = str(error)
+
+    def _attempts(self) -> tuple[AttemptRows | None, str]:
+        """Return the table of all attempts, if it is that of these episodes; else why not, in a line, if there is one."""
+        path = self.root / ATTEMPTS
+        if not self.root.is_dir() or _merged(self.root) is None or not path.is_file():
+            return None, ""
+        try:
+            rows = AttemptRows(path)
+        except EpisodesError as error:
+            return None, str(error)
+        if rows.kept != len(self):
+            return (
+                None,
+                f"{path}: tells of {rows.kept} recorded episodes, and there are {len(self)}; run the episodes again",
+            )
+        return rows, ""
+
+
+def _merged(folder: Path) -> Path | None:
+    for file in (folder / MANISKILL / TRAJECTORIES, folder / TRAJECTORIES):
+        if file.is_file():
+            return file
+    return None
+
+
+def _places(root: Path) -> list[_Place]:
+    if root.is_file():
+        return _of_file(root)
+    merged = _merged(root)
+    if merged is not None:
+        return _of_file(_inside(merged, root))
+    files = sorted((root / BATCHES).glob(f"*/*/{EPISODES}"))
+    with suppress(ManiTwinError):  # by their attempts' numbers, where those can be read
+        files = [folder / EPISODES for folder in batch_folders(root)]
+    places: list[_Place] = []
+    for file in files:
+        try:
+            places += _of_file(_inside(file, root))
+        except EpisodesError as error:  # a broken batch is one line among the others
+            places.append(_Place(file, 0, str(error)))
+    return places
+
+
+def _of_file(path: Path) -> list[_Place]:
+    with EpisodeFile(path) as file:
+        return [_Place(path, number) for number in range(len(file))]
+
+
+def _inside(file: Path, root: Path) -> Path:
+    if not file.resolve().is_relative_to(root.resolve()):
+        raise EpisodesError(f"{file}: leads out of the folder; put the file itself there")
+    return file
+
+
+def _configuration(root: Path) -> dict[str, Any]:
+    """Return what the run of a folder, or of a file in its folders, was made with; nothing where it is not known."""
+    folder = root.resolve() if root.is_dir() else root.resolve().parent
+    for each in (folder, *list(folder.parents)[:3]):
+        if (each / CONFIG).is_file():
+            try:
+                return read_configuration(each)
+            except EpisodesError:
+                return {}
+    return {}
