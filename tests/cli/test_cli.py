@@ -214,6 +214,8 @@ WRONG_VALUES = [
     "view . --port 70000",
     "view . --sample 3",
     "view . --static out --sample 0",
+    "view . --static out --twins .",
+    "view . --twins .",
     "review apply nothing_here",
     "review tune nothing_here",
 ]

@@ -126,6 +126,9 @@ class EpisodeFolders:
         if where is None:
             self.without_twins = f"{self.root}: does not say whose twins it is of; name their data set (--twins)"
             return
+        if dataset is None and "://" in where:  # what a file says is no wish of a person's
+            self.without_twins = f"{self.root}: its twins are at {where}; name it to have them fetched (--twins)"
+            return
         try:
             self.twins = TwinFolders(where, cache if "://" in where else None)
         except ManiTwinError as error:
