@@ -4,6 +4,8 @@
     python docs/make_view_pictures.py LINK TWIN_ID
     manitwin view SCENES --no-browser
     python docs/make_view_pictures.py LINK SCENE_ID --scene
+    manitwin view EPISODES --no-browser
+    python docs/make_view_pictures.py LINK NUMBER --episode
 
 ``LINK`` is the link of one use that the command prints.
 """
@@ -22,6 +24,9 @@ from playwright.sync_api import sync_playwright
 FOLDER = Path(__file__).resolve().parent
 BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
 WIDE, NARROW, SCENE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}, {"width": 1280, "height": 720}
+EPISODE = {"width": 1280, "height": 965}
+MOMENT_S = 4.2
+"""Of an episode: the thing is in the hand then."""
 WITHOUT_GPU = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 
 
@@ -31,7 +36,7 @@ def shown(page: Any, address: str, size: dict[str, int], scheme: str) -> Image.I
     page.emulate_media(color_scheme=scheme)
     page.goto("about:blank")
     page.goto(address, wait_until="networkidle")
-    if "/twin/" in address or "/scene/" in address:
+    if any(kind in address for kind in ("/twin/", "/scene/", "/episode/")):
         page.wait_for_selector("#viewer[data-ready]")
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
@@ -52,8 +57,9 @@ def main() -> None:
     """Make the pictures."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("link")
-    parser.add_argument("id", help="of a twin, or with --scene of a scene")
+    parser.add_argument("id", help="of a twin, or with --scene of a scene, with --episode of an episode")
     parser.add_argument("--scene", action="store_true", help="the picture of a scene's page alone")
+    parser.add_argument("--episode", action="store_true", help="the picture of an episode's page alone, by its number")
     given = parser.parse_args()
     address = given.link.split("/enter")[0]
     twin = f"{address}/twin/{given.id}"
@@ -62,10 +68,12 @@ def main() -> None:
         path = next(found for name in BROWSERS if (found := shutil.which(name)))
         page = playwright.chromium.launch(executable_path=path, args=WITHOUT_GPU).new_page()
         page.goto(given.link)
-        pictures = (
-            {"view_scene": shown(page, f"{address}/scene/{given.id}", SCENE, "light")}
-            if given.scene
-            else {
+        if given.scene:
+            pictures = {"view_scene": shown(page, f"{address}/scene/{given.id}", SCENE, "light")}
+        elif given.episode:
+            pictures = {"view_episode": shown(page, f"{address}/episode/{given.id}#t={MOMENT_S}", EPISODE, "light")}
+        else:
+            pictures = {
                 "view_gallery": shown(page, f"{address}/", WIDE, "light"),
                 "view_twin": shown(page, twin, WIDE, "light"),
                 "view_dark": shown(page, closer, WIDE, "dark"),
@@ -77,7 +85,6 @@ def main() -> None:
                     ]
                 ),
             }
-        )
     for name, picture in pictures.items():
         picture.save(FOLDER / f"{name}.webp", quality=82, method=6)
 

@@ -215,7 +215,6 @@ WRONG_VALUES = [
     "view . --sample 3",
     "view . --static out --sample 0",
     "view . --static out --twins .",
-    "view . --twins .",
     "review apply nothing_here",
     "review tune nothing_here",
 ]

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
 from fuzz_target import Case, target
 from lerobot_sets import written
-from synthetic_episodes import attempt, episode
+from synthetic_episodes import attempt, episode, with_granules
 
 from manitwin.episodes.attempts import read_attempts, success_of, write_attempts
 from manitwin.episodes.hdf5_file import EpisodeFile, checked, write_episodes
 from manitwin.episodes.lerobot.read import read_lerobot
+from manitwin.errors import EpisodesError
+from manitwin.web.episode_document import episode_document
+from manitwin.web.episode_folders import EpisodeFolders
+from manitwin.web.episode_pages import episode_page, recorded_row
+from manitwin.web.links import ServerLinks
+from manitwin.web.twin_document import document_bytes
 
 
 def hdf5(folder: Path) -> None:
@@ -32,6 +39,24 @@ def read_hdf5(case: Case) -> None:
             checked(file[number])
 
 
+def shown(folder: Path) -> None:
+    (folder / "maniskill").mkdir()
+    write_episodes(folder / "maniskill" / "trajectory.h5", [with_granules(episode(0, steps=4)), episode(1, steps=4)])
+    attempts(folder)
+
+
+def show(case: Case) -> None:
+    episodes = EpisodeFolders(str(case.folder), case.folder / "cache")
+    for number in range(len(episodes)):
+        with suppress(EpisodesError):
+            recorded_row(episodes.said(number), number)
+            episode_page(episodes.said(number), number, len(episodes), ServerLinks(), None, None)
+        with suppress(EpisodesError):
+            document_bytes(episode_document(episodes.episode(number), number, episodes, ServerLinks()))
+    if episodes.attempts is not None:
+        episodes.attempts.page(0, 10)
+
+
 def lerobot(folder: Path) -> None:
     written(folder / "set", 2)
 
@@ -48,3 +73,4 @@ def attempts(folder: Path) -> None:
 target("hdf5", hdf5, read_hdf5)
 target("lerobot", lerobot, read_set, files=("*.json", "*.parquet", "*.jsonl"), weight=0.5)
 target("attempts", attempts, lambda case: success_of(read_attempts(case.file)))
+target("shown_episodes", shown, show, files=("*.h5", "*.parquet"), weight=0.3)

@@ -167,7 +167,7 @@ def test_what_happens_is_found_in_the_recording_at_its_time(run: Path) -> None:
 
 def test_a_grip_that_is_lost_for_an_instant_is_one_grasp(tmp_path: Path) -> None:
     forces = recording().finger_forces_n.copy()
-    forces[GRASPED + 3] = 0
+    forces[GRASPED + 3], forces[2:4] = 0, 9.0
     kinds = [each["kind"] for each in document(run_of(tmp_path, arrays={"finger_forces_n": forces}))["happenings"]]
     assert kinds.count("grasped") == kinds.count("released") == 1
 
@@ -192,14 +192,19 @@ def test_literals_events_granules_and_touches_are_told(tmp_path: Path) -> None:
         facts={
             "granule_radius_m": 0.004,
             "events": [
-                {"kind": "pressed", "subject": "object_01", "second": None, "values": {"force_n": 6.25, "time_s": 0.4}}
+                {
+                    "kind": "pressed",
+                    "subject": "object_01",
+                    "second": None,
+                    "values": {"force_n": 6.2, "off_m": 0.0015, "time_s": 0.4},
+                }
             ],
         },
     )
     told = document(place)
     said = [(each["time_s"], each["label"]) for each in told["happenings"]]
     assert (0.6, "the robot touched what it should not") in said
-    assert (0.4, "pressed object_01 (box) (6.25 N)") in said
+    assert (0.4, "pressed object_01 (box) (6.2 N, 1.5 mm off)") in said
     assert (0.75, "now: near(object_01, object_00, 0.1)") in said
     assert (0.3, "the first granule in object_01 (box)") in said and (0.55, "6 granules in object_01 (box)") in said
     assert [each["label"] for each in told["literals"]] == [

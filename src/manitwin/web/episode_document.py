@@ -147,7 +147,7 @@ def _object_poses(recording: Recording, states: np.ndarray) -> list[list[float]]
 
 def _poses(positions_m: np.ndarray, quaternions_wxyz: np.ndarray) -> list[float]:
     """Return rows ``(S, 7)`` in one list; one row where all are equal as they are written."""
-    lengths = np.linalg.norm(quaternions_wxyz, axis=1)
+    lengths = np.linalg.norm(quaternions_wxyz.astype(float), axis=1)
     if not (np.abs(lengths - 1) < _LONGEST_QUATERNION).all():
         raise EpisodesError("a recorded rotation is none: its quaternion is not of length 1; write the episodes again")
     rows = np.round(np.hstack([positions_m, quaternions_wxyz]).astype(float), _DECIMALS)

@@ -20,16 +20,17 @@ from manitwin.formats.printable import printable_line
 HELD_N = 0.5
 """That both sides press with where a thing is held: what counts as a contact in the recording too (``unplanned_contact``)."""
 SHORT = 3
-"""States: what is interrupted for fewer goes on."""
+"""States: what is interrupted for so few goes on, and what lasts for fewer is left out."""
 MOST_EVENTS = 200
 
-_UNITS = {
-    "force_n": "N",
-    "off_m": "m off",
-    "angle_rad": "rad",
-    "speed_m_s": "m/s",
-    "rise_m": "m of rise",
+_SHOWN = {
+    "force_n": (1.0, "N"),
+    "off_m": (1e3, "mm off"),
+    "angle_rad": (180 / np.pi, "degrees off"),
+    "speed_m_s": (1.0, "m/s"),
+    "rise_m": (1e3, "mm of rise"),
 }
+"""Measured values of events that are told: by what they are multiplied, and the words after them."""
 
 
 @dataclass(frozen=True)
@@ -107,10 +108,10 @@ def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Hap
     recording = episode.recording
     target = called(episode.objects[recording.target].name)
     rate, last = float(RATE_HZ), recording.steps
-    held = _spans(recording.finger_forces_n.min(axis=1) > HELD_N)
+    held = _lasting(recording.finger_forces_n.min(axis=1) > HELD_N)
     found = [Happening(first / rate, "grasped", f"grasped {target}") for first, _ in held]
     found += [Happening((end + 1) / rate, "released", f"released {target}") for _, end in held if end < last]
-    aloft = _spans(~recording.target_on_support.astype(bool))
+    aloft = _lasting(~recording.target_on_support.astype(bool))
     found += [Happening(first / rate, "lifted", f"{target} leaves what it stood on") for first, _ in aloft if first]
     found += [Happening((end + 1) / rate, "set_down", f"{target} is set down") for _, end in aloft if end < last]
     for first, _ in _spans(recording.unplanned_contact.astype(bool)):
@@ -151,7 +152,11 @@ def _told(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happenin
     found = []
     for event in events:
         second = f", {called(event.second)}" if event.second else ""
-        values = ", ".join(f"{event.values[name]:.3g} {unit}" for name, unit in _UNITS.items() if name in event.values)
+        values = ", ".join(
+            f"{event.values[name] * factor:.1f} {words}"
+            for name, (factor, words) in _SHOWN.items()
+            if name in event.values
+        )
         label = f"{event.kind.replace('_', ' ')} {called(event.subject)}{second}{f' ({values})' if values else ''}"
         time_s = min(max(event.values.get("time_s", end_s), 0.0), end_s)
         found.append(Happening(time_s, "told", label))
@@ -181,6 +186,11 @@ def _spans(true: np.ndarray) -> list[tuple[int, int]]:
         else:
             found.append((start, end))
     return found
+
+
+def _lasting(true: np.ndarray) -> list[tuple[int, int]]:
+    """Return those of the spans that are not short: a thing that tips for an instant has not been lifted."""
+    return [(start, end) for start, end in _spans(true) if end - start + 1 >= SHORT]
 
 
 def span_json(span: Span) -> dict[str, Any]:

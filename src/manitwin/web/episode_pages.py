@@ -255,7 +255,7 @@ def _instructions(attempt: Attempt) -> str:
 def _objects(said: dict[str, Any], links: ServerLinks) -> str:
     target = said["target"]
     rows = "".join(
-        f'<tr><th scope="row">{text(each["name"])}{" (moved)" if place == target else ""}</th>'
+        f'<tr><th scope="row">{text(each["name"])}{" (target)" if place == target else ""}</th>'
         f'<td><a href="{text(links.twin(each["twin_id"]))}">{text(each["twin_id"])}</a></td></tr>\n'
         for place, each in enumerate(said["objects"])
     )
