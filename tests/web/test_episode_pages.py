@@ -36,6 +36,7 @@ from manitwin.robots.load import load_robot
 from manitwin.twin.dataset_root import twin_name
 from manitwin.web.episode_document import DOCUMENT
 from manitwin.web.episode_folders import is_episodes
+from manitwin.web.plain_files import write_plain_files
 from manitwin.web.serve import pages_of
 
 
@@ -79,6 +80,13 @@ def test_the_list_has_every_attempt_with_its_reason_and_leads_to_the_recorded_on
     assert b"approach blocked" in page and b"on_the_rim" not in page and b"/episode/" not in page
     assert b"/episode/1" in get(run, "/?outcome=kept&from=x")[1]
     assert b"on_the_rim" in get(run, "/?outcome=nonsense")[1]
+
+
+def test_a_run_of_failures_alone_says_why(tmp_path: Path) -> None:
+    place = write_run(tmp_path, [], (attempt(3, outcome="no_plan", plan_failures='{"no_path": 4}'),))
+    status, page = get(place, "/")
+    assert status == 200 and b"0 recorded episodes of 1 attempts" in page and b"4 no path" in page
+    assert get(place, "/episode/0")[0] == 404
 
 
 def test_the_page_says_how_it_ended_and_leads_to_its_neighbours_and_twins(run: Path) -> None:
@@ -401,6 +409,12 @@ def test_a_file_that_leads_out_of_the_folder_is_not_followed(tmp_path: Path) -> 
     file.symlink_to(tmp_path / "elsewhere.h5")
     with pytest.raises(EpisodesError, match="leads out of the folder"):
         pages_of(str(place), tmp_path / "cache")
+
+
+def test_episodes_are_not_written_as_plain_files(run: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="by the server alone"):
+        write_plain_files(str(run), tmp_path / "pages")
+    assert not (tmp_path / "pages").exists()
 
 
 def test_what_holds_no_episode_is_told(tmp_path: Path) -> None:

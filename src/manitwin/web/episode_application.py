@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from starlette.applications import Starlette
 from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
@@ -72,7 +74,8 @@ def _list(episodes: EpisodeFolders, start: str, outcome: str, title: str) -> Res
     place = place - place % PAGE_EPISODES if place < count else 0
     rows: list[AttemptRow | str]
     if episodes.attempts is None:
-        rows = [_read(episodes, number) for number in range(place, min(place + PAGE_EPISODES, count))]
+        numbers = range(place, min(place + PAGE_EPISODES, count))
+        rows = [_row(said, number) for said, number in zip(episodes.said_of(numbers), numbers, strict=True)]
     else:
         rows = list(episodes.attempts.page(place, PAGE_EPISODES, outcome))
     shown = EpisodeList(
@@ -81,9 +84,9 @@ def _list(episodes: EpisodeFolders, start: str, outcome: str, title: str) -> Res
     return HTMLResponse(list_page(shown, title, episodes.without_attempts, LINKS), headers=NOT_KEPT)
 
 
-def _read(episodes: EpisodeFolders, number: int) -> AttemptRow | str:
+def _row(said: dict[str, Any] | str, number: int) -> AttemptRow | str:
     try:
-        return recorded_row(episodes.said(number), number)
+        return said if isinstance(said, str) else recorded_row(said, number)
     except EpisodesError as error:  # a broken episode ends nothing but its own line
         return str(error)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -52,19 +53,19 @@ class EpisodeFolders:
 
     ``twins`` is None where it is not known, or not there, whose twins they are: ``without_twins`` says why. ``dataset`` names the
     data set of the twins, None: where they were as the episodes were made. ``cache`` takes those of a data set at a URL.
-    Raises UsageError where there are no episodes, EpisodesError where the one file of them cannot be read.
+    Raises UsageError where there are no attempts, EpisodesError where the one file of them cannot be read.
     """
 
     def __init__(self, place: str, cache: Path, dataset: str | None = None):
         self.root = Path(place)
         self._places = _places(self.root)
-        if not self._places:
-            raise UsageError(f"{place}: no recorded episode there; `manitwin trajectories` makes some")
         self._config = _configuration(self.root)
         self.twins: TwinFolders | None = None
         self.without_twins = ""
         self._find_twins(dataset, cache)
         self.attempts, self.without_attempts = self._attempts()
+        if not self._places and self.attempts is None:
+            raise UsageError(f"{place}: no recorded episode there; `manitwin trajectories` makes some")
 
     def __len__(self) -> int:
         return len(self._places)
@@ -74,6 +75,20 @@ class EpisodeFolders:
         place = self._place(number)
         with EpisodeFile(place.file) as file:
             return file.said(place.number)
+
+    def said_of(self, numbers: range) -> list[dict[str, Any] | str]:
+        """Return the same of episodes that are there, each file opened once; for one that cannot be read a line."""
+        found: list[dict[str, Any] | str] = []
+        for path, places in groupby((self._places[number] for number in numbers), key=lambda place: place.file):
+            told = list(places)
+            try:
+                if told[0].problem is not None:
+                    raise EpisodesError(told[0].problem)
+                with EpisodeFile(path) as file:
+                    found += [_said_or_why(file, place.number) for place in told]
+            except EpisodesError as error:
+                found += [str(error)] * len(told)
+        return found
 
     def episode(self, number: int) -> StoredEpisode:
         """Return an episode whose arrays fit together; raises UsageError for another number, EpisodesError for a broken one."""
@@ -151,6 +166,13 @@ class EpisodeFolders:
                 f"{path}: tells of {rows.kept} recorded episodes, and there are {len(self)}; run the episodes again",
             )
         return rows, ""
+
+
+def _said_or_why(file: EpisodeFile, number: int) -> dict[str, Any] | str:
+    try:
+        return file.said(number)
+    except EpisodesError as error:
+        return str(error)
 
 
 def _merged(folder: Path) -> Path | None:

@@ -15,11 +15,13 @@ from manitwin.errors import TwinError, UsageError
 from manitwin.formats.output_folder import new_folder
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
+from manitwin.web.episode_folders import is_episodes
 from manitwin.web.gallery_page import plain_gallery_page
 from manitwin.web.gallery_query import Gallery, View
 from manitwin.web.html import GALLERY, STAGE, STYLE, THREE, VIEWER
 from manitwin.web.links import FileLinks
 from manitwin.web.package_files import LICENSE, package_file
+from manitwin.web.scene_folders import is_scenes
 from manitwin.web.served_files import CARD, MODEL, VIEWS, TwinFolders, open_file
 from manitwin.web.twin_document import document_bytes, twin_document
 from manitwin.web.twin_page import DATA_SCRIPT, MODEL_SCRIPT, twin_page
@@ -52,6 +54,8 @@ def write_plain_files(
     that is a photo is not written: it may hold more than the twin, such as the place where it was taken. Raises UsageError
     where there are none, or more than ``MOST_TWINS``.
     """
+    if is_scenes(place) or is_episodes(place):
+        raise UsageError(f"{place}: scenes and episodes are shown by the server alone; leave out --static")
     with TemporaryDirectory(prefix="manitwin-view-") as cache:
         twins = TwinFolders(place, Path(cache) if "://" in place else None)
         return _written(place, twins, out, sample, seed, where, on_twin)
