@@ -112,8 +112,8 @@ def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Hap
     found = [Happening(first / rate, "grasped", f"grasped {target}") for first, _ in held]
     found += [Happening((end + 1) / rate, "released", f"released {target}") for _, end in held if end < last]
     aloft = _lasting(~recording.target_on_support.astype(bool))
-    found += [Happening(first / rate, "lifted", f"{target} leaves what it stood on") for first, _ in aloft if first]
-    found += [Happening((end + 1) / rate, "set_down", f"{target} is set down") for _, end in aloft if end < last]
+    found += [Happening(first / rate, "lifted", f"{target} leaves its support") for first, _ in aloft if first]
+    found += [Happening((end + 1) / rate, "set_down", f"{target} rests on a support") for _, end in aloft if end < last]
     for first, _ in _spans(recording.unplanned_contact.astype(bool)):
         found.append(Happening(first / rate, "contact", "the robot touched what it should not"))
     found += _granules(episode, called) + _told(episode, called)

@@ -62,7 +62,7 @@ globalThis.manitwinTimeline = (place, told, seek) => {
       shape("text", "most hand", { x: width - 4, y: top + 11, "text-anchor": "end" }).textContent = `${(1000 * open).toFixed(0)} mm`;
     }
     for (const each of told.happenings) {
-      const x = across(each.time_s);
+      const x = Math.min(Math.max(across(each.time_s), 5), Math.max(5, width - 5));
       titled(shape("path", `mark ${each.kind === "contact" ? "bad" : ""}`, { d: `M${x} ${height - MARKS + 2}l5 10h-10z` }), `${each.time_s.toFixed(2)} s: ${each.label}`);
     }
     head = shape("line", "head", { x1: 0, x2: 0, y1: 0, y2: height });

@@ -212,7 +212,10 @@
     }
     const middle = bounds.getCenter(new THREE.Vector3());
     const far = 1.15 * bounds.getSize(new THREE.Vector3()).length() + 0.75;
-    view.setHome([middle.x + 0.72 * far, middle.y - 0.66 * far, middle.z + 0.48 * far, middle.x, middle.y, middle.z]);
+    let across = 0;
+    for (let at = 1; at < told.tip.length; at += 7) across += told.tip[at];
+    const side = across > 0 ? 0.66 : -0.66; // where the hand works: it is before the arm then
+    view.setHome([middle.x + 0.72 * far, middle.y + side * far, middle.z + 0.48 * far, middle.x, middle.y, middle.z]);
   }
   function listen() {
     const keys = {
