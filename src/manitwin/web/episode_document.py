@@ -208,12 +208,12 @@ def _goal(episode: StoredEpisode) -> list[float] | None:
 
 
 def _hand(episode: StoredEpisode, states: np.ndarray) -> dict[str, Any]:
-    """Return the opening of jaws, m, or the first of a hand's joints, with its name."""
-    name = episode.robot.hand_state[0]
+    """Return the opening of jaws, m, the one joint of a hand, or the mean of its joints, rad, with what it is called."""
+    names, values = episode.robot.hand_state, episode.recording.hand[states]
     return {
-        "name": name,
-        "is_opening": name == OPENING,
-        "values": _plain(episode.recording.hand[states, 0]),
+        "name": names[0] if len(names) == 1 else "mean of the hand's joints, rad",
+        "is_opening": names == (OPENING,),
+        "values": _plain(values.mean(axis=1)),
     }
 
 

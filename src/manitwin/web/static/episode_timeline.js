@@ -38,9 +38,9 @@ globalThis.manitwinTimeline = (place, told, seek) => {
       }
     });
   }
-  function curve(values, most, top, kind) {
-    if (!(most > 0)) return;
-    const points = values.map((value, at) => `${across(times[at]).toFixed(1)},${(top + CHART * (1 - Math.max(0, value) / most)).toFixed(1)}`);
+  function curve(values, most, top, kind, least = 0) {
+    if (!(most > least)) return;
+    const points = values.map((value, at) => `${across(times[at]).toFixed(1)},${(top + CHART * (1 - (value - least) / (most - least))).toFixed(1)}`);
     shape("polyline", `curve ${kind}`, { points: points.join(" ") });
   }
   function drawAll() {
@@ -55,7 +55,7 @@ globalThis.manitwinTimeline = (place, told, seek) => {
     shape("rect", "frame", { x: 0.5, y: top, width: Math.max(1, width - 1), height: CHART });
     const force = Math.max(...told.forces_n[0], ...told.forces_n[1]);
     const open = Math.max(...told.hand.values);
-    curve(told.hand.values, open, top, "hand");
+    curve(told.hand.values, open, top, "hand", told.hand.is_opening ? 0 : Math.min(...told.hand.values));
     told.forces_n.forEach((side, number) => curve(side, force, top, `force${number}`));
     if (force > 0) shape("text", "most force", { x: 4, y: top + 11 }).textContent = `${force.toFixed(1)} N`;
     if (open > 0 && told.hand.is_opening) {

@@ -67,6 +67,8 @@
     layers.robot.add(...groups);
     try {
       const model = await view.parsed(await given(robot.model, "arrayBuffer"));
+      const materials = new Set(model.children.map((part) => part.material)); // parts share them
+      for (const each of materials) each.color.multiplyScalar(0.7); // white would be as bright as what is behind it
       for (const part of [...model.children]) {
         const group = groups[Number((/^l(\d+)p/.exec(part.name) || [])[1])];
         if (!group) continue;
