@@ -115,5 +115,5 @@ class _FileResponse(StreamingResponse):
 
 def message(status: int, said: str) -> Response:
     """Return a page that says one thing."""
-    body = f'<main class="message"><p role="alert">{text(said)}</p><p><a href="{LINKS.gallery()}">All twins</a></p></main>\n'
+    body = f'<main class="message"><p role="alert">{text(said)}</p><p><a href="{LINKS.gallery()}">The first page</a></p></main>\n'
     return HTMLResponse(page(str(status), body, LINKS), status, headers=NOT_KEPT)
