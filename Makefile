@@ -4,7 +4,7 @@ BIN := .venv/bin
 # a program that may not keep its bytecode compiles all of this at each start: tests start hundreds
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: setup demo test docs vlm-real usd-validate lerobot-real browser lint licences vulnerabilities lock lock-vlm-real lock-usd-validate lock-lerobot-real clean
+.PHONY: setup demo test docs vlm-real usd-validate simready lerobot-real browser lint licences vulnerabilities lock lock-vlm-real lock-usd-validate lock-simready lock-lerobot-real clean
 
 setup:
 	@$(PYTHON) scripts/setup.py
@@ -36,6 +36,10 @@ usd-validate: setup
 	@$(BIN)/python scripts/setup_side_environment.py usd-validate
 	@USD_VALIDATOR_REQUIRED=1 $(BIN)/python -m pytest tests/assets/writers/test_usd_validator.py
 
+simready: setup
+	@$(BIN)/python scripts/setup_side_environment.py simready
+	@SIMREADY_REQUIRED=1 $(BIN)/python -m pytest tests/assets/writers/test_simready.py
+
 lerobot-real: setup
 	@$(BIN)/python scripts/setup_side_environment.py lerobot
 	@LEROBOT_REQUIRED=1 $(BIN)/python -m pytest tests/episodes/test_real_lerobot.py
@@ -64,10 +68,14 @@ lock-usd-validate:
 	@$(BIN)/uv pip compile --quiet --universal --generate-hashes --python-version 3.11 --no-annotate --no-header \
 	  tests/assets/writers/usd_validator.in -o tests/assets/writers/usd_validator.lock
 
+lock-simready:
+	@$(BIN)/uv pip compile --quiet --universal --generate-hashes --python-version 3.11 --no-annotate --no-header \
+	  tests/assets/writers/simready.in -o tests/assets/writers/simready.lock
+
 lock-lerobot-real:
 	@$(BIN)/uv pip compile --quiet --universal --generate-hashes --python-version 3.11 --no-annotate --no-header \
 	  --override tests/episodes/real_lerobot.overrides tests/episodes/real_lerobot.in \
 	  -o tests/episodes/real_lerobot.lock
 
 clean:
-	rm -rf .venv .venv-vlm .venv-usd-validate .venv-lerobot demo
+	rm -rf .venv .venv-vlm .venv-usd-validate .venv-simready .venv-lerobot demo

@@ -1,6 +1,6 @@
 """Set up an environment of its own for something that tests ask and that wants other versions than this package.
 
-    python scripts/setup_side_environment.py vlm | usd-validate | lerobot
+    python scripts/setup_side_environment.py vlm | usd-validate | simready | lerobot
 
 Run by make, with the Python of ``.venv``. A second run takes no time: a stamp in the environment holds the digest of its lock.
 """
@@ -46,6 +46,12 @@ SIDES = {
         "NVIDIA's validator of USD assets, which the slow tests ask about exported stages; it wants numpy below 2",
         "tests/assets/writers/usd_validator.lock",
         "from pxr import Usd; import usd_validation_nvidia",
+        0.3,
+    ),
+    "simready": Side(
+        "NVIDIA's SimReady validator with its profiles, which a slow test asks about exported stages",
+        "tests/assets/writers/simready.lock",
+        "import simready.validate, simready.foundation.tier_core",
         0.3,
     ),
     "lerobot": Side(

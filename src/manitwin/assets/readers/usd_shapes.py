@@ -140,6 +140,10 @@ class StageShapes:
             return True
         if str(prim.GetTypeName()) in ("Cube", "Sphere", "Cylinder", "Capsule", "Cone"):
             return True
+        if UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide and not prim.HasAPI(
+            UsdPhysics.CollisionAPI
+        ):
+            return False  # drawn for people, as lines of grasps are
         if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer):
             self._source.find(f"{prim.GetTypeName()} prims in it were left out")
         return False

@@ -13,13 +13,16 @@ from manitwin.assets.writers.format_notes import FormatNotes
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import Physical, TwinRecord
 
+VIEW = "views/rgb_00.webp"
+"""The view that stands for a twin where a format has one picture."""
+
 
 @dataclass(frozen=True)
 class TwinContent:
     """A finished twin: object frame (Z up), metres.
 
     ``name`` is a file and element name, unique to the twin. ``hulls`` are vertices ``(V, 3)`` and faces ``(F, 3)``;
-    ``grasps`` the rows of grasps.parquet as columns.
+    ``grasps`` the rows of grasps.parquet as columns. ``picture`` is a view of it as a file of pixels; None: it has none.
     """
 
     name: str
@@ -29,6 +32,7 @@ class TwinContent:
     hulls: tuple[tuple[np.ndarray, np.ndarray], ...]
     grasps: dict[str, list[Any]]
     source: bytes
+    picture: bytes | None = None
 
     @property
     def physical(self) -> Physical:
@@ -49,6 +53,7 @@ class TwinContent:
             hulls=tuple((np.asarray(hull.vertices), np.asarray(hull.faces)) for hull in twin.hulls),
             grasps=twin.grasp_table().to_pydict(),
             source=twin.read_bytes(record.source.file),
+            picture=twin.read_bytes(VIEW) if VIEW in record.files else None,
         )
 
 

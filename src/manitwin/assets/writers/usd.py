@@ -7,6 +7,7 @@ import struct
 import zipfile
 
 from manitwin.assets.writers.exporter import Exported, TwinContent
+from manitwin.assets.writers.simready import thumbnail
 from manitwin.assets.writers.usd_stage import CANNOT_SAY, build_stage, crate
 
 _ALIGNMENT = 64  # USDZ specification, "Layout": file data starts on a multiple of 64 bytes
@@ -19,7 +20,7 @@ def export(twin: TwinContent) -> Exported:
     """Return the stage and its textures as they are in the twin; ``usdcat`` shows the stage as text."""
     stage, textures = build_stage(twin)
     main = f"{twin.name}.usdc"
-    return Exported({main: crate(stage.GetRootLayer()), **textures}, main, CANNOT_SAY)
+    return Exported({main: crate(stage.GetRootLayer()), **textures, **thumbnail(twin, main)}, main, CANNOT_SAY)
 
 
 def export_usdz(twin: TwinContent) -> Exported:

@@ -12,16 +12,22 @@ from pxr import Gf, Kind, Sdf, Usd, UsdGeom, UsdPhysics, UsdShade, Vt
 
 from manitwin.assets.writers.exporter import TwinContent
 from manitwin.assets.writers.mass_properties import principal_axes
+from manitwin.assets.writers.simready import define_grasp_lines, describe_asset, label_prims, set_display_color
 from manitwin.assets.writers.usd_materials import GlbImages, PreviewMaterials, unique_name
 from manitwin.formats.meshes.textures import material_of, uv_of
 from manitwin.twin.record_values import Estimate
+
+RUNTIME_COLLIDERS = ("MjcCollisionAPI", "NewtonCollisionAPI", "NewtonMeshCollisionAPI")
+"""Applied schemas by which MuJoCo's and Newton's importers know a collider; all their values are the defaults."""
 
 CANNOT_SAY = (
     "USD has no rule for how the frictions of two bodies are combined: the simulator's own is used "
     "(PhysX: average, unless physxMaterial:frictionCombineMode says otherwise)",
     "USD keeps single precision: vertices, mass and inertia are rounded to 7 digits",
-    "grasps, points and placements have no place in UsdPhysics: they stay in twin.json and grasps.parquet; the intervals "
-    "and sources of mass and friction are in the default prim's customData, under 'manitwin'",
+    "points and placements have no place in UsdPhysics: they stay in twin.json; the intervals and sources of mass and friction "
+    "are in the default prim's customData, under 'manitwin'",
+    "of the grasps that held the best and most different, 32 at most, are lines between the fingertips below 'grasps', without "
+    "approach and depth: all are in grasps.parquet",
 )
 
 
@@ -46,13 +52,17 @@ def build_stage(twin: TwinContent) -> tuple[Usd.Stage, dict[str, bytes]]:
     body.AddOrientOp().Set(Gf.Quatf(1, 0, 0, 0))
     body.AddScaleOp().Set(Gf.Vec3f(1, 1, 1))
     define_rigid_body(root, twin)
-    UsdGeom.Scope.Define(stage, path.AppendChild("visual"))
+    visual = UsdGeom.Scope.Define(stage, path.AppendChild("visual"))
     UsdGeom.Scope.Define(stage, path.AppendChild("materials"))
     materials = PreviewMaterials(stage, path.AppendPath("materials"), GlbImages(twin.visual_glb))
     for part in twin.visual:
         _define_visual(stage, path.AppendChild("visual"), part, materials)
     friction = define_physics_material(stage, path.AppendPath("materials/physics"), twin)
     define_hulls(stage, path.AppendChild("collision"), twin, friction)
+    define_grasp_lines(stage, path.AppendChild("grasps"), twin)
+    set_display_color(visual, twin.visual)
+    label_prims(stage, root, twin)
+    describe_asset(stage, twin)
     return stage, materials.textures
 
 
@@ -196,6 +206,8 @@ def define_hulls(stage: Usd.Stage, scope: Sdf.Path, twin: TwinContent, material:
         mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform)
         UsdPhysics.CollisionAPI.Apply(mesh.GetPrim())
         UsdPhysics.MeshCollisionAPI.Apply(mesh.GetPrim()).CreateApproximationAttr(UsdPhysics.Tokens.convexHull)
+        for schema in RUNTIME_COLLIDERS:
+            mesh.GetPrim().AddAppliedSchema(schema)
         UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material, materialPurpose="physics")
 
 

@@ -60,7 +60,8 @@ def _parts(stage: Usd.Stage, archive: UsdzArchive, source: MeshSource) -> list[t
                 "animated", "the mesh is bound to a skeleton", "apply the pose and export a still mesh"
             )
         if not prim.IsA(UsdGeom.Mesh):
-            if prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer):
+            drawn_for_people = UsdGeom.Imageable(prim).ComputePurpose() == UsdGeom.Tokens.guide  # as grasp lines are
+            if not drawn_for_people and (prim.IsA(UsdGeom.Gprim) or prim.IsA(UsdGeom.PointInstancer)):
                 source.find(f"{prim.GetTypeName()} prims in it were left out: only meshes are read")
             continue
         imageable = UsdGeom.Imageable(prim)

@@ -1,0 +1,28 @@
+"""Which item of Wikidata a category is, for formats that name classes by it (https://www.wikidata.org, CC0)."""
+
+from __future__ import annotations
+
+PHYSICAL_OBJECT = "Q223557"
+"""What every twin is: the item of a category that the table has not."""
+
+ITEMS = {
+    "apple": "Q89", "backpack": "Q5843", "banana": "Q503", "baseball bat": "Q809910", "baseball glove": "Q809894",
+    "blender": "Q501862", "book": "Q571", "bottle": "Q80228", "bowl": "Q153988", "broccoli": "Q47722", "cake": "Q13276",
+    "carrot": "Q81", "clock": "Q376", "computer mouse": "Q7987", "cup": "Q81727", "fork": "Q81881", "hammer": "Q25294",
+    "handbag": "Q467505", "hat": "Q80151", "knife": "Q32489", "laptop": "Q3962", "microwave": "Q127956",
+    "orange": "Q13191", "pencil": "Q14674", "pizza": "Q177", "plate": "Q57216", "remote control": "Q185091",
+    "sandwich": "Q28803", "scissors": "Q40847", "shoe": "Q22676", "skateboard": "Q15783", "spoon": "Q81895",
+    "suitcase": "Q200814", "teddy bear": "Q213477", "toaster": "Q14890", "toothbrush": "Q134205", "umbrella": "Q41607",
+    "vase": "Q191851", "wine glass": "Q1531435",
+}  # fmt: skip
+"""Items by category. None is guessed by its number: each was looked up with its label."""
+
+_HEADS = ("bottle", "bowl", "clock", "hammer", "scissors", "spoon", "vase")
+"""A category that ends in such a word is one of its kind: a water bottle is a bottle. (A tuning fork is no fork.)"""
+
+
+def item_of(category: str) -> str:
+    """Return the item of a category, of the kind that its last word names, or that of any physical object."""
+    word = category.strip().lower()
+    last = word.rpartition(" ")[2]
+    return ITEMS.get(word) or (ITEMS[last] if last in _HEADS else PHYSICAL_OBJECT)
