@@ -47,11 +47,13 @@ FAILED_ONCE = {
     "pool": (0, 19),
     "prompts": (1,),
     "replay": (0, 2, 52),
+    "robots": (98, 391, 666),
     "settings": (23,),
     "stl": (25, 93),
     "reviews": (112, 1020),
     "survey": (44, 80, 173, 276),
     "tiff": (47,),
+    "twin-asset": (3379,),
     "twin": (1, 11, 290, 705, 822),
 }
 """Cases that failed before what read them was mended, which are read first."""

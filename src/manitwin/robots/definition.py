@@ -219,7 +219,7 @@ def _inside(path: Path, boundary: Path, links_allowed: bool, what: str, director
         inside = inside and (links_allowed or path.resolve().is_relative_to(boundary.resolve()))
         there = inside and (plain.is_dir() if directory else plain.is_file())
         too_large = there and plain.stat().st_size > MAX_FILE_BYTES
-    except (OSError, ValueError) as error:  # a name that no file system can hold
+    except (OSError, ValueError, RuntimeError) as error:  # a name that no file system can hold, or links in a circle
         raise ConfigError(f"{what} cannot be a file: {error}; mend the name") from error
     if not inside:
         raise ConfigError(f"{what} leaves {boundary}; put it below that folder")

@@ -15,6 +15,7 @@ import numpy as np
 
 from manitwin.errors import ConfigError, Unavailable
 from manitwin.formats.installation import import_remedy
+from manitwin.formats.printable import printable_line
 from manitwin.formats.xml_file import read_xml
 from manitwin.robots.definition import RobotDefinition
 from manitwin.robots.links import LinkShape, links_of_urdf
@@ -22,6 +23,8 @@ from manitwin.robots.urdf import UrdfTree, child_of, parent_of
 
 STATES = 300
 CONTACT_SHARE = 0.9
+MOST_PAIRS = 5_000
+"""A hundred shapes that all move against each other: each pair is tried in every state."""
 SEED = 0
 Pairs = tuple[tuple[str, str], ...]
 
@@ -89,7 +92,13 @@ def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, s
         remedy = import_remedy(error, "pip install 'manitwin[robots]'")
         raise Unavailable(f"robots without an SRDF want pin and coal ({error}): {remedy}") from error
     urdf = tree.text()
-    model, geometry = pin.buildModelFromXML(urdf), pin.GeometryModel()
+    try:
+        model, geometry = pin.buildModelFromXML(urdf), pin.GeometryModel()
+    except ValueError as error:
+        said = printable_line(str(error), max_characters=120)
+        raise ConfigError(
+            f"{definition.name}: Pinocchio cannot read its URDF ({said}); mend its numbers and joints"
+        ) from error
     owners: list[str] = []
     for link in links_of_urdf(urdf):
         frame = model.frames[model.getBodyId(link.name)]
@@ -99,6 +108,11 @@ def _in_contact(tree: UrdfTree, definition: RobotDefinition) -> set[tuple[str, s
             geometry.addGeometryObject(pin.GeometryObject(f"{len(owners)}", frame.parentJoint, placement, convex))
             owners.append(link.name)
     geometry.addAllCollisionPairs()
+    if len(geometry.collisionPairs) > MOST_PAIRS:
+        raise ConfigError(
+            f"{definition.name}: {len(owners):,} collision shapes make {len(geometry.collisionPairs):,} pairs, of which at most"
+            f" {MOST_PAIRS:,} are tried; give an SRDF, or fewer shapes"
+        )
     data, geometry_data = model.createData(), geometry.createData()
     links = [_pair(owners[pair.first], owners[pair.second]) for pair in geometry.collisionPairs]
     home = pin.neutral(model)

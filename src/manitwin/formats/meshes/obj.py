@@ -61,6 +61,8 @@ def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
     materials = _materials(document, source)
     parts = []
     for name, group in document.groups.items():
+        if not group.corners:  # of its faces none has a corner
+            continue
         faces, corners = _unique_corners(group, (len(positions), len(uv), len(normals)), source)
         part = make_part(
             positions[corners[:, 0]],
