@@ -55,8 +55,8 @@ class QualityVerdict:
 class PhysicalEstimates:
     """An annotator's estimates of size, mass, friction and how the mass is spread.
 
-    ``longest_axis_m`` is the longest axis of the oriented box (None: keep the scale as it is). ``wall_thickness_m`` is given
-    for hollow things whose mesh is only an outer skin (None: the mesh is the solid matter, or full). ``mass_kg`` may be
+    ``longest_axis_m`` is the longest extent of the object as it stands (None: keep the scale as it is). ``wall_thickness_m`` is
+    given for hollow things whose mesh is only an outer skin (None: the mesh is the solid matter, or full). ``mass_kg`` may be
     None where only ``bulk_density_kg_m3`` (mass per volume of the repaired mesh) is known: one of both is given.
     ``part_materials`` names a material of the priors by the role of a part, where parts are of unlike matter (None: not said).
     ``findings`` are contradictions that remained when the annotator was asked again; None: its answers were not examined.
