@@ -79,11 +79,11 @@ def _backends(kind: str) -> Callable[[], Iterable[str]]:
     return find
 
 
-def _shipped(folder: str) -> Callable[[], Iterable[str]]:
-    """Return a search for the TOML files of a folder of this package."""
+def _shipped(*folders: str) -> Callable[[], Iterable[str]]:
+    """Return a search for the TOML files of folders of this package."""
 
     def find() -> Iterable[str]:
-        files = (resources.files("manitwin") / folder).iterdir()
+        files = (file for folder in folders for file in (resources.files("manitwin") / folder).iterdir())
         return sorted(Path(file.name).stem for file in files if file.name.endswith(".toml"))
 
     return find
@@ -98,7 +98,7 @@ PROPOSERS = Choices("model", _of("none", "openai", "anthropic", "replay"), spec=
 GENERATORS = Choices("generator", _backends("generator"), spec=True)
 GRASPERS = Choices("grasper", _backends("grasper"), spec=True)
 GRIPPERS = Choices("gripper", _shipped("robots/grippers/definitions"), or_file=".toml")
-ROBOTS = Choices("robot", _shipped("robots/definitions"), or_file=".toml")
+ROBOTS = Choices("robot", _shipped("robots/definitions", "robots/two_arm_definitions"), or_file=".toml")
 SKILLS = Choices(
     "skill",
     _of(
@@ -122,6 +122,7 @@ SKILLS = Choices(
         "wipe",
         "cut_motion",
         "aim",
+        "handover",
     ),
 )
 SURFACES = Choices("surface", _of("table", "shelf", "tray"))

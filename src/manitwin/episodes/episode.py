@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from manitwin.episodes.granule_counts import held_by, with_granule_counts
 from manitwin.episodes.judging import is_reached_already, judge
 from manitwin.episodes.outcome import moved_m, turned_rad
 from manitwin.episodes.planning.problem import PickPlaceProblem
+from manitwin.episodes.planning.two_arms import TwoArmPlanner
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.sequence import GoalSequence, course_of, later_courses
 from manitwin.episodes.settings import EpisodeSettings
@@ -46,7 +48,7 @@ def run_episode(
         elif is_reached_already(start, world):
             facts.outcome = "reached_already"
         elif (course := _first_course(start, facts, sequence)).plan():
-            execution = Execution(world, robot, closing, planner.tip_pose)
+            execution = Execution(world, robot, closing, *tip_poses_of(planner))
             execution.watches = list(course.watches(world))
             execution.literal = None if sequence is None else 0
             try:
@@ -67,6 +69,12 @@ def run_episode(
                 recording = with_granule_counts(recording, start.objects, skill_goal.openings, world.granules.radius_m)
             del execution, course
     return facts, recording
+
+
+def tip_poses_of(planner: Planner) -> tuple[Callable[[np.ndarray], np.ndarray], ...]:
+    """Return the forward kinematics of each arm that a planner plans for."""
+    taker = (planner.taker.tip_pose,) if isinstance(planner, TwoArmPlanner) else ()
+    return (planner.tip_pose, *taker)
 
 
 def world_of(problem: PickPlaceProblem, robot: Robot, settings: EpisodeSettings, closing_force_n: float) -> RobotWorld:

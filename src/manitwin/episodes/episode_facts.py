@@ -13,10 +13,14 @@ from manitwin.episodes.planning.problem import Grasp, PlanFailure
 
 @dataclass
 class EpisodeFacts:
-    """What became of an episode; ``replans`` counts what was planned anew and where that failed."""
+    """What became of an episode; ``replans`` counts what was planned anew and where that failed.
+
+    ``taker_grasp`` is that of the second arm, to which the target is handed over.
+    """
 
     outcome: str = "no_plan"
     grasp: Grasp | None = None
+    taker_grasp: Grasp | None = None
     grasps_tried: int = 0
     plan_failures: Counter[PlanFailure] = field(default_factory=Counter)
     errors: PlacementErrors | None = None

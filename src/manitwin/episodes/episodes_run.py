@@ -23,6 +23,7 @@ from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.settings import TrajectoriesConfig
+from manitwin.episodes.skills.handover import Handover
 from manitwin.episodes.skills.hands import check_hand, check_jaws
 from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.registry import load_skill
@@ -222,7 +223,7 @@ def make_episodes(
 
 def _twins_for(skill: Skill | None, pool: Pool) -> list[str]:
     """Return the ids of the twins that episodes are of: all, but of a skill that uses a thing alone those it can be used with."""
-    if not isinstance(skill, HeldSkill) or skill.has_partner:
+    if not isinstance(skill, HeldSkill | Handover) or skill.has_partner:
         return [twin.twin_id for twin in pool.twins]
     found = [twin.twin_id for twin in pool.twins if skill.suits(pool, twin, None)]
     if not found:

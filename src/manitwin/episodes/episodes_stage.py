@@ -24,6 +24,7 @@ from manitwin.episodes.instructions import episode_instructions
 from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
+from manitwin.episodes.planning.two_arms import TwoArmPlanner
 from manitwin.episodes.sealing_surface import with_surface
 from manitwin.episodes.setting import Setting, scene_setting, table_setting
 from manitwin.episodes.settings import TrajectoriesConfig
@@ -73,7 +74,8 @@ class EpisodesStage:
 
     @cached_property
     def _planner(self) -> PickPlacePlanner:
-        return PickPlacePlanner(self._robot, timestep_s=self.settings.episode.timestep_s)
+        planner = TwoArmPlanner if self._robot.arms else PickPlacePlanner
+        return planner(self._robot, timestep_s=self.settings.episode.timestep_s)
 
     @cached_property
     def _source(self) -> TwinSource:
@@ -217,6 +219,8 @@ class EpisodesStage:
             said["fixtures"] = [to_json(fixture) for fixture in setting.fixtures]
         if setting.skill_goal is not None and setting.skill_goal.granules is not None:
             said["granule_radius_m"] = setting.skill_goal.granules.radius_m
+        if facts.taker_grasp is not None:
+            said["taker_grasp_id"] = facts.taker_grasp.grasp_id
         if facts.events:
             said["events"] = [asdict(event) for event in facts.events]
         return StoredEpisode(attempt, recording, recorded_robot(self._robot), objects, said)

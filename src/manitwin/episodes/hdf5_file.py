@@ -19,8 +19,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, TypeAdapter, ValidationError
 
 from manitwin.episodes.attempts import Attempt, attempt_from
-from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta
+from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta, tip_poses
 from manitwin.episodes.stored_episode import (
+    RecordedArm,
     RecordedObject,
     RecordedRobot,
     StoredEpisode,
@@ -69,6 +70,13 @@ class _Said(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True)
 
 
+class _SaidArm(_Said):
+    name: str = Field(pattern=_NAME)
+    joints: int = Field(ge=1, le=64)
+    base_position_m: list[FiniteFloat] = Field(min_length=3, max_length=3)
+    base_quaternion_wxyz: list[FiniteFloat] = Field(min_length=4, max_length=4)
+
+
 class _SaidRobot(_Said):
     name: str = Field(pattern=_NAME)
     sha256: str
@@ -80,6 +88,7 @@ class _SaidRobot(_Said):
     max_opening_m: FiniteFloat
     hand_state: list[str] = Field(default=[OPENING], min_length=1, max_length=64)
     hand_action: list[str] = Field(default=[OPENING], min_length=1, max_length=64)
+    arms: list[_SaidArm] = Field(default=[], max_length=2)
 
 
 class _SaidObject(_Said):
@@ -178,8 +187,6 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
     positions = np.hstack([recording.joint_positions_rad, hand])
     speeds = np.append(np.diff(hand, axis=0) * np.float32(RATE_HZ), np.zeros((1, hand.shape[1]), np.float32), axis=0)
     velocities = np.hstack([recording.joint_velocities_rad_s, speeds])
-    base = np.zeros((steps + 1, 13), np.float32)
-    base[:, 3] = 1
     ended = np.arange(steps) == steps - 1
     target = recording.target
     poses = np.concatenate([recording.object_positions_m, recording.object_quaternions_wxyz], axis=2)
@@ -190,19 +197,19 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
     arrays: dict[str, np.ndarray] = {
         "obs/agent/qpos": positions,
         "obs/agent/qvel": velocities,
-        "obs/extra/tcp_pose": np.hstack([recording.tip_position_m, recording.tip_quaternion_wxyz]),
+        "obs/extra/tcp_pose": tip_poses(recording.tip_position_m, recording.tip_quaternion_wxyz),
         "obs/extra/obj_pose": poses[:, target],
         "actions": np.hstack([recording.action_joint_positions_rad, recording.action_hand]),
         "terminated": ended,
         "truncated": np.zeros(steps, bool),
         "success": ended & episode.attempt.succeeded,
         **{f"env_states/actors/{thing.name}": states[:, i] for i, thing in enumerate(episode.objects)},
-        f"env_states/articulations/{episode.robot.name}": np.hstack([base, positions, velocities]),
+        **_articulations(episode.robot, positions, velocities),
         f"{EXTRA}/phase": recording.phase,
         f"{EXTRA}/finger_forces_n": recording.finger_forces_n,
         f"{EXTRA}/target_on_support": recording.target_on_support,
         f"{EXTRA}/unplanned_contact": recording.unplanned_contact,
-        f"{EXTRA}/action_tip_pose": np.hstack([recording.action_tip_position_m, recording.action_tip_quaternion_wxyz]),
+        f"{EXTRA}/action_tip_pose": tip_poses(recording.action_tip_position_m, recording.action_tip_quaternion_wxyz),
         f"{EXTRA}/action_joint_delta": joint_delta(recording),
         f"{EXTRA}/action_tip_delta": tip_delta(recording),
         **{
@@ -220,7 +227,22 @@ def _write(group: h5py.Group, episode: StoredEpisode) -> None:
 
 def _hand_joints(hand: np.ndarray, robot: RecordedRobot) -> np.ndarray:
     """Return the positions of the hand's joints ``(T + 1, J)``: of jaws, half of the opening each."""
-    return np.repeat(hand / 2, 2, axis=1) if robot.hand_state == (OPENING,) else hand
+    return np.repeat(hand / 2, 2, axis=1) if robot.has_jaws else hand
+
+
+def _articulations(robot: RecordedRobot, positions: np.ndarray, velocities: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the states of the robot, or of each of its arms: the base, at rest, and the arm's joints before the hand's."""
+    arms = robot.arms or (RecordedArm(robot.name, len(robot.arm_joints), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)),)
+    hand = (positions.shape[1] - len(robot.arm_joints)) // len(arms)
+    found, first = {}, 0
+    for number, arm in enumerate(arms):
+        base = np.zeros((len(positions), 13), np.float32)
+        base[:, :3], base[:, 3:7] = arm.base_position_m, arm.base_quaternion_wxyz
+        after = len(robot.arm_joints) + number * hand
+        own = np.r_[first : first + arm.joints, after : after + hand]
+        found[f"env_states/articulations/{arm.name}"] = np.hstack([base, positions[:, own], velocities[:, own]])
+        first += arm.joints
+    return found
 
 
 def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> StoredEpisode:
@@ -238,13 +260,17 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
     if len({len(states) for states in each}) != 1:
         raise EpisodesError(f"{where}: the states of its objects are not equally many; {_REMEDY}")
     states = np.stack(each, axis=1)
-    jaws = robot.hand_state == (OPENING,)
-    width = arm + (2 if jaws else len(robot.hand_state))
+    jaws, arms = robot.has_jaws, robot.arm_count
+    if robot.arms and sum(each.joints for each in robot.arms) != arm:
+        raise EpisodesError(f"{where}: its arms have other joints than the robot; {_REMEDY}")
+    width = arm + (2 if jaws else 1) * len(robot.hand_state)
     positions, velocities = array("obs/agent/qpos", width), array("obs/agent/qvel", width)
-    tip, action_tip = array("obs/extra/tcp_pose", 7), array(f"{EXTRA}/action_tip_pose", 7)
+    tip, action_tip = (
+        array(name, 7 * arms).reshape(-1, arms, 7) for name in ("obs/extra/tcp_pose", f"{EXTRA}/action_tip_pose")
+    )
     actions = array("actions", arm + len(robot.hand_action))
     extra = {name: array(f"{EXTRA}/{name}") for name in ("phase", "target_on_support", "unplanned_contact")}
-    extra["finger_forces_n"] = array(f"{EXTRA}/finger_forces_n", 2)
+    extra["finger_forces_n"] = array(f"{EXTRA}/finger_forces_n", 2 * arms)
     if has_granules(content, group):
         extra |= {name: content.array(f"{group}/{EXTRA}/{name}") for name in _GRANULES}
         middles, held = (extra[name].shape for name in _GRANULES)
@@ -256,17 +282,17 @@ def _read(content: Hdf5, group: str, said: dict[str, Any], where: str) -> Stored
         target=said["target"],
         joint_positions_rad=positions[:, :arm],
         joint_velocities_rad_s=velocities[:, :arm],
-        hand=2 * positions[:, arm : arm + 1] if jaws else positions[:, arm:],
-        tip_position_m=tip[:, :3],
-        tip_quaternion_wxyz=tip[:, 3:],
+        hand=2 * positions[:, arm::2] if jaws else positions[:, arm:],
+        tip_position_m=tip[..., :3].reshape(len(tip), -1),
+        tip_quaternion_wxyz=tip[..., 3:].reshape(len(tip), -1),
         object_positions_m=states[..., :3],
         object_quaternions_wxyz=states[..., 3:7],
         object_linear_velocities_m_s=states[..., 7:10],
         object_angular_velocities_rad_s=states[..., 10:],
         action_joint_positions_rad=actions[:, :arm],
         action_hand=actions[:, arm:],
-        action_tip_position_m=action_tip[:, :3],
-        action_tip_quaternion_wxyz=action_tip[:, 3:],
+        action_tip_position_m=action_tip[..., :3].reshape(len(action_tip), -1),
+        action_tip_quaternion_wxyz=action_tip[..., 3:].reshape(len(action_tip), -1),
         **extra,
     )
     return StoredEpisode(attempt_from(said["attempt"]), recording, robot, objects, said["facts"])
@@ -309,23 +335,23 @@ def checked(episode: StoredEpisode) -> Recording:
 
 
 def _widths(robot: RecordedRobot, things: int, recording: Recording) -> dict[str, tuple[int, ...]]:
-    arm = len(robot.arm_joints)
+    arm, arms = len(robot.arm_joints), robot.arm_count
     positions = recording.granule_positions_m
     return {
         "granule_positions_m": () if positions is None else (*positions.shape[1:2], 3),
         "granules_in_objects": (things,),
         "joint_positions_rad": (arm,),
         "joint_velocities_rad_s": (arm,),
-        "tip_position_m": (3,),
-        "tip_quaternion_wxyz": (4,),
+        "tip_position_m": (3 * arms,),
+        "tip_quaternion_wxyz": (4 * arms,),
         "object_positions_m": (things, 3),
         "object_quaternions_wxyz": (things, 4),
         "object_linear_velocities_m_s": (things, 3),
         "object_angular_velocities_rad_s": (things, 3),
-        "finger_forces_n": (2,),
+        "finger_forces_n": (2 * arms,),
         "hand": (len(robot.hand_state),),
         "action_hand": (len(robot.hand_action),),
         "action_joint_positions_rad": (arm,),
-        "action_tip_position_m": (3,),
-        "action_tip_quaternion_wxyz": (4,),
+        "action_tip_position_m": (3 * arms,),
+        "action_tip_quaternion_wxyz": (4 * arms,),
     }

@@ -59,8 +59,9 @@ def state_of(
     made = world.granules
     granules = None if made is None else Granules(made.positions_m(), made.radius_m)
     return WorldState(
-        objects, touching, frozenset(furniture), events, goal.places_m, pegs, granules, start.granules_in, holders
-    )
+        objects, touching, frozenset(furniture), events, goal.places_m, pegs, granules, start.granules_in, holders,
+        tuple(each.robot.name for each in world.robots) if len(world.robots) > 1 else (),
+    )  # fmt: skip
 
 
 def judge(

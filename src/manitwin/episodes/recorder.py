@@ -18,7 +18,7 @@ class _State(NamedTuple):
     joint_positions_rad: np.ndarray
     joint_velocities_rad_s: np.ndarray
     hand: np.ndarray
-    tip_to_world: np.ndarray
+    tips_to_world: np.ndarray
     object_positions_m: list[np.ndarray]
     object_quaternions_wxyz: list[np.ndarray]
     object_linear_velocities_m_s: list[np.ndarray]
@@ -34,12 +34,13 @@ class _Action(NamedTuple):
 
 
 class Recorder:
-    """Takes a first state, then an action and the state that it led to at a time."""
+    """Takes a first state, then an action and the state that it led to at a time; of two arms what is of the first goes first."""
 
     def __init__(self, world: RobotWorld, touches: Touches, hand: np.ndarray):
         """Take the first state; ``hand (h,)`` is that of the hand."""
         self._world = world
-        self._states: list[_State] = [self._state(np.zeros(len(world.robot.robot.arm_joints)), hand)]
+        joints = sum(len(each.robot.arm_joints) for each in world.robots)
+        self._states: list[_State] = [self._state(np.zeros(joints), hand)]
         self._touches, self._unplanned, self._actions = [touches], [False], list[_Action]()
 
     def add(
@@ -60,44 +61,47 @@ class Recorder:
         self._touches.append(touches)
         self._unplanned.append(unplanned)
 
-    def recording(self, tip_pose: Callable[[np.ndarray], np.ndarray]) -> Recording:
-        """Return what was recorded; ``tip_pose`` is the forward kinematics. Quaternions never change their sign on the way."""
+    def recording(self, tip_poses: Callable[[np.ndarray], np.ndarray]) -> Recording:
+        """Return what was recorded; quaternions never change their sign on the way.
+
+        ``tip_poses`` is the forward kinematics: of joints ``(n,)``, those of all arms, the tips ``(arms, 4, 4)``.
+        """
         told = _columns(self._actions)
         states = _columns(self._states)
         tips, told_tips = (
-            np.array(states.pop("tip_to_world")),
-            np.array([tip_pose(q) for q in told["joint_positions_rad"]]),
+            np.array(states.pop("tips_to_world")),
+            np.array([tip_poses(q) for q in told["joint_positions_rad"]]),
         )
         granules_m = states.pop("granule_positions_m")
         object_quaternions = _continuous(np.array(states.pop("object_quaternions_wxyz")))
-        tip_quaternions = _continuous(quaternion_wxyz(tips[:, :3, :3]))
-        told_quaternions = _continuous(np.concatenate([tip_quaternions[:1], quaternion_wxyz(told_tips[:, :3, :3])]))
+        tip_quaternions = _continuous(quaternion_wxyz(tips[:, :, :3, :3]))
+        told_quaternions = _continuous(np.concatenate([tip_quaternions[:1], quaternion_wxyz(told_tips[:, :, :3, :3])]))
         return Recording(
             target=self._world.target,
             **{name: np.array(values, np.float32) for name, values in states.items()},
             object_quaternions_wxyz=object_quaternions.astype(np.float32),
-            tip_position_m=tips[:, :3, 3].astype(np.float32),
-            tip_quaternion_wxyz=tip_quaternions.astype(np.float32),
+            tip_position_m=_flat(tips[:, :, :3, 3]),
+            tip_quaternion_wxyz=_flat(tip_quaternions),
             finger_forces_n=np.array([touches.finger_forces_n for touches in self._touches], np.float32),
             target_on_support=np.array([touches.on_support for touches in self._touches]),
             unplanned_contact=np.array(self._unplanned),
             action_joint_positions_rad=np.array(told["joint_positions_rad"], np.float32),
             action_hand=np.array(told["hand"], np.float32),
-            action_tip_position_m=told_tips[:, :3, 3].astype(np.float32),
-            action_tip_quaternion_wxyz=told_quaternions[1:].astype(np.float32),
+            action_tip_position_m=_flat(told_tips[:, :, :3, 3]),
+            action_tip_quaternion_wxyz=_flat(told_quaternions[1:]),
             phase=np.array(told["phase"], np.uint8),
             granule_positions_m=None if granules_m[0] is None else np.array(granules_m, np.float32),
             active_literal=None if None in told["active_literal"] else np.array(told["active_literal"], np.uint8),
         )
 
     def _state(self, joint_velocities_rad_s: np.ndarray, hand: np.ndarray) -> _State:
-        robot, bodies = self._world.robot, self._world.bodies
+        robots, bodies = self._world.robots, self._world.bodies
         poses = [body.entity_pose for body in bodies]
         return _State(
-            joint_positions_rad=robot.joint_positions(),
+            joint_positions_rad=np.concatenate([robot.joint_positions() for robot in robots]),
             joint_velocities_rad_s=joint_velocities_rad_s,
             hand=hand,
-            tip_to_world=robot.gripper_pose(),
+            tips_to_world=np.array([robot.gripper_pose() for robot in robots]),
             object_positions_m=[pose.p for pose in poses],
             object_quaternions_wxyz=[pose.q for pose in poses],
             object_linear_velocities_m_s=[body.linear_velocity for body in bodies],
@@ -108,6 +112,11 @@ class Recorder:
 
 def _columns(rows: Sequence[_State] | Sequence[_Action]) -> dict[str, list[Any]]:
     return {name: list(values) for name, values in zip(rows[0]._fields, zip(*rows, strict=True), strict=True)}
+
+
+def _flat(of_arms: np.ndarray) -> np.ndarray:
+    """Return what arms have ``(T, arms, k)`` side by side, as the file has it ``(T, arms k)``."""
+    return of_arms.reshape(len(of_arms), -1).astype(np.float32)
 
 
 def _continuous(quaternions: np.ndarray) -> np.ndarray:

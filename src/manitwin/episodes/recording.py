@@ -24,6 +24,8 @@ class Recording:
     Where there are granules, ``granule_positions_m (T + 1, N, 3)`` are their middles and ``granules_in_objects (T + 1, O)``
     says how many each object holds. Of a goal of several literals ``active_literal (T,)`` is the number of the one that is
     worked on; the target, and what presses on it, are those of the last one.
+
+    Two arms stand side by side in all arrays of joints, hands, tips and fingers, the first one's numbers before the second's.
     """
 
     target: int
@@ -71,16 +73,24 @@ def joint_delta(recording: Recording) -> np.ndarray:
 
 
 def tip_delta(recording: Recording) -> np.ndarray:
-    """Return ``(T, 6 + h) float32``: how the tip's target differs from its pose, and what the hand is told itself.
+    """Return ``(T, 6 + h) float32``: how the tip's target differs from its pose (of two arms each's), and what hands are told.
 
     Three metres and a rotation vector of three radians, both along the axes of the world, which are those of the robot's
     base: ``p_target = p + d[:3]``, ``R_target = exp(d[3:6]) R``. This is the frame of ManiSkill's ``pd_ee_delta_pose``
     (``root_translation:root_aligned_body_rotation``), not scaled to [-1, 1].
     """
-    moved = recording.action_tip_position_m - recording.tip_position_m[:-1]
-    before = Rotation.from_quat(recording.tip_quaternion_wxyz[:-1], scalar_first=True)
-    after = Rotation.from_quat(recording.action_tip_quaternion_wxyz, scalar_first=True)
-    return _with_hand(np.hstack([moved, (after * before.inv()).as_rotvec()]), recording)
+    moved = (recording.action_tip_position_m - recording.tip_position_m[:-1]).reshape(-1, 3)
+    before = Rotation.from_quat(recording.tip_quaternion_wxyz[:-1].reshape(-1, 4), scalar_first=True)
+    after = Rotation.from_quat(recording.action_tip_quaternion_wxyz.reshape(-1, 4), scalar_first=True)
+    twists = np.hstack([moved, (after * before.inv()).as_rotvec()])
+    return _with_hand(twists.reshape(recording.steps, -1), recording)
+
+
+def tip_poses(position_m: np.ndarray, quaternion_wxyz: np.ndarray) -> np.ndarray:
+    """Return the poses of the tips of one or two arms ``(T, 7 arms)``, arm by arm, of ``(T, 3 arms)`` and ``(T, 4 arms)``."""
+    rows = len(position_m)
+    poses = np.concatenate([position_m.reshape(rows, -1, 3), quaternion_wxyz.reshape(rows, -1, 4)], axis=2)
+    return np.asarray(poses.reshape(rows, -1))
 
 
 def _with_hand(delta: np.ndarray, recording: Recording) -> np.ndarray:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from manitwin.episodes.courses.course import Course, Ended, Planner, Start
+from manitwin.episodes.courses.handover import HandoverCourse
 from manitwin.episodes.courses.held import HeldCourse
 from manitwin.episodes.courses.pick_place import PickPlaceCourse
 from manitwin.episodes.courses.push import PushCourse
@@ -82,6 +83,8 @@ def course_of(start: Start, facts: EpisodeFacts) -> Course:
     """Return the course of a start's goal."""
     if start.skill_goal is not None and start.skill_goal.pushes:
         return PushCourse(start, facts)
+    if start.skill_goal is not None and start.skill_goal.hands_over:
+        return HandoverCourse(start, facts)
     held = start.skill_goal is not None and start.skill_goal.is_of_a_path
     return HeldCourse(start, facts) if held else PickPlaceCourse(start, facts)
 

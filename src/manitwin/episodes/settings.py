@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from manitwin.config import RunConfig, Section, Seed
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION
 from manitwin.scenes.settings import application_run
+
+HANDOVER, TWO_ARMS = "handover", "two_pandas"
+"""The skill of two arms, and the robot that has them where none is named."""
 
 
 class EpisodeSettings(Section):
@@ -46,9 +49,9 @@ class EpisodeSettings(Section):
 class TrajectoriesConfig(Section):
     """Everything that decides what episodes are made of twins or scenes.
 
-    ``robot`` is a name or a TOML file. ``others`` objects stand around where twins are given and no scenes. ``batch`` episodes
-    of one object are made by one worker, and lost with it. Grasps of which more than ``retire_failed_share`` of the
-    executions failed are retired.
+    ``robot`` is a name or a TOML file; a handover is that of ``two_pandas`` where none is named. ``others`` objects stand around
+    where twins are given and no scenes. ``batch`` episodes of one object are made by one worker, and lost with it. Grasps of
+    which more than ``retire_failed_share`` of the executions failed are retired.
     """
 
     seed: Seed = 0
@@ -59,6 +62,13 @@ class TrajectoriesConfig(Section):
     retire_failed_share: float = Field(default=1 / 3, ge=0, lt=1)
     episode: EpisodeSettings = EpisodeSettings()
     run: RunConfig = Field(default_factory=application_run)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_two_arms(cls, data: Any) -> Any:
+        if isinstance(data, dict) and data.get("skill") == HANDOVER:
+            return {"robot": TWO_ARMS, **data}
+        return data
 
 
 class TasksConfig(Section):

@@ -8,15 +8,28 @@ from typing import Any
 
 from manitwin.episodes.attempts import Attempt
 from manitwin.episodes.recording import Recording
+from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.robots.robot import OPENING, Robot
+from manitwin.robots.two_arms import base_to_world
 from manitwin.robots.urdf import UrdfTree
+
+
+@dataclass(frozen=True)
+class RecordedArm:
+    """One of two arms: its name, how many joints it has, and where its base stands in the world."""
+
+    name: str
+    joints: int
+    base_position_m: tuple[float, ...]
+    base_quaternion_wxyz: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class RecordedRobot:
     """A robot by name and digest, with the names and limits of its joints; the arm's in the order of the recorded arrays.
 
-    ``hand_state`` and ``hand_action`` name what is recorded of the hand and what it is told.
+    ``hand_state`` and ``hand_action`` name what is recorded of the hand and what it is told. ``arms`` are those of a robot of
+    two, in the order of the arrays; of one arm there are none.
     """
 
     name: str
@@ -29,6 +42,17 @@ class RecordedRobot:
     max_opening_m: float
     hand_state: tuple[str, ...] = (OPENING,)
     hand_action: tuple[str, ...] = (OPENING,)
+    arms: tuple[RecordedArm, ...] = ()
+
+    @property
+    def arm_count(self) -> int:
+        """How many arms there are: one or two."""
+        return len(self.arms) or 1
+
+    @property
+    def has_jaws(self) -> bool:
+        """Whether each hand is two jaws, recorded by their opening."""
+        return bool(self.arms) or self.hand_state == (OPENING,)
 
 
 @dataclass(frozen=True)
@@ -72,6 +96,17 @@ def recorded_robot(robot: Robot) -> RecordedRobot:
         max_opening_m=float(robot.gripper.opening_m),
         hand_state=robot.hand_state_names,
         hand_action=robot.hand_action_names,
+        arms=tuple(_recorded_arm(arm) for arm in robot.arms),
+    )
+
+
+def _recorded_arm(arm: Robot) -> RecordedArm:
+    base = base_to_world(arm)
+    return RecordedArm(
+        arm.name,
+        len(arm.arm_joints),
+        tuple(base[:3, 3].tolist()),
+        tuple(quaternion_wxyz(base[:3, :3]).tolist()),
     )
 
 
@@ -79,7 +114,7 @@ def to_json(episode: StoredEpisode) -> str:
     """Return all of an episode but its arrays as one line of JSON, the same text for equal values."""
     said = {
         "attempt": asdict(episode.attempt),
-        "robot": asdict(episode.robot),
+        "robot": {name: value for name, value in asdict(episode.robot).items() if name != "arms" or value},
         "objects": [asdict(thing) for thing in episode.objects],
         "target": episode.recording.target,
         "facts": episode.facts,
@@ -90,4 +125,8 @@ def to_json(episode: StoredEpisode) -> str:
 def robot_from(said: dict[str, Any]) -> RecordedRobot:
     """Return the robot of a dict with its fields."""
     fields: dict[str, Any] = {n: tuple(value) if isinstance(value, list) else value for n, value in said.items()}
-    return RecordedRobot(**fields)
+    arms = tuple(
+        RecordedArm(**{n: tuple(value) if isinstance(value, list) else value for n, value in arm.items()})
+        for arm in said.get("arms", ())
+    )
+    return RecordedRobot(**{**fields, "arms": arms})

@@ -132,22 +132,33 @@ def shipped_robots() -> list[str]:
     return sorted(path.stem for path in _shipped_folder().iterdir() if path.suffix == ".toml")
 
 
+def shipped_two_arms() -> list[str]:
+    """Return the names of the sets of two arms that come with the package."""
+    return sorted(path.stem for path in _two_arms_folder().iterdir() if path.suffix == ".toml")
+
+
 def _shipped_folder() -> Path:
     return Path(str(resources.files("manitwin.robots") / "definitions"))
 
 
+def _two_arms_folder() -> Path:
+    return Path(str(resources.files("manitwin.robots") / "two_arm_definitions"))
+
+
 def definition_path(name_or_path: str) -> Path:
     """Return the file of a robot given by its shipped name or by path; raises UsageError naming what would be valid."""
+    shipped = [*shipped_robots(), *shipped_two_arms()]
     if name_or_path.endswith(".toml"):
         path = Path(name_or_path)
         if not path.is_file():
             raise UsageError(
-                f"robot file {name_or_path} is not there; give a .toml file or one of {', '.join(shipped_robots())}"
+                f"robot file {name_or_path} is not there; give a .toml file or one of {', '.join(shipped)}"
             )
         return path
-    if name_or_path not in shipped_robots():
-        raise UsageError(choose_from("robot", name_or_path, shipped_robots()) + ", or a .toml file")
-    return _shipped_folder() / f"{name_or_path}.toml"
+    if name_or_path not in shipped:
+        raise UsageError(choose_from("robot", name_or_path, shipped) + ", or a .toml file")
+    folder = _shipped_folder() if name_or_path in shipped_robots() else _two_arms_folder()
+    return folder / f"{name_or_path}.toml"
 
 
 def read_definition(path: Path) -> tuple[RobotDefinition, str]:

@@ -23,6 +23,7 @@ from manitwin.robots.definition import (
     definition_path,
     read_definition,
     shipped_robots,
+    shipped_two_arms,
     urdf_files,
 )
 from manitwin.robots.disabled_pairs import disabled_pairs
@@ -31,9 +32,10 @@ from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.links import links_of_urdf, poses_at
 from manitwin.robots.mounted_hands import MountedHand, mount_hand, read_arm
 from manitwin.robots.robot import Robot
+from manitwin.robots.two_arms import is_of_two_arms, load_two_arms
 from manitwin.robots.urdf import UrdfTree, parent_of
 
-__all__ = ["load_robot", "shipped_robots"]
+__all__ = ["load_robot", "shipped_robots", "shipped_two_arms"]
 
 AXIS_TOLERANCE = 1e-3
 TIP_TOLERANCE_M = (
@@ -48,7 +50,7 @@ def load_robot(name_or_path: str) -> Robot:
     an extra that is not installed.
     """
     path = definition_path(name_or_path)
-    return _load_shipped(path) if name_or_path in shipped_robots() else _load(path)
+    return _load_shipped(path) if not name_or_path.endswith(".toml") else _load(path)
 
 
 @lru_cache
@@ -57,6 +59,8 @@ def _load_shipped(path: Path) -> Robot:
 
 
 def _load(path: Path) -> Robot:
+    if is_of_two_arms(path):
+        return load_two_arms(path, lambda name: _load_one_arm(_beside(name, path.parent), path))
     definition, sha256 = read_definition(path)
     gripper = _gripper(definition.hand.gripper, path.parent)
     files = urdf_files(definition.urdf, path.parent, definition.name)
@@ -97,13 +101,24 @@ def _load(path: Path) -> Robot:
     return robot
 
 
+def _load_one_arm(name_or_path: str, wanted_by: Path) -> Robot:
+    if is_of_two_arms(definition_path(name_or_path)):
+        raise ConfigError(f"robot file {wanted_by}: {name_or_path} has two arms itself; name a robot of one")
+    return load_robot(name_or_path)
+
+
 def _gripper(name: str, folder: Path) -> Gripper:
-    if name.endswith(".toml"):
-        path = (folder / name).resolve()
-        if not path.is_relative_to(folder.resolve()) or not path.is_file():
-            raise ConfigError(f"gripper file {name} is not below {folder}; put it there, or name one of the shipped")
-        return load_gripper(str(path))
-    return load_gripper(name)
+    return load_gripper(_beside(name, folder, "gripper"))
+
+
+def _beside(name: str, folder: Path, kind: str = "robot") -> str:
+    """Return a shipped name as it is, and of a file that is named its path below a folder; else raise ConfigError."""
+    if not name.endswith(".toml"):
+        return name
+    path = (folder / name).resolve()
+    if not path.is_relative_to(folder.resolve()) or not path.is_file():
+        raise ConfigError(f"{kind} file {name} is not below {folder}; put it there, or name one of the shipped")
+    return str(path)
 
 
 def _palm(tree: UrdfTree, hand: MountedHand, gripper: Gripper) -> str:

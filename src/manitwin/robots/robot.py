@@ -1,6 +1,7 @@
 """A robot as data: an arm with a hand of any kind of gripper, as planner and simulation take it.
 
-World frame: the arm's base link at the origin, +Z up, +X forward; the table's top is the plane z = 0 below it.
+World frame: the arm's base link at the origin, +Z up, +X forward; the table's top is the plane z = 0 below it. Of two arms
+the first one's base is there.
 """
 
 from __future__ import annotations
@@ -41,6 +42,10 @@ class Robot:
     of its spring plunger; those of a hand with more joints are in the order of its gripper's file. ``hand_links`` are the palm,
     which comes first, and all that hangs from it: they may touch the held object. ``finger_links`` are those that press on
     it. ``disabled_pairs`` are pairs of links that are not tested for collision with each other.
+
+    Two ``arms`` (``two_arms``) are robots of their own, each with its base in the world and the same hand of two jaws: joints,
+    links and limits are then those of the first, then of the second; ``tip_link``, ``gripper_to_tip`` and ``workspace`` those
+    of the first. A robot of one arm has none.
     """
 
     name: str
@@ -59,6 +64,7 @@ class Robot:
     velocity_limits_rad_s: np.ndarray
     acceleration_limits_rad_s2: np.ndarray
     workspace: Workspace
+    arms: tuple[Robot, ...] = ()
 
     @property
     def has_jaws(self) -> bool:
@@ -68,6 +74,8 @@ class Robot:
     @property
     def hand_state_names(self) -> tuple[str, ...]:
         """The names of what is recorded of the hand: the opening of jaws, else its joints (rad, or m)."""
+        if self.arms:
+            return tuple(f"{arm.name}_{OPENING}" for arm in self.arms)
         return (OPENING,) if self.has_jaws else self.finger_joints
 
     @property
@@ -78,6 +86,8 @@ class Robot:
     @property
     def open_hand(self) -> np.ndarray:
         """The positions ``(J,)`` of ``finger_joints`` that a robot begins with: open; a cup where it is pressed on."""
+        if self.arms:
+            return np.concatenate([arm.open_hand for arm in self.arms])
         if isinstance(self.gripper, MultiFingerGripper):
             return self.gripper.postures[0].joints_at(np.array(self.gripper.postures[0].openings_m[-1]))
         return self.hand_joints(np.array([self.gripper.opening_m if self.has_jaws else 0.0]))

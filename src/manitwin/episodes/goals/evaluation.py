@@ -30,6 +30,7 @@ JUDGES: Mapping[str, Callable[[WorldState, Literal], Judgement]] = {
     "wiped": tool_use.wiped,
     "cut_motion": tool_use.cut_motion,
     "aimed": tool_use.aimed,
+    "handed_over": functional.handed_over,
 }
 assert JUDGES.keys() == SIGNATURES.keys(), "every predicate has a judge"
 

@@ -1,4 +1,4 @@
-"""What was done with an object: poured, pressed, struck, hung; measured on granules, contacts and holes."""
+"""What was done with an object: poured, pressed, struck, hung, handed over; measured on granules, contacts and holes."""
 
 from __future__ import annotations
 
@@ -156,6 +156,27 @@ def inserted(state: WorldState, literal: Literal) -> Judgement:
             "moving": thing.at_rest,
         },
         {"off_m": off_m, "below_rim_m": below_m, "angle_rad": angle_rad},
+    )
+
+
+def handed_over(state: WorldState, literal: Literal) -> Judgement:
+    """Judge that the second arm alone holds an object: nothing else touches it, and it is the value higher than it was."""
+    assert literal.value is not None
+    thing, touched = state.of(literal.subject), state.neighbours(literal.subject)
+    if len(state.arms) != 2:
+        return Judgement(False, "one_arm", {})
+    giver, taker = state.arms
+    before_m = transform_points(thing.start_object_to_world, thing.body.center_of_mass_m[None])[0, 2]
+    rise_m = float(thing.center_of_mass_m[2] - before_m)
+    return judged(
+        {
+            "not_held": taker in touched,
+            "giver_holds": giver not in touched,
+            "held_by_something_else": touched <= {taker},
+            "low": rise_m >= literal.value,
+            "moving": thing.at_rest,
+        },
+        {"rise_m": rise_m},
     )
 
 

@@ -43,6 +43,7 @@ SIGNATURES: Mapping[str, Signature] = {
     "wiped": Signature("place", "share", 0.8),
     "cut_motion": Signature("place", "share", 0.8),
     "aimed": Signature("object", "rad", 0.15),
+    "handed_over": Signature(None, "m", 0.05),
 }
 """Every predicate of the language; ``docs/skills.md`` says what each measures."""
 

@@ -82,6 +82,11 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "point {a} at {b}", "aim {a} at {b}", "direct {a} at {b}", "pick up {a} and point {it} at {b}",
         "take {a} and aim {it} at {b}", "please hold {a} so that {it} points at {b}",
     ),
+    "handed_over": (
+        "hand {a} over to the other arm", "give {a} to the other hand", "pass {a} from one hand to the other",
+        "pick up {a} and hand {it} over", "take {a} with one arm and give {it} to the other one",
+        "please pass {a} on to the other arm",
+    ),
     "pressed": (
         "press {a}", "push down on {a} with your fingertips", "press down on {a}", "give {a} a push from above",
         "close your hand and press {a}", "please press {a} once",

@@ -109,7 +109,8 @@ class Granules:
 class WorldState:
     """Objects by name; ``touching``: pairs of names (objects, furniture, fixtures, the robot) that press on each other.
 
-    ``granules_at_start``: how many granules each object held at the beginning.
+    ``granules_at_start``: how many granules each object held at the beginning. ``arms``: the names of two arms, the
+    one that gives first; each then touches under its own name.
     """
 
     objects: Mapping[str, ObjectState]
@@ -121,6 +122,7 @@ class WorldState:
     granules: Granules | None = None
     granules_at_start: Mapping[str, int] = field(default_factory=dict)
     holders: Mapping[str, Holder] = field(default_factory=dict)
+    arms: tuple[str, ...] = ()
 
     def of(self, name: str) -> ObjectState:
         """Return an object's state; raises UsageError naming those that there are."""

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 
 from manitwin.episodes.lerobot.lerobot_format import DEFAULT_FEATURES
-from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta
+from manitwin.episodes.recording import RATE_HZ, Recording, joint_delta, tip_delta, tip_poses
 from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode
 
 GRANULES = "observation.granules"
@@ -46,15 +46,17 @@ class Feature:
 def features_of(robot: RecordedRobot, *, granules: bool = False) -> tuple[Feature, ...]:
     """Return the features of a robot's episodes in the order of the columns, with or without counts of ``granules``."""
     joints, told = robot.arm_joints, robot.hand_action
+    prefixes = [f"{arm.name}_" for arm in robot.arms] or [""]
+    tips, twists = ([f"{prefix}{name}" for prefix in prefixes for name in names] for names in (_POSE, _TWIST))
     return (
         Feature("observation.state", "float32", (*joints, *robot.hand_state)),
         Feature("observation.velocity", "float32", joints),
-        Feature("observation.tip_pose", "float32", _POSE),
+        Feature("observation.tip_pose", "float32", tuple(tips)),
         Feature("observation.target_pose", "float32", _POSE),
         *([Feature(GRANULES, "int64", ("in_target", "in_others", "in_none"))] if granules else []),
         Feature("action", "float32", (*joints, *told)),
         Feature("action.joint_delta", "float32", (*joints, *told)),
-        Feature("action.tip_delta", "float32", (*_TWIST, *told)),
+        Feature("action.tip_delta", "float32", (*twists, *told)),
         Feature("next.success", "bool"),
         Feature("next.done", "bool"),
         Feature("phase", "int64"),
@@ -77,7 +79,7 @@ def frames_of(episode: StoredEpisode, episode_index: int, first_index: int, task
     return {
         "observation.state": state[now],
         "observation.velocity": recording.joint_velocities_rad_s[now],
-        "observation.tip_pose": np.hstack([recording.tip_position_m, recording.tip_quaternion_wxyz])[now],
+        "observation.tip_pose": tip_poses(recording.tip_position_m, recording.tip_quaternion_wxyz)[now],
         "observation.target_pose": np.hstack(poses),
         GRANULES: _granule_counts(episode.recording),
         "action": np.hstack([recording.action_joint_positions_rad, recording.action_hand]),

@@ -8,7 +8,7 @@ planned anew is no reason to give up: the path from before serves. Each knot is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,6 +45,10 @@ class HeldPath:
         return replace(self, poses=self.poses[first:end], meant_from=max(0, self.meant_from - first))
 
 
+Accepts = Callable[[Grasp, HeldPath, np.ndarray], bool]
+"""Tells of a grasp as it is used, a path and the arm's joints ``(n,)`` at its end whether they serve."""
+
+
 @dataclass(frozen=True)
 class HeldPlan:
     """One grasp's motions: reach, approach, (close), lift, carry to the path's first pose; and the joints' path (timed later)."""
@@ -66,11 +70,15 @@ class HeldPathPlanner:
     that takes longer at the joints' limits is not taken (near singularities some take 20 s).
     """
 
-    def __init__(self, parts: ArmPlanning, *, empty: bool = False, lets_go: bool = False):
+    def __init__(
+        self, parts: ArmPlanning, *, empty: bool = False, lets_go: bool = False, accepts: Accepts | None = None
+    ):
         """Take the models and single motions of an arm; ``empty``: its hand holds nothing, and must not touch the target.
 
-        ``lets_go``: what is held is let go at the path's end, where the hand must have room to go back.
+        ``lets_go``: what is held is let go at the path's end, where the hand must have room to go back. ``accepts`` is asked
+        whether another arm can take the object at the path's end; without it nobody takes it.
         """
+        self._accepts = accepts
         self.parts, self._lets_go, self._phase = parts, lets_go, Phase.REACH if empty else Phase.CARRY
 
     def plan(
@@ -201,6 +209,9 @@ class HeldPathPlanner:
         drawback = self._drawback(world, joints, longest_s)
         if drawback is not None:
             return drawback
+        grasp = replace(world.problem.grasps[index], gripper_to_object=gripper_to_object)
+        if self._accepts is not None and not self._accepts(grasp, path, joints(1.0)):
+            return "taker_blocked"
         grasped = world.problem.target.object_to_world @ gripper_to_object
         solutions, converged = parts.solutions.of(world.arm, Phase.APPROACH, grasped, joints(0.0))
         failure: PlanFailure = "approach_blocked" if converged else "no_inverse_kinematics"

@@ -14,12 +14,17 @@ BLIND_M = 0.05
 
 
 def plan_withdrawal(
-    parts: ArmPlanning, problem: PickPlaceProblem, object_to_world: np.ndarray, joints_rad: np.ndarray
+    parts: ArmPlanning,
+    problem: PickPlaceProblem,
+    object_to_world: np.ndarray,
+    joints_rad: np.ndarray,
+    *,
+    blind: bool = True,
 ) -> Motion | None:
     """Plan straight back along the approach, from an object that is at ``object_to_world (4, 4)`` now.
 
     10 cm, less where that is blocked; 5 cm whatever is around where all is: a hand that stays holds on to what it has let
-    go of. None where the arm cannot.
+    go of, and without ``blind`` not at all. None where the arm cannot.
     """
     world = parts.world_of(problem, object_to_world, as_hulls=True)
     start = np.asarray(joints_rad, float)
@@ -32,5 +37,7 @@ def plan_withdrawal(
         line = parts.motions.line(world.arm, Phase.RETREAT, start, back(way_m))
         if line is not None:
             return parts.motions.timed(Phase.RETREAT, line)
+    if not blind:
+        return None
     line = straight_line(parts.arm, start, back(BLIND_M))
     return None if line is None else parts.motions.timed(Phase.RETREAT, line)

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from manitwin.episodes.skills.aim import Aim
 from manitwin.episodes.skills.beside import SIDE_SKILLS
 from manitwin.episodes.skills.cut_motion import CutMotion
+from manitwin.episodes.skills.handover import Handover
 from manitwin.episodes.skills.hang import Hang
 from manitwin.episodes.skills.insert import Insert
 from manitwin.episodes.skills.place_in import PlaceIn
@@ -40,6 +41,7 @@ _SKILLS: tuple[Skill, ...] = (
     Wipe(),
     CutMotion(),
     Aim(),
+    Handover(),
 )
 
 SKILLS: Mapping[str, Skill] = {skill.name: skill for skill in _SKILLS}

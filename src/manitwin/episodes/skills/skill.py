@@ -58,6 +58,7 @@ class SkillGoal:
     objects, by name. Of a skill that moves the target along a held path there is the ``path`` that is made once all has come to
     rest, and its ``fixtures``; the one pose is then that of the beginning. ``granules`` lie in one of the objects;
     ``places_m`` are marked places ``(3,)`` in the world. ``pushes``: the closed hand pushes the target to one of them.
+    ``hands_over``: one arm hands the target over to another one.
     """
 
     goal: Goal
@@ -71,11 +72,12 @@ class SkillGoal:
     granules: GranuleFill | None = None
     places_m: Mapping[str, np.ndarray] = field(default_factory=dict)
     pushes: bool = False
+    hands_over: bool = False
 
     @property
     def is_of_a_path(self) -> bool:
         """True where the goal is reached on the way and not by where the target is let go."""
-        return self.path is not None or self.pushes
+        return self.path is not None or self.pushes or self.hands_over
 
 
 class Skill(ABC):

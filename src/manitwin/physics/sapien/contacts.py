@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -50,9 +50,9 @@ class Push:
 
 @dataclass(frozen=True)
 class Touches:
-    """The force (N) of each finger on the target, and whether something else carries it."""
+    """The force (N) of each finger on the target, of two arms the first's before the second's; and what else carries it."""
 
-    finger_forces_n: tuple[float, float]
+    finger_forces_n: tuple[float, ...]
     on_support: bool
 
 
@@ -64,13 +64,17 @@ class ContactReader:
         system: physx.PhysxCpuSystem,
         bodies: Iterable[tuple[physx.PhysxBaseComponent, str, Role]],
         max_contact_force_n: float,
+        arms: Mapping[str, str] | None = None,
     ):
-        """Take every body with its name and role.
+        """Take every body with its name and role; ``arms`` names the arm that each link of two arms is of.
+
+        Roles are then as one of the arms sees them: the other's hand is a HAND, the rest of it an ARM.
 
         ``has_strangers`` is to be set where there are bodies without one (granules): their contacts are left out then, which
         takes time where there are many.
         """
         self.has_strangers = False
+        self._arms = arms or {}
         self._system, self._max_impulse = system, max_contact_force_n * system.timestep
         self._roles: dict[physx.PhysxBaseComponent, Role] = {}
         self._names: dict[physx.PhysxBaseComponent, str] = {}
@@ -128,28 +132,44 @@ class ContactReader:
         return Touches((plus_n, minus_n), on_support)
 
     def pressing(self, contacts: Iterable[physx.PhysxContact]) -> set[frozenset[str]]:
-        """Return the pairs of names of what presses on each other; every part of the robot goes by ``ROBOT_NAME``."""
+        """Return the pairs of names of what presses on each other.
+
+        Every part of the robot goes by ``ROBOT_NAME``, of two arms each by its arm's name.
+        """
         pairs = set()
         for contact in contacts:
             if any(point.impulse.any() for point in contact.points):
                 pairs.add(frozenset(self._public_name(body) for body in contact.bodies))
         return {pair for pair in pairs if len(pair) == 2}
 
+    def _between_arms(self, first: physx.PhysxBaseComponent, second: physx.PhysxBaseComponent) -> bool:
+        of = [self._arms.get(self._names[body]) for body in (first, second)] if self._arms else [None]
+        return None not in of and of[0] != of[1]
+
     def _public_name(self, body: physx.PhysxBaseComponent) -> str:
-        return ROBOT_NAME if self._roles[body] < Role.TARGET else self._names[body]
+        name = self._names[body]
+        return self._arms.get(name, ROBOT_NAME) if self._roles[body] < Role.TARGET else name
 
     def unplanned(
         self, contacts: Iterable[physx.PhysxContact], *, in_hand: bool, meant: MeantContacts = NONE_MEANT
     ) -> set[tuple[str, str]]:
         """Return the names of what touches with more than the allowed force and should not, the robot's part first.
 
-        While the target is ``in_hand``, the palm may touch it. What is ``meant`` is allowed, pair by pair.
+        While the target is ``in_hand``, the palm may touch it. What is ``meant`` is allowed, pair by pair. Two arms must not
+        touch one another.
         """
         impulses: dict[tuple[str, str], np.ndarray] = {}
         forbidden = _FORBIDDEN_IN_HAND if in_hand else _FORBIDDEN
         for contact in contacts:
             first, second = contact.bodies
             one, other = self._roles[first], self._roles[second]
+            if self._between_arms(first, second):
+                turned = self._names[first] > self._names[second]
+                pair = (
+                    (self._names[second], self._names[first]) if turned else (self._names[first], self._names[second])
+                )
+                impulses[pair] = impulses.get(pair, 0.0) + (-1.0 if turned else 1.0) * _impulse(contact)
+                continue
             if not forbidden[one][other] and (meant.target is None or not _is_of_target(one, other)):
                 continue
             sign = 1.0

@@ -10,7 +10,7 @@ from manitwin.physics.sapien.articulation import LinkContact, build_articulation
 from manitwin.physics.sapien.body import CONTACT_OFFSET_M
 from manitwin.physics.sapien.fingers import finger_collision_groups
 from manitwin.physics.sapien.hand import MAX_DRIVE_FORCE
-from manitwin.physics.sapien.shapes import HAND_COLLISION_GROUPS
+from manitwin.physics.sapien.shapes import HAND_COLLISION_GROUPS, SECOND_ARM_COLLISION_GROUPS
 from manitwin.physics.sapien.visuals import add_robot_visuals
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.grippers.suction import SuctionGripper
@@ -33,13 +33,13 @@ SOLVER_ITERATIONS = 50
 
 
 class SapienRobot:
-    """A robot, its base fixed at the world's origin, at home and with open fingers.
+    """A robot of one arm, its base fixed where its URDF begins (at the world's origin), at home and with open fingers.
 
     ``links`` are its bodies by the names of their first links: what is fixed to a link is part of its body.
 
     Arm positions ``(n,)`` rad are in the order of ``robot.arm_joints``; openings are the distance between the pads (m).
     ``finger_force_n`` is the closing force; the fingers' drives give up at four times that. ``visual`` adds the meshes to
-    look at, which needs a scene with a renderer.
+    look at, which needs a scene with a renderer. ``second``: it is the second of two arms, which touches the first.
     """
 
     def __init__(
@@ -52,14 +52,17 @@ class SapienRobot:
         solver_iterations: int = SOLVER_ITERATIONS,
         contact_offset_m: float = CONTACT_OFFSET_M,
         visual: bool = False,
+        second: bool = False,
     ):
+        if robot.arms:
+            raise ValueError(f"{robot.name} has two arms; put each of its ``arms`` into the scene")
         self.robot = robot
         self._scene = scene  # kept: bodies go with their scene
         friction = robot.gripper.finger_friction if finger_friction is None else finger_friction
         bodies, part_of = bodies_of_urdf(robot.urdf, robot.hand_links[0])
         pads = physx.PhysxMaterial(friction, friction, 0.0)
         self.links = build_articulation(
-            scene, bodies, lambda link: _contact_of(robot, link, pads), contact_offset_m=contact_offset_m
+            scene, bodies, lambda link: _contact_of(robot, link, pads, second=second), contact_offset_m=contact_offset_m
         )
         tip_body, tip_to_body = part_of[robot.tip_link]
         self._tip, self._tip_in_body = self.links[tip_body], sapien.Pose(tip_to_body)
@@ -156,9 +159,9 @@ class SapienRobot:
         return np.asarray((self._tip.entity_pose * self._gripper_in_body).to_transformation_matrix(), float)
 
 
-def _contact_of(robot: Robot, link: Link, pads: physx.PhysxMaterial) -> LinkContact:
+def _contact_of(robot: Robot, link: Link, pads: physx.PhysxMaterial, *, second: bool) -> LinkContact:
     """Return how a link touches: pads are soft, and fingers with joints stop one another as in the trial of their grasps."""
-    groups: tuple[int, ...] = HAND_COLLISION_GROUPS
+    groups: tuple[int, ...] = SECOND_ARM_COLLISION_GROUPS if second else HAND_COLLISION_GROUPS
     if isinstance(robot.gripper, MultiFingerGripper):
         owners = {
             each.name: owner for each, owner in zip(robot.gripper.links, robot.gripper.finger_of_link, strict=True)

@@ -22,6 +22,7 @@ PATCH_RADIUS_M, MIN_PATCH_RADIUS_M = 0.01, 0.005  # of PhysX's torsional frictio
 # Of SAPIEN's four words: shapes whose first and second words have common bits collide, unless their third words have one too.
 COLLIDE_WITH_ALL = (1, 1, 0, 0)
 HAND_COLLISION_GROUPS = (1, 1, 2, 0)  # those of one hand or robot do not collide with one another
+SECOND_ARM_COLLISION_GROUPS = (1, 1, 4, 0)  # of a second arm, which collides with the first
 
 
 def set_contact(

@@ -33,6 +33,8 @@ LEAST_TABLE_M = 0.3
 class RobotWorld:
     """A robot before a scene; its objects are in the order of their names, the target at ``target``; ``granules``, if any.
 
+    ``robots`` are its arms, one or two; ``robot`` and ``contacts`` are those of the one that is ``used``.
+
     To be used in a ``with`` statement: at its end the cooked hulls are lent to other scenes, and nothing of it may be used.
     """
 
@@ -71,13 +73,24 @@ class RobotWorld:
         self.bodies = [
             self._add_object(placed, shapes) for placed, shapes in zip(self.placed, self._loan.__enter__(), strict=True)
         ]
-        self.robot = SapienRobot(self._scene, robot, finger_force_n=closing_force_n, contact_offset_m=contact_offset_m)
+        self.robots = tuple(
+            SapienRobot(
+                self._scene,
+                arm,
+                finger_force_n=closing_force_n,
+                contact_offset_m=contact_offset_m,
+                second=number > 0,
+            )
+            for number, arm in enumerate(robot.arms or (robot,))
+        )
+        self.robot = self.robots[0]
         self.expect_load(False)
         self._fixed = [
             (surface, box.name, role) for surface, box, role in zip(surfaces, standing, bearing, strict=True)
         ]
         self._max_contact_force_n = max_contact_force_n
-        self.contacts = ContactReader(self._system, self._roles(robot), max_contact_force_n)
+        self.readers = self._readers()
+        self.contacts = self.readers[0]
 
     def __enter__(self) -> RobotWorld:
         return self
@@ -85,14 +98,25 @@ class RobotWorld:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        del self.contacts, self.robot, self.bodies, self._fixed, self.granules, self._scene, self._system
+        del (
+            self.contacts,
+            self.readers,
+            self.robot,
+            self.robots,
+            self.bodies,
+            self._fixed,
+            self.granules,
+            self._scene,
+            self._system,
+        )
         self._loan.__exit__(kind, error, trace)
 
     def add_strangers(self, entities: Sequence[sapien.Entity]) -> None:
         """Add bodies that have no name and no role; contacts leave them out."""
         for entity in entities:
             self._scene.add_entity(entity)
-        self.contacts.has_strangers = True
+        for reader in self.readers:
+            reader.has_strangers = True
 
     def add_granules(self, fill: GranuleFill) -> None:
         """Put granules into the vessel that they are for, and let them fall."""
@@ -110,16 +134,23 @@ class RobotWorld:
     def expect_load(self, held: bool) -> None:
         """Choose the solver's iterations for a hand that holds something, or is empty."""
         iterations = self._iterations_held if held else self._iterations
-        self.robot.articulation.set_solver_position_iterations(iterations)
+        for robot in self.robots:
+            robot.articulation.set_solver_position_iterations(iterations)
         self.bodies[self.target].solver_position_iterations = iterations
 
     def take(self, number: int) -> None:
         """Make another object the target."""
         self.expect_load(False)
         self.target = number
-        strangers = self.contacts.has_strangers
-        self.contacts = ContactReader(self._system, self._roles(self.robot.robot), self._max_contact_force_n)
-        self.contacts.has_strangers = strangers
+        strangers, used = self.contacts.has_strangers, self.robots.index(self.robot)
+        self.readers = self._readers()
+        for reader in self.readers:
+            reader.has_strangers = strangers
+        self.contacts = self.readers[used]
+
+    def use(self, arm: int) -> None:
+        """Make another arm, by its number, the ``robot`` whose fingers ``contacts`` tells of."""
+        self.robot, self.contacts = self.robots[arm], self.readers[arm]
 
     def object_to_world(self, number: int) -> np.ndarray:
         """Return the pose ``(4, 4)`` of an object's frame."""
@@ -157,15 +188,22 @@ class RobotWorld:
         self._scene.add_entity(entity_at(component, sapien.Pose(placed.object_to_world)))
         return component
 
-    def _roles(self, robot: Robot) -> list[tuple[physx.PhysxBaseComponent, str, Role]]:
-        """Give every body its name and role; the robot's base does not move and touches nothing by accident."""
+    def _readers(self) -> list[ContactReader]:
+        """Return a reader for each arm."""
+        links = [(each.robot.name, name) for each in self.robots for name in each.links]
+        arms = {name: arm for arm, name in links} if len(self.robots) > 1 else None
+        return [ContactReader(self._system, self._roles(each), self._max_contact_force_n, arms) for each in self.robots]
+
+    def _roles(self, used: SapienRobot) -> list[tuple[physx.PhysxBaseComponent, str, Role]]:
+        """Give every body its name and role, as one arm sees them; a base does not move and touches nothing by accident."""
         roles: list[tuple[physx.PhysxBaseComponent, str, Role]] = list(self._fixed)
         for number, (body, placed) in enumerate(zip(self.bodies, self.placed, strict=True)):
             roles.append((body, placed.name, Role.TARGET if number == self.target else Role.OTHER))
-        for name, link in self.robot.links.items():
-            side = robot.side_of(name)
-            hand = Role.HAND if name in robot.hand_links else Role.ARM
-            roles.append((link, name, hand if side is None else Role(side)))
+        for each in self.robots:
+            for name, link in each.links.items():
+                side = each.robot.side_of(name) if each is used else None
+                hand = Role.HAND if name in each.robot.hand_links else Role.ARM
+                roles.append((link, name, hand if side is None else Role(side)))
         return roles
 
 

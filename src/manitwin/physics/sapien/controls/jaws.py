@@ -19,8 +19,8 @@ class JawsControl:
     """The jaws of a robot; what they are told, and what they are, is the opening (m)."""
 
     def __init__(self, world: RobotWorld, settings: TrialSettings):
-        """Take a world whose robot's jaws are open."""
-        self._world, self._settings = world, settings
+        """Take a world whose robot (of two arms, the one that is used now) has open jaws."""
+        self._robot, self._settings = world.robot, settings
         self._full_m = self._target_m = world.robot.robot.gripper.opening_m
         self._shared = SharedTarget(self._full_m, settings)
 
@@ -32,12 +32,12 @@ class JawsControl:
     @property
     def state(self) -> np.ndarray:
         """The opening."""
-        return np.array([self._world.robot.opening_m()])
+        return np.array([self._robot.opening_m()])
 
     @property
     def presses(self) -> bool:
         """Whether the target is so far within what is between the jaws."""
-        pressing_n = (self._world.robot.opening_m() - self._target_m) / 2 * self._settings.finger_stiffness_n_m
+        pressing_n = (self._robot.opening_m() - self._target_m) / 2 * self._settings.finger_stiffness_n_m
         return pressing_n > PRESSING_SHARE * self._settings.force_n
 
     def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
@@ -46,7 +46,7 @@ class JawsControl:
 
     def squeeze(self) -> None:
         """Move the target on by one frame."""
-        self._tell(2 * self._shared.move_on(self._world.robot.opening_m() / 2))
+        self._tell(2 * self._shared.move_on(self._robot.opening_m() / 2))
 
     def closing_empty(self) -> Iterator[None]:
         """Close at the closing speed; what they do not hold they do not press."""
@@ -77,4 +77,4 @@ class JawsControl:
 
     def _tell(self, opening_m: float) -> None:
         self._target_m = opening_m
-        self._world.robot.set_opening_target(opening_m)
+        self._robot.set_opening_target(opening_m)

@@ -1,0 +1,204 @@
+"""Plans of two arms, of which one moves at a time while the other is an obstacle: an object goes from hand to hand.
+
+The first arm's half is a held path (``held_path``) to a meeting place; a grasp and a meeting are taken where the second arm
+finds another grasp that it can approach while the first holds on, and where the first can let go and withdraw. Deterministic
+for a problem's seed, with work counted and never timed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from manitwin.episodes.planning.arm_obstacles import ArmObstacles
+from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner, HeldPlan
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.problem import (
+    Grasp,
+    Motion,
+    Phase,
+    PickPlaceProblem,
+    PlannerSettings,
+    PlanReport,
+)
+from manitwin.episodes.planning.withdrawal import plan_withdrawal
+from manitwin.geometry.poses import transform_points
+from manitwin.robots.robot import Robot
+
+APART_M = 0.06  # of the pads of two hands: less, and they have no room beside one another
+MOST_TAKEN = 6  # grasps of the taker that are tried beyond a look at its hand, for one of the giver and a meeting
+SETTLED_M = 0.004  # by how much fingers may stand farther apart than planned
+
+
+@dataclass(frozen=True)
+class Take:
+    """How the second arm takes: a grasp as it is used, and the motions from home to it."""
+
+    grasp: Grasp
+    gripper_to_object: np.ndarray
+    reach: Motion
+    approach: Motion
+
+    @property
+    def joints_rad(self) -> np.ndarray:
+        """Where the arm is when its hand closes."""
+        return np.asarray(self.approach.positions_rad[-1])
+
+
+@dataclass(frozen=True)
+class HandoverPlan:
+    """What the first arm does until it waits with the object, and what the second does then."""
+
+    give: HeldPlan
+    take: Take
+
+
+class TwoArmPlanner(PickPlacePlanner):
+    """The planner of the first of two arms, the giver, with that of the second, the ``taker``."""
+
+    def __init__(self, robot: Robot, timestep_s: float = 1 / 120, settings: PlannerSettings | None = None):
+        """Build the models of both arms and hands; ``robot`` has two ``arms``."""
+        giver, taker = robot.arms
+        super().__init__(giver, timestep_s, settings)
+        self.taker = PickPlacePlanner(taker, timestep_s, settings)
+        self._giver_shapes, self._taker_shapes = ArmObstacles(giver), ArmObstacles(taker)
+        self._tip_m = np.array([[0.0, 0, giver.gripper.tip_depth_m]])
+
+    def plan_handover(
+        self, problem: PickPlaceProblem, meetings: Sequence[HeldPath], *, longest_s: float
+    ) -> tuple[HandoverPlan | None, PlanReport]:
+        """Plan with the first of the grasps that leaves room for a second one, and the first meeting where both arms can be.
+
+        The report has no plan of its own, only what was tried and what it failed of.
+        """
+        grasps = self._with_room_for_another(problem.grasps)
+        asked = replace(self.with_taker_at(problem, self.taker.arm.home, None), grasps=grasps)
+        found: list[Take] = []
+
+        def can_be_taken(grasp: Grasp, path: HeldPath, joints_rad: np.ndarray) -> bool:
+            take = self.plan_take(problem, path.poses[-1], joints_rad, grasp.width_m, grasp.gripper_to_object)
+            if take is None:
+                return False
+            found.append(take)
+            return True
+
+        held = HeldPathPlanner(self.parts, accepts=can_be_taken)
+        give, report = held.plan(asked, meetings, as_hulls=False, longest_s=longest_s)
+        return (None if give is None else HandoverPlan(give, found[-1])), report
+
+    def plan_take(
+        self,
+        problem: PickPlaceProblem,
+        object_to_world: np.ndarray,
+        giver_rad: np.ndarray,
+        opening_m: float,
+        giver_to_object: np.ndarray,
+        first: Sequence[Grasp] = (),
+    ) -> Take | None:
+        """Plan how the second arm, at home, takes the object that the first holds at ``object_to_world (4, 4)``.
+
+        ``opening_m`` is that of the first hand, which is at ``giver_to_object``. Grasps of ``first`` are tried before all
+        others. None: none can be approached, or the first hand could not withdraw from any.
+        """
+        parts, ends = self.taker.parts, self.taker.parts.ends
+        asked = self._at_meeting(problem, object_to_world, giver_rad, opening_m)
+        world, rng = parts.world_of(asked, object_to_world), np.random.default_rng((problem.seed, 6))
+        order = [*first, *(grasp for grasp in problem.grasps if all(grasp is not other for other in first))]
+        tried = 0
+        for grasp in order:
+            if not self._are_apart(grasp.gripper_to_object, giver_to_object):
+                continue
+            for turn in parts.candidates.turns:
+                gripper_to_object = grasp.gripper_to_object @ turn
+                if parts.candidates.look_at_approach(world, gripper_to_object) is not None:
+                    continue
+                tried += 1
+                there = object_to_world @ gripper_to_object
+                solutions, _ = parts.solutions.of(world.arm, Phase.APPROACH, there, parts.arm.home)
+                for at_grasp in solutions:
+                    line = parts.motions.line(world.arm, Phase.APPROACH, at_grasp, ends.before(there))
+                    if line is None:
+                        continue
+                    approach = parts.motions.timed(Phase.APPROACH, line, backwards=True)
+                    if self.plan_withdrawal(problem, object_to_world, giver_rad, at_grasp, grasp) is None:
+                        continue
+                    start = approach.positions_rad[0]
+                    reach = parts.motions.free(world.arm, Phase.REACH, parts.arm.home, start, rng)
+                    if isinstance(reach, Motion):
+                        return Take(grasp, gripper_to_object, reach, approach)
+                if tried == MOST_TAKEN:
+                    return None
+        return None
+
+    def plan_withdrawal(
+        self,
+        problem: PickPlaceProblem,
+        object_to_world: np.ndarray,
+        giver_rad: np.ndarray,
+        taker_rad: np.ndarray,
+        grasp: Grasp,
+    ) -> Motion | None:
+        """Plan the first hand's way straight back from the object that the second arm holds by ``grasp``; None: it has none."""
+        asked = self.with_taker_at(problem, taker_rad, grasp)
+        return plan_withdrawal(self.parts, asked, object_to_world, giver_rad, blind=False)
+
+    def plan_home(
+        self,
+        problem: PickPlaceProblem,
+        object_to_world: np.ndarray,
+        giver_rad: np.ndarray,
+        taker_rad: np.ndarray,
+        grasp: Grasp,
+    ) -> Motion | None:
+        """Plan the first arm's way home around the second, which holds the object; None: there is none."""
+        asked = self.with_taker_at(problem, taker_rad, grasp)
+        asked = replace(asked, target=replace(problem.target, object_to_world=object_to_world))
+        world, rng = self.parts.world_of(asked, object_to_world), np.random.default_rng((problem.seed, 7))
+        found = self.parts.motions.free(world.arm, Phase.REACH, giver_rad, self.arm.home, rng)
+        return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
+
+    def plan_lift(
+        self, problem: PickPlaceProblem, gripper_to_object: np.ndarray, taker_rad: np.ndarray, giver_rad: np.ndarray
+    ) -> Motion | None:
+        """Plan the second arm straight up with what it holds; None: there is no way."""
+        parts = self.taker.parts
+        asked = replace(problem, obstacles=(*problem.obstacles, *self._giver_shapes.at(giver_rad, (self._open_m,))))
+        world = parts.world_of(asked, problem.target.object_to_world)
+        world.hold(gripper_to_object)
+        line = parts.motions.line(
+            world.arm, Phase.CARRY, taker_rad, parts.ends.above(parts.arm.gripper_pose(taker_rad))
+        )
+        return None if line is None else parts.motions.timed(Phase.CARRY, line)
+
+    def with_taker_at(self, problem: PickPlaceProblem, taker_rad: np.ndarray, grasp: Grasp | None) -> PickPlaceProblem:
+        """Return the first arm's problem with the second as an obstacle, open, or closed on a grasp."""
+        opening_m = self._open_m if grasp is None else grasp.width_m + SETTLED_M
+        return replace(problem, obstacles=(*problem.obstacles, *self._taker_shapes.at(taker_rad, (opening_m,))))
+
+    def _at_meeting(
+        self, problem: PickPlaceProblem, object_to_world: np.ndarray, giver_rad: np.ndarray, opening_m: float
+    ) -> PickPlaceProblem:
+        """Return the second arm's problem: the object in the air, and the first arm as it holds it and as it lets go."""
+        giver = self._giver_shapes.at(giver_rad, (opening_m, self._open_m))
+        return replace(
+            problem,
+            target=replace(problem.target, object_to_world=object_to_world),
+            goal_object_to_world=object_to_world,
+            obstacles=(*problem.obstacles, *giver),
+        )
+
+    @property
+    def _open_m(self) -> float:
+        return float(self.robot.gripper.opening_m)
+
+    def _with_room_for_another(self, grasps: Sequence[Grasp]) -> tuple[Grasp, ...]:
+        """Return the grasps that another one is far enough away from, those first that most are, in steps of a quarter."""
+        counts = [sum(self._are_apart(a.gripper_to_object, b.gripper_to_object) for b in grasps) for a in grasps]
+        ranked = [(-round(4 * count / len(grasps)), place) for place, count in enumerate(counts) if count]
+        return tuple(grasps[place] for _, place in sorted(ranked))
+
+    def _are_apart(self, first: np.ndarray, second: np.ndarray) -> bool:
+        tips = [transform_points(pose, self._tip_m)[0] for pose in (first, second)]
+        return float(np.linalg.norm(tips[0] - tips[1])) >= APART_M
