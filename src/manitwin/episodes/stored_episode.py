@@ -125,8 +125,8 @@ def to_json(episode: StoredEpisode) -> str:
 def robot_from(said: dict[str, Any]) -> RecordedRobot:
     """Return the robot of a dict with its fields."""
     fields: dict[str, Any] = {n: tuple(value) if isinstance(value, list) else value for n, value in said.items()}
-    arms = tuple(
-        RecordedArm(**{n: tuple(value) if isinstance(value, list) else value for n, value in arm.items()})
+    fields["arms"] = tuple(
+        RecordedArm(arm["name"], arm["joints"], tuple(arm["base_position_m"]), tuple(arm["base_quaternion_wxyz"]))
         for arm in said.get("arms", ())
     )
-    return RecordedRobot(**{**fields, "arms": arms})
+    return RecordedRobot(**fields)
