@@ -23,7 +23,7 @@ from manitwin.models.registry import backends
 from manitwin.models.weights.catalog import KNOWN_WEIGHTS
 from manitwin.pipeline.manifest import Units, Up
 from manitwin.robots.grippers.gripper import shipped_grippers
-from manitwin.robots.load import load_robot, shipped_robots
+from manitwin.robots.load import load_robot, shipped_robots, shipped_two_arms
 from manitwin.scenes.perception.segmentation import FORMATS as SEGMENTATIONS
 from manitwin.scenes.settings import LayoutSettings
 from manitwin.scenes.vqa.formats import FORMATS as QUESTION_FORMATS
@@ -41,7 +41,7 @@ def literal(section: type, name: str) -> set[str]:
         (choices.UP, set(get_args(Up))),
         (choices.EXECUTORS, set(EXECUTORS)),
         (choices.GRIPPERS, set(shipped_grippers())),
-        (choices.ROBOTS, set(shipped_robots())),
+        (choices.ROBOTS, {*shipped_robots(), *shipped_two_arms()}),
         (choices.SKILLS, set(skill_names())),
         (choices.SURFACES, literal(LayoutSettings, "surface")),
         (choices.CLUTTER, literal(LayoutSettings, "clutter")),

@@ -34,6 +34,13 @@ def test_what_is_not_the_grasps_fault_does_not_count() -> None:
     assert find_retirements([*innocent, borrowed], failed_share=0.0) == []
 
 
+def test_of_a_handover_the_first_hand_answers_for_what_it_drops_alone() -> None:
+    handed = [replace(KEPT, skill="handover", outcome=outcome) for outcome in ("goal_missed", "replan_failed", "kept")]
+    assert not find_retirements(handed, failed_share=0.1)
+    (found,) = find_retirements([*handed, replace(KEPT, skill="handover", outcome="dropped")], failed_share=0.2)
+    assert (found.executed, found.failed) == (4, 1)
+
+
 def test_a_retired_grasp_is_marked_and_used_no_more(tmp_path: Path) -> None:
     identity = write_brick(tmp_path, 0)
     folder, twins = tmp_path / twin_name(identity), TwinSource(tmp_path)

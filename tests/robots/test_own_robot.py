@@ -147,7 +147,8 @@ def test_a_missing_and_a_broken_mesh_are_named(tmp_path: Path):
 
 def test_unknown_robots_are_answered_with_the_known_ones():
     with pytest.raises(
-        UsageError, match=r"did you mean 'panda'.* Valid: panda, two_pandas, ur5_panda, ur5_robotiq, ur5_suction, xarm7_a"
+        UsageError,
+        match=r"did you mean 'panda'.* Valid: panda, two_pandas, ur5_panda, ur5_robotiq, ur5_suction, xarm7_a",
     ):
         load_robot("pandaa")
     with pytest.raises(UsageError, match=r"mine\.toml is not there"):

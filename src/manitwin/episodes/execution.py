@@ -89,6 +89,11 @@ class Execution:
         self._take_touches(self._world.contacts.read())
 
     @property
+    def used(self) -> int:
+        """The number of the arm that is used."""
+        return self._arms.index(self._arm)
+
+    @property
     def commanded_rad(self) -> np.ndarray:
         """The joints ``(n,)`` that the arm is told."""
         return self._arm.commanded_rad
@@ -232,7 +237,7 @@ class Execution:
     def _watch(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
         for arm in self._arms:
             arm.hand.look(contacts)
-        in_hand = phase in IN_HAND or any(arm.presses for arm in self._arms if arm is not self._arm)
+        in_hand = phase in IN_HAND or (len(self._arms) > 1 and self._is_held)
         unplanned = self._world.contacts.unplanned(contacts, in_hand=in_hand, meant=self.meant)
         for watch in self.watches:
             watch.look(self._world.contacts, contacts, self.length_s)
@@ -273,6 +278,6 @@ class Execution:
             arm.hand.touches(reader.touches(contacts))
             for arm, reader in zip(self._arms, self._world.readers, strict=True)
         ]
-        self.touches = of_arms[self._arms.index(self._arm)]
+        self.touches = of_arms[self.used]
         forces_n = tuple(force for touches in of_arms for force in touches.finger_forces_n)
         return replace(self.touches, finger_forces_n=forces_n)

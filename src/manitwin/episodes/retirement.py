@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 
 from manitwin.engine.ledger.ledger import LEDGER, Ledger
 from manitwin.episodes.attempts import EXECUTION_FAILURES, Attempt
+from manitwin.episodes.settings import HANDOVER
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.grasp_table import read_grasp_table
 from manitwin.twin.loaded_twin import TwinSource
@@ -21,6 +22,8 @@ from manitwin.twin.store import amend
 from manitwin.twin.wholeness import note_sizes
 
 GRASPS = "grasps.parquet"
+
+OF_THE_FIRST_HAND = ("dropped", "not_lifted")
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,8 @@ class Retirement:
 def find_retirements(attempts: Iterable[Attempt], *, failed_share: float) -> list[Retirement]:
     """Return the grasps of which more than ``failed_share`` of the executions failed, in order of twin and grasp.
 
-    Transferred grasps do not count: they say nothing of the gripper that a grasp was verified for.
+    Transferred grasps do not count: they say nothing of the gripper that a grasp was verified for. Of a handover the grasp is
+    that of the first hand, whose failures are those before the second one takes over.
     """
     executed: Counter[tuple[str, str]] = Counter()
     failed: dict[tuple[str, str], Counter[str]] = {}
@@ -50,7 +54,7 @@ def find_retirements(attempts: Iterable[Attempt], *, failed_share: float) -> lis
             continue
         key = attempt.twin_id, attempt.grasp_id
         executed[key] += 1
-        if attempt.outcome in EXECUTION_FAILURES:
+        if attempt.outcome in (OF_THE_FIRST_HAND if attempt.skill == HANDOVER else EXECUTION_FAILURES):
             failed.setdefault(key, Counter())[attempt.outcome] += 1
     return [
         Retirement(*key, executed[key], dict(sorted(outcomes.items())))

@@ -140,6 +140,24 @@ def test_upright_lifted_pushed_and_undisturbed() -> None:
     assert judge(replace(there, events=(replace(push, values={"rise_m": 0.05}),)), literal).failure == "lifted"
 
 
+@pytest.mark.parametrize(
+    ("pose", "touching", "still", "failure"),
+    [
+        (at(0.3, 0, 0.12), [("item", "taker")], True, None),
+        (at(0.3, 0, 0.12), [("item", "taker"), ("item", "giver")], True, "giver_holds"),
+        (at(0.3, 0, 0.12), [("item", "giver")], True, "not_held"),
+        (at(0.3, 0, 0.12), [], True, "not_held"),
+        (at(0.3, 0, 0.12), [("item", "taker"), ("item", "table")], True, "held_by_something_else"),
+        (at(0.3, 0, 0.06), [("item", "taker")], True, "low"),
+        (at(0.3, 0, 0.12), [("item", "taker")], False, "moving"),
+    ],
+)
+def test_handed_over(pose: np.ndarray, touching: list[tuple[str, str]], still: bool, failure: str | None) -> None:
+    held = replace(state(thing(pose, still=still, start=at(0.3, 0, 0.02)), *touching), arms=("giver", "taker"))
+    assert judge(held, Literal("handed_over", "item")).failure == failure
+    assert judge(replace(held, arms=()), Literal("handed_over", "item")).failure == "one_arm"
+
+
 def poured(inside: int, spilt: int, left: int) -> WorldState:
     """A source of 100 granules at x = 0.2 and a vessel at 0.5."""
     spots = [at(0.5, 0, 0.03)] * inside + [at(0.9, 0, 0.0)] * spilt + [at(0.2, 0, 0.03)] * left

@@ -17,7 +17,7 @@ from manitwin.physics.sapien.contacts import MeantContacts
 from manitwin.robots.two_arms import base_to_world
 
 GIVER, TAKER = 0, 1
-MEETINGS = 60
+MEETINGS = 24
 HEIGHTS_M, ASIDE_M, ALONG_M = (0.35, 0.55), 0.15, 0.08  # of the middle of the object, about half way between the bases
 TILTED_SHARE, TILT_RAD = 0.7, np.radians(100)
 RISEN_M = 0.03  # over which the meeting place is come up to
@@ -79,12 +79,12 @@ class HandoverCourse(Course):
         execution.use(GIVER)
         self._let_go(take, execution)
         execution.use(TAKER)
-        lift = self._arms.plan_lift(
+        carry = self._arms.plan_bring_home(
             self.problem, execution.gripper_to_object(), execution.commanded_rad, self._giver_rad
         )
-        self.facts.replans["taken_up" if lift is not None else "not_taken_up"] += 1
-        if lift is not None:
-            execution.follow(lift)
+        self.facts.replans["brought_home" if carry is not None else "not_brought_home"] += 1
+        if carry is not None:
+            execution.follow(carry)
         execution.wait_s(Phase.HOLD, HOLD_S)
 
     def _bring(self, plan: HandoverPlan, execution: Execution) -> None:

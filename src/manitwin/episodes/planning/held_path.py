@@ -92,6 +92,8 @@ class HeldPathPlanner:
         rng, tally, pairs = np.random.default_rng(problem.seed), GraspTally(), 0
         for candidate in self.parts.candidates.of(world):
             failure: PlanFailure | None = candidate.failure
+            if failure is None and self._accepts is not None:
+                failure = self._look_at_lift(world, candidate.gripper_to_object)
             for path in paths if failure is None else ():
                 pairs += 1
                 outcome = self._plan_pair(world, candidate.index, candidate.gripper_to_object, path, longest_s, rng)
@@ -235,6 +237,20 @@ class HeldPathPlanner:
                 grasp = world.problem.grasps[index]
                 return HeldPlan(grasp, gripper_to_object, reach, approached, lifted, carry, path, joints)
             failure = later(failure, reach)
+        return failure
+
+    def _look_at_lift(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:
+        """Return why the arm cannot grasp and lift by a pose of a grasp: cheap beside what an ``accepts`` asks."""
+        parts, grasped = self.parts, world.problem.target.object_to_world @ gripper_to_object
+        solutions, converged = parts.solutions.of(world.arm, Phase.APPROACH, grasped, parts.arm.home)
+        failure: PlanFailure = "approach_blocked" if converged else "no_inverse_kinematics"
+        for at_grasp in solutions:
+            there = parts.arm.gripper_pose(at_grasp)
+            if parts.motions.line(world.arm, Phase.APPROACH, at_grasp, parts.ends.before(there)) is None:
+                continue
+            if parts.motions.line(world.arm, Phase.LIFT, at_grasp, parts.ends.above(there)) is not None:
+                return None
+            failure = later(failure, "lift_blocked")
         return failure
 
     def _follow(

@@ -28,7 +28,10 @@ from manitwin.geometry.poses import transform_points
 from manitwin.robots.robot import Robot
 
 APART_M = 0.06  # of the pads of two hands: less, and they have no room beside one another
-MOST_TAKEN = 6  # grasps of the taker that are tried beyond a look at its hand, for one of the giver and a meeting
+MOST_TAKEN, MOST_RETAKEN = (
+    6,
+    24,
+)  # grasps of the taker that are tried beyond a look at its hand: beforehand, and at the meeting
 SETTLED_M = 0.004  # by how much fingers may stand farther apart than planned
 
 
@@ -106,7 +109,7 @@ class TwoArmPlanner(PickPlacePlanner):
         asked = self._at_meeting(problem, object_to_world, giver_rad, opening_m)
         world, rng = parts.world_of(asked, object_to_world), np.random.default_rng((problem.seed, 6))
         order = [*first, *(grasp for grasp in problem.grasps if all(grasp is not other for other in first))]
-        tried = 0
+        tried, most = 0, MOST_RETAKEN if first else MOST_TAKEN
         for grasp in order:
             if not self._are_apart(grasp.gripper_to_object, giver_to_object):
                 continue
@@ -128,7 +131,7 @@ class TwoArmPlanner(PickPlacePlanner):
                     reach = parts.motions.free(world.arm, Phase.REACH, parts.arm.home, start, rng)
                     if isinstance(reach, Motion):
                         return Take(grasp, gripper_to_object, reach, approach)
-                if tried == MOST_TAKEN:
+                if tried == most:
                     return None
         return None
 
@@ -159,14 +162,17 @@ class TwoArmPlanner(PickPlacePlanner):
         found = self.parts.motions.free(world.arm, Phase.REACH, giver_rad, self.arm.home, rng)
         return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
 
-    def plan_lift(
+    def plan_bring_home(
         self, problem: PickPlaceProblem, gripper_to_object: np.ndarray, taker_rad: np.ndarray, giver_rad: np.ndarray
     ) -> Motion | None:
-        """Plan the second arm straight up with what it holds; None: there is no way."""
+        """Plan the second arm's way home with what it holds, else straight up with it; None: there is no way."""
         parts = self.taker.parts
         asked = replace(problem, obstacles=(*problem.obstacles, *self._giver_shapes.at(giver_rad, (self._open_m,))))
-        world = parts.world_of(asked, problem.target.object_to_world)
+        world, rng = parts.world_of(asked, problem.target.object_to_world), np.random.default_rng((problem.seed, 8))
         world.hold(gripper_to_object)
+        home = parts.motions.free(world.arm, Phase.CARRY, taker_rad, parts.arm.home, rng)
+        if isinstance(home, Motion):
+            return home
         line = parts.motions.line(
             world.arm, Phase.CARRY, taker_rad, parts.ends.above(parts.arm.gripper_pose(taker_rad))
         )
@@ -194,9 +200,9 @@ class TwoArmPlanner(PickPlacePlanner):
         return float(self.robot.gripper.opening_m)
 
     def _with_room_for_another(self, grasps: Sequence[Grasp]) -> tuple[Grasp, ...]:
-        """Return the grasps that another one is far enough away from, those first that most are, in steps of a quarter."""
+        """Return the grasps that another one is far enough away from, those first that a quarter of them are, in their order."""
         counts = [sum(self._are_apart(a.gripper_to_object, b.gripper_to_object) for b in grasps) for a in grasps]
-        ranked = [(-round(4 * count / len(grasps)), place) for place, count in enumerate(counts) if count]
+        ranked = [(count < len(grasps) / 4, place) for place, count in enumerate(counts) if count]
         return tuple(grasps[place] for _, place in sorted(ranked))
 
     def _are_apart(self, first: np.ndarray, second: np.ndarray) -> bool:

@@ -1,0 +1,141 @@
+"""Print how handovers do with the twins of a data set: attempts, executed, kept, and of their negative controls.
+
+    python benchmarks/handover.py DATASET --seeds 10 --controls 5
+
+One row a twin. A negative control is the same episode with a second arm that goes 15 cm beside the object (beside), or does not
+close its hand (open): none may be kept. CPU seconds are those of an attempt, setting and planning included.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter
+from collections.abc import Sequence
+
+import numpy as np
+
+from manitwin.episodes.attempts import EXECUTION_FAILURES
+from manitwin.episodes.courses.handover import TAKER
+from manitwin.episodes.episode import run_episode
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.execution import Execution
+from manitwin.episodes.pick_place_tasks import Placeable
+from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
+from manitwin.episodes.planning.two_arms import Take, TwoArmPlanner
+from manitwin.episodes.setting import table_setting
+from manitwin.episodes.settings import EpisodeSettings
+from manitwin.episodes.skills.registry import load_skill
+from manitwin.episodes.target_grasps import shuffled, usable_grasps
+from manitwin.geometry.poses import transform
+from manitwin.robots.load import load_robot
+from manitwin.scenes.layouts.pool import PoolTwin, pool_of
+from manitwin.scenes.loaded_scene import furniture_boxes
+from manitwin.twin.loaded_twin import TwinSource
+
+BESIDE_M = 0.15
+EXECUTED = {"kept", "unplanned_contact", "disturbed", *EXECUTION_FAILURES}
+
+
+class Deceived(TwoArmPlanner):
+    """A planner whose second arm is told that the object is 15 cm beside where it is, once that is in the first hand."""
+
+    def plan_take(
+        self,
+        problem: PickPlaceProblem,
+        object_to_world: np.ndarray,
+        giver_rad: np.ndarray,
+        opening_m: float,
+        giver_to_object: np.ndarray,
+        first: Sequence[Grasp] = (),
+    ) -> Take | None:
+        """Plan for the wrong place where a plan is made anew."""
+        for angle in np.arange(0, 2 * np.pi, np.pi / 4) if first else ():
+            way = BESIDE_M * np.array([np.cos(angle), np.sin(angle), 0.0])
+            beside = transform(translation=way) @ object_to_world
+            found = super().plan_take(problem, beside, giver_rad, opening_m, giver_to_object, first)
+            if found is not None:
+                return found
+        return super().plan_take(problem, object_to_world, giver_rad, opening_m, giver_to_object, first)
+
+
+class Bench:
+    """Handovers of the twins of one data set."""
+
+    def __init__(self, dataset: str, robot: str):
+        """Read the pool."""
+        self.pool, self.source, self.robot = pool_of(dataset), TwinSource(dataset), load_robot(robot)
+        self.planners = {"": TwoArmPlanner(self.robot), "beside": Deceived(self.robot)}
+
+    def attempt(self, target: PoolTwin, seed: int, wrong: str = "") -> tuple[EpisodeFacts, float]:
+        """Return what became of an episode, or of its negative control of a kind, and its CPU seconds."""
+        began, rng, skill = time.process_time(), np.random.default_rng(seed), load_skill("handover")
+        setting = table_setting(skill, target, self.pool, self._placeable, 0, self.robot.workspace, rng)
+        if setting is None or setting.skill_goal is None:
+            return EpisodeFacts("no_room"), time.process_time() - began
+        grasps = shuffled(usable_grasps(self.source.twin(target.twin_id), self.robot.gripper), rng)
+        problem = PickPlaceProblem(
+            setting.task.objects[0],
+            setting.task.goal_object_to_world,
+            tuple(each.grasp for each in grasps),
+            (),
+            tuple(furniture_boxes(setting.furniture)),
+            seed,
+        )
+        planner = self.planners.get(wrong, self.planners[""])
+        close = Execution.close
+        try:
+            if wrong == "open":
+                Execution.close = _close_but_the_taker  # type: ignore[method-assign]
+            facts, _ = run_episode(problem, planner, self.robot, EpisodeSettings(), setting.skill_goal)
+        finally:
+            Execution.close = close  # type: ignore[method-assign]
+        return facts, time.process_time() - began
+
+    def _placeable(self, twin: PoolTwin) -> Placeable:
+        return Placeable.of(self.pool, twin)
+
+
+_close = Execution.close
+
+
+def _close_but_the_taker(execution: Execution) -> None:
+    if execution.used != TAKER:
+        _close(execution)
+
+
+def main() -> None:
+    """Print a row for each twin, and one for each kind of control."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("dataset")
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--controls", type=int, default=5)
+    parser.add_argument("--categories", default="", help="only twins of these")
+    parser.add_argument("--robot", default="two_pandas")
+    asked = parser.parse_args()
+    bench, skill = Bench(asked.dataset, asked.robot), load_skill("handover")
+    twins = [twin for twin in bench.pool.twins if skill is not None and skill.suits(bench.pool, twin, None)]
+    for twin in twins:
+        if asked.categories and twin.category not in asked.categories.split(","):
+            continue
+        for wrong, count in (("", asked.seeds), ("beside", asked.controls), ("open", asked.controls)):
+            done = [bench.attempt(twin, asked.first + number, wrong) for number in range(count)]
+            outcomes = Counter(facts.outcome for facts, _ in done)
+            executed = sum(found for outcome, found in outcomes.items() if outcome in EXECUTED)
+            reasons = Counter(
+                facts.evaluation.failure.split(": ")[1]
+                for facts, _ in done
+                if facts.evaluation is not None and facts.evaluation.failure is not None
+            )
+            replans = sum((facts.replans for facts, _ in done), Counter[str]())
+            cpu_s = float(np.median([spent for _, spent in done])) if done else 0.0
+            print(
+                f"{twin.category:16} {wrong or 'handover':9} {count} attempts, {executed} executed, "
+                f"{outcomes['kept']} kept, {cpu_s:.1f} CPU-s; {dict(outcomes)} {dict(reasons)} {dict(replans)}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()

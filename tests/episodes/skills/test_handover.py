@@ -1,0 +1,237 @@
+"""Handing over: the second arm alone holds the bar in the end; where it goes 15 cm beside, or does not close, nobody does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from brick_episodes import TABLE, digest, panda
+from held_skills import around, goal_of
+from synthetic_episodes import attempt as made_up_attempt
+
+from manitwin.episodes.courses.handover import GIVER, HandoverCourse
+from manitwin.episodes.episode import run_episode
+from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.execution import Execution
+from manitwin.episodes.hdf5_file import EpisodeFile, write_episodes
+from manitwin.episodes.lerobot.frame_features import features_of, frames_of
+from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem
+from manitwin.episodes.planning.two_arms import Take, TwoArmPlanner
+from manitwin.episodes.recording import Recording, tip_delta
+from manitwin.episodes.settings import EpisodeSettings, TrajectoriesConfig
+from manitwin.episodes.skills.hands import check_hand, check_jaws
+from manitwin.episodes.skills.registry import load_skill
+from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode, recorded_robot
+from manitwin.errors import EpisodesError, UsageError
+from manitwin.geometry.poses import transform
+from manitwin.robots.load import load_robot
+from rigid_boxes import above, box
+
+BAR = box([0.03, 0.24, 0.03], 0.2, center_m=(0, 0, 0))
+SIDEWAYS = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])  # the hand comes along X and closes along Z
+TURNED = np.array([[0.0, 0, 1], [0, -1, 0], [1, 0, 0]])
+GRASPS = tuple(
+    Grasp(f"{name}{number}", above([0, y_m, 0], rotation), 0.03)
+    for name, rotation in (
+        ("above", np.diag([1.0, -1, -1])),
+        ("from_x", TURNED),
+        ("from_-x", TURNED @ np.diag([-1.0, 1, -1])),
+    )
+    for number, y_m in enumerate((-0.09, -0.06, 0.0, 0.06, 0.09))
+)
+"""Across the bar, by three of its sides."""
+SURROUNDINGS = around(BAR, (), 0.45, -0.1)
+BAR_AT = transform(None, np.array([0.45, -0.1, 0.015]))
+
+
+@cache
+def two_pandas() -> TwoArmPlanner:
+    return TwoArmPlanner(load_robot("two_pandas"))
+
+
+def problem(grasps: tuple[Grasp, ...] = GRASPS) -> PickPlaceProblem:
+    placed = replace(SURROUNDINGS.objects[0], object_to_world=BAR_AT)
+    return PickPlaceProblem(placed, BAR_AT, grasps, (), (TABLE,), seed=3)
+
+
+def attempt(planner: TwoArmPlanner | None = None) -> tuple[EpisodeFacts, Recording | None]:
+    goal = goal_of("handover", SURROUNDINGS)
+    return run_episode(problem(), planner or two_pandas(), load_robot("two_pandas"), EpisodeSettings(), goal)
+
+
+@cache
+def kept() -> tuple[EpisodeFacts, Recording]:
+    facts, recording = attempt()
+    assert recording is not None
+    return facts, recording
+
+
+def test_the_second_arm_alone_holds_the_bar_in_the_end() -> None:
+    facts, recording = kept()
+    assert facts.outcome == "kept", (facts.evaluation, facts.unplanned, facts.plan_failures)
+    assert facts.grasp is not None
+    assert facts.taker_grasp is not None
+    giver_n, taker_n = recording.finger_forces_n[:, :2], recording.finger_forces_n[:, 2:]
+    assert giver_n[-1].max() == 0
+    assert taker_n[-1].min() > 10
+    assert recording.object_positions_m[-1, 0, 2] > recording.object_positions_m[0, 0, 2] + 0.05
+    lifted = np.flatnonzero(recording.phase == Phase.LIFT)
+    assert giver_n[lifted + 1].min() > 0, "the first arm picks it"
+    assert taker_n[lifted + 1].max() == 0
+    assert (np.minimum(giver_n.min(1), taker_n.min(1)) > 0).any(), "for a while both hold it"
+    assert (recording.finger_forces_n.max(1) > 0)[lifted[0] :].all(), "it is never let fall"
+
+
+def test_both_hands_hold_it_by_grasps_that_were_given_and_6_cm_apart() -> None:
+    facts, _ = kept()
+    assert facts.grasp in GRASPS
+    assert facts.taker_grasp in GRASPS
+    tip_m = np.array([0, 0, load_robot("panda").gripper.tip_depth_m, 1])
+    tips = [(grasp.gripper_to_object @ tip_m)[:3] for grasp in (facts.grasp, facts.taker_grasp)]
+    assert np.linalg.norm(tips[0] - tips[1]) >= 0.06 - 1e-9
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_episode() -> None:
+    again = attempt(TwoArmPlanner(load_robot("two_pandas")))[1]
+    assert again is not None
+    assert digest(again) == digest(kept()[1])
+
+
+class Beside(TwoArmPlanner):
+    """Plans the second arm for where the bar is not: 15 cm to the side, once the first one has brought it."""
+
+    def plan_take(self, problem, object_to_world, giver_rad, opening_m, giver_to_object, first=()) -> Take | None:
+        ways = [0.15 * np.array([x, y, 0.0]) for x, y in ((0, 1), (0, -1), (1, 0))] if first else [np.zeros(3)]
+        plans = (
+            super(Beside, self).plan_take(
+                problem, transform(None, way) @ object_to_world, giver_rad, opening_m, giver_to_object, first
+            )
+            for way in ways
+        )
+        return next((plan for plan in plans if plan is not None), None)
+
+
+def test_a_second_arm_15_cm_beside_takes_nothing() -> None:
+    facts, recording = attempt(Beside(load_robot("two_pandas")))
+    assert facts.outcome == "goal_missed"
+    assert facts.evaluation is not None
+    assert facts.evaluation.literals[0].failure == "not_held"
+    assert recording is not None
+    assert recording.object_positions_m[-1, 0, 2] < 0.1, "it fell"
+
+
+def test_a_second_arm_that_does_not_close_takes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    close = Execution.close
+    monkeypatch.setattr(Execution, "close", lambda self: close(self) if self.used == GIVER else None)
+    facts, recording = attempt()
+    assert facts.outcome == "goal_missed"
+    assert facts.evaluation is not None
+    assert facts.evaluation.literals[0].failure in ("not_held", "held_by_something_else", "low")
+    assert recording is not None
+    assert recording.finger_forces_n[-1].max() == 0
+
+
+def test_a_first_arm_that_does_not_let_go_has_not_handed_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    def stay(course: HandoverCourse, _: Take, execution: Execution) -> None:
+        course._giver_rad = execution.commanded_rad
+
+    monkeypatch.setattr(HandoverCourse, "_let_go", stay)
+    monkeypatch.setattr(TwoArmPlanner, "plan_bring_home", lambda *_: None)
+    facts, _ = attempt()
+    assert facts.outcome == "goal_missed"
+    assert facts.evaluation is not None
+    assert facts.evaluation.literals[0].failure == "giver_holds"
+
+
+def test_grasps_at_one_place_leave_no_room_for_a_second_hand() -> None:
+    goal = goal_of("handover", SURROUNDINGS)
+    near = tuple(grasp for grasp in GRASPS if grasp.grasp_id.endswith("2"))
+    robot = load_robot("two_pandas")
+    facts, recording = run_episode(problem(near), two_pandas(), robot, EpisodeSettings(), goal)
+    assert facts.outcome == "no_plan"
+    assert recording is None
+
+
+def stored() -> StoredEpisode:
+    robot, recording = recorded_robot(load_robot("two_pandas")), kept()[1]
+    return StoredEpisode(
+        made_up_attempt(0, robot_name=robot.name), recording, robot, (RecordedObject("object_00", "bar"),)
+    )
+
+
+def test_both_arms_are_stored_and_come_back(tmp_path: Path) -> None:
+    given = stored()
+    path = tmp_path / "episodes.h5"
+    write_episodes(path, [given])
+    with EpisodeFile(path) as file:
+        found = file[0]
+    assert found.robot == given.robot
+    for name, array in vars(given.recording).items():
+        if isinstance(array, np.ndarray):
+            np.testing.assert_allclose(getattr(found.recording, name), array, atol=1e-6, err_msg=name)
+    with h5py.File(path) as file:
+        group = file["traj_0"]
+        joints = given.recording.joint_positions_rad
+        taker = group["env_states/articulations/taker"][:]
+        assert sorted(group["env_states/articulations"]) == ["giver", "taker"]
+        np.testing.assert_allclose(taker[0, :7], [1.2, 0, 0, 0, 0, 0, 1], atol=1e-6)
+        np.testing.assert_array_equal(taker[:, 13:20], joints[:, 7:])
+        assert group["actions"].shape[1] == 16
+        assert group["obs/extra/tcp_pose"].shape[1] == 14
+
+
+def test_an_arm_of_other_joints_than_its_robot_is_refused(tmp_path: Path) -> None:
+    given = stored()
+    giver, taker = given.robot.arms
+    wrong = replace(given, robot=replace(given.robot, arms=(giver, replace(taker, joints=6))))
+    write_episodes(tmp_path / "episodes.h5", [wrong])
+    with EpisodeFile(tmp_path / "episodes.h5") as file, pytest.raises(EpisodesError, match="arms have other joints"):
+        file[0]
+
+
+def test_frames_name_what_is_of_which_arm() -> None:
+    given = stored()
+    features, frames = {each.name: each for each in features_of(given.robot)}, frames_of(given, 0, 0, 0)
+    for name in ("observation.state", "observation.tip_pose", "action", "action.tip_delta"):
+        assert frames[name].shape[1] == features[name].width, name
+    names = features["observation.state"].names
+    assert names is not None
+    assert names[0].startswith("giver_")
+    assert names[-1] == "taker_gripper_opening_m"
+    told = features["observation.tip_pose"].names
+    assert told is not None
+    assert told[7] == "taker_x_m"
+    taker_x_m = frames["observation.tip_pose"][0, 7]
+    assert taker_x_m == pytest.approx(1.2 - panda()[1].tip_pose(load_robot("panda").home_rad)[0, 3], abs=1e-3)
+
+
+def test_the_difference_of_the_taker_s_tip_leads_to_what_it_is_told() -> None:
+    recording = kept()[1]
+    delta = tip_delta(recording)
+    assert delta.shape[1] == 14
+    np.testing.assert_allclose(
+        recording.tip_position_m[:-1, 3:] + delta[:, 6:9], recording.action_tip_position_m[:, 3:], atol=1e-6
+    )
+
+
+def test_a_handover_is_done_by_two_arms_and_by_nothing_else() -> None:
+    two, one = load_robot("two_pandas"), load_robot("panda")
+    check_hand(two, load_skill("handover"))
+    with pytest.raises(UsageError, match="wants two arms, panda has one; give one of two_pandas"):
+        check_hand(one, load_skill("handover"))
+    for skill, name in ((load_skill("place_in"), "place_in"), (None, "pick_place"), (load_skill("pour"), "pour")):
+        with pytest.raises(UsageError, match=f"skill {name} wants one arm, two_pandas has two"):
+            check_hand(two, skill)
+    with pytest.raises(UsageError, match="tasks want one arm"):
+        check_jaws(two, "tasks")
+
+
+def test_two_arms_are_chosen_where_none_are_named() -> None:
+    assert TrajectoriesConfig(skill="handover").robot == "two_pandas"
+    assert TrajectoriesConfig(skill="handover", robot="mine.toml").robot == "mine.toml"
+    assert TrajectoriesConfig(skill="place_in").robot == "panda"
