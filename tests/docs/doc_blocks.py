@@ -49,9 +49,12 @@ def _prior_of_a_category(text: str, folder: Path, domain: str) -> None:
 
 
 def _robot(text: str, folder: Path, name: str) -> None:
-    """A robot's file, beside a URDF that has the joints that it names."""
-    (folder / name).parent.mkdir()
+    """A robot's file, beside a URDF that has the joints that it names; of two arms, those of robots that are shipped."""
+    (folder / name).parent.mkdir(exist_ok=True)
     (folder / name).write_text(text)
+    if "arms" in tomllib.loads(text):
+        assert [arm.name for arm in load_robot(str(folder / name)).arms] == ["giver", "taker"]
+        return
     urdf = (folder / name).parent / tomllib.loads(text)["urdf"]["file"]
     urdf.parent.mkdir(parents=True)
     solid = '<collision><origin xyz="0 0 0.05"/><geometry><box size="0.05 0.05 0.1"/></geometry></collision>'

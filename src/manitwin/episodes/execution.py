@@ -17,7 +17,6 @@ from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.geometry.poses import inverse
 from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts, Touches
 from manitwin.physics.sapien.controls.control import HandControl, control_of
-from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 from manitwin.robots.robot import Robot
@@ -36,9 +35,8 @@ TRACKING_S = 0.05  # after a motion, for the arm to come to rest
 
 @dataclass(eq=False)
 class _Arm:
-    """An arm in the world, where it is told to be, its hand, and whether that keeps pressing."""
+    """Where an arm of the world is told to be, its hand, and whether that keeps pressing."""
 
-    robot: SapienRobot
     tip_pose: Callable[[np.ndarray], np.ndarray]
     commanded_rad: np.ndarray
     hand: HandControl
@@ -69,7 +67,7 @@ class Execution:
         for number, (arm, tip_pose) in enumerate(zip(robot.arms or (robot,), tip_poses, strict=True)):
             world.use(number)
             home_rad = np.array(arm.home_rad, float)
-            self._arms.append(_Arm(world.robot, tip_pose, home_rad, control_of(world, closing)))
+            self._arms.append(_Arm(tip_pose, home_rad, control_of(world, closing)))
         world.use(0)
         self._arm = self._arms[0]
         self.meant: MeantContacts = NONE_MEANT
@@ -270,7 +268,7 @@ class Execution:
         return np.concatenate([arm.hand.state for arm in self._arms])
 
     def _joint_positions(self) -> np.ndarray:
-        return np.concatenate([arm.robot.joint_positions() for arm in self._arms])
+        return np.concatenate([robot.joint_positions() for robot in self._world.robots])
 
     def _take_touches(self, contacts: Sequence[physx.PhysxContact]) -> Touches:
         """Take down what the fingers of the arm that is used touch; return what those of all do."""

@@ -15,7 +15,7 @@ LEAST_LENGTH_M = 0.10  # of what has room for two hands
 class Handover(Skill):
     """Hand the target over from the first arm to the second; ``courses.handover`` chooses where, once all has come to rest."""
 
-    name, predicate, has_partner = "handover", "handed_over", False
+    name, predicate, has_partner, arms = "handover", "handed_over", False, 2
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
         """Accept what is 10 cm long or more."""

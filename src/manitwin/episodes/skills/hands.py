@@ -14,7 +14,7 @@ from manitwin.robots.robot import Robot
 
 def wants_jaws(skill: Skill | None) -> bool:
     """Tell whether a skill (None: pick-and-place) is planned for two jaws alone."""
-    return isinstance(skill, HeldSkill | Push)
+    return isinstance(skill, HeldSkill | Push | Handover)
 
 
 def check_hand(robot: Robot, skill: Skill | None) -> None:

@@ -84,13 +84,14 @@ class Skill(ABC):
     """A skill: ``name`` is that on the command line, ``has_partner`` tells whether a second object takes part.
 
     ``predicate`` is that of its goal. ``most_poses``: so many goal poses are planned for, one after the other, before a goal
-    counts as impossible to plan.
+    counts as impossible to plan. ``arms``: how many it takes.
     """
 
     name: str
     has_partner: bool
     predicate: str
     most_poses: int = 12
+    arms: int = 1
 
     @abstractmethod
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:

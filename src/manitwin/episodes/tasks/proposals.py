@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, create_model
 
-from manitwin.episodes.skills.registry import SKILLS
+from manitwin.episodes.skills.registry import ONE_ARM_SKILLS
 from manitwin.episodes.tasks.candidates import Action, Candidate, single_actions, undoes
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.models.vlm.client import ChatClient
@@ -55,7 +55,7 @@ def answer_type(scene: TaskScene) -> type[BaseModel]:
     """Return the type of an answer: the objects' names and the predicates of all skills are enumerations."""
     names = Enum("Object", {name: name for name in scene.names}, type=str)  # type: ignore[misc]
     seconds = Enum("Second", {name: name for name in (*scene.names, NOTHING)}, type=str)  # type: ignore[misc]
-    known = sorted({skill.predicate for skill in SKILLS.values()})
+    known = sorted({skill.predicate for skill in ONE_ARM_SKILLS.values()})
     predicates = Enum("Predicate", {name: name for name in known}, type=str)  # type: ignore[misc]
     strict = ConfigDict(extra="forbid")
     literal = create_model("Literal", __config__=strict, predicate=(predicates, ...), a=(names, ...), b=(seconds, ...))
@@ -73,7 +73,7 @@ def described(scene: TaskScene, count: int) -> str:
         x_m, y_m = placed.object_to_world[:2, 3]
         lines.append(f"- {placed.name}: {language.category if language else 'unknown'} at x {x_m:.2f}, y {y_m:.2f}")
     lines.append("The predicates; b is an object, or nothing:")
-    told = {skill.predicate: skill.has_partner for skill in SKILLS.values()}
+    told = {skill.predicate: skill.has_partner for skill in ONE_ARM_SKILLS.values()}
     lines += [f"- {name}(a, b)" if pair else f"- {name}(a), b nothing" for name, pair in sorted(told.items())]
     return "\n".join(lines)
 

@@ -8,6 +8,7 @@ import numpy as np
 from sapien import physx
 
 from manitwin.physics.sapien.contacts import Touches
+from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 from manitwin.physics.trial_phases import SharedTarget
@@ -20,9 +21,15 @@ class JawsControl:
 
     def __init__(self, world: RobotWorld, settings: TrialSettings):
         """Take a world whose robot (of two arms, the one that is used now) has open jaws."""
-        self._robot, self._settings = world.robot, settings
+        self._world, self._settings = world, settings
+        self._number = world.robots.index(world.robot)
         self._full_m = self._target_m = world.robot.robot.gripper.opening_m
         self._shared = SharedTarget(self._full_m, settings)
+
+    @property
+    def _robot(self) -> SapienRobot:
+        """The robot, which goes with its world: whoever has this control does not keep it."""
+        return self._world.robots[self._number]
 
     @property
     def told(self) -> np.ndarray:
