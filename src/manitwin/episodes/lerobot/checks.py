@@ -145,6 +145,8 @@ def check_statistics(path: Path, features: dict[str, dict[str, Any]], statistics
             raise EpisodesError(
                 f"{path}: the statistics of {name} are no numbers ({str(error)[:120]}); {_REMEDY}"
             ) from error
+        if not all(np.isfinite(value).all() for value in told.values()):
+            raise EpisodesError(f"{path}: the statistics of {name} are not finite; {_REMEDY}")
         wrong = [kind for kind, value in told.items() if value.shape != ((1,) if kind == "count" else shape)]
         if wrong:
             raise EpisodesError(
