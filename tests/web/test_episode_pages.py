@@ -224,6 +224,18 @@ def test_literals_events_granules_and_touches_are_told(tmp_path: Path) -> None:
     assert b"not true: too_far" in page and b"gap_m 0.3" in page
 
 
+def test_what_is_grasped_is_what_the_literal_of_that_time_is_about(tmp_path: Path) -> None:
+    place = run_of(
+        tmp_path,
+        arrays={"active_literal": (np.arange(STEPS) >= SET_DOWN + 1).astype(np.uint8)},
+        goal="near(object_01, object_00, 0.1) and upright(object_00)",
+    )
+    told = [
+        each["label"] for each in document(place)["happenings"] if each["kind"] in ("grasped", "lifted", "released")
+    ]
+    assert told == ["grasped object_01 (box)", "object_01 (box) leaves its support", "released object_01 (box)"]
+
+
 def test_a_long_episode_is_thinned_and_keeps_its_end_and_its_peaks(
     run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

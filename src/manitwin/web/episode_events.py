@@ -91,13 +91,17 @@ def literals(episode: StoredEpisode) -> list[Span]:
 
 def goal_literals(goal: str | None) -> list[str]:
     """Return the literals of a goal that are to come true, the whole of it where it cannot be read; none without one."""
+    found = [str(each) for each in _parsed(goal)]
+    return found or ([printable_line(goal, max_characters=400)] if goal else [])
+
+
+def _parsed(goal: str | None) -> tuple[Literal, ...]:
     if not goal:
-        return []
+        return ()
     try:
-        found: tuple[Literal, ...] = parse_goal(goal).literals
+        return parse_goal(goal).literals
     except UsageError:
-        return [printable_line(goal, max_characters=400)]
-    return [str(each) for each in found]
+        return ()
 
 
 def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:
@@ -105,15 +109,18 @@ def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Hap
 
     Raises EpisodesError where the facts tell of events that are none.
     """
-    recording = episode.recording
-    target = called(episode.objects[recording.target].name)
+    recording, moved = episode.recording, [called(name) for name in _moved(episode)]
     rate, last = float(RATE_HZ), recording.steps
-    held = _lasting(recording.finger_forces_n.min(axis=1) > HELD_N)
-    found = [Happening(first / rate, "grasped", f"grasped {target}") for first, _ in held]
-    found += [Happening((end + 1) / rate, "released", f"released {target}") for _, end in held if end < last]
-    aloft = _lasting(~recording.target_on_support.astype(bool))
-    found += [Happening(first / rate, "lifted", f"{target} leaves its support") for first, _ in aloft if first]
-    found += [Happening((end + 1) / rate, "set_down", f"{target} rests on a support") for _, end in aloft if end < last]
+    found: list[Happening] = []
+    for first, end in _lasting(recording.finger_forces_n.min(axis=1) > HELD_N):
+        found.append(Happening(first / rate, "grasped", f"grasped {moved[first]}"))
+        if end < last:
+            found.append(Happening((end + 1) / rate, "released", f"released {moved[first]}"))
+    for first, end in _lasting(~recording.target_on_support.astype(bool)):
+        if first:
+            found.append(Happening(first / rate, "lifted", f"{moved[first]} leaves its support"))
+        if end < last:
+            found.append(Happening((end + 1) / rate, "set_down", f"{moved[first]} rests on a support"))
     for first, _ in _spans(recording.unplanned_contact.astype(bool)):
         found.append(Happening(first / rate, "contact", "the robot touched what it should not"))
     found += _granules(episode, called) + _told(episode, called)
@@ -121,6 +128,20 @@ def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Hap
         Happening(span.first / rate, "literal", f"now: {span.label}") for span in literals(episode)[1:]
     ]  # the first one begins with the episode
     return sorted(found, key=lambda each: each.time_s)[:MOST_EVENTS]
+
+
+def _moved(episode: StoredEpisode) -> list[str]:
+    """Return the name of what is handled at each state: the subject of the literal that is worked on, else the target.
+
+    Contacts are recorded of what is handled then.
+    """
+    recording, names = episode.recording, {each.name for each in episode.objects}
+    target = episode.objects[recording.target].name
+    subjects = [each.subject for each in _parsed(episode.attempt.goal)]
+    if recording.active_literal is None:
+        return [target] * (recording.steps + 1)
+    known = [each if each in names else target for each in subjects]
+    return [known[value] if value < len(known) else target for value in _of_states(recording.active_literal)]
 
 
 def _granules(episode: StoredEpisode, called: Callable[[str], str]) -> list[Happening]:

@@ -86,7 +86,7 @@ globalThis.manitwinTimeline = (place, told, seek) => {
   drawAll();
   const key = document.createElement("p");
   key.className = "legend";
-  const entries = [["force0", "force on the target, N"], ["force1", "from the other side"], ["hand", told.hand.is_opening ? "opening" : told.hand.name]];
+  const entries = [["force0", "force on the object, N"], ["force1", "from the other side"], ["hand", told.hand.is_opening ? "opening" : told.hand.name]];
   for (const [kind, words] of entries) {
     const dot = document.createElement("i");
     dot.className = kind;

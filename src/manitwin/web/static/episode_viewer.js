@@ -122,7 +122,7 @@
     const rows = [["phase", during(told.phases, time)]];
     if (told.literals.length) rows.push(["goal", during(told.literals, time)]);
     rows.push([told.hand.is_opening ? "opening" : told.hand.name, told.hand.is_opening ? `${(1000 * opening).toFixed(1)} mm` : opening.toFixed(3)]);
-    rows.push(["force on the target", told.forces_n.map((side) => `${side[state].toFixed(1)} N`).join(", ")]);
+    rows.push(["force on the object", told.forces_n.map((side) => `${side[state].toFixed(1)} N`).join(", ")]);
     viewer.querySelector(".readout").replaceChildren(...rows.map(([name, value]) => {
       const row = document.createElement("div");
       const [dt, dd] = ["dt", "dd"].map((tag) => document.createElement(tag));
