@@ -115,7 +115,7 @@ def test_the_document_has_objects_and_links_where_they_were(run: Path) -> None:
         for joint, value in zip((*robot.arm_joints, *robot.finger_joints), angles, strict=True):
             q[model.joints[model.getJointId(joint)].idx_q] = value
         pin.framesForwardKinematics(model, data, q)
-        for link in told["robot"]["links"]:
+        for link in told["robots"][0]["links"]:
             pose = np.array(link["poses"]).reshape(-1, 7)
             expected = data.oMf[model.getFrameId(link["name"], pin.FrameType.BODY)]
             row = pose[min(state, len(pose) - 1)]
@@ -123,7 +123,9 @@ def test_the_document_has_objects_and_links_where_they_were(run: Path) -> None:
             turned = pin.Quaternion(row[3], *row[4:]).matrix()
             np.testing.assert_allclose(turned, expected.rotation, atol=5e-4)
     assert (
-        told["forces_n"][1][GRASPED] == 31.0 and told["hand"]["values"][GRASPED] == 0.07 and told["hand"]["is_opening"]
+        told["forces_n"][1][GRASPED] == 31.0
+        and told["hands"][0]["values"][GRASPED] == 0.07
+        and told["hands"][0]["is_opening"]
     )
     assert told["goal"][:3] == [0.45, 0.1, 0.0] and told["furniture"][0]["name"] == "board"
     assert [each["name"] for each in told["fixtures"]] == ["block"]
@@ -131,7 +133,7 @@ def test_the_document_has_objects_and_links_where_they_were(run: Path) -> None:
 
 @pytest.mark.slow
 def test_the_links_of_an_arm_come_as_one_small_file_by_their_numbers(run: Path) -> None:
-    told = document(run)["robot"]
+    told = document(run)["robots"][0]
     status, body = get(run, told["model"])
     tree, _ = unpack_glb(body)
     names = {node["name"].partition("p")[0] for node in tree["nodes"]}
@@ -150,7 +152,7 @@ def test_the_robot_of_a_run_may_be_a_file_and_its_links_are_where_it_says(tmp_pa
     assert "none of the package" in document(place)["unreadable"][0]
     config = json.loads((place / "config.json").read_text())
     (place / "config.json").write_text(json.dumps({**config, "robot": str(tmp_path / "boxy.toml")}))
-    told = document(place)["robot"]
+    told = document(place)["robots"][0]
     number = [each["name"] for each in told["links"]].index("upper")
     tree, _ = unpack_glb(get(place, told["model"])[1])
     mesh = next(each for each in tree["meshes"] if each["name"].startswith(f"l{number}p"))
@@ -246,7 +248,7 @@ def test_a_long_episode_is_thinned_and_keeps_its_end_and_its_peaks(
     told = document(place)
     assert told["time_s"] == [0.0, 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.05, 1.2]
     assert told["forces_n"][0][4] == max(told["forces_n"][0]) == 99.0
-    assert len(told["objects"][0]["poses"]) == 7 * 9 and told["tip"][-7:-4] == document(run)["tip"][-7:-4]
+    assert len(told["objects"][0]["poses"]) == 7 * 9 and told["tips"][0][-7:-4] == document(run)["tips"][0][-7:-4]
     monkeypatch.setattr("manitwin.web.episode_document.MOST_NUMBERS", 300)
     assert len(document(place)["time_s"]) == 4
 
@@ -380,7 +382,7 @@ def test_a_robot_that_is_not_known_leaves_the_objects(tmp_path: Path, of: dict[s
     write_scenes(tmp_path)
     one = stored(tmp_path, 0)
     told = document(write_run(tmp_path, [replace(one, robot=replace(one.robot, **of))]))
-    assert told["robot"] is None and cause in told["unreadable"][0] and len(told["objects"][0]["poses"]) > 7
+    assert told["robots"] == [] and cause in told["unreadable"][0] and len(told["objects"][0]["poses"]) > 7
 
 
 def test_facts_that_are_none_cost_their_own_part_only(tmp_path: Path) -> None:

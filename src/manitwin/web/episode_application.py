@@ -12,6 +12,7 @@ from starlette.types import ASGIApp
 
 from manitwin.episodes.attempts import OUTCOMES
 from manitwin.errors import EpisodesError, UsageError
+from manitwin.robots.robot import Robot
 from manitwin.web.application import LINKS, NOT_KEPT, PACKAGE_FILES, answered, message
 from manitwin.web.attempt_rows import AttemptRow
 from manitwin.web.episode_document import DOCUMENT, episode_document
@@ -35,9 +36,11 @@ def episode_application(pages: ASGIApp, episodes: EpisodeFolders, title: str) ->
         return await answered(lambda: _document(episodes, _number(request)))
 
     async def give_robot(request: Request) -> Response:
-        name = request.path_params["name"]
+        name, arm = request.path_params["name"], request.query_params.get("arm", "0")
         return await answered(
-            lambda: Response(robot_glb(episodes.robot(name).urdf), media_type="model/gltf-binary", headers=NOT_KEPT)
+            lambda: Response(
+                robot_glb(_arm(episodes, name, arm).urdf), media_type="model/gltf-binary", headers=NOT_KEPT
+            )
         )
 
     return Starlette(
@@ -58,6 +61,14 @@ def no_twins(why: str) -> ASGIApp:
         return message(404, why)
 
     return Starlette(routes=[PACKAGE_FILES, Route("/{path:path}", tell)])
+
+
+def _arm(episodes: EpisodeFolders, name: str, number: str) -> Robot:
+    robot = episodes.robot(name)
+    arms = robot.arms or (robot,)
+    if number not in map(str, range(len(arms))):
+        raise UsageError("the robot has no arm of this number")
+    return arms[int(number)]
 
 
 def _number(request: Request) -> int:

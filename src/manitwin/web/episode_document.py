@@ -14,7 +14,7 @@ from manitwin.episodes.stored_episode import StoredEpisode
 from manitwin.errors import EpisodesError, ManiTwinError
 from manitwin.formats.printable import printable_line
 from manitwin.geometry.poses import quaternion_wxyz
-from manitwin.robots.robot import OPENING, Robot
+from manitwin.robots.robot import Robot
 from manitwin.web.episode_events import happenings, literals, phases, span_json
 from manitwin.web.episode_folders import EpisodeFolders
 from manitwin.web.links import ServerLinks
@@ -40,35 +40,38 @@ def episode_document(
 ) -> dict[str, Any]:
     """Return the document: metres, world frame, quaternions wxyz, seconds; ``unreadable`` has a line for what cannot be shown.
 
-    Poses are rows of position and quaternion, one for each of ``time_s``, or one in all where it never changes. Forces are
-    the largest between two rows. Raises EpisodesError for rotations that are none, and for more than can be shown.
+    ``robots`` has the robot, or each of two arms. Poses are rows of position and quaternion, one for each of ``time_s``, or one
+    in all where it never changes. Forces are the largest between two rows. Raises EpisodesError for rotations that are none,
+    and for more than can be shown.
     """
     recording, unreadable = episode.recording, list[str]()
     if len(episode.objects) > MOST_OBJECTS:
         raise EpisodesError(f"{len(episode.objects)} objects are more than the {MOST_OBJECTS} that are shown")
     try:
-        robot: Robot | None = folders.robot_of(episode.robot)
-        shown = shown_links(robot.urdf) if robot is not None else []
+        found = folders.robot_of(episode.robot)
+        shown = [shown_links(arm.urdf) for arm in found.arms or (found,)]
+        robot: Robot | None = found
     except ManiTwinError as error:
         robot, shown = None, []
         unreadable.append(str(error))
     objects, called = _objects(episode, folders, links, unreadable)
-    states = shown_states(recording, len(shown) + len(episode.objects))
+    states = shown_states(recording, sum(map(len, shown)) + len(episode.objects) + episode.robot.arm_count)
     return {
         "episode_id": episode.attempt.episode_id,
         "number": number,
         "time_s": [round(float(state) / RATE_HZ, _DECIMALS) for state in states],
         "rate_hz": RATE_HZ,
-        "robot": None if robot is None else _robot(robot, shown, recording, states, links),
+        "robots": [] if robot is None else _arms(robot, shown, recording, states, links),
         "objects": [
             {**each, "poses": poses} for each, poses in zip(objects, _object_poses(recording, states), strict=True)
         ],
         "target": recording.target,
-        "tip": _poses(recording.tip_position_m[states], recording.tip_quaternion_wxyz[states]),
+        "tips": _tips(recording, states),
         "granules": _granules(episode, states, unreadable),
         **_room(episode, unreadable),
         "goal": _goal(episode),
-        "hand": _hand(episode, states),
+        "hands": _hands(episode, states),
+        "sides": _sides(episode),
         "forces_n": [
             [round(float(each), 2) for each in side] for side in _largest(recording.finger_forces_n, states).T
         ],
@@ -91,7 +94,7 @@ def shown_states(recording: Recording, things: int) -> np.ndarray:
     granules = (
         0 if recording.granule_positions_m is None else min(recording.granule_positions_m.shape[1], MOST_GRANULES)
     )
-    numbers = _LENGTH_OF_POSE * (things + 1) + 3 * granules
+    numbers = _LENGTH_OF_POSE * things + 3 * granules
     most = min(MOST_STATES, MOST_NUMBERS // numbers)
     step = -(-count // max(1, most))
     return np.unique(np.append(np.arange(0, count, step), count - 1))
@@ -129,15 +132,29 @@ def _objects(
     return told, lambda name: words.get(name, name.replace("_", " "))
 
 
-def _robot(
-    robot: Robot, shown: list[str], recording: Recording, states: np.ndarray, links: ServerLinks
-) -> dict[str, Any]:
-    rows = [link_poses(robot, recording.joint_positions_rad[state], recording.hand[state]) for state in states]
+def _arms(
+    robot: Robot, shown: list[list[str]], recording: Recording, states: np.ndarray, links: ServerLinks
+) -> list[dict[str, Any]]:
+    """Return the links of the robot, or of each of its two arms, whose numbers stand side by side in the arrays."""
+    arms = robot.arms or (robot,)
+    ends = np.cumsum([len(arm.arm_joints) for arm in arms])[:-1]
+    joints = np.split(recording.joint_positions_rad[states], ends, axis=1)
+    hands = np.split(recording.hand[states], len(arms), axis=1)
     told = []
-    for name in shown:
-        poses = np.array([row[name] for row in rows])
-        told.append({"name": name, "poses": _poses(poses[:, :3, 3], quaternion_wxyz(poses[:, :3, :3]))})
-    return {"name": robot.name, "model": links.robot(robot.name), "links": told}
+    for number, (arm, names) in enumerate(zip(arms, shown, strict=True)):
+        rows = [link_poses(arm, *row) for row in zip(joints[number], hands[number], strict=True)]
+        of_links = []
+        for name in names:
+            poses = np.array([row[name] for row in rows])
+            of_links.append({"name": name, "poses": _poses(poses[:, :3, 3], quaternion_wxyz(poses[:, :3, :3]))})
+        told.append({"name": arm.name, "model": links.robot(robot.name, number), "links": of_links})
+    return told
+
+
+def _tips(recording: Recording, states: np.ndarray) -> list[list[float]]:
+    positions = recording.tip_position_m[states].reshape(len(states), -1, 3)
+    quaternions = recording.tip_quaternion_wxyz[states].reshape(len(states), -1, 4)
+    return [_poses(positions[:, number], quaternions[:, number]) for number in range(positions.shape[1])]
 
 
 def _object_poses(recording: Recording, states: np.ndarray) -> list[list[float]]:
@@ -207,17 +224,25 @@ def _goal(episode: StoredEpisode) -> list[float] | None:
     return _plain(np.append(pose[:3, 3], quaternion_wxyz(pose[:3, :3])))
 
 
-def _hand(episode: StoredEpisode, states: np.ndarray) -> dict[str, Any]:
-    """Return the opening of jaws, m, the one joint of a hand, or the mean of its joints, rad, with what it is called."""
+def _hands(episode: StoredEpisode, states: np.ndarray) -> list[dict[str, Any]]:
+    """Return the opening of jaws, m, of each arm; else the one joint of a hand, or the mean of its joints, rad, by name."""
     names, values = episode.robot.hand_state, episode.recording.hand[states]
-    return {
-        "name": names[0] if len(names) == 1 else "mean of the hand's joints, rad",
-        "is_opening": names == (OPENING,),
-        "values": _plain(values.mean(axis=1)),
-    }
+    called = [f"{arm.name}: opening" for arm in episode.robot.arms] or ["opening"]
+    if episode.robot.has_jaws and len(called) == values.shape[1]:
+        return [
+            {"name": name, "is_opening": True, "values": _plain(values[:, place])} for place, name in enumerate(called)
+        ]
+    name = names[0] if len(names) == 1 else "mean of the hand's joints, rad"
+    return [{"name": name, "is_opening": False, "values": _plain(values.mean(axis=1))}]
+
+
+def _sides(episode: StoredEpisode) -> list[str]:
+    """Return what each of the forces is."""
+    words = ("force on the object, N", "from the other side")
+    return [f"{arm.name}: {each}" for arm in episode.robot.arms for each in words] or list(words)
 
 
 def _largest(values: np.ndarray, states: np.ndarray) -> np.ndarray:
-    """Return the largest of ``(T + 1, 2)`` since the state before, for each of the states."""
+    """Return the largest of ``(T + 1, F)`` since the state before, for each of the states."""
     starts = np.append(0, states[:-1] + 1)
     return np.asarray(np.maximum.reduceat(values, starts, axis=0))

@@ -112,10 +112,12 @@ def happenings(episode: StoredEpisode, called: Callable[[str], str]) -> list[Hap
     recording, moved = episode.recording, [called(name) for name in _moved(episode)]
     rate, last = float(RATE_HZ), recording.steps
     found: list[Happening] = []
-    for first, end in _lasting(recording.finger_forces_n.min(axis=1) > HELD_N):
-        found.append(Happening(first / rate, "grasped", f"grasped {moved[first]}"))
-        if end < last:
-            found.append(Happening((end + 1) / rate, "released", f"released {moved[first]}"))
+    for number, forces_n in enumerate(np.split(recording.finger_forces_n, episode.robot.arm_count, axis=1)):
+        by = f" by the {episode.robot.arms[number].name}" if episode.robot.arms else ""
+        for first, end in _lasting(forces_n.min(axis=1) > HELD_N):
+            found.append(Happening(first / rate, "grasped", f"grasped {moved[first]}{by}"))
+            if end < last:
+                found.append(Happening((end + 1) / rate, "released", f"released {moved[first]}{by}"))
     for first, end in _lasting(~recording.target_on_support.astype(bool)):
         if first:
             found.append(Happening(first / rate, "lifted", f"{moved[first]} leaves its support"))

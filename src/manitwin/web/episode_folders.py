@@ -16,10 +16,10 @@ from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES
 from manitwin.episodes.hdf5_file import EpisodeFile, checked
 from manitwin.episodes.hdf5_merge import TRAJECTORIES
-from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode
+from manitwin.episodes.stored_episode import RecordedRobot, StoredEpisode, recorded_robot
 from manitwin.errors import ConfigError, EpisodesError, ManiTwinError, UsageError
 from manitwin.formats.printable import printable_line
-from manitwin.robots.load import load_robot, shipped_robots
+from manitwin.robots.load import load_robot, shipped_robots, shipped_two_arms
 from manitwin.robots.robot import Robot
 from manitwin.web.attempt_rows import AttemptRows
 from manitwin.web.served_files import TwinFolders
@@ -110,7 +110,7 @@ class EpisodeFolders:
 
         Raises UsageError where it is neither; ConfigError and Unavailable as ``load_robot`` does.
         """
-        if name in shipped_robots():
+        if name in (*shipped_robots(), *shipped_two_arms()):
             return load_robot(name)
         made_with = self._config.get("robot")
         if made_with is not None and made_with.endswith(".toml"):
@@ -124,8 +124,9 @@ class EpisodeFolders:
     def robot_of(self, recorded: RecordedRobot) -> Robot:
         """Return the robot of a recording; raises ConfigError where the one of its name has other joints."""
         robot = self.robot(recorded.name)
-        if robot.arm_joints != recorded.arm_joints or robot.hand_state_names != recorded.hand_state:
-            raise ConfigError(f"the robot {robot.name} has other joints than it had as it was recorded")
+        now = recorded_robot(robot)
+        if (now.arm_joints, now.hand_state, now.arms) != (recorded.arm_joints, recorded.hand_state, recorded.arms):
+            raise ConfigError(f"the robot {robot.name} has other joints or bases than it had as it was recorded")
         return robot
 
     def _place(self, number: int) -> _Place:

@@ -65,9 +65,9 @@ class ServerLinks:
         """Return the page of a recorded episode."""
         return f"/episode/{number}"
 
-    def robot(self, name: str) -> str:
-        """Return the looks of a robot's links."""
-        return f"/robot/{quote(name, safe='')}/links.glb"
+    def robot(self, name: str, arm: int = 0) -> str:
+        """Return the looks of the links of a robot, of two arms those of one."""
+        return f"/robot/{quote(name, safe='')}/links.glb{f'?arm={arm}' if arm else ''}"
 
     def file(self, twin_id: str, name: str, revision: str) -> str:
         """Return a file of a twin."""

@@ -53,12 +53,13 @@ globalThis.manitwinTimeline = (place, told, seek) => {
     band(literals, BAND);
     const top = height - MARKS - CHART;
     shape("rect", "frame", { x: 0.5, y: top, width: Math.max(1, width - 1), height: CHART });
-    const force = Math.max(...told.forces_n[0], ...told.forces_n[1]);
-    const open = Math.max(...told.hand.values);
-    curve(told.hand.values, open, top, "hand", told.hand.is_opening ? 0 : Math.min(...told.hand.values));
+    const force = Math.max(...told.forces_n.flat());
+    const opened = told.hands.flatMap((each) => each.values);
+    const open = Math.max(...opened);
+    for (const each of told.hands) curve(each.values, open, top, "hand", each.is_opening ? 0 : Math.min(...opened));
     told.forces_n.forEach((side, number) => curve(side, force, top, `force${number}`));
     if (force > 0) shape("text", "most force", { x: 4, y: top + 11 }).textContent = `${force.toFixed(1)} N`;
-    if (open > 0 && told.hand.is_opening) {
+    if (open > 0 && told.hands[0].is_opening) {
       shape("text", "most hand", { x: width - 4, y: top + 11, "text-anchor": "end" }).textContent = `${(1000 * open).toFixed(0)} mm`;
     }
     for (const each of told.happenings) {
@@ -86,7 +87,7 @@ globalThis.manitwinTimeline = (place, told, seek) => {
   drawAll();
   const key = document.createElement("p");
   key.className = "legend";
-  const entries = [["force0", "force on the object, N"], ["force1", "from the other side"], ["hand", told.hand.is_opening ? "opening" : told.hand.name]];
+  const entries = [...told.sides.map((words, number) => [`force${number}`, words]), ["hand", told.hands.map((each) => each.name).join(", ")]];
   for (const [kind, words] of entries) {
     const dot = document.createElement("i");
     dot.className = kind;

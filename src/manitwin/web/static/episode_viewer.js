@@ -118,10 +118,9 @@
   }
   const during = (spans, time) => (spans.findLast((span) => span.from_s <= time + 1e-6) || { label: "–" }).label;
   function readout(time) {
-    const opening = told.hand.values[state];
     const rows = [["phase", during(told.phases, time)]];
     if (told.literals.length) rows.push(["goal", during(told.literals, time)]);
-    rows.push([told.hand.is_opening ? "opening" : told.hand.name, told.hand.is_opening ? `${(1000 * opening).toFixed(1)} mm` : opening.toFixed(3)]);
+    for (const { name, is_opening, values } of told.hands) rows.push([name, is_opening ? `${(1000 * values[state]).toFixed(1)} mm` : values[state].toFixed(3)]);
     rows.push(["force on the object", told.forces_n.map((side) => `${side[state].toFixed(1)} N`).join(", ")]);
     viewer.querySelector(".readout").replaceChildren(...rows.map(([name, value]) => {
       const row = document.createElement("div");
@@ -209,13 +208,13 @@
   }
   function lookFrom() {
     const bounds = new THREE.Box3().expandByPoint(new THREE.Vector3(0, 0, 0.1));
-    for (const poses of [told.tip, ...told.objects.map((each) => each.poses)]) {
+    for (const poses of [...told.tips, ...told.objects.map((each) => each.poses)]) {
       for (let at = 0; at < poses.length; at += 7) bounds.expandByPoint(vector(poses, at));
     }
     const middle = bounds.getCenter(new THREE.Vector3());
     const far = 1.15 * bounds.getSize(new THREE.Vector3()).length() + 0.75;
     let across = 0;
-    for (let at = 1; at < told.tip.length; at += 7) across += told.tip[at];
+    for (let at = 1; at < told.tips[0].length; at += 7) across += told.tips[0][at];
     const side = across > 0 ? 0.66 : -0.66; // where the hand works: it is before the arm then
     view.setHome([middle.x + 0.72 * far, middle.y + side * far, middle.z + 0.48 * far, middle.x, middle.y, middle.z]);
   }
@@ -256,7 +255,7 @@
     told.unreadable.forEach(fail);
     addBoxes(told.furniture, "#b9b3a8");
     addBoxes(told.fixtures, "#9aa3ab");
-    addPath(told.tip);
+    told.tips.forEach(addPath);
     if (told.granules) addGranules();
     timeline = globalThis.manitwinTimeline(viewer.querySelector(".timeline"), told, seek);
     listHappenings();
@@ -264,7 +263,7 @@
     listen();
     showLayers();
     show(state);
-    await Promise.all([told.robot ? addRobot(told.robot) : null, addObjects(told.objects)]);
+    await Promise.all([...told.robots.map(addRobot), addObjects(told.objects)]);
     requestAnimationFrame(() => requestAnimationFrame(() => {
       viewer.dataset.ready = String(Math.round(performance.now()));
       if (!view.problems.length) report("Drag to turn, scroll for nearer; point at anything for its name.");
