@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from drawn_episodes import (
     write_run,
 )
 from drawn_scenes import write_scenes
+from manitwin.episodes.recording import Recording
 from manitwin.episodes.stored_episode import StoredEpisode, recorded_robot
 from manitwin.errors import EpisodesError, UsageError
 from manitwin.formats.glb import unpack_glb
@@ -164,6 +165,31 @@ def test_the_robot_of_a_run_may_be_a_file_and_its_links_are_where_it_says(tmp_pa
     np.testing.assert_allclose(turned[:, :3], np.tile([0.0, 0.0, 0.4], (STEPS + 1, 1)), atol=1e-4)
     angles = 2 * np.arctan2(turned[:, 6], turned[:, 3])
     np.testing.assert_allclose(angles, moved.joint_positions_rad[:, 0], atol=5e-4)
+
+
+def test_two_arms_stand_where_their_bases_are_and_each_has_its_hand(tmp_path: Path) -> None:
+    """The taker has the giver's joints, so that its links are the giver's turned about the vertical and 1.2 m away."""
+    write_scenes(tmp_path)
+    one = recording()
+    beside = [
+        each.name
+        for each in fields(Recording)
+        if each.name.startswith(("joint_", "tip_", "action_", "hand", "finger_"))
+    ]
+    twice = replace(one, **{name: np.hstack([getattr(one, name)] * 2) for name in beside})
+    twice.finger_forces_n[:, :2] = 0  # the taker alone grasps
+    robot = recorded_robot(load_robot("two_pandas"))
+    place = write_run(tmp_path, [replace(stored(tmp_path, 0, twice), robot=robot)])
+    told = document(place)
+    assert told["unreadable"] == [] and [each["name"] for each in told["robots"]] == ["giver", "taker"]
+    for first, second in zip(*(each["links"] for each in told["robots"]), strict=True):
+        giver, taker = (np.array(each["poses"]).reshape(-1, 7)[:, :3] for each in (first, second))
+        np.testing.assert_allclose(taker, giver * [-1, -1, 1] + [1.2, 0, 0], atol=2e-4)
+    assert len(told["tips"]) == len(told["hands"]) == 2 and len(told["forces_n"]) == len(told["sides"]) == 4
+    assert {"grasped object_00 (can) by the taker", "released object_00 (can) by the taker"} < {
+        each["label"] for each in told["happenings"]
+    }
+    assert get(place, told["robots"][1]["model"].replace("arm=1", "arm=2"))[0] == 404
 
 
 def test_what_happens_is_found_in_the_recording_at_its_time(run: Path) -> None:

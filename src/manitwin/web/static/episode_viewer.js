@@ -208,7 +208,8 @@
   }
   function lookFrom() {
     const bounds = new THREE.Box3().expandByPoint(new THREE.Vector3(0, 0, 0.1));
-    for (const poses of [...told.tips, ...told.objects.map((each) => each.poses)]) {
+    const bases = told.robots.flatMap((each) => each.links.slice(0, 1).map((link) => link.poses));
+    for (const poses of [...bases, ...told.tips, ...told.objects.map((each) => each.poses)]) {
       for (let at = 0; at < poses.length; at += 7) bounds.expandByPoint(vector(poses, at));
     }
     const middle = bounds.getCenter(new THREE.Vector3());
@@ -216,7 +217,8 @@
     let across = 0;
     for (let at = 1; at < told.tips[0].length; at += 7) across += told.tips[0][at];
     const side = across > 0 ? 0.66 : -0.66; // where the hand works: it is before the arm then
-    view.setHome([middle.x + 0.72 * far, middle.y + side * far, middle.z + 0.48 * far, middle.x, middle.y, middle.z]);
+    const [ahead, beside] = bases.length > 1 ? [0.1, -1] : [0.72, side]; // two arms that face each other: from their side
+    view.setHome([middle.x + ahead * far, middle.y + beside * far, middle.z + 0.48 * far, middle.x, middle.y, middle.z]);
   }
   function listen() {
     const keys = {
