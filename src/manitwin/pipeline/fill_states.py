@@ -45,7 +45,7 @@ def filling_of(
             )
         )
     return Filling(
-        assumption=f"mass_kg is that of a full {prior.category}; an empty one has {least_kg_m3:g} kg/m3 of its volume in an even"
+        assumption=f"the twin is a full {prior.category}; an empty one has {least_kg_m3:g} kg/m3 of its volume in an even"
         " wall, and contents are level, standing as in the object frame",
         states=states,
     )
