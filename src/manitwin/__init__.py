@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from manitwin.dataset.index.twins import Twins
     from manitwin.dataset.publish.publish import Published, publish_dataset
     from manitwin.dataset.publish.shards import unpack_shard
+    from manitwin.episodes.environment.start_noise import StartNoise
     from manitwin.episodes.hdf5_file import EpisodeFile
     from manitwin.episodes.lerobot.read import LeRobotSet, read_lerobot
     from manitwin.episodes.publication.publish import PublishedEpisodes, publish_episodes
@@ -92,6 +93,7 @@ __all__ = [
     "Robot",
     "SapienRobot",
     "Scene",
+    "StartNoise",
     "TasksConfig",
     "TasksReport",
     "TrajectoriesConfig",
@@ -169,6 +171,7 @@ _DEFINED_IN = {
         "publish_dataset",
     ),
     "manitwin.dataset.publish.shards": ("unpack_shard",),
+    "manitwin.episodes.environment.start_noise": ("StartNoise",),
     "manitwin.episodes.hdf5_file": ("EpisodeFile",),
     "manitwin.episodes.lerobot.read": (
         "LeRobotSet",

@@ -22,6 +22,7 @@ if TYPE_CHECKING:  # what only a build needs takes 2 CPU-seconds to import
     from manitwin.engine.events import ItemEnded, OnStage
     from manitwin.episodes.collect import AttemptTotals
     from manitwin.episodes.environment.environment import TaskEnvironment
+    from manitwin.episodes.environment.start_noise import StartNoise
     from manitwin.episodes.lerobot.write import LeRobotSummary
     from manitwin.episodes.retirement import Retirement
     from manitwin.episodes.settings import PicturesConfig, TasksConfig, TrajectoriesConfig
@@ -326,16 +327,27 @@ def make_env(
     cameras: Sequence[str] = (),
     picture_px: int = 128,
     max_steps: int = 1200,
+    start_noise: StartNoise | None = None,
 ) -> TaskEnvironment:
     """Return the Gymnasium environment of a task of a file or folder of tasks; the only one needs no ``task_id``.
 
     Observations are states, with pictures of ``cameras`` besides; docs/policies.md says what is in them and what an action is.
-    ``twins``: where the twins are now. An episode is cut off after ``max_steps`` steps of 1/20 s. Raises UsageError for an
-    unknown task or camera, and for a scene that is another one than the task's.
+    ``twins``: where the twins are now. An episode is cut off after ``max_steps`` steps of 1/20 s. With ``start_noise`` the
+    seeds of ``reset`` draw other starts. Raises UsageError for an unknown task or camera, and for a scene that is another one
+    than the task's.
     """
     from manitwin.episodes.environment.make import make_env as make
 
-    return make(tasks, task_id, twins=twins, robot=robot, cameras=cameras, picture_px=picture_px, max_steps=max_steps)
+    return make(
+        tasks,
+        task_id,
+        twins=twins,
+        robot=robot,
+        cameras=cameras,
+        picture_px=picture_px,
+        max_steps=max_steps,
+        start_noise=start_noise,
+    )
 
 
 def render_episodes(

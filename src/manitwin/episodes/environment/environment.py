@@ -11,14 +11,16 @@ import numpy as np
 from gymnasium import spaces
 
 from manitwin.episodes.courses.course import Start
+from manitwin.episodes.environment.start_noise import DrawnStart, StartNoise, draw_start
 from manitwin.episodes.episode import closing_of, settled, world_of
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import REST_ROWS, STILL_ROWS, WATCH_S
 from manitwin.episodes.goals.evaluation import Evaluation, evaluate
-from manitwin.episodes.judging import state_of
+from manitwin.episodes.judging import is_reached_already, state_of
 from manitwin.episodes.outcome import is_at_rest
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.recording import RATE_HZ
 from manitwin.episodes.sequence import course_of, problem_of
 from manitwin.episodes.settings import EpisodeSettings
@@ -28,6 +30,7 @@ from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.physics.sapien.world import RobotWorld
 
 MOST_METRES, MOST_SPEED = 10.0, 100.0
+STARTS_TRIED = 8  # with noise: settled, and refused where something falls or the goal is true already
 HELD_M = 1e-3  # a hand that is told to open less far than this below its widest holds something, or is about to
 
 
@@ -65,12 +68,13 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         painter: Painter | None = None,
         cameras: Sequence[str] = (),
         picture_px: int = 128,
+        start_noise: StartNoise | None = None,
     ):
         """Take a task that is set up; nothing is simulated before ``reset``."""
         self.task, self.instructions = setting.task, setting.task.instructions
         self.render_mode = "rgb_array" if painter is not None else None
         self._setting, self._planner, self._settings, self._painter = setting, planner, settings, painter
-        self._robot, self._max_steps = planner.robot, max_steps
+        self._robot, self._max_steps, self._noise = planner.robot, max_steps, start_noise
         self._closing = closing_of(self._robot, settings)
         self._substeps = round(1 / RATE_HZ / settings.timestep_s)
         self._per_look = max(1, int(WATCH_S / settings.timestep_s + 1e-9))
@@ -103,25 +107,22 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Put everything where the scene has it, let it come to rest, and return the first observation.
 
-        A task begins in one way: ``seed`` draws nothing but what ``np_random`` gives. Raises UsageError where the scene does
-        not stay.
+        A task begins in one way: ``seed`` draws nothing but what ``np_random`` gives. With noise of the start ``np_random``
+        draws another start each time, and ``info["start_noise"]`` says which. Raises UsageError where the scene does not stay,
+        or no start is found.
         """
         super().reset(seed=seed)
-        self._leave()
-        goal = self._setting.goal
-        self._world = world = world_of(self._setting.problem, self._robot, self._settings, self._closing.force_n)
-        start = settled(self._setting.problem, self._planner, self._settings, goal, world)
-        if start is None:
-            raise UsageError(f"task {self.task.task_id}: its scene does not stay where it is; make the layouts again")
+        start, world, drawn = self._begun()
         start.moved, start.partners = self._setting.sequence.moved, self._setting.sequence.partners
         self._start, self._steps = start, 0
-        self._target_rad = np.array(self._robot.home_rad, float)
+        self._target_rad = np.array(self._robot.home_rad if drawn is None else drawn.joints_rad, float)
         self._opening_target_m = float(self._robot.gripper.opening_m)
         self._velocities = np.zeros(len(self._target_rad))
         self._watches = self._event_watches(start, world)
         self._poses = deque([self._object_poses()], maxlen=REST_ROWS)
         self._pressing = deque([self._pairs()], maxlen=STILL_ROWS)
-        return self._observation(), self._info(self._evaluation())
+        info = self._info(self._evaluation())
+        return self._observation(), info if drawn is None else info | {"start_noise": drawn.info}
 
     def step(self, action: np.ndarray) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """Carry out an action for 1/20 s; the episode ends with success, or is cut off after the most steps."""
@@ -150,6 +151,34 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         if self._painter is not None:
             self._painter.close()
             self._painter = None
+
+    def _begun(self) -> tuple[Start, RobotWorld, DrawnStart | None]:
+        """Put a start into physics, with noise the first of those drawn that stays and of which the goal is not true yet."""
+        if self._noise is None:
+            start, world = self._settled(self._setting.problem, None)
+            if start is None:
+                raise UsageError(
+                    f"task {self.task.task_id}: its scene does not stay where it is; make the layouts again"
+                )
+            return start, world, None
+        for _ in range(STARTS_TRIED):
+            drawn = draw_start(self._noise, self._setting, self._planner, self.np_random)
+            start, world = self._settled(drawn.problem, drawn.joints_rad)
+            if start is not None and not is_reached_already(start, world):
+                return start, world, drawn
+        self._leave()
+        raise UsageError(
+            f"task {self.task.task_id}: of {STARTS_TRIED} starts with {self._noise} none stays with the goal still to reach; "
+            "give less start_noise"
+        )
+
+    def _settled(self, problem: PickPlaceProblem, joints_rad: np.ndarray | None) -> tuple[Start | None, RobotWorld]:
+        """Leave the world before, and let a problem come to rest in another, the arm at home or with its joints elsewhere."""
+        self._leave()
+        self._world = world = world_of(problem, self._robot, self._settings, self._closing.force_n)
+        if joints_rad is not None:
+            world.robot.set_state(joints_rad, float(self._robot.gripper.opening_m))
+        return settled(problem, self._planner, self._settings, self._setting.goal, world), world
 
     def _leave(self) -> None:
         if self._world is not None:

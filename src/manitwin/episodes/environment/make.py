@@ -8,6 +8,7 @@ from pathlib import Path
 
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.environment.environment import TaskEnvironment
+from manitwin.episodes.environment.start_noise import StartNoise
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.hands import check_jaws
@@ -33,10 +34,13 @@ def make_env(
     cameras: Sequence[str] = (),
     picture_px: int = 128,
     max_steps: int = 1200,
+    start_noise: StartNoise | None = None,
 ) -> TaskEnvironment:
     """Return a task's environment, as ``manitwin.make_env`` says; raises UsageError for what is not there."""
     if not max_steps >= 1:
         raise UsageError(f"max_steps is {max_steps}; give 1 or more")
+    if not (start_noise is None or isinstance(start_noise, StartNoise)):
+        raise UsageError(f"start_noise is {start_noise!r}; give a manitwin.StartNoise, or None")
     task = one_task(tasks, task_id)
     folder = Path(tasks) if Path(tasks).is_dir() else Path(tasks).parent
     said = read_json_object(folder / CONFIG, UsageError, inside=folder, name=str(folder / CONFIG), remedy=_REMEDY)
@@ -62,5 +66,12 @@ def make_env(
 
         painter = WorldPainter(setting, source, chosen, cameras, picture_px)
     return TaskEnvironment(
-        setting, planner, settings, max_steps=max_steps, painter=painter, cameras=cameras, picture_px=picture_px
+        setting,
+        planner,
+        settings,
+        max_steps=max_steps,
+        painter=painter,
+        cameras=cameras,
+        picture_px=picture_px,
+        start_noise=start_noise,
     )

@@ -1,0 +1,160 @@
+"""Other starts of a task: the arm's joints and the objects on surfaces, drawn around where the scene has them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from numbers import Real
+from typing import Any
+
+import numpy as np
+
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.problem import Phase, PickPlaceProblem
+from manitwin.episodes.tasks.task_setting import TaskSetting
+from manitwin.errors import UsageError
+from manitwin.geometry.poses import transform, transform_points
+from manitwin.scenes.layouts.placing import Obstacles, in_workspace, is_within
+
+MOST = {"joints_rad": 0.5, "position_m": 0.5, "yaw_rad": np.pi}
+"""Beyond these nothing of a start would be left: objects cross their table, joints leave the sector before the robot."""
+DRAWS_TRIED = 200  # for the arm, and for each object
+LEAST_GAP_M = 1e-3  # to what stands around; the densest layouts are sampled with 3 mm
+
+
+@dataclass(frozen=True)
+class StartNoise:
+    """How much the start of a task varies with the seed of ``reset``; what is 0 stays as the scene has it.
+
+    ``joints_rad`` is the standard deviation of the normal distribution of each joint of the arm around its home (as ManiSkill's
+    ``robot_init_qpos_noise``). Objects move by up to ``position_m`` along x and along y, and turn by up to ``yaw_rad`` about
+    the vertical through their centre of mass, evenly. Raises UsageError for what is no number from 0 to 0.5 rad, 0.5 m and pi.
+    """
+
+    joints_rad: float = 0.0
+    position_m: float = 0.0
+    yaw_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse what is no such number."""
+        for each in fields(self):
+            value = getattr(self, each.name)
+            if not isinstance(value, Real) or isinstance(value, bool) or not 0 <= float(value) <= MOST[each.name]:
+                raise UsageError(
+                    f"start_noise: {each.name} is {value!r}; give a number from 0 to {MOST[each.name]:.6g}"
+                )
+
+
+@dataclass(frozen=True)
+class DrawnStart:
+    """A start that was drawn: its problem, the arm's joints ``(n,)`` rad, and what was added to joints and objects.
+
+    ``moves (k, 3)``: of each object, in the order of names, the way along x and y (m) and the turn about the vertical (rad).
+    """
+
+    problem: PickPlaceProblem
+    joints_rad: np.ndarray
+    joint_offsets_rad: np.ndarray
+    moves: np.ndarray
+
+    @property
+    def info(self) -> dict[str, Any]:
+        """What ``reset`` says of it."""
+        return {"joint_offsets_rad": self.joint_offsets_rad, "object_moves": self.moves}
+
+
+def draw_start(
+    noise: StartNoise, setting: TaskSetting, planner: PickPlacePlanner, rng: np.random.Generator
+) -> DrawnStart:
+    """Draw where the objects stand and how the arm is held, clear of each other.
+
+    Objects that stand on the furniture and carry nothing move, one after the other: each stays on its surface, clear of all
+    else, and in the workspace where it was in it. Joints stay within their limits, the arm clear of everything as it is on
+    its free ways. Raises UsageError where so many draws were all refused.
+    """
+    problem, moves = _with_objects_moved(noise, setting, planner, rng)
+    joints_rad = _joints(noise, problem, planner, rng)
+    return DrawnStart(problem, joints_rad, joints_rad - planner.robot.home_rad, moves)
+
+
+def _with_objects_moved(
+    noise: StartNoise, setting: TaskSetting, planner: PickPlacePlanner, rng: np.random.Generator
+) -> tuple[PickPlaceProblem, np.ndarray]:
+    scene, problem = setting.scene, setting.problem
+    moves = np.zeros((len(scene.objects), 3))
+    spread = np.array([noise.position_m, noise.position_m, noise.yaw_rad], float)
+    if not spread.any():
+        return problem, moves
+    supports = {support.name: support for support in scene.scene.record.furniture.supports}
+    stands_on = {name: supports[surface] for name, surface in _movable(setting).items()}
+    bodies = [scene.pool.body(each.twin_id).parts for each in scene.objects]
+    poses = [each.object_to_world for each in scene.objects]
+    boxes = (*problem.static_boxes, *problem.fixtures)
+    for number, each in enumerate(scene.objects):
+        if each.name not in stands_on:
+            continue
+        support, center_m = stands_on[each.name], each.body.center_of_mass_m
+        around = Obstacles(boxes, [bodies[k].at(poses[k]) for k in range(len(poses)) if k != number])
+        was_in_reach = _in_reach(each.object_to_world, center_m, planner)
+        for _ in range(DRAWS_TRIED):
+            move = spread * rng.uniform(-1, 1, 3)
+            pose = _moved(each.object_to_world, center_m, move)
+            parts = bodies[number].at(pose)
+            if (
+                is_within(parts, support)
+                and (not was_in_reach or _in_reach(pose, center_m, planner))
+                and around.is_clear(parts, support.height_m, LEAST_GAP_M)
+            ):
+                break
+        else:
+            raise UsageError(
+                f"start_noise: no free place for {each.name} of task {setting.task.task_id} in {DRAWS_TRIED} draws; "
+                f"give another position_m or yaw_rad than {noise.position_m} and {noise.yaw_rad}"
+            )
+        poses[number], moves[number] = pose, move
+    moved = {each.name: replace(each, object_to_world=pose) for each, pose in zip(scene.objects, poses, strict=True)}
+    return replace(
+        problem,
+        target=moved[problem.target.name],
+        obstacles=tuple(moved[each.name] for each in problem.obstacles),
+    ), moves
+
+
+def _movable(setting: TaskSetting) -> dict[str, str]:
+    """Return the surfaces of the objects that stand on furniture and carry nothing, by the objects' names."""
+    objects = setting.scene.scene.record.objects
+    carrying = {each.supported_by for each in objects}
+    return {each.name: each.surface for each in objects if each.supported_by is None and each.name not in carrying}
+
+
+def _moved(object_to_world: np.ndarray, center_of_mass_m: np.ndarray, move: np.ndarray) -> np.ndarray:
+    """Return a pose ``(4, 4)`` after a move: along x and y (m), turned about the vertical through the centre of mass (rad)."""
+    along_x_m, along_y_m, yaw_rad = move
+    cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    center = transform_points(object_to_world, center_of_mass_m[None])[0]
+    to_place = transform(turn, center - turn @ center + [along_x_m, along_y_m, 0.0])
+    result: np.ndarray = to_place @ object_to_world
+    return result
+
+
+def _in_reach(object_to_world: np.ndarray, center_of_mass_m: np.ndarray, planner: PickPlacePlanner) -> bool:
+    center = transform_points(object_to_world, center_of_mass_m[None])[:, :2]
+    return bool(in_workspace(center, planner.robot.workspace)[0])
+
+
+def _joints(
+    noise: StartNoise, problem: PickPlaceProblem, planner: PickPlacePlanner, rng: np.random.Generator
+) -> np.ndarray:
+    home_rad, arm = np.array(planner.robot.home_rad, float), planner.arm
+    if not noise.joints_rad:
+        return home_rad
+    world = planner.parts.world_of(problem, problem.goal_object_to_world).arm
+    world.enter(Phase.REACH)
+    for _ in range(DRAWS_TRIED):
+        drawn = home_rad + noise.joints_rad * rng.standard_normal(len(home_rad))
+        if (drawn >= arm.lower).all() and (drawn <= arm.upper).all() and world.is_free(drawn):
+            return drawn
+    raise UsageError(
+        f"start_noise: no free position of the arm in {DRAWS_TRIED} draws; "
+        f"give a smaller joints_rad than {noise.joints_rad}"
+    )
