@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from boxy_robot import tip_pose
 
+from boxy_robot import tip_pose
 from manitwin.episodes.cameras import named_cameras
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform, transform_points

@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 import trimesh
-from boxy_robot import boxy_robot, moving
 
+from boxy_robot import boxy_robot, moving
 from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.recording import Recording
 from manitwin.episodes.replay_pictures import EpisodeReplay, link_poses, link_visuals
