@@ -169,15 +169,6 @@ def test_damaged_file_of_a_stage_runs_again(place: Path) -> None:
     assert built(place).exit_code == 0 and content(place) == before
 
 
-def test_results_of_items_that_have_ended_may_be_removed(place: Path) -> None:
-    before = content(place)
-    shutil.rmtree(place / ".work")
-    assert found(place) == [] and len(found(place, digests=True)) > 0
-    assert built(place).exit_code == 0 and content(place) == before
-    shutil.rmtree(twins(place)[0])
-    assert built(place).exit_code == 0 and content(place) == before
-
-
 @pytest.mark.parametrize("damage", DAMAGES)
 @pytest.mark.parametrize("file", ["parts.json", "twins/*.parquet"])
 def test_damaged_index_is_named_by_readers_and_healed(place: Path, file: str, damage: str) -> None:
