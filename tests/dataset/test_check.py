@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+import sqlite3
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -91,6 +92,24 @@ DAMAGES: dict[str, Callable[[Path], None]] = {
     "a device": lambda path: (path.unlink(), path.symlink_to("/dev/zero"))[0],
     "a folder": lambda path: (path.unlink(), path.mkdir())[0],
 }
+
+
+def test_results_of_items_that_have_ended_may_be_removed_whole(place: Path) -> None:
+    before = content(place)
+    shutil.rmtree(place / ".work")
+    assert found(place) == [] and found(place, digests=True) == []
+    assert built(place).exit_code == 0 and content(place) == before
+    shutil.rmtree(twins(place)[0])
+    assert built(place).exit_code == 0 and content(place) == before
+
+
+def test_results_of_an_item_at_work_may_not_be_removed(place: Path) -> None:
+    with sqlite3.connect(place / "ledger.sqlite") as ledger:
+        (number,) = ledger.execute("SELECT min(number) FROM items WHERE state = 'accepted'").fetchone()
+        ledger.execute("UPDATE items SET state = 'waiting' WHERE number = ?", (number,))
+    ledger.close()
+    shutil.rmtree(place / ".work")
+    assert any(f"item {number}, stage " in each and "its result is not there" in each for each in found(place))
 
 
 @pytest.mark.parametrize("damage", DAMAGES)

@@ -143,11 +143,23 @@ def _half_folders(root: DatasetRoot) -> Iterator[Disagreement]:
 
 
 def _done_without_result(ledger: Ledger, root: DatasetRoot, digests: bool) -> Iterator[Disagreement]:
+    """Tell the results that are damaged or gone.
+
+    An item that has ended, and whose folder of results is gone as a whole, lacks nothing: a person may remove it for room,
+    and what is asked of the item later runs again.
+    """
     rows = ledger.connection.execute(
-        "SELECT s.number, i.twin_id, s.stage, s.key FROM stages s JOIN items i USING (number)"
-        " WHERE s.state = 'done' AND s.key IS NOT NULL ORDER BY s.number"
+        "SELECT s.number, i.twin_id, s.stage, s.key, i.state IN ('accepted', 'rejected', 'duplicate')"
+        " FROM stages s JOIN items i USING (number) WHERE s.state = 'done' AND s.key IS NOT NULL ORDER BY s.number"
     ).fetchall()
-    for number, twin_id, stage, key in rows:
+    removed = {
+        twin_id
+        for twin_id in {str(row[1]) for row in rows if row[4]}
+        if _FOLDER.fullmatch(twin_id) and not root.exists(f"{WORK}/{twin_id}")
+    }
+    for number, twin_id, stage, key, has_ended in rows:
+        if has_ended and twin_id in removed:
+            continue
         name = f"{WORK}/{twin_id}/{stage}/{key}"
         if all(_FOLDER.fullmatch(each) for each in (str(twin_id), stage, key)) and _is_result(root, name, digests):
             continue
