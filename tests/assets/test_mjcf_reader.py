@@ -61,8 +61,10 @@ def test_mass_of_mujocos_own_density_is_not_declared(tmp_path: Path) -> None:
 def test_mass_of_a_written_density_is_declared_and_said(tmp_path: Path) -> None:
     default = '<default><geom density="100" friction="0.8 0.01 0.001"/></default>'
     asset = read_asset(mjcf(tmp_path, '<body><freejoint/><geom size="0.05"/></body>', default))
-    assert asset.inertial.mass_kg == pytest.approx(100 * 4 / 3 * np.pi * 0.05**3)
-    assert asset.inertial.inertia_kg_m2 is None
+    mass_kg = 100 * 4 / 3 * np.pi * 0.05**3
+    assert asset.inertial.mass_kg == pytest.approx(mass_kg)
+    assert np.allclose(asset.inertial.center_of_mass_m, 0, atol=1e-12)
+    assert np.allclose(asset.inertial.inertia_kg_m2, 0.4 * mass_kg * 0.05**2 * np.eye(3), rtol=1e-9)
     assert asset.contact.friction_static == asset.contact.friction_dynamic == 0.8
     assert any("density" in remark for remark in asset.remarks)
 
@@ -161,3 +163,61 @@ def test_an_object_whose_meshes_are_not_there_lacks_files_and_is_no_broken_one(t
     body = '<body><freejoint/><geom type="mesh" mesh="w"/></body>'
     asset = read_asset(mjcf(tmp_path, body, '<asset><mesh name="w" file="gone.stl"/></asset>'))
     assert asset.missing_files == ("gone.stl",) and asset.visual == () and asset.inertial.mass_kg is None
+
+
+def test_a_mass_of_geoms_in_several_bodies_is_combined_as_mujoco_has_it(tmp_path: Path) -> None:
+    bodies = (
+        '<body pos="1 0 0"><freejoint/><geom size="0.05" mass="0.2" pos="0.1 0 0"/>'
+        '<body pos="0 0 0.3" euler="0 0 30"><geom type="box" size="0.1 0.05 0.02" mass="0.4"/></body></body>'
+    )
+    path = mjcf(tmp_path, bodies)
+    inertial = read_asset(path).inertial
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert inertial.mass_kg == pytest.approx(float(model.body_subtreemass[1]))
+    assert np.allclose(inertial.center_of_mass_m, data.subtree_com[1] - [1, 0, 0], atol=1e-9)
+    spinning = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, spinning)
+    about_origin = spinning[3:, 3:]  # of the free joint's turn, about the body's own origin
+    c = inertial.center_of_mass_m
+    moved = inertial.mass_kg * (c @ c * np.eye(3) - np.outer(c, c))
+    assert np.allclose(inertial.inertia_kg_m2 + moved, about_origin, rtol=1e-6, atol=1e-9)
+
+
+def test_replicated_bodies_are_written_out_and_the_first_is_read(tmp_path: Path) -> None:
+    body = '<body name="b"><freejoint/><geom size="0.02"/></body>'
+    asset = read_asset(mjcf(tmp_path, f'<replicate count="3" offset="0.1 0 0">{body}</replicate>'))
+    assert len(asset.collision) == 1 and len(asset.remarks) == 2
+    many = read_asset(mjcf(tmp_path, f'<replicate count="400" offset="0.1 0 0">{body}</replicate>'))
+    assert len(many.remarks) == 1 and "399 more bodies" in many.remarks[0]
+    nested = f'<replicate count="1000"><replicate count="1000">{body}</replicate></replicate>'
+    with pytest.raises(AssetError, match="no single object"):
+        read_asset(mjcf(tmp_path, nested))
+
+
+def test_height_fields_soft_bodies_and_plugins_are_left_out_and_said(tmp_path: Path) -> None:
+    before = (
+        '<extension><plugin plugin="mujoco.sdf.torus"><instance name="t"/></plugin></extension>'
+        '<default><default class="ground"><geom type="hfield" hfield="hill"/></default></default>'
+        '<asset><hfield name="hill" file="hill.png" size="1 1 1 1"/>'
+        '<mesh name="torus"><plugin instance="t"/></mesh></asset>'
+    )
+    body = (
+        '<geom class="ground"/><flexcomp name="cloth" type="grid" count="3 3 1" dim="2"/>'
+        '<body name="thing"><freejoint/><geom size="0.02"/><geom type="sdf" mesh="torus"><plugin instance="t"/></geom></body>'
+    )
+    asset = read_asset(mjcf(tmp_path, body, before))
+    assert asset.name == "thing" and len(asset.collision) == 1
+    said = " ".join(asset.remarks)
+    for words in ("height fields were left out", "<flexcomp> is no rigid body", "a plug-in computes"):
+        assert words in said
+
+
+def test_shapes_of_the_world_stand_fast_and_planes_alone_are_sheets(tmp_path: Path) -> None:
+    table = read_asset(mjcf(tmp_path, '<geom type="plane" size="0 0 1"/><geom type="box" size="0.3 0.2 0.1"/>'))
+    assert table.static and np.allclose(np.ptp(table.visual[0].vertices, axis=0), [0.6, 0.4, 0.2])
+    ground = read_asset(mjcf(tmp_path, '<geom type="plane" size="2 0 1"/>'))
+    assert ground.static and np.allclose(ground.visual[0].bounds, [[-2, -0.5, -1e-3], [2, 0.5, 0]])
+    moving = read_asset(mjcf(tmp_path, '<geom type="plane" size="2 2 1"/><body name="ball"><geom size="0.02"/></body>'))
+    assert moving.name == "ball" and not moving.static

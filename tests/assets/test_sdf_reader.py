@@ -239,3 +239,14 @@ def test_models_are_found_as_folders_and_as_single_files(tmp_path: Path) -> None
 )
 def test_statements_in_words(text: str, licence: str | None, attribution: str | None) -> None:
     assert stated_licence([text]) == (licence, attribution)
+
+
+def test_elements_of_a_prefix_that_nobody_declares_are_skipped_and_broken_xml_is_not(tmp_path: Path) -> None:
+    inside = link("a", f'<visual name="v"><drake:proximity>1</drake:proximity>{BOX}</visual>')
+    assert len(read(tmp_path / "one", inside).visual) == 1
+    for broken in ("<drake:proximity>", "<drake:p/>&gone;", '<drake:p a="1" a="2"/>'):
+        with pytest.raises(AssetError, match="XML is broken"):
+            read(tmp_path / "two", inside + broken)
+    (tmp_path / "three.sdf").write_text("<drake:sdf><model/></drake:sdf>")
+    with pytest.raises(AssetError, match="not <sdf>"):
+        read_asset(tmp_path / "three.sdf", "sdf")

@@ -208,3 +208,30 @@ def test_entities_are_refused(tmp_path: Path) -> None:
     )
     with pytest.raises(AssetError, match=r"entity|document type"):
         read_asset(path)
+
+
+def test_what_tools_add_for_themselves_and_shapes_without_size_are_left_out(tmp_path: Path) -> None:
+    shapes = (
+        f'<visual><geometry><box size="0.1 0.2 0.4"/><d:declare_convex xmlns:d="http://x.org"/></geometry></visual>'
+        f"<visual drake:hidden='1'><geometry><sphere radius='0'/></geometry></visual><collision>{BOX_SHAPE}</collision>"
+    )
+    asset = read_asset(urdf(tmp_path, f'<link name="l">{shapes}</link><drake:note>mine</drake:note>'))
+    assert len(asset.visual) == len(asset.collision) == 1
+    assert len(asset.remarks) == 1 and "has no size" in asset.remarks[0]
+
+
+def test_a_joint_to_the_world_needs_no_link_of_that_name(tmp_path: Path) -> None:
+    joint = '<joint name="j" type="fixed"><origin xyz="0 0 1"/><parent link="world"/><child link="l"/></joint>'
+    asset = read_asset(urdf(tmp_path, f'<link name="l"><collision>{BOX_SHAPE}</collision></link>{joint}'))
+    assert np.allclose(bounds(asset.collision[0].vertices).mean(0), [0, 0, 1])
+
+
+def test_a_mesh_of_a_format_that_is_not_read_costs_that_shape_alone(tmp_path: Path) -> None:
+    (tmp_path / "soft.vtk").write_text("# vtk DataFile Version 3.0\n")
+    body = (
+        f'<link name="l"><visual>{BOX_SHAPE}</visual>'
+        '<collision><geometry><mesh filename="soft.vtk"/></geometry></collision></link>'
+    )
+    asset = read_asset(urdf(tmp_path, body))
+    assert len(asset.visual) == 1 and asset.collision == () and asset.missing_files == ()
+    assert any("soft.vtk is a .vtk file, which is not read" in remark for remark in asset.remarks)

@@ -18,6 +18,8 @@ from manitwin.formats.meshes.source import MeshLimits
 MESH_LIMITS = MeshLimits(max_bytes=1 << 29, max_faces=2_000_000)
 MAX_SHAPES = 4096
 MAX_FACES = 8_000_000  # of all shapes together: one mesh may be named by many of them
+UNREAD_FORMATS = frozenset({".vtk", ".vtu", ".wrl", ".iv", ".x3d", ".3ds", ".fbx", ".off", ".ac", ".bin", ".mesh"})
+"""Of meshes that descriptions name: for some engines, or for none but the one that they were made for."""
 _NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' is not there")
 
 
@@ -77,6 +79,13 @@ class AssetFiles:
             if resolved in self.used:
                 return resolved
         return None
+
+    def is_of_unread_format(self, path: Path) -> bool:
+        """Tell whether a mesh is of a format that is known and not read (``UNREAD_FORMATS``); it is remarked."""
+        unread = path.suffix.lower() in UNREAD_FORMATS
+        if unread:
+            self.remark(f"{path.name} is a {path.suffix.lower()} file, which is not read: its shape was left out")
+        return unread
 
     def _note_above(self, file: Path) -> None:
         if self.own is not None and not file.is_relative_to(self.own.resolve()):

@@ -22,6 +22,7 @@ _HEAD_BYTES, _FRAGMENT_BYTES = 1 << 16, 1 << 23
 _FIRST_TAG = re.compile(rb"<([A-Za-z][\w.:-]*)[\s/>]")
 _SHAPES = (b"<geom", b"<visual", b"<collision", b"<include", b"<replicate", b"<composite", b"<flexcomp", b"<attach")
 """What shapes are, or come from, in MJCF, URDF and SDF."""
+_WORLD_BODY = re.compile(rb"<worldbody[\s>].*?</worldbody>", re.DOTALL)
 _ENDS = (b"</mujoco>", b"</robot>", b"</sdf>")
 _MARKS = re.compile(rb"<extra_info[\s/>]|<custom_data[\s/>]")
 _ROBOTWIN_DATA = re.compile(r"model_data\d*\.json")
@@ -131,6 +132,8 @@ def _is_fragment(file: Path) -> bool:
     if len(content) == _FRAGMENT_BYTES:
         return False
     content = _without_comments(content)
+    if content.rstrip().endswith(b"</mujoco>") and b"<include" not in content:
+        content = b"".join(_WORLD_BODY.findall(content)) + b"</mujoco>"  # defaults name shapes, and make none
     ends = any(content.rstrip().endswith(end) for end in _ENDS)  # what is cut short is a broken asset, not a fragment
     return ends and (not any(tag in content for tag in _SHAPES) or b"<xacro:macro" in content)
 

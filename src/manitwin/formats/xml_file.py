@@ -20,6 +20,7 @@ from manitwin.formats.bounded_file import Refusal, read_bytes
 from manitwin.formats.markdown import one_line
 
 MAX_XML_BYTES = 64 << 20
+_UNKNOWN_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
 _HEAD_BYTES, _DECLARATION_BYTES = 1 << 16, 1 << 10
 MAX_NUMBER = 1e9  # no length, mass or moment of an object that a gripper meets comes near
 
@@ -64,21 +65,39 @@ def parse_xml(
     declares_type = _declares_document_type(data)
     if declares_type:
         raise refusal(f"{name}: its XML declares a document type, which is not read; remove it")
-    parser = etree.XMLParser(
+    huge_tree = max_bytes is None and declares_type is False  # it also lifts libxml2's limit on expanding entities
+    parser = _parser(comments, huge_tree)
+    try:
+        root = etree.fromstring(data, parser)
+    except etree.XMLSyntaxError as error:
+        if {entry.type_name for entry in parser.error_log} != {_UNKNOWN_PREFIX}:
+            raise refusal(f"{name}: its XML is broken ({' '.join(str(error).split())[:120]}); mend it") from error
+        root = _without_unknown_prefixes(etree.fromstring(data, _parser(comments, huge_tree, recover=True)))
+    if root.getroottree().docinfo.doctype:
+        raise refusal(f"{name}: its XML declares a document type, which is not read; remove it")
+    if root.tag.rpartition("}")[2] != tag:
+        raise refusal(f"{name}: its XML is <{str(root.tag)[:40]}>, not <{tag}>; give a file of that kind")
+    return root
+
+
+def _parser(comments: bool, huge_tree: bool, recover: bool = False) -> etree.XMLParser:
+    return etree.XMLParser(
         resolve_entities=False,
         no_network=True,
         load_dtd=False,
         remove_comments=not comments,
-        huge_tree=max_bytes is None and declares_type is False,  # it also lifts libxml2's limit on expanding entities
+        huge_tree=huge_tree,
+        recover=recover,
     )
-    try:
-        root = etree.fromstring(data, parser)
-    except etree.XMLSyntaxError as error:
-        raise refusal(f"{name}: its XML is broken ({' '.join(str(error).split())[:120]}); mend it") from error
-    if root.getroottree().docinfo.doctype:
-        raise refusal(f"{name}: its XML declares a document type, which is not read; remove it")
-    if etree.QName(root).localname != tag:
-        raise refusal(f"{name}: its XML is <{str(root.tag)[:40]}>, not <{tag}>; give a file of that kind")
+
+
+def _without_unknown_prefixes(root: etree._Element) -> etree._Element:
+    """Take out elements and attributes whose prefix is nowhere declared: what tools add for themselves alone, as others skip."""
+    for element in list(root.iter(etree.Element)):
+        if ":" in element.tag.rpartition("}")[2] and element is not root:
+            element.getparent().remove(element)
+        for key in [key for key in element.attrib if ":" in key.rpartition("}")[2]]:
+            del element.attrib[key]
     return root
 
 

@@ -217,14 +217,21 @@ def inertial_of(link: etree._Element) -> tuple[float | None, np.ndarray, np.ndar
     return None if mass is None else float(mass.get("value")), origin_of(inertial), tensor
 
 
-def read_urdf(path: Path, rules: UrdfRules = ROBOT, name: str | None = None) -> UrdfTree:
-    """Read a URDF and check all of it that the rules say is read.
+def read_urdf(
+    path: Path,
+    rules: UrdfRules = ROBOT,
+    name: str | None = None,
+    prepare: Callable[[etree._Element], None] | None = None,
+) -> UrdfTree:
+    """Read a URDF and check all of it that the rules say is read; ``prepare`` may change its root element first.
 
     Raises the rules' error, which names the file (``name``: as messages call it, else by its path), the element, the cause
     and the remedy.
     """
     name = name or str(path)
     root = read_xml(path, "robot", name=name, refusal=rules.error, comments=not rules.simulated)
+    if prepare is not None:
+        prepare(root)
     tree = UrdfTree(name, root, rules.error)
     _check_tree(tree, rules)
     for link_name, link in tree.links.items():

@@ -66,25 +66,35 @@ def digest(audited: Sequence[Audited], rules: Sequence[RuleText]) -> str:
     for rule in sorted(rules, key=lambda rule: (_SEVERITIES.index(rule.severity), -by_rule[rule.code], rule.code)):
         if by_rule[rule.code]:
             lines.append(f"  {by_rule[rule.code]:>6} {rule.severity:<8} {rule.code} {rule.name}")
+    unread = unread_by_cause(audited)
+    if unread:
+        lines.append("not read or without geometry, by cause")
+        for cause, assets in unread[:_LISTED]:
+            lines.append(f"  {len(assets):>6} {cause}, as {printable_line(assets[0])}")
+    worst = worst_assets(audited)[:_LISTED]
+    if worst:
+        lines.append("most errors")
+        for each in worst:
+            counts = count_by_severity([each])
+            lines.append(f"  {counts['error']:>6} and {counts['warning']} warnings: {printable_line(each.asset)}")
+    return "\n".join(lines)
+
+
+def unread_by_cause(audited: Sequence[Audited]) -> list[tuple[str, list[str]]]:
+    """Return why assets could not be read or measured, with the assets of each cause, the most frequent first."""
     unread: dict[str, list[str]] = {}
     for each in audited:
         for finding in each.findings:
             if finding.code in _NOT_READ:
                 unread.setdefault(_cause(finding.message), []).append(each.asset)
-    if unread:
-        lines.append("not read or without geometry, by cause")
-        for cause, assets in sorted(unread.items(), key=lambda entry: (-len(entry[1]), entry[0]))[:_LISTED]:
-            lines.append(f"  {len(assets):>6} {cause}, as {printable_line(assets[0])}")
-    errors = {each.asset: count_by_severity([each]) for each in audited}
-    worst = sorted(errors, key=lambda asset: (-errors[asset]["error"], -errors[asset]["warning"], asset))[:_LISTED]
-    if worst and errors[worst[0]]["error"]:
-        lines.append("most errors")
-        for asset in worst:
-            if errors[asset]["error"]:
-                lines.append(
-                    f"  {errors[asset]['error']:>6} and {errors[asset]['warning']} warnings: {printable_line(asset)}"
-                )
-    return "\n".join(lines)
+    return sorted(unread.items(), key=lambda entry: (-len(entry[1]), entry[0]))
+
+
+def worst_assets(audited: Sequence[Audited]) -> list[Audited]:
+    """Return the assets with errors, those with most errors first, then with most warnings, then by name."""
+    counts = {id(each): count_by_severity([each]) for each in audited}
+    found = [each for each in audited if counts[id(each)]["error"]]
+    return sorted(found, key=lambda each: (-counts[id(each)]["error"], -counts[id(each)]["warning"], each.asset))
 
 
 def _cause(message: str) -> str:

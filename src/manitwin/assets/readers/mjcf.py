@@ -15,7 +15,7 @@ from manitwin.assets.asset import Asset, CollisionShape, Contact, Inertial, comb
 from manitwin.assets.asset_files import AssetFiles, joined
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
-from manitwin.assets.readers.mjcf_model import CompiledMjcf, MjcfSource, compiled, open_mjcf
+from manitwin.assets.readers.mjcf_model import NO_OBJECTS, CompiledMjcf, MjcfSource, compiled, open_mjcf
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.textures import (
@@ -32,6 +32,9 @@ from manitwin.geometry.poses import inverse, rotation_from_quaternion_wxyz, tran
 _INERTIA_FROM_GEOM = 1  # mjtInertiaFromGeom: true; 2 is auto
 _SHOWN_GROUPS = 3  # MuJoCo's viewer shows groups 0 to 2 (mjvOption.geomgroup)
 _KINDS = mujoco.mjtGeom
+_WORLD = 0
+_MOST_NAMED = 24  # of bodies that are left out
+_SHEET_M, _UNBOUNDED_M = 1e-3, 1.0  # how thick a plane is shown, and how wide one without an end
 _MESH_KINDS = (int(_KINDS.mjGEOM_MESH), int(_KINDS.mjGEOM_SDF))
 
 
@@ -40,8 +43,9 @@ def read(path: Path, root: Path | None = None) -> Asset:
 
     Defaults, frames and shapes are resolved by MuJoCo; meshes and textures are read here, below ``root`` (``root_of`` the path
     by default). An <inertial> is what the file declares; a mass that follows from a geom's mass or density that the file writes
-    is kept without a centre and inertia, with a remark; what only MuJoCo's own default density gives is not declared. Raises
-    AssetError naming what is broken. Source: the MJCF reference of MuJoCo.
+    is kept with the centre and inertia that MuJoCo computes of it, with a remark; what only MuJoCo's own default density gives
+    is not declared. A file of planes alone is shown as sheets. Raises AssetError naming what is broken. Source: the MJCF
+    reference of MuJoCo.
     """
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent)
@@ -50,7 +54,7 @@ def read(path: Path, root: Path | None = None) -> Asset:
     result = compiled(source, files)
     spec, model = result.spec, result.model
     bodies = _rigid_bodies(file, model, files)
-    shapes = BodyShapes(result, files)
+    shapes = BodyShapes(result, files, planes=not any(_is_solid(model, index) for index, _ in bodies))
     visual, collision = shapes.of(bodies)
     names = [model.body(index).name for index, _ in bodies]
     licence, attribution = stated_licence(source.texts)
@@ -64,6 +68,7 @@ def read(path: Path, root: Path | None = None) -> Asset:
         unit_m=1.0,
         inertial=_declared_inertial(source, spec, model, bodies, files),
         contact=_declared_contact(source, model, shapes.colliding(bodies), files),
+        static=bodies[0][0] == _WORLD,
         license=licence,
         attribution=attribution,
         files=files.sorted_files(),
@@ -84,18 +89,29 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, 
         own = transform(rotation_from_quaternion_wxyz(model.body_quat[index]), model.body_pos[index])
         poses[index] = np.eye(4) if starts else poses[parent] @ own
         groups.setdefault(head_of[index], []).append((index, poses[index]))
-    shaped = [g for g in groups.values() if any(model.body_geomnum[index] > 0 for index, _ in g)]
+    world = [(_WORLD, np.eye(4))]  # shapes fixed to it: a static object
+    shaped = [g for g in groups.values() if any(_is_solid(model, index) for index, _ in g)]
     if not shaped:
-        if model.body_geomnum[0] > 0:  # shapes fixed to the world: a static object
-            return [(0, np.eye(4))]
+        if _is_solid(model, _WORLD):
+            return world
         if files.missing and groups:  # whose meshes are not there
             return next(iter(groups.values()))
+        if model.ngeom:
+            return next((g for g in groups.values() if any(model.body_geomnum[index] for index, _ in g)), world)
         raise AssetError(f"{file.name}: no body of it has a geom")
-    for group in shaped[1:]:
+    if len(shaped) > _MOST_NAMED:
+        files.remark(f"{len(shaped) - 1} more bodies move by themselves and were left out: one rigid object is read")
+    for group in shaped[1:] if len(shaped) <= _MOST_NAMED else ():
         files.remark(
             f"body {model.body(group[0][0]).name!r} moves by itself and was left out: one rigid object is read"
         )
     return shaped[0]
+
+
+def _is_solid(model: Any, body: int) -> bool:
+    """Tell whether a body has a shape that is no plane."""
+    start, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
+    return any(int(model.geom_type[geom]) != int(_KINDS.mjGEOM_PLANE) for geom in range(start, start + count))
 
 
 def _declared_inertial(
@@ -107,10 +123,12 @@ def _declared_inertial(
     explicit = [index for index, _ in bodies if by_index[index].explicitinertial and not forced]
     if explicit and all(index in explicit for index, _ in massive):
         return combined_inertial([_inertial(model, index, pose) for index, pose in bodies if index in explicit])
-    if explicit or not source.writes(("mass", "density")):
+    if (
+        explicit or not source.writes(("mass", "density")) or files.missing
+    ):  # of a mesh that is not there nothing is known
         return Inertial()
     files.remark("its mass follows from a mass or density written for its geoms; centre and inertia are MuJoCo's own")
-    return Inertial(float(sum(model.body_mass[index] for index, _ in bodies)))
+    return combined_inertial([_inertial(model, index, pose) for index, pose in massive]) if massive else Inertial(0.0)
 
 
 def _inertial(model: Any, index: int, body_to_asset: np.ndarray) -> Inertial:
@@ -133,10 +151,10 @@ def _declared_contact(source: MjcfSource, model: Any, geoms: list[int], files: A
 
 
 class BodyShapes:
-    """Reads the geoms of one compiled file."""
+    """Reads the geoms of one compiled file; ``planes``: as sheets, of what has no other shape."""
 
-    def __init__(self, compiled: CompiledMjcf, files: AssetFiles):
-        self._compiled, self._model, self._files = compiled, compiled.model, files
+    def __init__(self, compiled: CompiledMjcf, files: AssetFiles, *, planes: bool = False):
+        self._compiled, self._model, self._files, self._planes = compiled, compiled.model, files, planes
 
     def of(
         self, bodies: list[tuple[int, np.ndarray]]
@@ -174,9 +192,10 @@ class BodyShapes:
         material = self._material(geom)
         if int(model.geom_type[geom]) in _MESH_KINDS:
             return self._mesh(geom, pose, material)
-        solid = _primitive(int(model.geom_type[geom]), np.array(model.geom_size[geom]))
+        kind, size = int(model.geom_type[geom]), np.array(model.geom_size[geom])
+        solid = _sheet(size) if self._planes and kind == int(_KINDS.mjGEOM_PLANE) else _primitive(kind, size)
         if solid is None:
-            self._files.remark("planes and height fields were left out: they are no objects")
+            self._files.remark(NO_OBJECTS)
             return []
         self._files.count(len(solid.faces))
         name = model.geom(geom).name or f"geom_{geom:02d}"
@@ -226,6 +245,14 @@ def _written_out(model: Any, mesh: int) -> tuple[np.ndarray, np.ndarray]:
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
     face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
     return np.array(model.mesh_vert[first : first + count], float), np.array(model.mesh_face[face : face + faces], int)
+
+
+def _sheet(size: np.ndarray) -> trimesh.Trimesh:
+    """Return a plane as a sheet under it: half lengths, of which 0 has no end (MJCF reference, geom type)."""
+    sides = [2 * float(half) if half > 0 else _UNBOUNDED_M for half in size[:2]]
+    sheet = trimesh.creation.box((*sides, _SHEET_M))
+    sheet.apply_translation((0, 0, -_SHEET_M / 2))
+    return sheet
 
 
 def _primitive(kind: int, size: np.ndarray) -> trimesh.Trimesh | None:

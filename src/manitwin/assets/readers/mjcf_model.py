@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,26 +13,18 @@ from lxml import etree  # type: ignore[import-untyped]
 from PIL import Image
 
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles, joined
+from manitwin.assets.readers.mjcf_contents import keep_rigid_objects
 from manitwin.errors import AssetError
 from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, decode_texture
-from manitwin.formats.xml_file import MAX_NUMBER, MAX_XML_BYTES, comments_before, read_xml, xml_text
+from manitwin.formats.xml_file import MAX_XML_BYTES, comments_before, read_xml, xml_text
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
-_SECTIONS = frozenset({"compiler", "default", "asset", "worldbody"})
-_ASSETS = frozenset({"mesh", "material", "texture"})
-# plug-ins are code, and the others make many bodies of one line
-_NOT_READ = ("attach", "composite", "flexcomp", "plugin", "replicate", "model")
-_WORDS = frozenset({"name", "file", "mesh", "material", "texture", "class", "childclass", "model", "user"})
-_OF_SHAPE_AND_MASS = frozenset(
-    {"pos", "size", "scale", "fromto", "vertex", "refpos", "mass", "density", "diaginertia", "fullinertia", "friction"}
-)
-"""Attributes whose numbers are those of an object; stiffnesses and limits may be as large as anybody likes."""
 _MAX_INCLUDES = 32
 _HEAD_BYTES = 1 << 16
 _LEAST_MASS_KG, _LEAST_INERTIA_KG_M2 = 1e-9, 1e-12
-_MAX_ELEMENTS = 100_000
+NO_OBJECTS = "planes and height fields were left out: they are no objects"
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
 
 
@@ -58,22 +49,8 @@ def open_mjcf(file: Path, files: AssetFiles) -> MjcfSource:
     root = read_xml(file, "mujoco")
     comments = comments_before(root)
     _put_in_includes(file, root, file, files, {file.resolve()})
-    if sum(1 for _ in root.iter()) > _MAX_ELEMENTS:
-        raise AssetError(f"{file.name}: more than {_MAX_ELEMENTS} elements; it is no single object")
-    for tag in _NOT_READ:
-        if root.find(f".//{tag}") is not None:
-            raise AssetError(f"{file.name}: it uses <{tag}>, which is not read; write it out as bodies and geoms")
     texts = (*comments, *(f"{t.get('name')}: {t.get('data')}" for t in root.iterfind("custom/text")))
-    for section in list(root):
-        if section.tag not in _SECTIONS:
-            root.remove(section)
-    for entry in root.xpath("asset/*"):
-        if entry.tag not in _ASSETS:
-            entry.getparent().remove(entry)
-    for element in root.iter(etree.Element):
-        _check_numbers(file, element)
-    _leave_out_repeated(root, files)
-    _leave_out_unknown_materials(root, files)
+    keep_rigid_objects(file, root, files)
     return MjcfSource(file, root, texts)
 
 
@@ -105,41 +82,6 @@ def _put_in_includes(
             parent.insert(position + offset, child)
 
 
-def _leave_out_repeated(root: etree._Element, files: AssetFiles) -> None:
-    """Take out assets that are written twice: parts of robots and scenes bring their own, and are joined by programs."""
-    seen: dict[tuple[str, str], dict[str, str]] = {}
-    for entry in root.xpath("asset/*[@name]"):
-        key, written = (entry.tag, entry.get("name")), dict(entry.attrib)
-        if seen.setdefault(key, written) is not written and seen[key] == written:
-            entry.getparent().remove(entry)
-            files.remark(
-                f"<{entry.tag}> {entry.get('name')[:60]!r} is written twice, which MuJoCo refuses; once was read"
-            )
-
-
-def _leave_out_unknown_materials(root: etree._Element, files: AssetFiles) -> None:
-    known = {entry.get("name") for entry in root.iterfind("asset/material")}
-    for element in root.iter("geom", "site"):
-        name = element.get("material")
-        if name is not None and name not in known:
-            del element.attrib["material"]
-            files.remark(f"the material {name[:60]!r} is nowhere written, which MuJoCo refuses; its shapes are grey")
-
-
-def _check_numbers(file: Path, element: etree._Element) -> None:
-    for name, text in element.attrib.items():
-        if name in _WORDS:
-            continue
-        for word in text.split():
-            try:
-                value = float(word)
-            except ValueError:
-                break
-            bounded = name in _OF_SHAPE_AND_MASS
-            if math.isnan(value) or (bounded and abs(value) > MAX_NUMBER):
-                raise AssetError(f"{file.name}: <{element.tag} {name}> is {value}, no number that an object can have")
-
-
 @dataclass(frozen=True)
 class CompiledMjcf:
     """An MJCF file after MuJoCo's compiler: the spec, the model, and by name what was read from files.
@@ -167,6 +109,9 @@ def compiled(source: MjcfSource, files: AssetFiles) -> CompiledMjcf:
     spec.compiler.discardvisual = False
     meshes = _take_meshes(source, spec, files)
     textures = _take_textures(source, spec, files)
+    for geom in [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD]:  # their data is not read
+        spec.delete(geom)
+        files.remark(NO_OBJECTS)
     try:
         try:
             model = spec.compile()

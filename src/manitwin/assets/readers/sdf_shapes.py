@@ -155,7 +155,7 @@ class SdfShapes:
     def _mesh_parts(self, shape: etree._Element, color: np.ndarray | None, what: str) -> list[trimesh.Trimesh]:
         uri = text_of(shape, "uri") or ""
         path = self._files.find(uri, self._candidates(uri))
-        if path is None:
+        if path is None or self._files.is_of_unread_format(path):
             return []
         scale = text_of(shape, "scale")
         return mesh_parts(

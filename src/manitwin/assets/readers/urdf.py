@@ -27,6 +27,9 @@ from manitwin.robots.urdf import (
     read_urdf,
 )
 
+_WORLD = "world"
+"""Drake and Gazebo know it without a <link>."""
+
 RULES = UrdfRules(
     error=AssetError,
     joint_types=(*JOINT_TYPES, "floating", "planar"),
@@ -58,10 +61,21 @@ def read(path: Path, root: Path | None = None) -> Asset:
 def open_urdf(path: Path, root: Path | None = None) -> UrdfObject:
     """Parse a URDF and choose the object in it; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
-    tree = read_urdf(file, RULES, file.name)
+    tree = read_urdf(file, RULES, file.name, _as_loaders_take_it)
     files = AssetFiles(root or root_of(path), file.resolve().parent)
     files.used.add(file.resolve())
     return UrdfObject(file, tree, _rigid_links(tree, files), files)
+
+
+def _as_loaders_take_it(root: etree._Element) -> None:
+    """Leave out what tools of others add to shapes in namespaces of their own, and add the world that joints hang from."""
+    for geometry in root.iter("geometry"):
+        for foreign in [child for child in geometry.iterchildren("*") if etree.QName(child).namespace]:
+            geometry.remove(foreign)
+    links = {link.get("name") for link in root.findall("link")}
+    parents = {parent.get("link") for parent in root.iterfind("joint/parent")}
+    if links and _WORLD in parents - links:
+        root.insert(0, etree.Element("link", name=_WORLD))
 
 
 def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> Asset:

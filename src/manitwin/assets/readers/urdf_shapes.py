@@ -64,7 +64,8 @@ class LinkShapes:
             return self._mesh_parts(shape, color)
         for key in ("size", "radius", "length"):
             if not all(values_of(shape, key) > 0):
-                raise self._tree.refuse(where, f"has <{shape.tag} {key}={shape.get(key)!r}>, not above zero", "mend it")
+                self._files.remark(f"{where} has no size (<{shape.tag} {key}={shape.get(key)!r}>) and was left out")
+                return []
         solid = _primitive(shape)
         self._files.count(len(solid.faces))
         return [make_part(solid.vertices, solid.faces, material=plain_material(color), name=str(shape.tag))]
@@ -72,7 +73,7 @@ class LinkShapes:
     def _mesh_parts(self, shape: etree._Element, color: np.ndarray | None) -> list[trimesh.Trimesh]:
         name = shape.get("filename") or ""
         path = self._files.find(name, self._candidates(name))
-        if path is None:
+        if path is None or self._files.is_of_unread_format(path):
             return []
         note = "it was not turned, as ROS does not"  # RViz and Gazebo Classic disagree; ROS takes meshes along the link's axes
         return mesh_parts(self._files, path, self._files.mesh(path), color=color, turned_note=note)

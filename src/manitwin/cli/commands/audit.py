@@ -39,6 +39,9 @@ def audit(
     write_baseline: Annotated[
         Path | None, typer.Option(help="Write all that is found as a baseline, and exit with 0.", metavar="FILE")
     ] = None,
+    html: Annotated[
+        Path | None, typer.Option(help="Also write a page of all findings, with the worst in pictures.", metavar="FILE")
+    ] = None,
     explain: Annotated[str | None, typer.Option(help="Say what a rule is about, and stop.", metavar="CODE")] = None,
 ) -> None:
     """Find what is wrong with assets of any tool: mass, inertia, collision, scale, frames, grasps. Exit 1 on errors."""
@@ -79,6 +82,8 @@ def audit(
             f"{len(fragments)} descriptions without a shape, which others include, are no assets and were left alone"
         )
     _write_end(audited, rules, format)
+    if html is not None:
+        _write_page(audited, rules, html, paths or [])
     if write_baseline is not None:
         _write_baseline(audited, write_baseline)
         return
@@ -102,6 +107,24 @@ def _write_baseline(audited: Sequence[Audited], file: Path) -> None:
     except OSError as error:
         raise UsageError(f"{file}: cannot be written ({error.strerror}); give another file") from error
     err_console.print(f"{file}: a baseline of what was found; --baseline takes it")
+
+
+def _write_page(audited: Sequence[Audited], rules: Sequence[RuleText], file: Path, named: Sequence[Path]) -> None:
+    from manitwin.assets.audit.picture import audited_picture
+    from manitwin.assets.root import root_of
+    from manitwin.errors import UsageError
+    from manitwin.web.audit_page import audit_page, shown_assets
+
+    pictures = {}
+    for each in shown_assets(audited):
+        picture = audited_picture(Path(each.asset), root_of(Path(each.asset), named))
+        if picture is not None:
+            pictures[each.asset] = picture
+    try:
+        file.write_bytes(audit_page(audited, rules, pictures))
+    except OSError as error:
+        raise UsageError(f"{file}: cannot be written ({error.strerror}); give another file") from error
+    err_console.print(f"{file}: a page of all findings")
 
 
 def _write_end(audited: Sequence[Audited], rules: Sequence[RuleText], format: str) -> None:

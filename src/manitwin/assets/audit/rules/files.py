@@ -29,7 +29,10 @@ def unreadable(measured: MeasuredAsset) -> Iterator[Complaint]:
 def no_geometry(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of an asset without anything to see or to touch."""
     if measured.body is None:
-        yield Complaint("it has neither visual nor collision geometry")
+        names = measured.asset.missing_files
+        named = ", ".join(repr(name) for name in names[:4]) + (f" and {len(names) - 4} more" if len(names) > 4 else "")
+        why = f", since these files are not there: {named}" if names else ""
+        yield Complaint(f"it has neither visual nor collision geometry{why}", values={"missing": list(names[:50])})
 
 
 def wild_geometry(measured: MeasuredAsset) -> Iterator[Complaint]:

@@ -1,0 +1,107 @@
+"""A picture of an asset as its files say it: what is seen beside what collides."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+import trimesh
+from PIL import Image
+
+from manitwin.assets.asset import Asset
+from manitwin.assets.read import read_asset
+from manitwin.assets.within_limits import within_limits
+from manitwin.errors import AssetError
+from manitwin.formats.meshes.textures import linear_to_srgb, material_of
+from manitwin.geometry.poses import rotation_between
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.render.cameras import Camera, hero_camera
+from manitwin.render.false_colors import id_color
+from manitwin.render.raycast import cast_camera, merged
+
+PANEL_PX = 320
+"""The side of each of the two panels."""
+
+PICTURE = "manitwin.assets.audit.picture:picture_of_path"
+_FINER = 2  # rays along a pixel's side
+_GROUND_RGB, _GREY = (246, 246, 244), (190, 190, 190)
+_AMBIENT = 0.35
+_LARGEST_M = 1e6  # beyond it nothing is measured, and nothing drawn
+_FIELD_OF_VIEW_DEG = 30.0
+
+
+def audited_picture(path: Path, root: Path | None = None) -> bytes | None:
+    """Return the picture of the asset at a path, made in a process with limits; None where there is nothing to draw."""
+    try:
+        picture: bytes | None = within_limits(PICTURE, path, root)
+    except AssetError:
+        return None
+    return picture
+
+
+def picture_of_path(path: Path, root: Path | None = None) -> bytes | None:
+    """Read the asset at a path and return its picture; raises AssetError where it cannot be read."""
+    return asset_picture(read_asset(path, root=root))
+
+
+def asset_picture(asset: Asset) -> bytes | None:
+    """Return a PNG of two panels: the visual parts in their plain colours, and the collision shapes, each in one of its own.
+
+    Both are seen by one camera, upright. None where nothing has a face, or a vertex is no finite place.
+    """
+    seen = [part for part in asset.visual if len(part.faces)]
+    felt = [
+        trimesh.Trimesh(shape.vertices, shape.faces, process=False) for shape in asset.collision if len(shape.faces)
+    ]
+    points = [np.asarray(mesh.vertices, float)[np.unique(mesh.faces)] for mesh in (*seen, *felt)]
+    if not points or not all((np.abs(each) <= _LARGEST_M).all() for each in points):  # NaN is not less either
+        return None
+    upright = rotation_between(
+        np.array([0.0, 1, 0]) if asset.up == "y" else np.array([0.0, 0, 1]), np.array([0.0, 0, 1])
+    )
+    corners = np.concatenate(points) @ upright.T
+    if not np.ptp(corners, axis=0).any():
+        return None
+    side = PANEL_PX * _FINER
+    camera = hero_camera(corners, fov_y_deg=_FIELD_OF_VIEW_DEG, width_px=side, height_px=side)
+    panels = [
+        _panel(seen, [_plain_color(part) for part in seen], upright, camera),
+        _panel(felt, [id_color(number + 1) for number in range(len(felt))], upright, camera),
+    ]
+    buffer = io.BytesIO()
+    Image.fromarray(np.concatenate(panels, axis=1)).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def _panel(
+    parts: Sequence[trimesh.Trimesh], colors: Sequence[tuple[int, int, int]], upright: np.ndarray, camera: Camera
+) -> np.ndarray:
+    """Return ``(P, P, 3) uint8`` of parts in one colour each, lit from beside the camera, both sides alike."""
+    picture = np.full((camera.height_px, camera.width_px, 3), _GROUND_RGB, np.uint8)
+    if parts:
+        mesh = merged(list(parts))
+        turned = trimesh.Trimesh(np.asarray(mesh.vertices) @ upright.T, mesh.faces, process=False)
+        _, normals, face = cast_camera(RayCaster(turned), camera)
+        hit = face >= 0
+        light = camera.camera_to_object[:3, :3] @ (np.array([-0.4, 0.5, 1.0]) / np.linalg.norm([-0.4, 0.5, 1.0]))
+        shade = _AMBIENT + (1 - _AMBIENT) * np.abs(normals[hit] @ light)
+        of_face = np.repeat(np.array(colors, float), [len(part.faces) for part in parts], axis=0)
+        picture[hit] = np.rint(of_face[face[hit]] * shade[:, None]).astype(np.uint8)
+    return np.asarray(cv2.resize(picture, (PANEL_PX, PANEL_PX), interpolation=cv2.INTER_AREA))
+
+
+def _plain_color(part: trimesh.Trimesh) -> tuple[int, int, int]:
+    """Return the colour (sRGB) of a part's material; of a textured one the mean of its picture."""
+    material = material_of(part)
+    texture = material.baseColorTexture
+    if texture is not None:
+        red, green, blue = np.asarray(texture.convert("RGB").resize((8, 8))).reshape(-1, 3).mean(0)
+        return round(float(red)), round(float(green)), round(float(blue))
+    factor = material.baseColorFactor  # linear, in 255ths (``pbr_material``)
+    if factor is None:
+        return _GREY
+    red, green, blue = 255 * linear_to_srgb(np.asarray(factor, float)[:3] / 255)
+    return round(float(red)), round(float(green)), round(float(blue))

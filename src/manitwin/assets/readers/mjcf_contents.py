@@ -1,0 +1,119 @@
+"""What of an MJCF file describes rigid objects; the rest is taken out, and said where an object lacks it."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from pathlib import Path
+
+from lxml import etree  # type: ignore[import-untyped]
+
+from manitwin.assets.asset_files import AssetFiles
+from manitwin.errors import AssetError
+from manitwin.formats.xml_file import MAX_NUMBER
+
+_SECTIONS = frozenset({"compiler", "default", "asset", "worldbody"})
+_ASSETS = frozenset({"mesh", "material", "texture"})
+_NOT_READ = ("attach", "model")  # of other files
+_SOFT = ("composite", "flexcomp")
+_CODE = "plugin"
+_WORDS = frozenset({"name", "file", "mesh", "material", "texture", "class", "childclass", "model", "user"})
+_OF_SHAPE_AND_MASS = frozenset(
+    {"pos", "size", "scale", "fromto", "vertex", "refpos", "mass", "density", "diaginertia", "fullinertia", "friction"}
+)
+"""Attributes whose numbers are those of an object; stiffnesses and limits may be as large as anybody likes."""
+_MAX_ELEMENTS = 100_000
+
+
+def keep_rigid_objects(file: Path, root: etree._Element, files: AssetFiles) -> None:
+    """Take everything out of a parsed MJCF that is no part of a rigid object; raises AssetError for what is not read.
+
+    Composites and flexes are soft, plug-ins are code, and neither is read; ``replicate`` stays, which MuJoCo writes out.
+    """
+    if _written_out(root) > _MAX_ELEMENTS:
+        raise AssetError(f"{file.name}: more than {_MAX_ELEMENTS} elements; it is no single object")
+    for tag in _NOT_READ:
+        if root.find(f".//{tag}") is not None:
+            raise AssetError(f"{file.name}: it uses <{tag}>, which is not read; write it out as bodies and geoms")
+    for tag in _SOFT:
+        for element in list(root.iter(tag)):
+            element.getparent().remove(element)
+            files.remark(f"<{tag}> is no rigid body and was left out")
+    for section in list(root):
+        if section.tag not in _SECTIONS:
+            root.remove(section)
+    _leave_out_plugins(root, files)
+    for entry in root.xpath("asset/*"):
+        if entry.tag not in _ASSETS:
+            entry.getparent().remove(entry)
+    for element in root.iter(etree.Element):
+        _check_numbers(file, element)
+    _leave_out_repeated(root, files)
+    _leave_out_unknown_materials(root, files)
+
+
+def _written_out(element: etree._Element) -> float:
+    """Return how many elements there are once every <replicate> is written out."""
+    count = 0.0
+    weights: dict[etree._Element, float] = {}
+    for each in element.iter(etree.Element):
+        weight = weights.get(each.getparent(), 1.0)
+        if each.tag == "replicate":
+            with suppress(ValueError):  # MuJoCo says what is wrong with it
+                weight *= max(1.0, float(each.get("count", "1")))
+        weights[each] = weight
+        count += weight
+    return count
+
+
+def _leave_out_plugins(root: etree._Element, files: AssetFiles) -> None:
+    """Take out plug-ins, and the meshes and geoms whose shape is what one computes."""
+    computed = set()
+    for plugin in list(root.iter(_CODE)):
+        holder = plugin.getparent()
+        holder.remove(plugin)
+        if holder.tag == "mesh":
+            computed.add(holder.get("name"))
+            holder.getparent().remove(holder)
+        elif holder.tag == "geom" and holder.get("type") == "sdf":
+            holder.getparent().remove(holder)
+        else:  # it adds a force, say
+            continue
+        files.remark("shapes that a plug-in computes were left out: it is code, and none is run")
+    for geom in [geom for geom in root.iter("geom") if geom.get("mesh") in computed and computed]:
+        geom.getparent().remove(geom)
+
+
+def _leave_out_repeated(root: etree._Element, files: AssetFiles) -> None:
+    """Take out assets that are written twice: parts of robots and scenes bring their own, and are joined by programs."""
+    seen: dict[tuple[str, str], dict[str, str]] = {}
+    for entry in root.xpath("asset/*[@name]"):
+        key, written = (entry.tag, entry.get("name")), dict(entry.attrib)
+        if seen.setdefault(key, written) is not written and seen[key] == written:
+            entry.getparent().remove(entry)
+            files.remark(
+                f"<{entry.tag}> {entry.get('name')[:60]!r} is written twice, which MuJoCo refuses; once was read"
+            )
+
+
+def _leave_out_unknown_materials(root: etree._Element, files: AssetFiles) -> None:
+    known = {entry.get("name") for entry in root.iterfind("asset/material")}
+    for element in root.iter("geom", "site"):
+        name = element.get("material")
+        if name is not None and name not in known:
+            del element.attrib["material"]
+            files.remark(f"the material {name[:60]!r} is nowhere written, which MuJoCo refuses; its shapes are grey")
+
+
+def _check_numbers(file: Path, element: etree._Element) -> None:
+    for name, text in element.attrib.items():
+        if name in _WORDS:
+            continue
+        for word in text.split():
+            try:
+                value = float(word)
+            except ValueError:
+                break
+            bounded = name in _OF_SHAPE_AND_MASS
+            if math.isnan(value) or (bounded and abs(value) > MAX_NUMBER):
+                raise AssetError(f"{file.name}: <{element.tag} {name}> is {value}, no number that an object can have")
