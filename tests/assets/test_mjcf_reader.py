@@ -190,7 +190,7 @@ def test_replicated_bodies_are_written_out_and_the_first_is_read(tmp_path: Path)
     asset = read_asset(mjcf(tmp_path, f'<replicate count="3" offset="0.1 0 0">{body}</replicate>'))
     assert len(asset.collision) == 1 and len(asset.remarks) == 2
     many = read_asset(mjcf(tmp_path, f'<replicate count="400" offset="0.1 0 0">{body}</replicate>'))
-    assert len(many.remarks) == 1 and "399 more bodies" in many.remarks[0]
+    assert len(many.remarks) == 1 and "398 more bodies" in many.remarks[0]
     nested = f'<replicate count="1000"><replicate count="1000">{body}</replicate></replicate>'
     with pytest.raises(AssetError, match="no single object"):
         read_asset(mjcf(tmp_path, nested))

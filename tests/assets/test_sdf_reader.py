@@ -250,3 +250,22 @@ def test_elements_of_a_prefix_that_nobody_declares_are_skipped_and_broken_xml_is
     (tmp_path / "three.sdf").write_text("<drake:sdf><model/></drake:sdf>")
     with pytest.raises(AssetError, match="not <sdf>"):
         read_asset(tmp_path / "three.sdf", "sdf")
+
+
+def test_hyphens_within_a_comment_and_a_model_that_is_not_there(tmp_path: Path) -> None:
+    inside = "<!-- density of foil -- thin ---><!---->" + link("a")
+    assert len(read(tmp_path / "one", inside).visual) == 1
+    with pytest.raises(AssetError, match="XML is broken"):
+        read(tmp_path / "two", inside + "<link>")
+    with pytest.raises(AssetError, match=r"'model://gone' that it includes is not there; give the folder"):
+        read(tmp_path / "three", "<include><uri>model://gone</uri></include>")
+
+
+def test_all_links_of_what_stands_fast_are_read_and_many_that_move_are_counted(tmp_path: Path) -> None:
+    links = "".join(link(name) for name in "abcdef")
+    stairs = read(tmp_path / "one", "<static>true</static>" + links)
+    assert stairs.static and len(stairs.visual) == 6 and stairs.remarks == ()
+    loose = read(tmp_path / "two", links)
+    assert len(loose.visual) == 1
+    (said,) = loose.remarks
+    assert said.startswith("link 'b' is joined to nothing fixed, and with it 4 more links were left out")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -20,6 +20,8 @@ MAX_SHAPES = 4096
 MAX_FACES = 8_000_000  # of all shapes together: one mesh may be named by many of them
 UNREAD_FORMATS = frozenset({".vtk", ".vtu", ".wrl", ".iv", ".x3d", ".3ds", ".fbx", ".off", ".ac", ".bin", ".mesh"})
 """Of meshes that descriptions name: for some engines, or for none but the one that they were made for."""
+MOST_NAMED = 3
+"""Of the parts that are left out: of a robot's or a building's, a person reads the count."""
 _NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' is not there")
 
 
@@ -44,6 +46,13 @@ class AssetFiles:
         """Note something once."""
         if sentence not in self.remarks:
             self.remarks.append(sentence)
+
+    def remark_left_out(self, parts: Sequence[str], what: str) -> None:
+        """Note parts that are not of the rigid object that is read: each by what is said of it, or many as their count."""
+        if len(parts) > MOST_NAMED:
+            self.remark(f"{parts[0]}, and with it {len(parts) - 1} more {what} were left out: one rigid object is read")
+        for part in parts if len(parts) <= MOST_NAMED else ():
+            self.remark(f"{part} and was left out: one rigid object is read")
 
     def find(self, name: str, candidates: Iterable[Path]) -> Path | None:
         """Return the first candidate that is a file below the root; None, and noted as missing, where there is none.

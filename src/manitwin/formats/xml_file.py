@@ -20,6 +20,7 @@ from manitwin.formats.bounded_file import Refusal, read_bytes
 from manitwin.formats.markdown import one_line
 
 MAX_XML_BYTES = 64 << 20
+_HYPHENS_IN_COMMENT = "ERR_HYPHEN_IN_COMMENT"
 _UNKNOWN_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
 _HEAD_BYTES, _DECLARATION_BYTES = 1 << 16, 1 << 10
 MAX_NUMBER = 1e9  # no length, mass or moment of an object that a gripper meets comes near
@@ -70,7 +71,10 @@ def parse_xml(
     try:
         root = etree.fromstring(data, parser)
     except etree.XMLSyntaxError as error:
-        if {entry.type_name for entry in parser.error_log} != {_UNKNOWN_PREFIX}:
+        kinds = {entry.type_name for entry in parser.error_log}
+        if _HYPHENS_IN_COMMENT in kinds and (mended := _with_sound_comments(data)) != data:
+            return parse_xml(mended, tag, name, refusal=refusal, comments=comments, max_bytes=max_bytes)
+        if kinds != {_UNKNOWN_PREFIX}:
             raise refusal(f"{name}: its XML is broken ({' '.join(str(error).split())[:120]}); mend it") from error
         root = _without_unknown_prefixes(etree.fromstring(data, _parser(comments, huge_tree, recover=True)))
     if root.getroottree().docinfo.doctype:
@@ -89,6 +93,16 @@ def _parser(comments: bool, huge_tree: bool, recover: bool = False) -> etree.XML
         huge_tree=huge_tree,
         recover=recover,
     )
+
+
+def _with_sound_comments(data: bytes) -> bytes:
+    """Return a document without two hyphens within comments, which TinyXML and so Gazebo, PyBullet and MuJoCo do not mind."""
+
+    def apart(comment: re.Match[bytes]) -> bytes:
+        inside = re.sub(rb"-(?=-)", b"- ", comment.group(1))
+        return b"<!--" + inside + (b" -->" if inside.endswith(b"-") else b"-->")
+
+    return re.sub(rb"<!--(.*?)-->", apart, data, flags=re.DOTALL)
 
 
 def _without_unknown_prefixes(root: etree._Element) -> etree._Element:

@@ -61,7 +61,8 @@ class GivenParts(Record):
 class ImportRecord(Record):
     """An imported asset in the object frame: Z up, origin at the bottom centre of its visual meshes, metres.
 
-    ``asset_to_object`` is what brought the asset's own axes there. ``missing`` says in words what it does not give.
+    ``asset_to_object`` is what brought the asset's own axes there. ``missing`` says in words what it does not give,
+    ``dropped`` what it gives and was not taken over, and why.
     """
 
     import_version: Literal[1] = 1
@@ -86,6 +87,7 @@ class ImportRecord(Record):
     rests: list[Matrix4]
     missing: list[str]
     remarks: list[str]
+    dropped: list[str] = Field(default_factory=list)
     parts: GivenParts | None = None
 
     @property

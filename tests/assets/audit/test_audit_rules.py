@@ -318,3 +318,41 @@ def test_what_stands_fast_is_asked_for_no_mass_and_judged_by_no_hand() -> None:
     static = replace(scaled(clean(), 100), static=True, inertial=Inertial(), contact=Contact())
     codes = {finding.code for finding in audit_asset(static, RULES)}
     assert not codes & {"MAS001", "SCL001", "COL003", "COL004", "FRI001"}
+    wrong = replace(clean(), static=True, collision=(), inertial=Inertial(0.0, np.full(3, 9.0), -np.eye(3)))
+    assert errors(audit_asset(wrong, RULES)) == set()
+
+
+def test_the_shape_of_what_lacks_a_mesh_is_not_judged() -> None:
+    half = replace(
+        clean(), visual=(textured(box((0.01, 0.01, 0.01), (0, 0, 0))),), rests=(), missing_files=("mug.dae",)
+    )
+    assert errors(audit_asset(half, RULES)) == {"FIL002"}
+    assert "COM002" in errors(audit_asset(replace(half, missing_files=("paint.png",)), RULES))
+
+
+def test_a_size_is_wrong_where_its_own_mass_says_so() -> None:
+    """A rail of 4 m that weighs as a rail does is none of a hand's things, and not wrong."""
+
+    def long(sides: tuple[float, float, float], mass_kg: float | None) -> set[str]:
+        mesh = box(sides, (0, 0, sides[2] / 2))
+        return codes(
+            audit_asset(
+                replace(
+                    clean(), name="rail", category=None, captions=(), visual=(textured(mesh),), frames=(), grasps=(), rests=(),
+                    collision=(shape("rail", np.asarray(mesh.vertices)),), inertial=Inertial(mass_kg),
+                ),
+                RULES,
+            )
+        )  # fmt: skip
+
+    assert "SCL001" not in long((4.0, 0.2, 0.2), 30.0)
+    assert "SCL001" in long((4.0, 4.0, 2.0), 30.0)  # lighter than 32 m3 of air
+    assert "SCL001" not in long((4.0, 0.2, 0.2), None) and "SCL001" in long((40.0, 2.0, 2.0), None)
+    assert "SCL001" not in long((0.002, 0.002, 0.001), 1e-5) and "SCL001" in long((8e-5, 8e-5, 8e-5), 0.3)
+
+
+def test_a_plane_is_a_ground_and_no_aeroplane() -> None:
+    ground = trimesh.creation.box((1.9, 1.9, 0.01))
+    plane = replace(clean(), name="ground_plane", category=None, visual=(textured(ground),), collision=())
+    assert "SCL002" not in codes(audit_asset(plane, RULES))
+    assert "SCL002" in codes(audit_asset(replace(plane, name="toy_airplane"), RULES))

@@ -105,7 +105,9 @@ def test_command_prints_one_line_an_asset(tmp_path: Path) -> None:
     done = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out"), "--from", "urdf"])
     assert done.exit_code == 0, done.output
     said = " ".join(done.output.split())
-    assert "mug: urdf; kept mass 0.32 kg, friction 0.55, inertia; missing restitution" in said
+    kept = "mass 0.32 kg, centre of mass, inertia, friction 0.55, dynamic friction 0.55"
+    assert f"mug: urdf; kept {kept}; missing restitution" in said
+    assert "dropped 1 collision shape: a build makes and checks its own" in said
     assert "1 imported, 0 not" in said
     again = CliRunner().invoke(app, [str(path), "-o", str(tmp_path / "out")])
     assert again.exit_code == 0 and "mug: imported before, left as it is" in again.output

@@ -7,11 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from typer.testing import CliRunner
 
 from foreign_assets import embodiedgen, gso, manitwin100k, mug_urdf
 from handmade import mug
 from manitwin.assets.importers.importer import import_assets
 from manitwin.assets.read import read_asset
+from manitwin.cli.main import app
 from manitwin.errors import AssetError, UsageError
 from manitwin.formats.glb import read_glb
 from manitwin.formats.meshes.textures import material_of
@@ -217,3 +219,44 @@ def test_import_record_that_was_broken_is_one_line(tmp_path: Path) -> None:
     (folder / "import.json").write_text(json.dumps(record | {"mass_kg": -1}))
     with pytest.raises(UsageError, match=r"import\.json: mass_kg"):
         read_import_record(folder / "import.json")
+
+
+def test_mass_properties_that_no_body_has_are_dropped_with_the_reason(tmp_path: Path) -> None:
+    def told(inertial: str) -> ImportRecord:
+        path = mug_urdf(tmp_path / "in", mass_kg=0.32)
+        head, rest = path.read_text().split("<inertial>")
+        path.write_text(f"{head}<inertial>{inertial}</inertial>{rest.split('</inertial>')[1]}")
+        return imported(path, tmp_path / "out")[0]
+
+    tensor = '<inertia ixx="{}" ixy="0" ixz="0" iyy="{}" iyz="0" izz="{}"/>'
+    inside, outside = '<origin xyz="0.505 0 0.245"/><mass value="0.32"/>', '<origin xyz="3 0 0"/><mass value="0.32"/>'
+    for wrong, why in (
+        (tensor.format("5e-4", "5e-4", "4e-3"), "inertia: principal moments"),
+        (tensor.format("-5e-4", "5e-4", "4e-4"), "inertia: the inertia is not positive definite"),
+        (tensor.format("1.0", "1.0", "1.0"), "inertia: the inertia is the template's constant"),
+    ):
+        record = told(inside + wrong)
+        assert record.inertia_kg_m2 is None and record.center_of_mass_m is not None
+        assert any(reason.startswith(why) for reason in record.dropped), record.dropped
+        assert "inertia" not in record.missing
+    record = told(outside + tensor.format("5e-4", "5e-4", "4e-4"))
+    assert record.center_of_mass_m is None and any("outside the object's convex hull" in d for d in record.dropped)
+    assert told(inside + tensor.format("5e-4", "5e-4", "4e-4")).dropped == [
+        "1 collision shape: a build makes and checks its own"
+    ]
+
+
+def test_report_has_what_was_kept_and_dropped_of_each_and_why_one_failed(tmp_path: Path) -> None:
+    mug_urdf(tmp_path / "in" / "a", mass_kg=0.0)
+    (tmp_path / "in" / "bad.urdf").write_text("<robot name='x'/>")
+    words = ["import", str(tmp_path / "in"), "-o", str(tmp_path / "out"), "--report", str(tmp_path / "report.json")]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 3, done.output
+    report = json.loads((tmp_path / "report.json").read_text())
+    assert report["summary"] == {"imported": 1, "imported_before": 0, "not_imported": 1}
+    mug_entry, bad = report["assets"]
+    assert mug_entry["folder"] == "mug" and "centre of mass" in mug_entry["kept"]
+    assert "mass: 0 is none that an object can have" in mug_entry["dropped"]
+    assert bad["folder"] is None and "no <link>" in bad["error"]
+    refused = CliRunner().invoke(app, [*words[:-1], str(tmp_path / "no" / "report.json")])
+    assert "cannot be written" in str(refused.exception)

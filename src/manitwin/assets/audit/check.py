@@ -16,16 +16,28 @@ from manitwin.twin.store import RECORD, read_record
 STOPS = ("FIL005", "FIL006")
 """Where one of these holds there is nothing to measure."""
 
+OF_THE_WHOLE_SHAPE = (
+    "MAS003", "MAS004", "INE005", "COM002", "COM003", "COL", "SCL", "FRM005", "GRA", "PLC", "TWN", "RUN"
+)  # fmt: skip
+"""Rules that measure the shape: where a mesh of it is not there (FIL002 says so), what is left says nothing of it."""
+OF_WHAT_MOVES = ("MAS", "INE", "COM", "COL001", "FRI001", "SCL001", "RUN")
+"""Rules that are not held against what stands fast: no engine asks it for a mass."""
+_MESHES = frozenset({".obj", ".stl", ".dae", ".msh", ".glb", ".gltf", ".ply", ".usd", ".usda", ".usdc", ".usdz"})
+
 
 def audit_asset(asset: Asset, rules: Sequence[Rule], engines: Sequence[str] = ()) -> list[Finding]:
     """Hold rules against an asset, in their order, and run it in engines.
 
-    One whose geometry cannot be measured gets that finding only.
+    One whose geometry cannot be measured gets that finding only, and one of which a mesh is not there none of its shape.
     """
     measured = MeasuredAsset(asset, tuple(engines))
     broken = [code for code in STOPS if measured.complaints(RULES_BY_CODE[code].check)]
     if broken:
         rules = [rule for rule in rules if rule.code in broken]
+    elif any(Path(name).suffix.lower() in _MESHES for name in asset.missing_files):
+        rules = [rule for rule in rules if not rule.code.startswith(OF_THE_WHOLE_SHAPE)]
+    if asset.static:
+        rules = [rule for rule in rules if not rule.code.startswith(OF_WHAT_MOVES)]
     return [_finding(rule, asset.path, complaint) for rule in rules for complaint in measured.complaints(rule.check)]
 
 

@@ -32,6 +32,9 @@ FEW = 40
 
 Measure = TypeVar("Measure")
 
+OTHER_IN_SIMULATION = frozenset({"plane", "planes"})
+"""Words whose everyday sense is not that of names of assets: a plane is a ground there, and no aeroplane."""
+
 CLOSED = 1e-3
 """The sum of the area vectors of a closed surface is zero; up to this share of the area it counts as closed."""
 
@@ -194,7 +197,9 @@ class MeasuredAsset:
     @cached_property
     def prior(self) -> Prior | None:
         """The prior of the asset's category, or of its name; None where unknown."""
-        return lookup(self.asset.category) or lookup(self._name_in_words)
+        by_category = lookup(self.asset.category)
+        words = self._name_in_words.lower().split()
+        return by_category or (None if words and words[-1] in OTHER_IN_SIMULATION else lookup(self._name_in_words))
 
     @cached_property
     def material_words(self) -> str:

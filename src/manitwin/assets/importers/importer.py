@@ -68,8 +68,10 @@ def kept_words(record: ImportRecord) -> list[str]:
     """Return in words what an import kept, besides the mesh."""
     kept = [] if record.category is None else [record.category]
     kept += [] if record.mass_kg is None else [f"mass {record.mass_kg:.4g} kg"]
-    kept += [] if record.friction_static is None else [f"friction {record.friction_static:.3g}"]
+    kept += [] if record.center_of_mass_m is None else ["centre of mass"]
     kept += [] if record.inertia_kg_m2 is None else ["inertia"]
+    kept += [] if record.friction_static is None else [f"friction {record.friction_static:.3g}"]
+    kept += [] if record.friction_dynamic is None else [f"dynamic friction {record.friction_dynamic:.3g}"]
     for count, what in (
         (len(record.captions), "captions"),
         (len(record.functional_points), "functional points"),

@@ -10,6 +10,7 @@ import trimesh
 from pydantic import ValidationError
 
 from manitwin.assets.asset import AnnotatedFrame, AnnotatedGrasps, Asset
+from manitwin.assets.importers.dropped import CENTER, INERTIA, impossible_mass_properties, left_out
 from manitwin.errors import AssetError
 from manitwin.geometry.canonical_frame import object_frame
 from manitwin.geometry.poses import GLTF_TO_OBJECT, inverse, transform_points
@@ -41,21 +42,28 @@ def asset_to_object(asset: Asset) -> np.ndarray:
 def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
     """Return the import record of an asset; what cannot be true is not kept, and named among what is missing."""
     remarks = list(asset.remarks)
-    numbers, missing = _numbers(asset)
+    numbers, missing, dropped = _numbers(asset)
+    impossible = impossible_mass_properties(asset)
+    dropped += [f"{what}: {why}" for what, why in impossible.items()]
     functional = [_point(frame, to_object) for frame in asset.frames if frame.kind in ("functional", "target")]
     grasp = [_point(frame, to_object) for frame in asset.frames if frame.kind == "contact"]
     for points, what in ((functional, "functional"), (grasp, "grasp")):
         if len(points) > _MAX_POINTS:
-            remarks.append(f"of {len(points)} {what} points the first {_MAX_POINTS} were kept")
+            dropped.append(
+                f"{len(points) - _MAX_POINTS} {what} points: the first {_MAX_POINTS} are enough to choose from"
+            )
     rests, repairs = settled_rests(asset, to_object)
     remarks += repairs
-    center, inertia = asset.inertial.center_of_mass_m, asset.inertial.inertia_kg_m2
+    center = None if CENTER in impossible else asset.inertial.center_of_mass_m
+    inertia = None if INERTIA in impossible else asset.inertial.inertia_kg_m2
     rotation = to_object[:3, :3]
     captions = list(dict.fromkeys(" ".join(text.split())[:_MAX_LETTERS] for text in asset.captions if text.strip()))
+    if len(captions) > _MAX_TEXTS:
+        dropped.append(f"{len(captions) - _MAX_TEXTS} captions: the first {_MAX_TEXTS} are enough to choose from")
     grasps = [_grasps(entry, to_object) for entry in asset.grasps if len(entry.held)]
     absent = {
-        "centre of mass": center is None,
-        "inertia": inertia is None,
+        CENTER: asset.inertial.center_of_mass_m is None,
+        INERTIA: asset.inertial.inertia_kg_m2 is None,
         "material": not asset.contact.material,
         "category": not asset.category,
         "captions": not captions,
@@ -87,6 +95,7 @@ def import_record(asset: Asset, to_object: np.ndarray) -> ImportRecord:
             "grasps": grasps,
             "rests": [rest.tolist() for rest in rests],
             "missing": missing,
+            "dropped": [*dropped, *left_out(asset)],
             "remarks": list(dict.fromkeys(remarks)),
             **numbers,
         },
@@ -102,8 +111,8 @@ def _validated(asset: Asset, fields: dict[str, Any]) -> ImportRecord:
         raise AssetError(f"{asset.path.name}: {place}: {first['msg']}; mend it where it was made") from error
 
 
-def _numbers(asset: Asset) -> tuple[dict[str, float | None], list[str]]:
-    """Return mass, friction and restitution where they can be true, and what is missing of them."""
+def _numbers(asset: Asset) -> tuple[dict[str, float | None], list[str], list[str]]:
+    """Return mass, friction and restitution where they can be true, what is missing of them, and what was dropped and why."""
     contact = asset.contact
     given = {
         "mass_kg": ("mass", asset.inertial.mass_kg, 0.0, np.inf),
@@ -112,18 +121,21 @@ def _numbers(asset: Asset) -> tuple[dict[str, float | None], list[str]]:
         "restitution": ("restitution", contact.restitution, -1e-9, 1.0),
     }
     numbers: dict[str, float | None] = {}
-    missing = []
+    missing: list[str] = []
+    dropped: list[str] = []
     for key, (what, value, above, at_most) in given.items():
         numbers[key] = value if value is not None and above < value <= at_most else None
         if value is None:
             missing.append(what)
         elif numbers[key] is None:
             missing.append(f"{what} (declared as {value:g})")
+            dropped.append(f"{what}: {value:g} is none that an object can have")
     static, dynamic = numbers["friction_static"], numbers["friction_dynamic"]
     if static is not None and dynamic is not None and dynamic > static:
         numbers["friction_dynamic"] = None
         missing.append(f"dynamic friction (declared as {dynamic:g}, above the static {static:g})")
-    return numbers, missing
+        dropped.append(f"dynamic friction: {dynamic:g} is above the static {static:g}")
+    return numbers, missing, dropped
 
 
 def _point(frame: AnnotatedFrame, to_object: np.ndarray) -> GivenPoint:

@@ -33,7 +33,6 @@ _INERTIA_FROM_GEOM = 1  # mjtInertiaFromGeom: true; 2 is auto
 _SHOWN_GROUPS = 3  # MuJoCo's viewer shows groups 0 to 2 (mjvOption.geomgroup)
 _KINDS = mujoco.mjtGeom
 _WORLD = 0
-_MOST_NAMED = 24  # of bodies that are left out
 _SHEET_M, _UNBOUNDED_M = 1e-3, 1.0  # how thick a plane is shown, and how wide one without an end
 _MESH_KINDS = (int(_KINDS.mjGEOM_MESH), int(_KINDS.mjGEOM_SDF))
 
@@ -99,12 +98,7 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, 
         if model.ngeom:
             return next((g for g in groups.values() if any(model.body_geomnum[index] for index, _ in g)), world)
         raise AssetError(f"{file.name}: no body of it has a geom")
-    if len(shaped) > _MOST_NAMED:
-        files.remark(f"{len(shaped) - 1} more bodies move by themselves and were left out: one rigid object is read")
-    for group in shaped[1:] if len(shaped) <= _MOST_NAMED else ():
-        files.remark(
-            f"body {model.body(group[0][0]).name!r} moves by itself and was left out: one rigid object is read"
-        )
+    files.remark_left_out([f"body {model.body(g[0][0]).name!r} moves by itself" for g in shaped[1:]], "bodies")
     return shaped[0]
 
 

@@ -97,7 +97,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         unit_m=1.0,
         inertial=_declared_inertial(opened),
         contact=_declared_contact(opened),
-        static=(text_of(opened.model, "static") or "").lower() in ("true", "1"),
+        static=_stands_fast(opened.model),
         license=licence,
         attribution=attribution,
         files=opened.files.sorted_files(),
@@ -118,15 +118,27 @@ def _only_model(file: Path, root: etree._Element, files: AssetFiles) -> etree._E
             name = other.get("name") or text_of(other, "uri") or ""
             files.remark(f"the {'included' if tag == 'include' else 'nested'} model {name[:60]!r} was left out")
     if model.find("link") is None:
+        included = text_of(model, "include/uri")
+        if included is not None:
+            raise AssetError(
+                f"{file.name}: its model has no <link> of its own, and the model {included[:80]!r} that it includes is not there;"
+                " give the folder that holds both"
+            )
         raise AssetError(f"{file.name}: its model has no <link>")
     return model
+
+
+def _stands_fast(model: etree._Element) -> bool:
+    return (text_of(model, "static") or "").lower() in ("true", "1")
 
 
 def _rigid_links(
     file: Path, model: etree._Element, frames: ModelFrames, files: AssetFiles
 ) -> tuple[etree._Element, ...]:
-    """Return the links of the first rigid group that has a shape, in the order of the file."""
+    """Return the links of the first rigid group that has a shape, in the order of the file; all of what stands fast."""
     links = {link.get("name"): link for link in model.findall("link")}
+    if _stands_fast(model):
+        return tuple(links.values())
     group = {name: {name} for name in links}
     moves: dict[str, str] = {}
     for joint in model.findall("joint"):
@@ -139,13 +151,15 @@ def _rigid_links(
             large |= small
             group.update(dict.fromkeys(small, large))
     chosen: set[str] | None = None
+    left_out = []
     for name, link in links.items():
         shaped = link.find("visual") is not None or link.find("collision") is not None
         if chosen is None and shaped:
             chosen = group[name]
         elif chosen is not None and shaped and name not in chosen:
             how = f"moves by joint {moves[name]}" if name in moves else "is joined to nothing fixed"
-            files.remark(f"link {name!r} {how} and was left out: one rigid object is read")
+            left_out.append(f"link {name!r} {how}")
+    files.remark_left_out(left_out, "links")
     chosen = chosen or group[next(iter(links))]
     return tuple(link for name, link in links.items() if name in chosen)
 

@@ -180,12 +180,14 @@ def _rigid_links(tree: UrdfTree, files: AssetFiles) -> tuple[tuple[etree._Elemen
                     heads.append(child)
         groups.append(group)
     shaped = [group for group in groups if any(_has_shape(links[name]) for name, _ in group)]
+    left_out = []
     for group in shaped[1:]:
         holder = held.get(group[0][0])
         how = "is joined to nothing"
         if holder is not None:
             how = f"moves by joint {holder.get('name')} ({holder.get('type')})"
-        files.remark(f"link {group[0][0]!r} {how} and was left out: one rigid object is read")
+        left_out.append(f"link {group[0][0]!r} {how}")
+    files.remark_left_out(left_out, "links")
     chosen = shaped[0] if shaped else groups[0]
     return tuple((links[name], pose) for name, pose in chosen)
 

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from manitwin.cli import choices, options
-from manitwin.cli.console import out_console, print_error
+from manitwin.cli.console import err_console, out_console, print_error
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from manitwin.assets.importers.importer import Imported
 
 
 def import_(
@@ -27,13 +32,19 @@ def import_(
             metavar="FORMAT",
         ),
     ] = "auto",
+    report: Annotated[
+        Path | None,
+        typer.Option(help="Also write as JSON what was kept and dropped of each asset, and why.", metavar="FILE"),
+    ] = None,
 ) -> None:
     """Take assets of other tools over, keep what is annotated, and say what is missing."""
 
     from manitwin.assets.importers.importer import import_assets, kept_words
 
     done = there = failed = 0
+    every = []
     for imported in import_assets(paths, out, format=format):  # type: ignore[arg-type]
+        every.append(imported)
         if imported.record is None or imported.folder is None:
             failed += 1
             named = str(imported.error).startswith(f"{imported.path}: ")
@@ -48,9 +59,24 @@ def import_(
         kept = ", ".join(kept_words(record)) or "the mesh only"
         missing = f"; missing {', '.join(record.missing)}" if record.missing else ""
         out_console.print(f"{imported.folder.name}: {record.format}; kept {kept}{missing}")
+        for reason in record.dropped:
+            out_console.print(f"  dropped {reason}")
         for remark in record.remarks:
             out_console.print(f"  {remark}")
+    if report is not None:
+        _write_report(every, report)
     before = f", {there} imported before" if there else ""
     then = f"; manitwin build {out} -o TWINS fills in what is missing" if done or there else ""
     out_console.print(f"{done} imported{before}, {failed} not{then}")
     raise typer.Exit(3 if failed else 0)
+
+
+def _write_report(every: Sequence[Imported], file: Path) -> None:
+    from manitwin.assets.importers.report import report_of
+    from manitwin.errors import UsageError
+
+    try:
+        file.write_text(report_of(every), encoding="utf-8")
+    except OSError as error:
+        raise UsageError(f"{file}: cannot be written ({error.strerror}); give another file") from error
+    err_console.print(f"{file}: what was kept and dropped of each asset")

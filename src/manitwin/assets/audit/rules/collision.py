@@ -30,8 +30,8 @@ MANY_SHAPES, MANY_VERTICES = 128, 255
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an asset without collision shapes."""
-    if not measured.asset.collision and measured.visual is not None:
+    """Complain of an asset that may move and has no collision shapes; what stands fast may be there to be seen."""
+    if not measured.asset.collision and measured.visual is not None and not measured.asset.static:
         yield Complaint("there are no collision shapes: the object falls through the table")
 
 

@@ -10,8 +10,14 @@ from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.models.annotators.priors import Interval
 
-SMALLEST_M, LARGEST_M = 0.005, 2.0
-"""Longest sides of things that a hand or an arm handles."""
+SMALLEST_M, LARGEST_M = 0.001, 2.0
+"""Longest sides that nothing else has to speak for: from the smallest parts that robots place to what an arm reaches across."""
+
+AIR_KG_M3 = 1.2
+"""At 20 degrees Celsius and sea level: a thing whose convex hull is lighter than so much air has another size, or mass."""
+
+LARGEST_UNWEIGHED_M = 10.0
+"""Of what declares no mass: furniture, robots and vehicles are shorter; a thing of 10 cm in centimetres is as long."""
 
 BEYOND_USUAL = 4.0
 """How far beyond the interval of nearly all such things a longest side may be: toys and samples are smaller."""
@@ -27,15 +33,23 @@ FLOOR_SHARE, CENTER_SHARE = 0.01, 0.02
 
 
 def outside_hand_size(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of objects that nobody handles."""
+    """Complain of objects that are dust, or of a size that their own mass speaks against."""
     longest = measured.longest_m
-    if measured.asset.static:
+    if measured.asset.static or measured.bounds is None or SMALLEST_M <= longest <= LARGEST_M:
         return
-    if measured.bounds is not None and not SMALLEST_M <= longest <= LARGEST_M:
-        usual = Interval(low=0.02, typical=0.15, high=0.5) if measured.prior is None else measured.prior.longest_axis_m
-        yield Complaint(
-            f"the longest side is {_length(longest)}{_mix_up(longest, usual)}", values={"longest_m": longest}
-        )
+    mass, hull_m3 = measured.asset.inertial.mass_kg, float(measured.hull.volumes_m3.sum())
+    because = ""
+    if longest > LARGEST_M:
+        if mass is not None and mass > 0 and hull_m3 > 0:
+            if mass >= AIR_KG_M3 * hull_m3:
+                return
+            because = f", and {mass:.3g} kg is less than so much air weighs"
+        elif longest <= LARGEST_UNWEIGHED_M:
+            return
+    usual = Interval(low=0.02, typical=0.15, high=0.5) if measured.prior is None else measured.prior.longest_axis_m
+    yield Complaint(
+        f"the longest side is {_length(longest)}{because}{_mix_up(longest, usual)}", values={"longest_m": longest}
+    )
 
 
 def against_category(measured: MeasuredAsset) -> Iterator[Complaint]:
@@ -109,7 +123,7 @@ RULES = (
         "size-out-of-range",
         "error",
         why="Files in millimetres or centimetres load as objects of 80 m, or as dust (IsaacSim #52, IsaacLab-Arena #815: a"
-        " scale of 0.007). Things that hands and arms handle have longest sides of 5 mm to 2 m.",
+        " scale of 0.007). What is longer than 2 m must weigh more than so much air; without a mass it may have 10 m.",
         remedy="Bake metres into the vertices, and declare no scale anywhere.",
         check=outside_hand_size,
     ),

@@ -1,0 +1,41 @@
+"""What an asset declares and an import does not take over, each with its reason."""
+
+from __future__ import annotations
+
+from manitwin.assets.asset import Asset
+from manitwin.assets.audit.measured import MeasuredAsset
+from manitwin.assets.audit.rules import center_of_mass, inertia
+
+CENTER, INERTIA = "centre of mass", "inertia"
+
+_CENTER_RULES = (center_of_mass.outside, center_of_mass.left_at_origin)
+_INERTIA_RULES = (inertia.not_positive_definite, inertia.triangle, inertia.placeholder, inertia.magnitude)
+
+
+def impossible_mass_properties(asset: Asset) -> dict[str, str]:
+    """Return why the declared centre of mass or inertia cannot be that of the object, by ``CENTER`` and ``INERTIA``.
+
+    These are the rules of the audit (INE002 to INE005, COM002 and COM003): what they complain of, engines refuse or get wrong.
+    """
+    measured = MeasuredAsset(asset)
+    found = {}
+    for what, rules, declared in (
+        (CENTER, _CENTER_RULES, asset.inertial.center_of_mass_m),
+        (INERTIA, _INERTIA_RULES, asset.inertial.inertia_kg_m2),
+    ):
+        said = [complaint.message for rule in rules for complaint in measured.complaints(rule)]
+        if declared is not None and said:
+            found[what] = said[0]
+    return found
+
+
+def left_out(asset: Asset) -> list[str]:
+    """Return in words what else a build has no place for."""
+    words = []
+    if asset.collision:
+        count = len(asset.collision)
+        words.append(f"{count} collision shape{'' if count == 1 else 's'}: a build makes and checks its own")
+    turns = sum(frame.kind == "orientation" for frame in asset.frames)
+    if turns:
+        words.append(f"{turns} orientation frame{'' if turns == 1 else 's'}: they are no place on the object")
+    return words
