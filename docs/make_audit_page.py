@@ -22,6 +22,7 @@ manitwin audit ASSETS --fix --jobs 2
 manitwin audit ASSETS --write-baseline audit_baseline.json
 manitwin audit ASSETS --baseline audit_baseline.json
 manitwin audit ASSETS --engines mujoco,sapien,pybullet
+manitwin audit ASSETS --html audit.html
 manitwin audit --explain INE004
 ```
 
@@ -38,12 +39,17 @@ status: 0 no errors, 1 errors, 2 wrong use.
   its own folder. FIL007 notes what was read from above. Descriptions without a shape, which others include, are no assets.
 - What most assets of a folder have in common (LIC001, LIC002) is said once, with the count; JSON and SARIF have each.
 - One cause is one finding: of an object in millimetres the size is wrong, and its mass, inertia and grasps are not held
-  against it.
+  against it; of one that lacks a mesh the file is missing, and what is left of its shape is not judged.
+- What stands fast (`<static>` in SDF; in MJCF shapes of the world, and bodies without a joint beside others that have one) is
+  asked for no mass, inertia, friction or collision. Its size and mass are held against a category where the asset declares one or
+  its name says no less: a "lock" need not be a padlock, a "truck" no toy.
 - `--fix` writes what follows from the asset's own words, each file whole, with the old one beside it as `<name>.orig`. It never
   moves an origin.
 - `--write-baseline FILE` notes what is found of each asset, and `--baseline FILE` leaves that out from then on: a project with
   old findings fails for new ones alone ([in continuous integration](audit_in_ci.md)). A
   finding is known by its asset's path from the baseline's folder and its rule.
+- `--html FILE` writes a page of all findings: by rule, by cause of what could not be read, and the 24 worst assets with what is seen
+  beside what collides. It is one file that loads nothing else.
 - Of twenty assets and more it ends with what they amount to: by rule, what could not be read and why, and the worst ones.
 - `--engines` also runs each asset (the RUN rules): its collision shapes, with its declared mass, centre of mass, inertia and
   friction (0.5 where it declares none), are put down on a plane from 5 mm, as they stand in the file, in each of the engines at

@@ -221,3 +221,13 @@ def test_shapes_of_the_world_stand_fast_and_planes_alone_are_sheets(tmp_path: Pa
     assert ground.static and np.allclose(ground.visual[0].bounds, [[-2, -0.5, -1e-3], [2, 0.5, 0]])
     moving = read_asset(mjcf(tmp_path, '<geom type="plane" size="2 2 1"/><body name="ball"><geom size="0.02"/></body>'))
     assert moving.name == "ball" and not moving.static
+
+
+def test_what_a_free_joint_lets_go_is_the_object_and_what_has_no_joint_beside_it_stands_fast(tmp_path: Path) -> None:
+    table = '<body name="table"><geom type="box" size="0.3 0.3 0.1"/></body>'
+    ball = '<body name="ball"><freejoint/><geom size="0.02"/></body>'
+    assert read_asset(mjcf(tmp_path, table + ball)).name == "ball"
+    door = '<body name="door"><joint/><geom type="box" size="0.3 0.3 0.01"/></body>'
+    cabinet = read_asset(mjcf(tmp_path, table + door))
+    assert cabinet.name == "table" and cabinet.static
+    assert not read_asset(mjcf(tmp_path, table)).static  # a program that loads it adds the joint

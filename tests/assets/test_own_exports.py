@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from exported_twins import content
+from exported_twins import CENTER_OF_MASS_M, DYNAMIC, INERTIA_KG_M2, MASS_KG, RESTITUTION, STATIC, content
 from input_items import collect_items
 from manitwin.assets.audit.run import audit_assets
 from manitwin.assets.importers.importer import import_assets
@@ -81,3 +81,51 @@ def test_an_export_of_unknown_licence_is_still_found_wanting(tmp_path: Path) -> 
     assert len(found) == len(READABLE)
     assert {finding.code for one in found for finding in one.findings} == {"LIC001"}
     assert all(len(one.findings) == 1 for one in found)
+
+
+MASS_PROPERTIES = {"mass_kg", "center_of_mass_m", "inertia_kg_m2"}
+COMES_BACK = {
+    "mjcf": MASS_PROPERTIES | {"friction_static"},
+    "urdf": MASS_PROPERTIES | {"friction_static", "restitution"},
+    "sdf": MASS_PROPERTIES | {"friction_static", "restitution"},
+    "usd": MASS_PROPERTIES | {"friction_static", "friction_dynamic", "restitution"},
+    "usdz": MASS_PROPERTIES | {"friction_static", "friction_dynamic", "restitution"},
+    "isaaclab": MASS_PROPERTIES | {"friction_static", "friction_dynamic", "restitution"},
+}
+"""What each format can say of a body; the others of these numbers are missing after an import, and said to be."""
+
+
+@pytest.mark.parametrize("format", sorted(COMES_BACK))
+def test_an_export_imports_back_with_equal_numbers(exports: Path, tmp_path: Path, format: str) -> None:
+    (imported,) = import_assets([exports / format], tmp_path)
+    record = imported.record
+    assert record is not None, imported.error
+    assert [reason for reason in record.dropped if "collision shape" not in reason] == []
+    to_object = np.array(record.asset_to_object)
+    turn = to_object[:3, :3]
+    expected = {
+        "mass_kg": MASS_KG,
+        "center_of_mass_m": turn @ CENTER_OF_MASS_M + to_object[:3, 3],
+        "inertia_kg_m2": turn @ INERTIA_KG_M2 @ turn.T,
+        "friction_static": STATIC,
+        "friction_dynamic": DYNAMIC,
+        "restitution": RESTITUTION,
+    }
+    for name in COMES_BACK[format]:
+        found = getattr(record, name)
+        assert found is not None, name
+        assert np.allclose(found, expected[name], rtol=1e-5, atol=1e-9), name
+
+
+def test_a_twin_imports_back_with_its_grasps(tmp_path: Path) -> None:
+    folder = tmp_path / "twins" / twin_name(write_accepted(tmp_path / "twins", 1))
+    (imported,) = import_assets([folder], tmp_path / "out")
+    record = imported.record
+    assert record is not None, imported.error
+    (given,) = record.grasps
+    held, twin = np.array(given.held), Twin(folder).grasps()
+    back = np.linalg.inv(np.array(record.asset_to_object)) @ np.array(given.gripper_to_object)
+    assert held.any() and not held.all()
+    assert np.allclose(back[held], twin.gripper_to_object, atol=1e-6)
+    assert np.allclose(np.array(given.width_m)[held], twin.width_m)
+    assert np.allclose(np.array(given.depth_m)[held], twin.depth_m)

@@ -355,4 +355,27 @@ def test_a_plane_is_a_ground_and_no_aeroplane() -> None:
     ground = trimesh.creation.box((1.9, 1.9, 0.01))
     plane = replace(clean(), name="ground_plane", category=None, visual=(textured(ground),), collision=())
     assert "SCL002" not in codes(audit_asset(plane, RULES))
+    for wider in ("door_lock", "fire_truck", "street_lamp"):  # no padlock, no toy, and no lamp of a desk
+        assert "SCL002" not in codes(audit_asset(replace(plane, name=wider), RULES)), wider
     assert "SCL002" in codes(audit_asset(replace(plane, name="toy_airplane"), RULES))
+
+
+def test_a_mark_that_shows_a_goal_is_no_obstacle_and_a_mass_of_zero_is_one_finding() -> None:
+    for name, found in (("milk", True), ("milk-visual", False), ("goal_marker", False)):
+        asset = replace(clean(), name=name, path=Path(f"{name}.xml"), category=None, collision=(), grasps=(), frames=())
+        assert ("COL001" in codes(audit_asset(asset, RULES))) == found, name
+    weightless = replace(moved(clean(), np.array([0, 0, 0.05])), inertial=Inertial(0.0, np.zeros(3), np.zeros((3, 3))))
+    assert codes(audit_asset(weightless, RULES)) & {"MAS002", "INE002", "COM003"} == {"MAS002"}
+
+
+def test_a_frame_around_a_picture_is_no_vessel_and_a_box_on_its_side_is_one() -> None:
+    def opened(depth_m: float) -> Asset:
+        outer, inner = box((0.02 + depth_m, 0.4, 0.4), (0, 0, 0.2)), box((depth_m, 0.36, 0.36), (0.01, 0, 0.2))
+        wall = trimesh.boolean.difference([outer, inner], engine="manifold")
+        return replace(
+            clean(), name="thing", category=None, captions=(), frames=(), grasps=(), rests=(),
+            visual=(textured(wall),), collision=(shape("hull", np.asarray(outer.vertices)),),
+        )  # fmt: skip
+
+    assert "COL003" not in codes(audit_asset(opened(0.05), RULES))
+    assert "COL003" in codes(audit_asset(opened(0.3), RULES))

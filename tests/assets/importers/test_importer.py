@@ -254,7 +254,7 @@ def test_report_has_what_was_kept_and_dropped_of_each_and_why_one_failed(tmp_pat
     assert done.exit_code == 3, done.output
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["summary"] == {"imported": 1, "imported_before": 0, "not_imported": 1}
-    mug_entry, bad = report["assets"]
+    bad, mug_entry = report["assets"]
     assert mug_entry["folder"] == "mug" and "centre of mass" in mug_entry["kept"]
     assert "mass: 0 is none that an object can have" in mug_entry["dropped"]
     assert bad["folder"] is None and "no <link>" in bad["error"]

@@ -10,17 +10,15 @@ from typing import Any, TypeVar
 
 import numpy as np
 import trimesh
-from embreex.mesh_construction import TriangleMesh
-from embreex.rtcore_scene import EmbreeScene
 from scipy.spatial import cKDTree
 
 from manitwin.assets.asset import Asset
 from manitwin.assets.audit.convex_shapes import ConvexShapes, UniformSolid, inertia_of_second_moment
 from manitwin.assets.audit.finding import Complaint
+from manitwin.assets.audit.open_air import OpenAir, open_air
 from manitwin.geometry.distance import closest_points_on_triangles, distance_to_surface
-from manitwin.geometry.ray_caster import MILLIMETRES
 from manitwin.geometry.sampling import sample_surface
-from manitwin.models.annotators.priors import Prior, lookup
+from manitwin.models.annotators.priors import Prior, found_by, lookup
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.store import read_record
 
@@ -32,19 +30,8 @@ FEW = 40
 
 Measure = TypeVar("Measure")
 
-OTHER_IN_SIMULATION = frozenset({"plane", "planes"})
-"""Words whose everyday sense is not that of names of assets: a plane is a ground there, and no aeroplane."""
-
 CLOSED = 1e-3
 """The sum of the area vectors of a closed surface is zero; up to this share of the area it counts as closed."""
-
-AIR_SAMPLES = 1500
-_AXES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]])
-
-# As geometry.cavity has measured: the smallest vessel (a shoe) holds 5.4 % of its hull, the largest hollow sideways
-# that is none (a clamp's jaws) 5.2 %.
-_LEAST_SHARE_UP = 0.05
-_LEAST_SHARE_SIDEWAYS = 0.10
 
 
 @dataclass(frozen=True)
@@ -197,9 +184,7 @@ class MeasuredAsset:
     @cached_property
     def prior(self) -> Prior | None:
         """The prior of the asset's category, or of its name; None where unknown."""
-        by_category = lookup(self.asset.category)
-        words = self._name_in_words.lower().split()
-        return by_category or (None if words and words[-1] in OTHER_IN_SIMULATION else lookup(self._name_in_words))
+        return lookup(self.asset.category) or _prior_of_name(self._name_in_words)
 
     @cached_property
     def material_words(self) -> str:
@@ -219,6 +204,17 @@ class MeasuredAsset:
             return None
         path = self.asset.path
         return read_record(path if path.is_dir() else path.parent)
+
+
+def _prior_of_name(words: str) -> Prior | None:
+    """Return the prior of what a name says, None where its word is wider: a plane is no aeroplane, and a truck no toy."""
+    found = found_by(words)
+    if found is None:
+        return None
+    prior, word = found
+    toy = prior.category.startswith("toy ") and "toy" not in words.lower().split()
+    wider = word != prior.category and prior.category.endswith(word)
+    return None if toy or wider else prior
 
 
 def _integrate(mesh: trimesh.Trimesh) -> SurfaceIntegrals:
@@ -243,56 +239,3 @@ def _integrate(mesh: trimesh.Trimesh) -> SurfaceIntegrals:
 def _second_moment(weights: np.ndarray, corners: np.ndarray, total: np.ndarray) -> np.ndarray:
     points = corners.reshape(-1, 3)
     return points.T @ (np.repeat(weights, 3)[:, None] * points) + total.T @ (weights[:, None] * total)
-
-
-@dataclass(frozen=True)
-class OpenAir:
-    """Points in an object's box from which some axis leads outside.
-
-    ``points_m (N, 3)``; ``hollow (N,)``: those in the largest hollow, which the object closes on all sides but ``opens (3,)``;
-    None where there is no such hollow. Points that see a wall in every direction count as matter.
-    """
-
-    points_m: np.ndarray
-    hollow: np.ndarray
-    opens: np.ndarray | None
-
-
-def open_air(mesh: trimesh.Trimesh, up: np.ndarray, hull_volume_m3: float) -> OpenAir:
-    """Look along the six axes from random points in a mesh's box; ``up (3,)`` is an axis.
-
-    Works on meshes with seams and on walls without thickness. A hollow that only opens downward is none: scans often
-    lack their bottom.
-    """
-    low, high = mesh.bounds
-    points = low + (high - low) * np.random.default_rng(0).random((AIR_SAMPLES, 3))
-    escapes = _escapes(mesh, points)
-    outside = escapes.any(1)
-    points, escapes = points[outside], escapes[outside]
-    pit = escapes.sum(1) == 1
-    point_m3 = float(np.prod(high - low)) / AIR_SAMPLES
-    best, share = None, 0.0
-    for index, axis in enumerate(_AXES):
-        if float(axis @ up) < -0.5:
-            continue
-        held = float((pit & escapes[:, index]).sum()) * point_m3 / hull_volume_m3 if hull_volume_m3 > 0 else 0.0
-        least = _LEAST_SHARE_UP if float(axis @ up) > 0.5 else _LEAST_SHARE_SIDEWAYS
-        if held >= least and held > share:
-            best, share = index, held
-    if best is None:
-        return OpenAir(points, np.zeros(len(points), dtype=bool), None)
-    return OpenAir(points, pit & escapes[:, best], _AXES[best])
-
-
-def _escapes(mesh: trimesh.Trimesh, points: np.ndarray) -> np.ndarray:
-    """Tell for points ``(N, 3)`` which of the six axes lead outside, ``(N, 6) bool``.
-
-    Takes the mesh by its indices, unlike ``RayCaster``: the tree over it is most of the cost.
-    """
-    scene = EmbreeScene()
-    vertices = (np.asarray(mesh.vertices) * MILLIMETRES).astype(np.float32)
-    surface = TriangleMesh(scene, vertices, np.asarray(mesh.faces).astype(np.int32))
-    origins = np.repeat((points * MILLIMETRES).astype(np.float32), len(_AXES), axis=0)
-    hits = scene.run(origins, np.tile(_AXES.astype(np.float32), (len(points), 1)))
-    del surface  # the scene knows of it, but does not keep it
-    return np.asarray(hits < 0).reshape(len(points), len(_AXES))

@@ -67,7 +67,7 @@ def read(path: Path, root: Path | None = None) -> Asset:
         unit_m=1.0,
         inertial=_declared_inertial(source, spec, model, bodies, files),
         contact=_declared_contact(source, model, shapes.colliding(bodies), files),
-        static=bodies[0][0] == _WORLD,
+        static=_stands_fast(model, bodies[0][0]),
         license=licence,
         attribution=attribution,
         files=files.sorted_files(),
@@ -77,7 +77,10 @@ def read(path: Path, root: Path | None = None) -> Asset:
 
 
 def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, np.ndarray]]:
-    """Return the bodies of the first rigid group that has a geom, with their poses in the group's first body."""
+    """Return the bodies of a rigid group that has a geom, with their poses in the group's first body.
+
+    It is the first one that a free joint lets go, else the first.
+    """
     groups: dict[int, list[tuple[int, np.ndarray]]] = {}
     head_of: dict[int, int] = {0: 0}
     poses: dict[int, np.ndarray] = {0: np.eye(4)}
@@ -90,6 +93,7 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, 
         groups.setdefault(head_of[index], []).append((index, poses[index]))
     world = [(_WORLD, np.eye(4))]  # shapes fixed to it: a static object
     shaped = [g for g in groups.values() if any(_is_solid(model, index) for index, _ in g)]
+    shaped.sort(key=lambda group: not _is_free(model, group[0][0]))
     if not shaped:
         if _is_solid(model, _WORLD):
             return world
@@ -100,6 +104,16 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, 
         raise AssetError(f"{file.name}: no body of it has a geom")
     files.remark_left_out([f"body {model.body(g[0][0]).name!r} moves by itself" for g in shaped[1:]], "bodies")
     return shaped[0]
+
+
+def _stands_fast(model: Any, body: int) -> bool:
+    """Tell whether a body is the world, or has no joint where others have some: a program adds that of a single object."""
+    return body == _WORLD or (model.njnt > 0 and int(model.body_weldid[body]) == _WORLD)
+
+
+def _is_free(model: Any, body: int) -> bool:
+    first = int(model.body_jntadr[body])
+    return first >= 0 and int(model.jnt_type[first]) == int(mujoco.mjtJoint.mjJNT_FREE)
 
 
 def _is_solid(model: Any, body: int) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,6 +10,9 @@ import numpy as np
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
+
+SEEN_ONLY = frozenset({"visual", "vis", "marker", "ghost", "target", "goal"})
+"""Words in names of what shows where a thing shall be: it is meant to be no obstacle."""
 
 BOX_SLACK_M, BOX_SLACK_SHARE = 0.003, 0.03
 """How far a side of the collision's box may be from the visual's, and which share of the longest side."""
@@ -30,8 +34,11 @@ MANY_SHAPES, MANY_VERTICES = 128, 255
 
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
-    """Complain of an asset that may move and has no collision shapes; what stands fast may be there to be seen."""
-    if not measured.asset.collision and measured.visual is not None and not measured.asset.static:
+    """Complain of an asset that may move and has no collision shapes; what stands fast, or is a mark, is there to be seen."""
+    if measured.asset.collision or measured.visual is None or measured.asset.static:
+        return
+    named = re.split(r"[^a-z]+", f"{measured.asset.name} {measured.asset.path.stem}".lower())
+    if not SEEN_ONLY & set(named):
         yield Complaint("there are no collision shapes: the object falls through the table")
 
 

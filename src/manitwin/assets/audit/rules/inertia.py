@@ -45,7 +45,9 @@ def principal_moments(inertia: np.ndarray) -> np.ndarray | None:
 def not_positive_definite(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of a tensor that is not symmetric, finite and positive definite."""
     inertia = measured.asset.inertial.inertia_kg_m2
-    if inertia is None:
+    if inertia is None or (
+        measured.asset.inertial.mass_kg == 0 and not inertia.any()
+    ):  # no mass (MAS002), so no inertia
         return
     moments = principal_moments(inertia)
     if moments is None:
