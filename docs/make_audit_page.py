@@ -22,7 +22,7 @@ manitwin audit ASSETS --fix --jobs 2
 manitwin audit ASSETS --write-baseline audit_baseline.json
 manitwin audit ASSETS --baseline audit_baseline.json
 manitwin audit ASSETS --engines mujoco,sapien,pybullet
-manitwin audit ASSETS --html audit.html
+manitwin audit ASSETS --engine mujoco --html audit.html
 manitwin audit --explain INE004
 ```
 
@@ -48,9 +48,12 @@ status: 0 no errors, 1 errors, 2 wrong use.
 - `--write-baseline FILE` notes what is found of each asset, and `--baseline FILE` leaves that out from then on: a project with
   old findings fails for new ones alone ([in continuous integration](audit_in_ci.md)). A
   finding is known by its asset's path from the baseline's folder and its rule.
-- `--html FILE` writes a page of all findings: by rule, by cause of what could not be read, and the 24 worst assets with what is seen
-  beside what collides. It is one file that loads nothing else.
+- `--html FILE` writes a page of all findings: by rule, by cause of what could not be read, and the 24 worst assets with what is
+  seen beside what collides. It is one file that loads nothing else.
 - Of twenty assets and more it ends with what they amount to: by rule, what could not be read and why, and the worst ones.
+- `--engine mujoco|pybullet|sapien|physx|gazebo` judges collision shapes (COL) as that engine takes them: PyBullet makes a hull of
+  each group of an OBJ file, MuJoCo, SAPIEN and PhysX one hull of a mesh, Gazebo collides with the triangles, whose hulls are
+  not judged. Without it the groups of an OBJ count as their author divided them.
 - `--engines` also runs each asset (the RUN rules): its collision shapes, with its declared mass, centre of mass, inertia and
   friction (0.5 where it declares none), are put down on a plane from 5 mm, as they stand in the file, in each of the engines at
   its usual step and at half of it, for 4 s. What declares no mass or inertia is not run, and that is said. Convex hulls of the

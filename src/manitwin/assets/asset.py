@@ -21,7 +21,8 @@ FrameKind = Literal["contact", "functional", "target", "orientation"]
 class CollisionShape:
     """One collision geometry: ``vertices (V, 3)`` m and ``faces (F, 3)``; primitives come as their meshes.
 
-    ``convex``: the simulator takes its convex hull, whatever the faces say.
+    ``convex``: the simulator takes its convex hull, whatever the faces say. ``primitive``: it is a box, sphere or the like by its
+    format. ``groups`` are vertices and faces of what its file keeps apart, where that is more than one.
     """
 
     name: str
@@ -29,6 +30,8 @@ class CollisionShape:
     faces: np.ndarray
     convex: bool
     file: Path | None = None
+    primitive: bool = False
+    groups: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,9 @@ from manitwin.assets.asset import AnnotatedFrame, Asset, Contact, Inertial
 from manitwin.assets.audit.check import audit_asset, audit_path
 from manitwin.assets.audit.finding import Finding
 from manitwin.assets.audit.rules import RULES, RULES_BY_CODE
+from manitwin.assets.audit.run import TAKEN_BY, audit_assets
+from manitwin.assets.audit.taken_by import A_HULL_EACH_GROUP, ONE_HULL, TRIANGLES
+from manitwin.errors import UsageError
 from manitwin.formats.npy_file import labels_to_npy
 from manitwin.geometry.poses import transform
 from manitwin.twin.loaded_twin import Twin
@@ -366,6 +369,8 @@ def test_a_mark_that_shows_a_goal_is_no_obstacle_and_a_mass_of_zero_is_one_findi
         assert ("COL001" in codes(audit_asset(asset, RULES))) == found, name
     weightless = replace(moved(clean(), np.array([0, 0, 0.05])), inertial=Inertial(0.0, np.zeros(3), np.zeros((3, 3))))
     assert codes(audit_asset(weightless, RULES)) & {"MAS002", "INE002", "COM003"} == {"MAS002"}
+    template = replace(weightless, inertial=Inertial(0.0, None, np.eye(3)), collision=())
+    assert codes(audit_asset(template, RULES)) & {"MAS002", "INE004", "COL001"} == {"MAS002"}
 
 
 def test_a_frame_around_a_picture_is_no_vessel_and_a_box_on_its_side_is_one() -> None:
@@ -379,3 +384,42 @@ def test_a_frame_around_a_picture_is_no_vessel_and_a_box_on_its_side_is_one() ->
 
     assert "COL003" not in codes(audit_asset(opened(0.05), RULES))
     assert "COL003" in codes(audit_asset(opened(0.3), RULES))
+    cupboard = codes(audit_asset(replace(opened(0.3), up="y"), RULES))
+    assert "SCL003" not in codes(audit_asset(replace(opened(0.3), up="y", static=True), RULES)), cupboard
+
+
+def test_a_ball_is_a_primitive_however_finely_it_is_drawn(tmp_path: Path) -> None:
+    in_urdf = '<collision><geometry><sphere radius="0.02"/></geometry></collision>'
+    in_sdf = '<collision name="c"><geometry><sphere><radius>0.02</radius></sphere></geometry></collision>'
+    for text, name in (
+        ('<mujoco><worldbody><body><freejoint/><geom size="0.02"/></body></worldbody></mujoco>', "ball.xml"),
+        (f'<robot name="ball"><link name="l">{in_urdf}</link></robot>', "ball.urdf"),
+        (f'<sdf version="1.9"><model name="ball"><link name="l">{in_sdf}</link></model></sdf>', "ball.sdf"),
+    ):
+        (tmp_path / name).write_text(text)
+        assert "COL007" not in codes(audit_path(tmp_path / name, RULES).findings), name
+
+
+def test_groups_of_an_obj_are_hulls_of_their_own_where_the_engine_makes_them_so(tmp_path: Path) -> None:
+    """Two boxes apart in one file: PyBullet makes two hulls of them, MuJoCo one that fills the gap."""
+    lines, count = [], 0
+    for number, x in enumerate((-0.1, 0.1)):
+        piece = box((0.04, 0.2, 0.2), (x, 0, 0))
+        lines += [f"o piece_{number}", *(f"v {a} {b} {c}" for a, b, c in piece.vertices)]
+        lines += [f"f {a} {b} {c}" for a, b, c in piece.faces + 1 + count]
+        count += len(piece.vertices)
+    (tmp_path / "gap.obj").write_text("\n".join(lines))
+    mesh = '<geometry><mesh filename="gap.obj" scale="1 1 0.5"/></geometry>'
+    path = tmp_path / "gap.urdf"
+    path.write_text(
+        f'<robot name="thing"><link name="l"><visual>{mesh}</visual><collision>{mesh}</collision></link></robot>'
+    )
+
+    def found(engine: str | None) -> set[str]:
+        return codes(audit_path(path, RULES, engine=engine).findings) & {"COL002", "COL003", "COL004", "COL005"}
+
+    assert found(None) == found("pybullet") == found("gazebo") == set()
+    assert found("mujoco") == found("sapien") == found("physx") == {"COL004"}
+    assert {*ONE_HULL, *A_HULL_EACH_GROUP, *TRIANGLES} == set(TAKEN_BY)
+    with pytest.raises(UsageError, match="mujoco"):
+        audit_assets([path], engine="mujuco")

@@ -9,6 +9,7 @@ from manitwin.assets.asset import Asset
 from manitwin.assets.audit.finding import Audited, Complaint, Finding, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules import RULES_BY_CODE
+from manitwin.assets.audit.taken_by import OF_HULLS, TRIANGLES, as_taken_by
 from manitwin.assets.read import read_asset
 from manitwin.errors import AssetError, TwinError
 from manitwin.twin.store import RECORD, read_record
@@ -25,11 +26,16 @@ OF_WHAT_MOVES = ("MAS", "INE", "COM", "COL001", "FRI001", "SCL001", "RUN")
 _MESHES = frozenset({".obj", ".stl", ".dae", ".msh", ".glb", ".gltf", ".ply", ".usd", ".usda", ".usdc", ".usdz"})
 
 
-def audit_asset(asset: Asset, rules: Sequence[Rule], engines: Sequence[str] = ()) -> list[Finding]:
-    """Hold rules against an asset, in their order, and run it in engines.
+def audit_asset(
+    asset: Asset, rules: Sequence[Rule], engines: Sequence[str] = (), engine: str | None = None
+) -> list[Finding]:
+    """Hold rules against an asset as an ``engine`` takes it (``as_taken_by``), in their order, and run it in ``engines``.
 
     One whose geometry cannot be measured gets that finding only, and one of which a mesh is not there none of its shape.
     """
+    asset = as_taken_by(asset, engine)
+    if engine in TRIANGLES:
+        rules = [rule for rule in rules if rule.code not in OF_HULLS]
     measured = MeasuredAsset(asset, tuple(engines))
     broken = [code for code in STOPS if measured.complaints(RULES_BY_CODE[code].check)]
     if broken:
@@ -42,7 +48,12 @@ def audit_asset(asset: Asset, rules: Sequence[Rule], engines: Sequence[str] = ()
 
 
 def audit_path(
-    path: Path, rules: Sequence[Rule], fix: bool = False, root: Path | None = None, engines: Sequence[str] = ()
+    path: Path,
+    rules: Sequence[Rule],
+    fix: bool = False,
+    root: Path | None = None,
+    engines: Sequence[str] = (),
+    engine: str | None = None,
 ) -> Audited:
     """Read an asset below a ``root`` and hold rules against it; with ``fix``, mend what is safe first.
 
@@ -50,13 +61,13 @@ def audit_path(
     """
     try:
         asset = read_asset(path, root=root)
-        findings = audit_asset(asset, rules, engines)
+        findings = audit_asset(asset, rules, engines, engine)
         done: list[str] = []
         if fix:
             done = _mend(asset, findings)
             if done:
                 asset = read_asset(path, root=root)
-                findings = audit_asset(asset, rules, engines)
+                findings = audit_asset(asset, rules, engines, engine)
     except AssetError as error:
         return _unread(path, str(error), rules)
     except MemoryError:
@@ -93,7 +104,12 @@ def _finding(rule: Rule, path: Path, complaint: Complaint) -> Finding:
 
 
 def audit_by_codes(
-    path: Path, codes: Sequence[str], fix: bool, root: Path | None = None, engines: Sequence[str] = ()
+    path: Path,
+    codes: Sequence[str],
+    fix: bool,
+    root: Path | None = None,
+    engines: Sequence[str] = (),
+    engine: str | None = None,
 ) -> Audited:
     """Audit an asset in a process with limits, to which rules go by their codes."""
-    return audit_path(path, [RULES_BY_CODE[code] for code in codes], fix, root, engines)
+    return audit_path(path, [RULES_BY_CODE[code] for code in codes], fix, root, engines, engine)

@@ -15,13 +15,15 @@ from manitwin.assets.audit.finding import Audited, Finding, RuleText
 from manitwin.assets.read import find_assets
 from manitwin.assets.root import root_of
 from manitwin.assets.within_limits import LIMITS, why_ended
-from manitwin.errors import UsageError
+from manitwin.errors import UsageError, choose_from
 from manitwin.formats.isolated import ProcessCrashed, called, limit_address_space, run_isolated
 
 if TYPE_CHECKING:
     from pebble import ProcessPool
 
 ENGINES = ("mujoco", "sapien", "pybullet")
+TAKEN_BY = ("mujoco", "pybullet", "sapien", "physx", "gazebo")
+"""Engines whose reading of collision shapes can be judged (``taken_by``)."""
 
 AHEAD = 4
 """Assets handed to every process in advance."""
@@ -62,6 +64,13 @@ def check_engines(engines: Iterable[str]) -> tuple[str, ...]:
     return chosen
 
 
+def check_engine(engine: str | None) -> str | None:
+    """Return the engine whose reading of collision shapes is judged; raises UsageError for one that is not known."""
+    if engine is not None and engine not in TAKEN_BY:
+        raise UsageError(choose_from("engine", engine, TAKEN_BY))
+    return engine
+
+
 def audit_all(
     paths: Sequence[Path],
     rules: Sequence[RuleText],
@@ -70,27 +79,30 @@ def audit_all(
     fix: bool = False,
     named: Sequence[Path] = (),
     engines: Sequence[str] = (),
+    engine: str | None = None,
 ) -> Iterator[Audited]:
     """Audit assets in ``jobs`` processes and yield what was found in the order of the paths.
 
-    ``engines`` are those that each is run in (``check_engines``).
+    ``engines`` are those that each is run in (``check_engines``), ``engine`` the one whose reading of collision shapes is judged.
     ``named`` are the folders that the user gave: what an asset names is read below them (``root_of``).
     One that brings its process down, hangs or takes too much memory costs itself alone: it is a finding of it.
     """
     if jobs > 1 and len(paths) > 1:
         with _one_thread_each():
-            yield from _in_processes(paths, rules, jobs, fix, named, engines)
+            yield from _in_processes(paths, rules, jobs, fix, named, engines, engine)
         return
     for path in paths:
         with _one_thread_each():  # another process is started after a crash
-            audited = _audited(path, rules, fix, root_of(path, named), engines)
+            audited = _audited(path, rules, fix, root_of(path, named), engines, engine)
         yield audited
 
 
-def _audited(path: Path, rules: Sequence[RuleText], fix: bool, root: Path, engines: Sequence[str]) -> Audited:
+def _audited(
+    path: Path, rules: Sequence[RuleText], fix: bool, root: Path, engines: Sequence[str], engine: str | None
+) -> Audited:
     try:
         codes = tuple(rule.code for rule in rules)
-        found: Audited = run_isolated(AUDIT, path, codes, fix, root, tuple(engines), limits=LIMITS)
+        found: Audited = run_isolated(AUDIT, path, codes, fix, root, tuple(engines), engine, limits=LIMITS)
     except (ProcessCrashed, MemoryError) as error:
         return _unread(path, why_ended(error), rules)
     return found
@@ -124,6 +136,7 @@ def _in_processes(
     fix: bool,
     named: Sequence[Path],
     engines: Sequence[str],
+    engine: str | None,
 ) -> Iterator[Audited]:
     from pebble import ProcessPool
 
@@ -137,7 +150,7 @@ def _in_processes(
             initargs=(LIMITS.memory_bytes,),
         )
         try:
-            yield from _from_pool(pool, paths, rules, jobs, fix, named, engines)
+            yield from _from_pool(pool, paths, rules, jobs, fix, named, engines, engine)
         finally:
             pool.stop()
             pool.join()
@@ -157,11 +170,12 @@ def _from_pool(
     fix: bool,
     named: Sequence[Path],
     engines: Sequence[str],
+    engine: str | None,
 ) -> Iterator[Audited]:
     codes = tuple(rule.code for rule in rules)
     waiting: deque[tuple[Path, Any]] = deque()
     for path in paths:
-        arguments = (path, codes, fix, root_of(path, named), tuple(engines))
+        arguments = (path, codes, fix, root_of(path, named), tuple(engines), engine)
         waiting.append((path, pool.schedule(called, args=(AUDIT, arguments), timeout=LIMITS.seconds)))
         if len(waiting) >= AHEAD * jobs:
             yield _result(*waiting.popleft(), rules)
@@ -188,12 +202,15 @@ def audit_assets(
     jobs: int = 1,
     fix: bool = False,
     engines: Iterable[str] = (),
+    engine: str | None = None,
 ) -> list[Audited]:
     """Audit every asset at or below paths and return what was found of each.
 
-    ``engines`` (mujoco, sapien, pybullet) also run it. Raises UsageError for a wrong path, code or engine.
+    ``engine`` (mujoco, pybullet, sapien, physx or gazebo) is the one whose reading of collision shapes is judged; ``engines``
+    (mujoco, sapien, pybullet) also run it. Raises UsageError for a wrong path, code or engine.
     """
     run_in = check_engines(engines)
+    check_engine(engine)
     rules = rules_selected(select, ignore)
     given = [Path(path) for path in paths]
-    return list(audit_all(find_all(given), rules, jobs=jobs, fix=fix, named=given, engines=run_in))
+    return list(audit_all(find_all(given), rules, jobs=jobs, fix=fix, named=given, engines=run_in, engine=engine))

@@ -180,7 +180,8 @@ class BodyShapes:
             if geom in colliding and parts:
                 vertices, faces = joined(parts)
                 name = self._model.geom(geom).name or f"geom_{geom:02d}"
-                collision.append(CollisionShape(name, vertices, faces, convex=True))
+                primitive = int(self._model.geom_type[geom]) not in _MESH_KINDS
+                collision.append(CollisionShape(name, vertices, faces, True, primitive=primitive))
             if self._model.geom_group[geom] < _SHOWN_GROUPS:
                 visual[geom in colliding] += parts
         return tuple(visual[False] or visual[True]), tuple(collision)

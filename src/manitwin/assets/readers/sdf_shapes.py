@@ -119,7 +119,8 @@ class SdfShapes:
             parts = self._placed(element, link, what)
             if parts:
                 name = element.get("name") or f"{link.get('name')}_{index:02d}"
-                yield CollisionShape(name, *joined(parts), convex=True, file=self._mesh_path(element))
+                primitive = element.find("geometry/mesh") is None
+                yield CollisionShape(name, *joined(parts), True, self._mesh_path(element), primitive)
 
     def _elements(self, link: etree._Element, tag: str) -> Iterator[tuple[etree._Element, str]]:
         for element in link.findall(tag):

@@ -13,9 +13,11 @@ from lxml import etree  # type: ignore[import-untyped]
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.obj_groups import obj_groups
 from manitwin.assets.root import upward
 from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part, pbr_material, srgb_to_linear
+from manitwin.geometry.poses import transform_points
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
 _SCHEMES = ("package://", "model://")
@@ -56,7 +58,10 @@ class LinkShapes:
             if parts:
                 vertices, faces = joined(parts)
                 name = element.get("name") or f"{link.get('name')}_{index:02d}"
-                yield CollisionShape(name, vertices, faces, convex=True, file=self._mesh_file(element))
+                file = self._mesh_file(element)
+                yield CollisionShape(
+                    name, vertices, faces, True, file, geometry_of(element).tag != "mesh", placed_groups(file, to_asset)
+                )
 
     def _parts(self, element: etree._Element, where: str, color: np.ndarray | None) -> list[trimesh.Trimesh]:
         shape = geometry_of(element)
@@ -115,6 +120,12 @@ def candidates(name: str, file: Path, root: Path) -> Iterator[Path]:
     yield from (folder / inside for folder in folders)
     if rest:
         yield from (folder / rest for folder in folders)
+
+
+def placed_groups(file: Path | None, to_asset: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """Return the groups of a mesh file that was read (``obj_groups``), brought into the asset's axes by ``(4, 4)``."""
+    groups = [] if file is None else obj_groups(file)
+    return tuple((transform_points(to_asset, vertices), faces) for vertices, faces in groups)
 
 
 def _scale(element: etree._Element) -> np.ndarray:

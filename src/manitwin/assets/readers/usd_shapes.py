@@ -82,7 +82,9 @@ class StageShapes:
             world = self.to_world(prim)
             baked = bake_transform(local, world)
             self._checked(baked, prim)
-            shapes.append(CollisionShape(prim.GetName(), np.asarray(baked.vertices), np.asarray(baked.faces), convex))
+            vertices, faces = np.asarray(baked.vertices), np.asarray(baked.faces)
+            primitive = not prim.IsA(UsdGeom.Mesh)
+            shapes.append(CollisionShape(prim.GetName(), vertices, faces, convex, primitive=primitive))
         return tuple(shapes)
 
     def _collider(self, prim: Usd.Prim) -> tuple[trimesh.Trimesh, bool]:

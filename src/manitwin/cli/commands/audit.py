@@ -31,6 +31,12 @@ def audit(
         str | None,
         choices.AUDIT_ENGINES.option(help="Also drop each asset in these: mujoco, sapien, pybullet.", metavar="A,B"),
     ] = None,
+    engine: Annotated[
+        str | None,
+        choices.AUDIT_ENGINE.option(
+            help="Judge collision as mujoco, pybullet, sapien, physx or gazebo takes it.", metavar="ENGINE"
+        ),
+    ] = None,
     fix: Annotated[bool, typer.Option("--fix", help="Mend what is safe; old files stay beside as .orig.")] = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, max=options.MOST_JOBS, help="Processes.")] = 1,
     baseline: Annotated[
@@ -72,7 +78,7 @@ def audit(
     if not assets:
         raise UsageError(f"{', '.join(map(str, paths or []))}: holds no asset of a known format; {VALID_ASSETS}")
     audited = []
-    for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths or [], engines=run_in):
+    for each in audit_all(assets, rules, jobs=jobs, fix=fix, named=paths or [], engines=run_in, engine=engine):
         each = each if known is None else known.without_known(each)
         audited.append(each)
         if format == "text":

@@ -37,6 +37,8 @@ def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of an asset that may move and has no collision shapes; what stands fast, or is a mark, is there to be seen."""
     if measured.asset.collision or measured.visual is None or measured.asset.static:
         return
+    if measured.asset.inertial.mass_kg == 0:  # MAS002 says so; Bullet lets it stand fast
+        return
     named = re.split(r"[^a-z]+", f"{measured.asset.name} {measured.asset.path.stem}".lower())
     if not SEEN_ONLY & set(named):
         yield Complaint("there are no collision shapes: the object falls through the table")
@@ -160,7 +162,11 @@ def costly(measured: MeasuredAsset) -> Iterator[Complaint]:
     if len(shapes) > MANY_SHAPES:
         yield Complaint(f"{len(shapes)} collision shapes: every contact becomes slow", values={"shapes": len(shapes)})
     corners = zip(measured.shapes.kept, measured.shapes.corners, strict=True)
-    large = [(shapes[index], count) for index, count in corners if shapes[index].convex and count > MANY_VERTICES]
+    large = [
+        (shapes[index], count)
+        for index, count in corners
+        if shapes[index].convex and not shapes[index].primitive and count > MANY_VERTICES
+    ]
     if large:
         most = max(count for _, count in large)
         yield Complaint(

@@ -28,7 +28,7 @@ def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
     inertial = measured.asset.inertial
     if measured.asset.format == "mjcf":
         return
-    if inertial.mass_kg is not None and inertial.inertia_kg_m2 is None:
+    if inertial.mass_kg and inertial.inertia_kg_m2 is None:  # of no mass, which MAS002 says, there is none
         centre = " and no centre of mass: they are" if inertial.center_of_mass_m is None else ": it is"
         yield Complaint(f"a mass is declared, but no inertia{centre} left to the simulator")
 
@@ -69,7 +69,7 @@ def is_placeholder(inertia: np.ndarray | None) -> bool:
 def placeholder(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of an inertia of 1.0 about all axes that the shape does not have."""
     inertia = measured.asset.inertial.inertia_kg_m2
-    if not is_placeholder(inertia):
+    if not is_placeholder(inertia) or measured.asset.inertial.mass_kg == 0:
         return
     band = plausible_moments(measured)
     if band is None or (np.ones(3) > band[1]).any():

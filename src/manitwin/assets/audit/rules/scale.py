@@ -84,7 +84,7 @@ def _length(metres: float) -> str:
 
 def up_axis(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of an object that stands on the origin's plane, or opens, along another axis than its format's up."""
-    if measured.bounds is None:
+    if measured.bounds is None or measured.asset.static:  # a cupboard opens to its front
         return
     declared = measured.asset.up
     other = np.array([0.0, 0, 1]) if declared == "y" else np.array([0.0, 1, 0])
