@@ -163,6 +163,12 @@ def test_an_object_whose_meshes_are_not_there_lacks_files_and_is_no_broken_one(t
     body = '<body><freejoint/><geom type="mesh" mesh="w"/></body>'
     asset = read_asset(mjcf(tmp_path, body, '<asset><mesh name="w" file="gone.stl"/></asset>'))
     assert asset.missing_files == ("gone.stl",) and asset.visual == () and asset.inertial.mass_kg is None
+    known = '<geom size="0.1" density="50"/>'
+    for name, mass in (("gone.stl", None), ("gone.png", 50 * 4 / 3 * np.pi * 0.1**3)):
+        kind = f'<mesh name="w" file="{name}"/>' if mass is None else f'<texture type="2d" name="w" file="{name}"/>'
+        half = '<geom type="mesh" mesh="w"/>' if mass is None else ""
+        found = read_asset(mjcf(tmp_path, f"<body><freejoint/>{known}{half}</body>", f"<asset>{kind}</asset>"))
+        assert found.inertial.mass_kg == (None if mass is None else pytest.approx(mass))
 
 
 def test_a_mass_of_geoms_in_several_bodies_is_combined_as_mujoco_has_it(tmp_path: Path) -> None:

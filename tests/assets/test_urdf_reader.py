@@ -235,3 +235,23 @@ def test_a_mesh_of_a_format_that_is_not_read_costs_that_shape_alone(tmp_path: Pa
     asset = read_asset(urdf(tmp_path, body))
     assert len(asset.visual) == 1 and asset.collision == () and asset.missing_files == ()
     assert any("soft.vtk is a .vtk file, which is not read" in remark for remark in asset.remarks)
+
+
+def test_commas_between_numbers_are_read_as_spaces(tmp_path: Path) -> None:
+    origin = '<origin xyz="0.07, 0, -0.69"/>'
+    asset = read_asset(urdf(tmp_path, f'<link name="l"><visual>{origin}{BOX_SHAPE}</visual></link>'))
+    assert np.allclose(bounds(asset.visual[0].vertices).mean(0), [0.07, 0, -0.69])
+
+
+def test_a_distance_field_of_isaac_gym_is_collided_with_as_it_is_drawn(tmp_path: Path) -> None:
+    body = f'<link name="l"><collision>{BOX_SHAPE}<sdf resolution="256"/></collision><collision>{BOX_SHAPE}</collision></link>'
+    first, second = read_asset(urdf(tmp_path, body)).collision
+    assert first.as_drawn and not second.as_drawn and second.primitive
+
+
+def test_an_asset_of_which_links_were_left_out_is_partial(tmp_path: Path) -> None:
+    shape = f"<collision>{BOX_SHAPE}</collision>"
+    leg = '<joint name="j" type="revolute"><parent link="l"/><child link="leg"/></joint>'
+    links = f'<link name="l">{shape}</link><link name="leg">{shape}</link>'
+    assert read_asset(urdf(tmp_path, links + leg)).partial
+    assert not read_asset(urdf(tmp_path, links + leg.replace("revolute", "fixed"))).partial

@@ -23,6 +23,7 @@ class CollisionShape:
 
     ``convex``: the simulator takes its convex hull, whatever the faces say. ``primitive``: it is a box, sphere or the like by its
     format. ``groups`` are vertices and faces of what its file keeps apart, where that is more than one.
+    ``as_drawn``: the file asks for the triangles themselves, as a distance field, say.
     """
 
     name: str
@@ -32,6 +33,7 @@ class CollisionShape:
     file: Path | None = None
     primitive: bool = False
     groups: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    as_drawn: bool = False
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,8 @@ class Asset:
     ``up`` is the axis that stands up by the format's rule or the file's word; ``unit_m`` the length of a file's unit, None
     where it declares none. ``missing_files`` are named and not there; ``remarks`` are what the reader had to note, one line each.
     ``rests`` are declared resting poses, asset to plane ``(4, 4)``. ``static``: it is said to stand fast, as buildings do, and is
-    no object that moves.
+    no object that moves. ``partial``: other bodies of the file, such as a robot's links, were left out; its name is of
+    them all.
     """
 
     format: Format
@@ -108,6 +111,7 @@ class Asset:
     grasps: tuple[AnnotatedGrasps, ...] = ()
     rests: tuple[np.ndarray, ...] = ()
     static: bool = False
+    partial: bool = False
     license: str | None = None
     attribution: str | None = None
     files: tuple[Path, ...] = ()

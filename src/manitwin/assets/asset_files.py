@@ -20,6 +20,7 @@ MAX_SHAPES = 4096
 MAX_FACES = 8_000_000  # of all shapes together: one mesh may be named by many of them
 UNREAD_FORMATS = frozenset({".vtk", ".vtu", ".wrl", ".iv", ".x3d", ".3ds", ".fbx", ".off", ".ac", ".bin", ".mesh"})
 """Of meshes that descriptions name: for some engines, or for none but the one that they were made for."""
+MESHES = frozenset({".obj", ".stl", ".dae", ".msh", ".glb", ".gltf", ".ply", ".usd", ".usda", ".usdc", ".usdz"})
 MOST_NAMED = 3
 """Of the parts that are left out: of a robot's or a building's, a person reads the count."""
 _NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' is not there")
@@ -30,7 +31,7 @@ class AssetFiles:
     """The files that an asset names, looked up below ``root`` and nowhere else, links resolved.
 
     ``own`` is the folder of the asset itself; what is read from above it is remarked. ``used`` are the files that were found,
-    ``missing`` the names that were not, ``remarks`` one line each.
+    ``missing`` the names that were not, ``remarks`` one line each. ``partial``: bodies were left out.
     """
 
     root: Path
@@ -38,6 +39,7 @@ class AssetFiles:
     used: set[Path] = field(default_factory=set)
     missing: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    partial: bool = False
     _meshes: dict[Path, MeshFile] = field(default_factory=dict)
     _shapes: int = 0
     _faces: int = 0
@@ -47,8 +49,14 @@ class AssetFiles:
         if sentence not in self.remarks:
             self.remarks.append(sentence)
 
+    @property
+    def lacks_a_mesh(self) -> bool:
+        """Tell whether a file that is missing is a mesh."""
+        return any(Path(name).suffix.lower() in MESHES for name in self.missing)
+
     def remark_left_out(self, parts: Sequence[str], what: str) -> None:
         """Note parts that are not of the rigid object that is read: each by what is said of it, or many as their count."""
+        self.partial = self.partial or bool(parts)
         if len(parts) > MOST_NAMED:
             self.remark(f"{parts[0]}, and with it {len(parts) - 1} more {what} were left out: one rigid object is read")
         for part in parts if len(parts) <= MOST_NAMED else ():

@@ -363,6 +363,12 @@ def test_a_plane_is_a_ground_and_no_aeroplane() -> None:
     assert "SCL002" in codes(audit_asset(replace(plane, name="toy_airplane"), RULES))
 
 
+def test_the_name_of_a_whole_says_nothing_of_one_part_of_it() -> None:
+    robot = replace(scaled(clean(), 10), name="mug", category=None, collision=(), grasps=(), frames=(), rests=())
+    assert {"SCL002", "COL001"} <= codes(audit_asset(robot, RULES))
+    assert not {"SCL002", "COL001"} & codes(audit_asset(replace(robot, partial=True), RULES))
+
+
 def test_a_mark_that_shows_a_goal_is_no_obstacle_and_a_mass_of_zero_is_one_finding() -> None:
     for name, found in (("milk", True), ("milk-visual", False), ("goal_marker", False)):
         asset = replace(clean(), name=name, path=Path(f"{name}.xml"), category=None, collision=(), grasps=(), frames=())
@@ -419,6 +425,11 @@ def test_groups_of_an_obj_are_hulls_of_their_own_where_the_engine_makes_them_so(
         return codes(audit_path(path, RULES, engine=engine).findings) & {"COL002", "COL003", "COL004", "COL005"}
 
     assert found(None) == found("pybullet") == found("gazebo") == set()
+    faces = "\n".join(line for line in lines if not line.startswith("o ")).replace("f ", "o face\nf ")
+    (tmp_path / "faces.obj").write_text(faces)  # a group for every face is no decomposition
+    path.write_text(path.read_text().replace("gap.obj", "faces.obj"))
+    assert found(None) == {"COL004"}
+    path.write_text(path.read_text().replace("faces.obj", "gap.obj"))
     assert found("mujoco") == found("sapien") == found("physx") == {"COL004"}
     assert {*ONE_HULL, *A_HULL_EACH_GROUP, *TRIANGLES} == set(TAKEN_BY)
     with pytest.raises(UsageError, match="mujoco"):

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from manitwin.assets.asset import Asset
+from manitwin.assets.asset_files import MESHES
 from manitwin.assets.audit.finding import Audited, Complaint, Finding, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules import RULES_BY_CODE
@@ -23,7 +24,6 @@ OF_THE_WHOLE_SHAPE = (
 """Rules that measure the shape: where a mesh of it is not there (FIL002 says so), what is left says nothing of it."""
 OF_WHAT_MOVES = ("MAS", "INE", "COM", "COL001", "FRI001", "SCL001", "RUN")
 """Rules that are not held against what stands fast: no engine asks it for a mass."""
-_MESHES = frozenset({".obj", ".stl", ".dae", ".msh", ".glb", ".gltf", ".ply", ".usd", ".usda", ".usdc", ".usdz"})
 
 
 def audit_asset(
@@ -40,7 +40,7 @@ def audit_asset(
     broken = [code for code in STOPS if measured.complaints(RULES_BY_CODE[code].check)]
     if broken:
         rules = [rule for rule in rules if rule.code in broken]
-    elif any(Path(name).suffix.lower() in _MESHES for name in asset.missing_files):
+    elif any(Path(name).suffix.lower() in MESHES for name in asset.missing_files):
         rules = [rule for rule in rules if not rule.code.startswith(OF_THE_WHOLE_SHAPE)]
     if asset.static:
         rules = [rule for rule in rules if not rule.code.startswith(OF_WHAT_MOVES)]

@@ -184,7 +184,8 @@ class MeasuredAsset:
     @cached_property
     def prior(self) -> Prior | None:
         """The prior of the asset's category, or of its name; None where unknown."""
-        return lookup(self.asset.category) or _prior_of_name(self._name_in_words)
+        of_name = None if self.asset.partial else _prior_of_name(self._name_in_words)  # a Bolt that walks is no bolt
+        return lookup(self.asset.category) or of_name
 
     @cached_property
     def material_words(self) -> str:

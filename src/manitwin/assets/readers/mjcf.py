@@ -73,6 +73,7 @@ def read(path: Path, root: Path | None = None) -> Asset:
         files=files.sorted_files(),
         missing_files=files.missing_names(),
         remarks=tuple(files.remarks),
+        partial=files.partial,
     )
 
 
@@ -131,9 +132,7 @@ def _declared_inertial(
     explicit = [index for index, _ in bodies if by_index[index].explicitinertial and not forced]
     if explicit and all(index in explicit for index, _ in massive):
         return combined_inertial([_inertial(model, index, pose) for index, pose in bodies if index in explicit])
-    if (
-        explicit or not source.writes(("mass", "density")) or files.missing
-    ):  # of a mesh that is not there nothing is known
+    if explicit or not source.writes(("mass", "density")) or files.lacks_a_mesh:  # of which nothing is known
         return Inertial()
     files.remark("its mass follows from a mass or density written for its geoms; centre and inertia are MuJoCo's own")
     return combined_inertial([_inertial(model, index, pose) for index, pose in massive]) if massive else Inertial(0.0)

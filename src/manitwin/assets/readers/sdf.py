@@ -103,6 +103,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         files=opened.files.sorted_files(),
         missing_files=opened.files.missing_names(),
         remarks=tuple(opened.files.remarks),
+        partial=opened.files.partial,
     )
 
 

@@ -27,6 +27,7 @@ from manitwin.robots.urdf import (
     read_urdf,
 )
 
+_TRIPLES = frozenset({"xyz", "rpy", "rgba", "size", "scale"})
 _WORLD = "world"
 """Drake and Gazebo know it without a <link>."""
 
@@ -72,6 +73,9 @@ def _as_loaders_take_it(root: etree._Element) -> None:
     for geometry in root.iter("geometry"):
         for foreign in [child for child in geometry.iterchildren("*") if etree.QName(child).namespace]:
             geometry.remove(foreign)
+    for element in root.iter("origin", "color", "box", "mesh"):
+        for key in _TRIPLES.intersection(element.attrib):  # "0.1, 0, 0.2" is read as three numbers
+            element.set(key, element.get(key).replace(",", " "))
     links = {link.get("name") for link in root.findall("link")}
     parents = {parent.get("link") for parent in root.iterfind("joint/parent")}
     if links and _WORLD in parents - links:
@@ -101,6 +105,7 @@ def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> A
         files=found.files.sorted_files(),
         missing_files=found.files.missing_names(),
         remarks=tuple(found.files.remarks),
+        partial=found.files.partial,
     )
 
 

@@ -59,9 +59,10 @@ class LinkShapes:
                 vertices, faces = joined(parts)
                 name = element.get("name") or f"{link.get('name')}_{index:02d}"
                 file = self._mesh_file(element)
-                yield CollisionShape(
-                    name, vertices, faces, True, file, geometry_of(element).tag != "mesh", placed_groups(file, to_asset)
-                )
+                primitive = geometry_of(element).tag != "mesh"
+                field = element.find("sdf") is not None  # Isaac Gym collides with a distance field of the mesh
+                groups = () if field else placed_groups(file, to_asset)
+                yield CollisionShape(name, vertices, faces, True, file, primitive, groups, as_drawn=field)
 
     def _parts(self, element: etree._Element, where: str, color: np.ndarray | None) -> list[trimesh.Trimesh]:
         shape = geometry_of(element)

@@ -35,7 +35,7 @@ MANY_SHAPES, MANY_VERTICES = 128, 255
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of an asset that may move and has no collision shapes; what stands fast, or is a mark, is there to be seen."""
-    if measured.asset.collision or measured.visual is None or measured.asset.static:
+    if measured.asset.collision or measured.visual is None or measured.asset.static or measured.asset.partial:
         return
     if measured.asset.inertial.mass_kg == 0:  # MAS002 says so; Bullet lets it stand fast
         return
@@ -72,6 +72,8 @@ def box_differs(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def has_convex_pieces(measured: MeasuredAsset) -> bool:
     """Tell whether the collision is made of convex pieces, in the place of what is seen: only then is it what it looks."""
+    if any(shape.as_drawn for shape in measured.asset.collision):
+        return False
     return bool(len(measured.shapes)) and not measured.complaints(box_differs) and not measured.complaints(not_convex)
 
 
@@ -165,7 +167,7 @@ def costly(measured: MeasuredAsset) -> Iterator[Complaint]:
     large = [
         (shapes[index], count)
         for index, count in corners
-        if shapes[index].convex and not shapes[index].primitive and count > MANY_VERTICES
+        if shapes[index].convex and not (shapes[index].primitive or shapes[index].as_drawn) and count > MANY_VERTICES
     ]
     if large:
         most = max(count for _, count in large)

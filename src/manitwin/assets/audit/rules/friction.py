@@ -14,7 +14,7 @@ LARGEST = 2.0
 
 def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of an asset that declares no friction."""
-    if measured.asset.static:
+    if measured.asset.static or not measured.asset.collision:  # nothing of it rubs
         return
     contact = measured.asset.contact
     if contact.friction_static is None and contact.friction_dynamic is None:
