@@ -8,6 +8,8 @@ import pytest
 import trimesh
 from PIL import Image
 
+from manitwin.assets.audit.check import audit_path
+from manitwin.assets.audit.rules import RULES
 from manitwin.assets.read import read_asset
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.textures import material_of
@@ -237,3 +239,19 @@ def test_what_a_free_joint_lets_go_is_the_object_and_what_has_no_joint_beside_it
     cabinet = read_asset(mjcf(tmp_path, table + door))
     assert cabinet.name == "table" and cabinet.static
     assert not read_asset(mjcf(tmp_path, table)).static  # a program that loads it adds the joint
+
+
+def test_shapes_of_one_group_are_seen_alike_and_a_computed_inertia_is_not_judged(tmp_path: Path) -> None:
+    legs = '<geom type="box" size="0.02 0.02 0.3" pos="0.3 0 -0.3" contype="0" conaffinity="0" density="100"/>'
+    top = '<geom type="box" size="0.4 0.4 0.02" density="100"/>'
+    table = read_asset(mjcf(tmp_path, f"<body>{legs}{top}</body>"))
+    assert len(table.visual) == 2 and len(table.collision) == 1 and table.inertial.computed
+    apart = read_asset(
+        mjcf(tmp_path, f"<body>{legs.replace('contype', 'group=' + chr(34) + '1' + chr(34) + ' contype')}{top}</body>")
+    )
+    assert len(apart.visual) == 1  # the other group is collision alone
+    bob = (
+        '<geom type="capsule" size="0.01" fromto="0 0 0 0 0 -0.5" mass="0"/><geom size="0.05" pos="0 0 -0.5" mass="1"/>'
+    )
+    pendulum = mjcf(tmp_path, f"<body><joint/>{bob}</body>")
+    assert "INE005" not in {finding.code for finding in audit_path(pendulum, RULES).findings}

@@ -269,3 +269,8 @@ def test_all_links_of_what_stands_fast_are_read_and_many_that_move_are_counted(t
     assert len(loose.visual) == 1
     (said,) = loose.remarks
     assert said.startswith("link 'b' is joined to nothing fixed, and with it 4 more links were left out")
+
+
+def test_friction_of_pybullets_contact_is_read(tmp_path: Path) -> None:
+    contact = "<contact><lateral_friction>0.3</lateral_friction></contact>"
+    assert read(tmp_path, link("a", f'{contact}<visual name="v">{BOX}</visual>')).contact.friction_static == 0.3

@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.assets.read import read_asset
 from manitwin.errors import AssetError
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.textures import make_part, pbr_material
 
 BOX_SHAPE = '<geometry><box size="0.1 0.2 0.4"/></geometry>'
 
@@ -255,3 +257,22 @@ def test_an_asset_of_which_links_were_left_out_is_partial(tmp_path: Path) -> Non
     links = f'<link name="l">{shape}</link><link name="leg">{shape}</link>'
     assert read_asset(urdf(tmp_path, links + leg)).partial
     assert not read_asset(urdf(tmp_path, links + leg.replace("revolute", "fixed"))).partial
+
+
+@pytest.mark.parametrize(("collision", "turned"), [("", True), ("z", False), ("y", True)])
+def test_gltf_stands_as_what_collides_says_and_upright_where_nothing_does(
+    tmp_path: Path, collision: str, turned: bool
+) -> None:
+    """A rod of 1 m that is long along Y in the glTF: Drake makes it long along Z, SAPIEN leaves it."""
+    rod = trimesh.creation.box([0.1, 0.1, 1.0])  # along Z here, which the file has as Y
+    (tmp_path / "rod.glb").write_bytes(
+        write_glb([make_part(rod.vertices, rod.faces, material=pbr_material(), name="rod")])
+    )
+    long = {"": "", "z": "0.1 1.0 0.1", "y": "0.1 0.1 1.0"}[collision]
+    felt = f'<collision><geometry><box size="{long}"/></geometry></collision>' if long else ""
+    asset = read_asset(
+        urdf(tmp_path, f'<link name="l"><visual><geometry><mesh filename="rod.glb"/></geometry></visual>{felt}</link>')
+    )
+    extents = np.ptp(asset.visual[0].vertices, axis=0)
+    assert int(extents.argmax()) == (2 if turned else 1)
+    assert any("glTF meshes were turned" in remark for remark in asset.remarks) == turned

@@ -38,11 +38,15 @@ class CollisionShape:
 
 @dataclass(frozen=True)
 class Inertial:
-    """The declared mass properties: the centre of mass and ``inertia_kg_m2 (3, 3)`` about it, both along the asset's axes."""
+    """The declared mass properties: the centre of mass and ``inertia_kg_m2 (3, 3)`` about it, both along the asset's axes.
+
+    ``computed``: centre and inertia are what the format's engine computes of masses or densities of shapes, and not written.
+    """
 
     mass_kg: float | None = None
     center_of_mass_m: np.ndarray | None = None
     inertia_kg_m2: np.ndarray | None = None
+    computed: bool = False
 
 
 @dataclass(frozen=True)

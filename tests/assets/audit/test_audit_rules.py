@@ -331,6 +331,8 @@ def test_the_shape_of_what_lacks_a_mesh_is_not_judged() -> None:
     )
     assert errors(audit_asset(half, RULES)) == {"FIL002"}
     assert "COM002" in errors(audit_asset(replace(half, missing_files=("paint.png",)), RULES))
+    unweighed = replace(half, inertial=Inertial())  # of a density, say: without the mesh there is no mass to tell
+    assert "MAS001" not in codes(audit_asset(unweighed, RULES))
 
 
 def test_a_size_is_wrong_where_its_own_mass_says_so() -> None:

@@ -19,7 +19,7 @@ STOPS = ("FIL005", "FIL006")
 """Where one of these holds there is nothing to measure."""
 
 OF_THE_WHOLE_SHAPE = (
-    "MAS003", "MAS004", "INE005", "COM002", "COM003", "COL", "SCL", "FRM005", "GRA", "PLC", "TWN", "RUN"
+    "MAS001", "MAS003", "MAS004", "INE005", "COM002", "COM003", "COL", "SCL", "FRM005", "GRA", "PLC", "TWN", "RUN"
 )  # fmt: skip
 """Rules that measure the shape: where a mesh of it is not there (FIL002 says so), what is left says nothing of it."""
 OF_WHAT_MOVES = ("MAS", "INE", "COM", "COL001", "FRI001", "SCL001", "RUN")

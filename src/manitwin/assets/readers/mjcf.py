@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -135,7 +136,8 @@ def _declared_inertial(
     if explicit or not source.writes(("mass", "density")) or files.lacks_a_mesh:  # of which nothing is known
         return Inertial()
     files.remark("its mass follows from a mass or density written for its geoms; centre and inertia are MuJoCo's own")
-    return combined_inertial([_inertial(model, index, pose) for index, pose in massive]) if massive else Inertial(0.0)
+    found = combined_inertial([_inertial(model, index, pose) for index, pose in massive]) if massive else Inertial(0.0)
+    return replace(found, computed=True)
 
 
 def _inertial(model: Any, index: int, body_to_asset: np.ndarray) -> Inertial:
@@ -168,12 +170,13 @@ class BodyShapes:
     ) -> tuple[tuple[trimesh.Trimesh, ...], tuple[CollisionShape, ...]]:
         """Return the visual parts and the collision shapes of bodies with their poses.
 
-        A geom collides where contype or conaffinity is not zero. Visual are the others in a group that the viewer shows;
-        where there are none, the colliding ones in such a group.
+        A geom collides where contype or conaffinity is not zero. Visual are the others in a group that the viewer shows, with
+        the colliding ones of the same groups; where there are none, the colliding ones in such a group.
         """
         colliding = set(self.colliding(bodies))
         visual: dict[bool, list[trimesh.Trimesh]] = {True: [], False: []}
         collision = []
+        groups = {int(self._model.geom_group[geom]) for geom, _ in self._geoms(bodies) if geom not in colliding}
         for geom, body_to_asset in self._geoms(bodies):
             parts = self._parts(geom, body_to_asset)
             if geom in colliding and parts:
@@ -182,7 +185,7 @@ class BodyShapes:
                 primitive = int(self._model.geom_type[geom]) not in _MESH_KINDS
                 collision.append(CollisionShape(name, vertices, faces, True, primitive=primitive))
             if self._model.geom_group[geom] < _SHOWN_GROUPS:
-                visual[geom in colliding] += parts
+                visual[geom in colliding and int(self._model.geom_group[geom]) not in groups] += parts
         return tuple(visual[False] or visual[True]), tuple(collision)
 
     def colliding(self, bodies: list[tuple[int, np.ndarray]]) -> list[int]:

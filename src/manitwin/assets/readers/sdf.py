@@ -197,8 +197,10 @@ def _declared_contact(opened: SdfModel) -> Contact:
     said_mu = [(s, text) for s in surfaces if (text := text_of(s, "friction/ode/mu")) is not None]
     bounces = [text for s in surfaces if (text := text_of(s, "bounce/restitution_coefficient")) is not None]
     restitution = number(bounces[0], f"{opened.file.name}: restitution_coefficient") if bounces else None
-    if not said_mu:
-        return Contact(restitution=restitution)
+    if not said_mu:  # PyBullet reads its <contact> of URDF in SDF too
+        lateral = next((t for link in opened.links if (t := text_of(link, "contact/lateral_friction"))), None)
+        friction = None if lateral is None else number(lateral, f"{opened.file.name}: lateral_friction")
+        return Contact(friction, friction, restitution)
     values = [number(text, f"{opened.file.name}: mu") for _, text in said_mu]
     if max(values) > min(values):
         opened.files.remark(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -17,20 +17,30 @@ from manitwin.assets.obj_groups import obj_groups
 from manitwin.assets.root import upward
 from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part, pbr_material, srgb_to_linear
-from manitwin.geometry.poses import transform_points
+from manitwin.geometry.poses import GLTF_TO_OBJECT, transform_points
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
 _SCHEMES = ("package://", "model://")
+_Y_UP_FORMATS = ("glb", "gltf")
 _BARE_MESHES = (".stl",)  # a mesh that has a colour of its own keeps it
 
 
 class LinkShapes:
     """Reads shapes of the links of one URDF."""
 
-    def __init__(self, tree: UrdfTree, file: Path, files: AssetFiles):
-        self._tree, self._file, self._files = tree, file, files
+    def __init__(self, tree: UrdfTree, file: Path, files: AssetFiles, *, turn_gltf: bool = False):
+        self._tree, self._file, self._files, self._turn_gltf = tree, file, files, turn_gltf
+        self.has_gltf = False
         materials = [*tree.element.findall("material"), *tree.element.iterfind("link/visual/material")]
         self._colors = {each.get("name"): color for each in materials if (color := _rgba(each)) is not None}
+
+    def all(
+        self, links: Iterable[tuple[etree._Element, np.ndarray]]
+    ) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
+        """Return the visual parts and the collision shapes of links with their poses."""
+        placed = list(links)
+        visual = [part for link, pose in placed for part in self.visual(link, pose)]
+        return visual, [shape for link, pose in placed for shape in self.collision(link, pose)]
 
     def visual(self, link: etree._Element, link_to_asset: np.ndarray) -> Iterator[trimesh.Trimesh]:
         """Yield a link's visual parts in the asset's axes; what is written twice at one place is shown once."""
@@ -82,7 +92,12 @@ class LinkShapes:
         if path is None or self._files.is_of_unread_format(path):
             return []
         note = "it was not turned, as ROS does not"  # RViz and Gazebo Classic disagree; ROS takes meshes along the link's axes
-        return mesh_parts(self._files, path, self._files.mesh(path), color=color, turned_note=note)
+        mesh = self._files.mesh(path)
+        parts = mesh_parts(self._files, path, mesh, color=color, turned_note=note)
+        if mesh.format not in _Y_UP_FORMATS:
+            return parts
+        self.has_gltf = True
+        return [bake_transform(part, GLTF_TO_OBJECT) for part in parts] if self._turn_gltf else parts
 
     def _candidates(self, name: str) -> Iterator[Path]:
         clean = name.replace("\\", "/").removeprefix("file://")

@@ -46,6 +46,8 @@ def left_at_origin(measured: MeasuredAsset) -> Iterator[Complaint]:
     center = measured.asset.inertial.center_of_mass_m
     if center is None or center.any() or not len(measured.hull) or measured.complaints(outside):
         return
+    if measured.asset.inertial.computed:  # it is where its shapes' masses put it
+        return
     if measured.asset.inertial.mass_kg == 0:  # MAS002 says so
         return
     shapes = measured.shapes if len(measured.shapes) else measured.hull

@@ -107,7 +107,7 @@ def plausible_moments(measured: MeasuredAsset) -> tuple[np.ndarray, np.ndarray] 
 def magnitude(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of principal moments that no such body of that mass has."""
     moments, band = _sound_moments(measured), plausible_moments(measured)
-    if moments is None or band is None or is_of_wrong_size(measured):
+    if moments is None or band is None or is_of_wrong_size(measured) or measured.asset.inertial.computed:
         return
     if measured.complaints(triangle) or measured.complaints(placeholder):
         return
