@@ -12,6 +12,8 @@ from manitwin.assets.asset import Asset
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import find_assets, read_asset
 from manitwin.errors import AssetError
+from manitwin.formats.glb import write_glb
+from manitwin.formats.meshes.textures import make_part, pbr_material
 
 BOX = "<geometry><box><size>0.1 0.2 0.3</size></box></geometry>"
 
@@ -274,3 +276,14 @@ def test_all_links_of_what_stands_fast_are_read_and_many_that_move_are_counted(t
 def test_friction_of_pybullets_contact_is_read(tmp_path: Path) -> None:
     contact = "<contact><lateral_friction>0.3</lateral_friction></contact>"
     assert read(tmp_path, link("a", f'{contact}<visual name="v">{BOX}</visual>')).contact.friction_static == 0.3
+
+
+def test_gltf_of_a_model_is_turned_where_what_collides_says_so(tmp_path: Path) -> None:
+    rod = trimesh.creation.box([0.1, 0.1, 1.0])  # along Z here, which the file has as Y
+    (tmp_path / "rod.glb").write_bytes(
+        write_glb([make_part(rod.vertices, rod.faces, material=pbr_material(), name="rod")])
+    )
+    seen = '<visual name="v"><geometry><mesh><uri>rod.glb</uri></mesh></geometry></visual>'
+    for size, along in (("0.1 0.1 1.0", 2), ("0.1 1.0 0.1", 1)):
+        felt = f'<collision name="c"><geometry><box><size>{size}</size></box></geometry></collision>'
+        assert int(np.ptp(read(tmp_path, link("a", seen + felt)).visual[0].vertices, axis=0).argmax()) == along

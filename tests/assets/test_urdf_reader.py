@@ -249,6 +249,8 @@ def test_a_distance_field_of_isaac_gym_is_collided_with_as_it_is_drawn(tmp_path:
     body = f'<link name="l"><collision>{BOX_SHAPE}<sdf resolution="256"/></collision><collision>{BOX_SHAPE}</collision></link>'
     first, second = read_asset(urdf(tmp_path, body)).collision
     assert first.as_drawn and not second.as_drawn and second.primitive
+    concave = f'<link name="l"><collision concave="yes">{BOX_SHAPE}</collision></link>'  # PyBullet's
+    assert read_asset(urdf(tmp_path, concave)).collision[0].as_drawn
 
 
 def test_an_asset_of_which_links_were_left_out_is_partial(tmp_path: Path) -> None:

@@ -353,6 +353,7 @@ def test_a_size_is_wrong_where_its_own_mass_says_so() -> None:
     assert "SCL001" not in long((4.0, 0.2, 0.2), 30.0)
     assert "SCL001" in long((4.0, 4.0, 2.0), 30.0)  # lighter than 32 m3 of air
     assert "SCL001" not in long((4.0, 0.2, 0.2), None) and "SCL001" in long((40.0, 2.0, 2.0), None)
+    assert "SCL001" not in long((40.0, 2.0, 2.0), 0.0)  # a scene of Bullet's
     assert "SCL001" not in long((0.002, 0.002, 0.001), 1e-5) and "SCL001" in long((8e-5, 8e-5, 8e-5), 0.3)
 
 
@@ -392,6 +393,7 @@ def test_a_frame_around_a_picture_is_no_vessel_and_a_box_on_its_side_is_one() ->
 
     assert "COL003" not in codes(audit_asset(opened(0.05), RULES))
     assert "COL003" in codes(audit_asset(opened(0.3), RULES))
+    assert "COL003" not in codes(audit_asset(replace(opened(0.3), partial=True), RULES))
     cupboard = codes(audit_asset(replace(opened(0.3), up="y"), RULES))
     assert "SCL003" not in codes(audit_asset(replace(opened(0.3), up="y", static=True), RULES)), cupboard
 

@@ -13,6 +13,7 @@ from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.read import is_file_below, only_file
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
+from manitwin.assets.readers.upright import upright_shapes
 from manitwin.assets.readers.urdf_shapes import candidates
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
@@ -80,9 +81,9 @@ def _included(file: Path, root: etree._Element, files: AssetFiles) -> tuple[Path
 
 def asset_of(opened: SdfModel, path: Path) -> Asset:
     """Return the asset that an SDF's elements describe; raises AssetError."""
-    shapes = SdfShapes(opened.file, opened.frames, opened.files)
-    visual = [part for link in opened.links for part in shapes.visual(link)]
-    collision = [shape for link in opened.links for shape in shapes.collision(link)]
+    visual, collision = upright_shapes(
+        lambda turn: SdfShapes(opened.file, opened.frames, opened.files, turn_gltf=turn).all(opened.links), opened.files
+    )
     if not visual and not collision and not opened.files.missing:
         raise AssetError(f"{opened.file.name}: no link of it has a shape")
     licence, attribution = _licence(opened)

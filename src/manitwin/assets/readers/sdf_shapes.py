@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,12 +15,13 @@ from scipy.spatial.transform import Rotation
 from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.readers.urdf_shapes import candidates, mesh_parts, plain_material
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part
 from manitwin.formats.xml_file import number, numbers, text_of
-from manitwin.geometry.poses import transform
+from manitwin.geometry.poses import GLTF_TO_OBJECT, transform
 
 MODEL_FRAME = "__model__"
 _SHEET_M = 1e-3
@@ -101,8 +102,14 @@ class ModelFrames:
 class SdfShapes:
     """Reads shapes of the links of one SDF model; meshes are looked up in the asset's folder and nowhere else."""
 
-    def __init__(self, file: Path, frames: ModelFrames, files: AssetFiles):
-        self._file, self._frames, self._files = file, frames, files
+    def __init__(self, file: Path, frames: ModelFrames, files: AssetFiles, *, turn_gltf: bool = False):
+        self._file, self._frames, self._files, self._turn_gltf = file, frames, files, turn_gltf
+
+    def all(self, links: Iterable[etree._Element]) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
+        """Return the visual parts and the collision shapes of links."""
+        placed = list(links)
+        visual = [part for link in placed for part in self.visual(link)]
+        return visual, [shape for link in placed for shape in self.collision(link)]
 
     def visual(self, link: etree._Element) -> Iterator[trimesh.Trimesh]:
         """Yield a link's visual parts in the model's frame."""
@@ -159,14 +166,17 @@ class SdfShapes:
         if path is None or self._files.is_of_unread_format(path):
             return []
         scale = text_of(shape, "scale")
-        return mesh_parts(
+        mesh = self._submesh(shape, self._files.mesh(path), path)
+        parts = mesh_parts(
             self._files,
             path,
-            self._submesh(shape, self._files.mesh(path), path),
+            mesh,
             color=color,
             turned_note="it was not turned",  # as for URDF: simulators disagree
             scale=None if scale is None else numbers(scale, 3, f"{what} scale"),
         )
+        turn = self._turn_gltf and mesh.format in Y_UP_FORMATS
+        return [bake_transform(part, GLTF_TO_OBJECT) for part in parts] if turn else parts
 
     def _submesh(self, shape: etree._Element, mesh: MeshFile, path: Path) -> MeshFile:
         name = text_of(shape, "submesh/name")

@@ -6,13 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from lxml import etree  # type: ignore[import-untyped]
 
-from manitwin.assets.asset import Asset, CollisionShape, Contact, Inertial, combined_inertial
+from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import AssetFiles
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
+from manitwin.assets.readers.upright import upright_shapes
 from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
@@ -28,7 +28,6 @@ from manitwin.robots.urdf import (
     read_urdf,
 )
 
-_SAME_M = 1e-6
 _TRIPLES = frozenset({"xyz", "rpy", "rgba", "size", "scale"})
 _WORLD = "world"
 """Drake and Gazebo know it without a <link>."""
@@ -86,7 +85,9 @@ def _as_loaders_take_it(root: etree._Element) -> None:
 
 def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> Asset:
     """Return the asset that a URDF's elements describe; ``contact`` stands in for what they say of friction."""
-    visual, collision = _shapes(found)
+    visual, collision = upright_shapes(
+        lambda turn: LinkShapes(found.tree, found.file, found.files, turn_gltf=turn).all(found.links), found.files
+    )
     if not visual and not collision and not found.files.missing:
         raise found.tree.refuse("", "no link of it has a shape", "give it a visual or a collision shape")
     licence, attribution = stated_licence(comments_before(found.tree.element))
@@ -107,33 +108,6 @@ def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> A
         remarks=tuple(found.files.remarks),
         partial=found.files.partial,
     )
-
-
-def _shapes(found: UrdfObject) -> tuple[list[trimesh.Trimesh], list[CollisionShape]]:
-    """Return the visual parts and collision shapes, those of glTF files turned from Y up to Z up where they fit so.
-
-    Drake and Gazebo turn them, as the format has Y up; SAPIEN does not. What collides tells which of the two a file was made for,
-    where that is no glTF too; else it is turned.
-    """
-    as_written = LinkShapes(found.tree, found.file, found.files)
-    visual, collision = as_written.all(found.links)
-    if not as_written.has_gltf:
-        return visual, collision
-    turned_visual, turned_collision = LinkShapes(found.tree, found.file, found.files, turn_gltf=True).all(found.links)
-    if _apart_m(turned_visual, turned_collision) > _apart_m(visual, collision) + _SAME_M:
-        return visual, collision
-    found.files.remark("its glTF meshes were turned from Y up to Z up, as Drake and Gazebo do and SAPIEN does not")
-    return turned_visual, turned_collision
-
-
-def _apart_m(visual: list[trimesh.Trimesh], collision: list[CollisionShape]) -> float:
-    """Return how far a side of the collision's box is from the visual's; 0 where one of them has none."""
-    seen = [np.asarray(part.vertices) for part in visual if len(part.vertices)]
-    felt = [shape.vertices for shape in collision if len(shape.vertices)]
-    if not seen or not felt:
-        return 0.0
-    boxes = [np.array([np.concatenate(each).min(0), np.concatenate(each).max(0)]) for each in (seen, felt)]
-    return float(np.abs(boxes[0] - boxes[1]).max())
 
 
 def declared_inertial(links: tuple[tuple[etree._Element, np.ndarray], ...]) -> Inertial:

@@ -14,6 +14,7 @@ from manitwin.assets import primitives
 from manitwin.assets.asset import CollisionShape
 from manitwin.assets.asset_files import AssetFiles, joined
 from manitwin.assets.obj_groups import obj_groups
+from manitwin.assets.readers.upright import Y_UP_FORMATS
 from manitwin.assets.root import upward
 from manitwin.formats.meshes.read import MeshFile
 from manitwin.formats.meshes.textures import bake_transform, make_part, pbr_material, srgb_to_linear
@@ -21,7 +22,6 @@ from manitwin.geometry.poses import GLTF_TO_OBJECT, transform_points
 from manitwin.robots.urdf import UrdfTree, geometry_of, origin_of, values_of
 
 _SCHEMES = ("package://", "model://")
-_Y_UP_FORMATS = ("glb", "gltf")
 _BARE_MESHES = (".stl",)  # a mesh that has a colour of its own keeps it
 
 
@@ -30,7 +30,6 @@ class LinkShapes:
 
     def __init__(self, tree: UrdfTree, file: Path, files: AssetFiles, *, turn_gltf: bool = False):
         self._tree, self._file, self._files, self._turn_gltf = tree, file, files, turn_gltf
-        self.has_gltf = False
         materials = [*tree.element.findall("material"), *tree.element.iterfind("link/visual/material")]
         self._colors = {each.get("name"): color for each in materials if (color := _rgba(each)) is not None}
 
@@ -70,9 +69,10 @@ class LinkShapes:
                 name = element.get("name") or f"{link.get('name')}_{index:02d}"
                 file = self._mesh_file(element)
                 primitive = geometry_of(element).tag != "mesh"
-                field = element.find("sdf") is not None  # Isaac Gym collides with a distance field of the mesh
-                groups = () if field else placed_groups(file, to_asset)
-                yield CollisionShape(name, vertices, faces, True, file, primitive, groups, as_drawn=field)
+                # Isaac Gym collides with a distance field of the mesh, PyBullet with the triangles of what does not move
+                drawn = element.find("sdf") is not None or element.get("concave") == "yes"
+                groups = () if drawn else placed_groups(file, to_asset)
+                yield CollisionShape(name, vertices, faces, True, file, primitive, groups, as_drawn=drawn)
 
     def _parts(self, element: etree._Element, where: str, color: np.ndarray | None) -> list[trimesh.Trimesh]:
         shape = geometry_of(element)
@@ -94,10 +94,8 @@ class LinkShapes:
         note = "it was not turned, as ROS does not"  # RViz and Gazebo Classic disagree; ROS takes meshes along the link's axes
         mesh = self._files.mesh(path)
         parts = mesh_parts(self._files, path, mesh, color=color, turned_note=note)
-        if mesh.format not in _Y_UP_FORMATS:
-            return parts
-        self.has_gltf = True
-        return [bake_transform(part, GLTF_TO_OBJECT) for part in parts] if self._turn_gltf else parts
+        turn = self._turn_gltf and mesh.format in Y_UP_FORMATS
+        return [bake_transform(part, GLTF_TO_OBJECT) for part in parts] if turn else parts
 
     def _candidates(self, name: str) -> Iterator[Path]:
         clean = name.replace("\\", "/").removeprefix("file://")

@@ -37,6 +37,8 @@ def outside_hand_size(measured: MeasuredAsset) -> Iterator[Complaint]:
     longest = measured.longest_m
     if measured.asset.static or measured.bounds is None or SMALLEST_M <= longest <= LARGEST_M:
         return
+    if longest > LARGEST_M and measured.asset.inertial.mass_kg == 0:  # MAS002 says so; Bullet lets it stand fast
+        return
     mass, hull_m3 = measured.asset.inertial.mass_kg, float(measured.hull.volumes_m3.sum())
     because = ""
     if longest > LARGEST_M:

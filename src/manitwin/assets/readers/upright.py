@@ -1,0 +1,41 @@
+"""glTF meshes in URDF and SDF: some loaders turn them from Y up to Z up, and files are made for either."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import trimesh
+
+from manitwin.assets.asset import CollisionShape
+from manitwin.assets.asset_files import AssetFiles
+
+Shapes = tuple[list[trimesh.Trimesh], list[CollisionShape]]
+Y_UP_FORMATS = ("glb", "gltf")
+_SAME_M = 1e-6
+
+
+def upright_shapes(read: Callable[[bool], Shapes], files: AssetFiles) -> Shapes:
+    """Return the visual parts and collision shapes that ``read`` gives, those of glTF files turned where they fit so.
+
+    ``read`` is told whether to turn them. Drake and Gazebo do, as the format has Y up; SAPIEN does not. What collides tells which
+    of the two a file was made for, where that is no glTF too; else it is turned.
+    """
+    as_written = read(False)
+    if not any(file.suffix.lower().lstrip(".") in Y_UP_FORMATS for file in files.used):
+        return as_written
+    turned = read(True)
+    if _apart_m(*turned) > _apart_m(*as_written) + _SAME_M:
+        return as_written
+    files.remark("its glTF meshes were turned from Y up to Z up, as Drake and Gazebo do and SAPIEN does not")
+    return turned
+
+
+def _apart_m(visual: list[trimesh.Trimesh], collision: list[CollisionShape]) -> float:
+    """Return how far a side of the collision's box is from the visual's; 0 where one of them has none."""
+    seen = [np.asarray(part.vertices) for part in visual if len(part.vertices)]
+    felt = [shape.vertices for shape in collision if len(shape.vertices)]
+    if not seen or not felt:
+        return 0.0
+    boxes = [np.array([np.concatenate(each).min(0), np.concatenate(each).max(0)]) for each in (seen, felt)]
+    return float(np.abs(boxes[0] - boxes[1]).max())
