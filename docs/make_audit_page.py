@@ -60,6 +60,8 @@ status: 0 no errors, 1 errors, 2 wrong use.
   shapes are taken, as the engines do of bodies that move; joints do not move. PyBullet is one's own to install.
 - `--format json` has the numbers behind every finding; `sarif` (2.1.0) is what code hosts show beside a change.
 
+[Findings checked by hand](audit_checked.md) says how often it is right.
+
 From Python: `manitwin.audit_assets(["assets"], ignore=["LIC"], jobs=2)` returns what was found of each asset.
 
 This page is written by `python docs/make_audit_page.py`.
