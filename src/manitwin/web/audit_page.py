@@ -67,5 +67,5 @@ def _all(audited: Sequence[Audited]) -> Table:
         if each.findings:
             counts = count_by_severity([each])
             codes = ", ".join(dict.fromkeys(finding.code for finding in each.findings))
-            rows.append((each.asset, each.format, *(counts[severity] for severity in _SEVERITIES), codes))
+            rows.append((each.asset, each.format, counts["error"], counts["warning"], counts["note"], codes))
     return Table("Assets", ("asset", "format", "errors", "warnings", "notes", "rules"), rows)
