@@ -18,6 +18,7 @@ import time
 import numpy as np
 import trimesh
 from points import held_out
+from scipy.spatial import cKDTree
 
 from manitwin.geometry.parts.cut_up import cut_up
 from manitwin.geometry.parts.part_rules import PartRule
@@ -35,8 +36,12 @@ TRUE_ROLES: dict[PartRule, tuple[str, dict[str, str]]] = {
     "stemmed": ("bowl", {"stem": "stem", "foot": "foot"}),
     "ended": ("head", {"handle": "handle", "neck": "neck"}),
     "pistol": ("housing", {"handle": "grip", "switch": "grip"}),
+    "open": ("body", {"inside": "inside", "rim": "rim", "base": "base", "underside": "base", "knob": "body"}),
+    "closed": ("body", {"top": "top", "base": "base"}),
 }
 """By rule, the role of parts that are not named here, and of those that are."""
+RIM_M, RIM_SHARE = 0.018, 0.4
+"""A rim is what a finger pad covers on either side of the template's own rim, at most so much of height or radius."""
 CLEAN_BAR, ROUGH_BAR = 0.88, 0.78
 
 
@@ -82,12 +87,27 @@ def score(category: str, seed: int, rough: bool) -> float | None:
         return None
     rest, roles = TRUE_ROLES[prior.parts]
     truth = np.array([roles.get(name, rest) for name in made.mesh.names])[part]
+    if prior.parts == "open":
+        truth = with_rim(mesh, truth)
     answer, areas = np.array(told.roles)[told.role], np.asarray(mesh.area_faces)
+    answer = np.where(np.isin(answer, [rest, *roles.values()]), answer, rest)
+    if prior.parts in ("open", "closed") and not np.isin(("base", "underside"), made.mesh.names).any():
+        answer = np.where(answer == "base", rest, answer)  # the template does not tell its base from its wall
     each = [
         areas[(answer == role) & (truth == role)].sum() / areas[(answer == role) | (truth == role)].sum()
         for role in np.union1d(truth, answer)
     ]
     return float(np.mean(each))
+
+
+def with_rim(mesh: trimesh.Trimesh, truth: np.ndarray) -> np.ndarray:
+    """Return the roles of a vessel's faces, those near the faces of its rim being of it too."""
+    rim = np.asarray(mesh.triangles_center)[truth == "rim"]
+    if not len(rim):
+        return truth
+    reach_m = min(RIM_M, RIM_SHARE * max(float(mesh.extents[2]), float(np.ptp(rim, axis=0)[:2].max()) / 2))
+    near = cKDTree(rim).query(mesh.triangles_center)[0] <= reach_m
+    return np.where(near & np.isin(truth, ["body", "inside"]), "rim", truth)
 
 
 def roughened(mesh: trimesh.Trimesh, part: np.ndarray) -> tuple[trimesh.Trimesh, np.ndarray]:

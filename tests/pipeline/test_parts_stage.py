@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from handmade import mug, visual
+from handmade import cup, mug, visual
 from manitwin.engine.stage import Draft
 from manitwin.formats.glb import read_glb, write_glb
 from manitwin.models.annotators.part_names import part_name
@@ -102,7 +102,15 @@ def test_name_is_that_of_the_whole_part(role: str, category: str, labels: list[s
     assert prior is not None and part_name(role, prior, labels) == name
 
 
-@pytest.mark.parametrize("name", ["bowl", "box", "gizmo"])
+def test_a_vessel_without_a_handle_has_an_inside_and_a_base(tmp_path: Path) -> None:
+    mesh = cup()
+    draft = draft_of(tmp_path, mesh, [visual(mesh, baseColorFactor=[200, 10, 10, 255])], "bowl", None)
+    table = PartsStage().run(draft, tmp_path)["parts"]
+    assert {part["name"] for part in table} >= {"body", "inside", "base"}
+    assert {part["source"] for part in table} == {"geometry:open"}
+
+
+@pytest.mark.parametrize("name", ["book", "box", "gizmo"])
 def test_nothing_is_told_of_what_has_no_rule(tmp_path: Path, name: str) -> None:
     assert parts_of_mug(tmp_path, name) == {}
     with np.load(tmp_path / PARTS_FILE) as arrays:

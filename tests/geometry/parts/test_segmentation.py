@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from trimesh.creation import annulus, box, cylinder, revolve
+from trimesh.creation import annulus, box, cylinder, icosphere, revolve
 
 from manitwin.geometry.parts.part_rules import PartRule
 from manitwin.geometry.parts.segmentation import Segmentation, carried_over, segmented
@@ -122,6 +122,55 @@ def test_neck_is_what_is_thinner_than_head_and_handle() -> None:
     assert x.min() > -0.055 and x.max() < 0.005
 
 
+def cup() -> trimesh.Trimesh:
+    return turned((0, 0), (0.04, 0), (0.04, 0.09), (0.036, 0.09), (0.036, 0.006), (0, 0.006))
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.0003])
+def test_both_sides_of_a_wall_are_inside_and_body_and_its_edge_is_the_rim(noise_m: float) -> None:
+    mesh = cup().subdivide_to_size(0.004)
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    clean, away_m = mesh.triangles_center.copy(), np.hypot(*mesh.triangles_center[:, :2].T)
+    mesh.vertices += np.random.default_rng(0).normal(0, noise_m, mesh.vertices.shape) if noise_m else 0.0
+    found = told(mesh, "open", stands=True)
+    assert found is not None and found.roles == ("body", "inside", "rim", "base")
+    upper, high = clean[:, 2] > 0.09 - 0.014, clean[:, 2] < 0.09 - 0.022
+    assert (found.role[upper] == 2).mean() > 0.99  # a finger's width on either side
+    assert (found.role[high & (away_m < 0.037) & (clean[:, 2] > 0.005)] == 1).mean() > 0.99
+    assert (found.role[high & (away_m > 0.039) & (clean[:, 2] > 0.004)] == 0).mean() > 0.99
+    assert (found.role[(clean[:, 2] < 0.001) & (away_m < 0.038)] == 3).mean() > 0.99
+
+
+def test_wall_of_one_face_from_top_to_bottom_shows_no_rim() -> None:
+    mesh = cup()
+    found = told(mesh, "open", stands=True)
+    assert found is not None and set(np.unique(found.role)) == {0, 1, 3}
+
+
+def test_inside_of_a_vase_goes_on_behind_its_shoulder() -> None:
+    vase = turned(
+        *((0, 0), (0.05, 0), (0.06, 0.08), (0.02, 0.15), (0.02, 0.2)),
+        *((0.017, 0.2), (0.017, 0.15), (0.056, 0.08), (0.046, 0.004), (0, 0.004)),
+    )
+    found = told(vase, "open", stands=True)
+    assert found is not None
+    radial = np.einsum("ij,ij->i", vase.face_normals[:, :2], vase.triangles_center[:, :2])
+    shoulder = (vase.triangles_center[:, 2] > 0.09) & (vase.triangles_center[:, 2] < 0.145)
+    assert (found.role[shoulder & (radial < 0)] == 1).all() and (found.role[shoulder & (radial > 0)] == 0).all()
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.0003])
+def test_top_and_base_of_a_can_end_at_its_edges(noise_m: float) -> None:
+    can = at(cylinder(0.033, 0.1), 0, 0, 0.05).subdivide_to_size(0.004)
+    mesh = trimesh.Trimesh(can.vertices, can.faces)
+    flat, height = np.abs(mesh.face_normals[:, 2]) > 0.5, mesh.triangles_center[:, 2].copy()
+    mesh.vertices += np.random.default_rng(0).normal(0, noise_m, mesh.vertices.shape) if noise_m else 0.0
+    found = told(mesh, "closed", stands=True)
+    assert found is not None and found.roles == ("body", "top", "base")
+    truth = np.where(flat, np.where(height > 0.05, 1, 2), 0)
+    assert mesh.area_faces[found.role != truth].sum() < 0.03 * mesh.area
+
+
 @pytest.mark.parametrize(
     ("mesh", "rule", "stands"),
     [
@@ -131,6 +180,8 @@ def test_neck_is_what_is_thinner_than_head_and_handle() -> None:
         (at(cylinder(0.03, 0.12), 0, 0, 0.06), "spouted", True),
         (at(cylinder(0.03, 0.12), 0, 0, 0.06), "stemmed", True),
         (box((0.1, 0.1, 0.1)), "pistol", False),
+        (box((0.1, 0.1, 0.1)), "open", True),
+        (icosphere(3, 0.05), "closed", True),
     ],
 )
 def test_what_a_form_does_not_show_is_not_guessed(mesh: trimesh.Trimesh, rule: PartRule, stands: bool) -> None:

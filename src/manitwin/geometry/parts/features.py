@@ -16,7 +16,7 @@ from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape, SurfacePoin
 Feature = Literal[
     "opening", "rim", "inside", "handle", "handle_end", "head", "face", "tip", "edge", "middle", "neck", "spout",
     "top", "base", "side", "center", "front", "back", "end", "ring", "mouth", "bristles", "muzzle", "grip", "housing",
-    "apex", "arch_end",
+    "apex", "arch_end", "end_wall",
 ]  # fmt: skip
 """A place on an object that geometry can point out."""
 
@@ -249,6 +249,11 @@ def _end(shape: Shape, points: SurfacePoints) -> np.ndarray:
     return _near(0.5 - np.abs(along - 0.5), 0.08) * (0.8 + 0.2 * height) * (0.7 + 0.3 * middle)
 
 
+def _end_wall(shape: Shape, points: SurfacePoints) -> np.ndarray:
+    """What looks sideways near an end of the long axis: where fingers hold that come to the end of a box or can."""
+    return _end(shape, points) * (1 - np.abs(points.normals[:, 2]))
+
+
 def _ring(shape: Shape, points: SurfacePoints) -> np.ndarray | None:
     """The inner side of a ring: surface that looks at the centre of the box from nearby."""
     toward = shape.obb_to_object[:3, 3] - points.positions_m
@@ -296,5 +301,5 @@ _SCORERS: dict[str, Callable[[Shape, SurfacePoints], np.ndarray | None]] = {
     "base": _base, "side": _side, "center": _center, "front": partial(_large_face, side=1),
     "back": partial(_large_face, side=-1), "end": _end, "ring": _ring,
     "mouth": _mouth, "bristles": _bristles, "muzzle": _muzzle, "grip": _grip, "housing": _housing,
-    "apex": _apex, "arch_end": _arch_end,
+    "apex": _apex, "arch_end": _arch_end, "end_wall": _end_wall,
 }  # fmt: skip

@@ -15,8 +15,10 @@ import numpy as np
 from manitwin.geometry.parts.protrusions import Protrusion
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape
 
-PartRule = Literal["handled", "spouted", "capped", "stemmed", "ended", "pistol"]
-PartRole = Literal["body", "handle", "spout", "cap", "bowl", "stem", "foot", "head", "neck", "housing", "grip"]
+PartRule = Literal["handled", "spouted", "capped", "stemmed", "ended", "pistol", "open", "closed"]
+PartRole = Literal[
+    "body", "handle", "spout", "cap", "bowl", "stem", "foot", "head", "neck", "housing", "grip", "inside", "rim", "base", "top",
+]  # fmt: skip
 ROLES: dict[PartRule, tuple[PartRole, ...]] = {
     "handled": ("body", "handle"),
     "spouted": ("body", "handle", "spout"),
@@ -24,8 +26,10 @@ ROLES: dict[PartRule, tuple[PartRole, ...]] = {
     "stemmed": ("bowl", "stem", "foot"),
     "ended": ("head", "neck", "handle"),
     "pistol": ("housing", "grip"),
+    "open": ("body", "inside", "rim", "base"),
+    "closed": ("body", "top", "base"),
 }
-"""The parts that each rule may tell."""
+"""The parts that each rule may tell; those of ``open`` and ``closed`` are of the surface alone (``skin_rules``)."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +46,9 @@ class Membership:
 
 
 def membership(rule: PartRule, shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Return the parts of surface points ``(N, 3)`` by a rule; None where the shape does not show them."""
-    return _RULES[rule](shape, points_m)
+    """Return the parts of points ``(N, 3)`` by a rule; None where it does not show them, or they are of the surface alone."""
+    told = _RULES.get(rule)
+    return None if told is None else told(shape, points_m)
 
 
 _SURE_REACH = 3.0  # times the least reach of a handle: sticks out beyond doubt

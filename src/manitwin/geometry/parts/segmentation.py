@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from manitwin.geometry.parts.cut_up import cut_up
 from manitwin.geometry.parts.part_rules import PartRule, membership
 from manitwin.geometry.parts.shape import Shape
+from manitwin.geometry.parts.skin_rules import skin_membership
 from manitwin.geometry.parts.surface_graph import EDGE_SHARE, SurfaceGraph
 
 _LEAST_AREA_SHARE = 0.005  # a part that is smaller is a slip of the rules
@@ -30,7 +31,7 @@ class Segmentation:
 def segmented(mesh: trimesh.Trimesh, shape: Shape, rule: PartRule) -> Segmentation | None:
     """Return the parts of a closed mesh by the rule of its form; None where it does not show at least two of them."""
     graph = SurfaceGraph(mesh)
-    found = membership(rule, shape, graph.centers_m)
+    found = membership(rule, shape, graph.centers_m) or skin_membership(rule, shape, graph, mesh)
     if found is None:
         return None
     shares = np.bincount(found.index, graph.areas_m2, len(found.roles)) / graph.areas_m2.sum()

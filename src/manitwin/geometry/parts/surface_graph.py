@@ -37,6 +37,16 @@ class SurfaceGraph:
         return np.asarray(self._mesh.triangles_center)
 
     @property
+    def normals(self) -> np.ndarray:
+        """The outward unit normals ``(P, 3)`` of the pieces."""
+        return np.asarray(self._mesh.face_normals)
+
+    @property
+    def corners_m(self) -> np.ndarray:
+        """The corners ``(C, 3)`` of the pieces."""
+        return np.asarray(self._mesh.vertices)
+
+    @property
     def areas_m2(self) -> np.ndarray:
         """The areas ``(P,)`` of the pieces."""
         return np.asarray(self._mesh.area_faces)
@@ -69,6 +79,10 @@ class SurfaceGraph:
         share = np.zeros((self._face_count, len(names)))
         np.add.at(share, (self._of_face, place), self.areas_m2 + 1e-15)
         return np.asarray(names[share.argmax(1)])
+
+    def of_pieces(self, labels: np.ndarray) -> np.ndarray:
+        """Return the label of each piece ``(P,)`` from those of the mesh's faces ``(F,)``."""
+        return np.asarray(labels[self._of_face])
 
     @cached_property
     def _pairs(self) -> np.ndarray:

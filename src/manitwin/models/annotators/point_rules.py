@@ -243,6 +243,7 @@ _PLACES: dict[str, str] = {
     "housing": "barrel behind the working end",
     "apex": "highest place of the arch",
     "arch_end": "end of the arch",
+    "end_wall": "side near the end",
 }
 
 
