@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from grasp_drafts import PANDA, Scripted, number_of, proposed_draft, run_all
 from manitwin.config import RobustnessConfig, VerifyConfig
+from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics.trial import TrialResult
 from manitwin.pipeline.robustness import RobustnessStage, rank_values
 from manitwin.twin.grasp_summary import RobustnessSummary
 
@@ -64,6 +67,37 @@ def test_perturbations_reach_pose_body_and_settings_within_their_ranges(tmp_path
     assert 0 < shift_m.max() <= 0.005 and len(np.unique(shift_m)) == 10
     assert 25 <= force_n.min() < 35 and 40 < force_n.max() <= 50
     assert 0.6 <= friction.min() < 0.8 and 1.2 < friction.max() <= 1.4
+
+
+def test_a_vessel_that_weighs_less_has_less_in_it_and_its_centre_of_mass_lies_lower(tmp_path: Path) -> None:
+    bodies: list[RigidBody] = []
+
+    class Seen(Scripted):
+        def run(self, body: RigidBody, *rest: Any, **more: Any) -> list[TrialResult]:
+            bodies.append(body)
+            return super().run(body, *rest, **more)
+
+    draft = proposed_draft(tmp_path, ["held"])
+    physical = draft.fields["physical"]
+    physical["center_of_mass_uncertainty_m"] = 0.0
+    masses, heights_m = (0.05, 0.175, 0.3), (0.125, 0.08, 0.125)  # empty, half full and full
+    physical["mass_kg"] = physical["mass_kg"] | {"low": 0.05, "high": 0.4}
+    physical["filling"] = {
+        "assumption": "full",
+        "states": [
+            {"share": share, "mass_kg": mass, "center_of_mass_m": [0, 0, z], "inertia_kg_m2": (0.001 * mass * np.eye(3)).tolist()}
+            for share, mass, z in zip((0, 0.5, 1), masses, heights_m, strict=True)
+        ],
+    }  # fmt: skip
+    run_all(
+        draft,
+        tmp_path,
+        RobustnessStage(RobustnessConfig(error=1e-6), VerifyConfig(), Seen(lambda pose, settings: "held"), PANDA),
+    )
+    weights = np.array([body.mass_kg for body in bodies])
+    assert len(bodies) == 10 and weights.min() < 0.1 and weights.max() > 0.3
+    assert np.allclose([body.center_of_mass_m[2] for body in bodies], np.interp(weights, masses, heights_m))
+    assert np.allclose([body.inertia_kg_m2[0, 0] for body in bodies], 0.001 * weights)
 
 
 def test_nothing_held_is_nothing_tried(tmp_path: Path) -> None:

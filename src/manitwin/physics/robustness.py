@@ -92,6 +92,32 @@ class Spread:
 
 
 @dataclass(frozen=True)
+class FillCurve:
+    """How centre of mass and inertia of a vessel go with its mass, from empty to full.
+
+    ``masses_kg (K,)`` rising, ``centers_m (K, 3)`` and ``inertias_kg_m2 (K, 3, 3)`` about them, object frame.
+    """
+
+    masses_kg: np.ndarray
+    centers_m: np.ndarray
+    inertias_kg_m2: np.ndarray
+
+    def filled(self, body: RigidBody, mass_kg: float) -> RigidBody:
+        """Return the body as the vessel is that weighs so much: states between two known ones are in line with both.
+
+        What weighs less than the empty one, or more than the full one, is spread as that is.
+        """
+        place = float(np.interp(mass_kg, self.masses_kg, np.arange(len(self.masses_kg))))
+        below = min(int(place), len(self.masses_kg) - 2)
+        share = place - below
+        mixed = [
+            (1 - share) * values[below] + share * values[below + 1]
+            for values in (self.masses_kg, self.centers_m, self.inertias_kg_m2)
+        ]
+        return replace(body, mass_kg=mass_kg, center_of_mass_m=mixed[1], inertia_kg_m2=mixed[2] * (mass_kg / mixed[0]))
+
+
+@dataclass(frozen=True)
 class Perturbation:
     """One draw: shift (m) and rotation vector (rad) of the hand in its own frame, factors, mass, shift of the centre of mass."""
 
@@ -109,8 +135,13 @@ class Perturbation:
         shift = gripper_to_object[:3, :3] @ self.shift_m
         return transform(rotation, tip + shift - depth_m * rotation[:, 2])
 
-    def body(self, body: RigidBody) -> RigidBody:
-        """Return the body with another mass, centre of mass and friction; the inertia goes with the mass."""
+    def body(self, body: RigidBody, filling: FillCurve | None = None) -> RigidBody:
+        """Return the body with another mass, centre of mass and friction; the inertia goes with the mass.
+
+        Of a vessel the drawn mass says how full it is, and ``filling`` where its centre of mass then is.
+        """
+        if filling is not None:
+            body = filling.filled(body, self.mass_kg)
         return replace(
             body,
             mass_kg=self.mass_kg,

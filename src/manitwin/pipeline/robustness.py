@@ -9,7 +9,14 @@ import numpy as np
 
 from manitwin.config import Resource, RobustnessConfig, VerifyConfig
 from manitwin.engine.stage import Draft
-from manitwin.physics.robustness import Robustness, SequentialTest, Spread, draw_perturbations, try_until_clear
+from manitwin.physics.robustness import (
+    FillCurve,
+    Robustness,
+    SequentialTest,
+    Spread,
+    draw_perturbations,
+    try_until_clear,
+)
 from manitwin.physics.trial import GraspTrial
 from manitwin.pipeline.grasps import UNFILTERED
 from manitwin.pipeline.object_state import joints_of, load_body
@@ -25,7 +32,7 @@ ROBUSTNESS = "robustness{}"
 class RobustnessStage:
     """Try each held grasp again and again; writes ``held (N,)`` and ``trials (N,)``, zero trials where it never held."""
 
-    version = "2"
+    version = "3"
     needs: Resource = "cpu"
 
     def __init__(
@@ -51,7 +58,8 @@ class RobustnessStage:
         spread = self._spread(draft.field("physical"))
         draws = draw_perturbations(spread, self.settings.max_trials, draft.seed)
         body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
-        variants = [(draw, draw.body(body), draw.settings(settings)) for draw in draws]
+        filling = fill_curve(draft.field("physical"))
+        variants = [(draw, draw.body(body, filling), draw.settings(settings)) for draw in draws]
 
         def survives(index: int, number: int) -> bool:
             draw, other_body, other_settings = variants[number]
@@ -92,6 +100,15 @@ class RobustnessStage:
             robust_share=self.settings.robust_share,
             fragile_share=self.settings.fragile_share,
         )
+
+
+def fill_curve(physical: dict[str, Any]) -> FillCurve | None:
+    """Return how a vessel's centre of mass goes with its mass, None for what has no fill states."""
+    filling = physical.get("filling")
+    if filling is None:
+        return None
+    names = ("mass_kg", "center_of_mass_m", "inertia_kg_m2")
+    return FillCurve(*(np.array([state[name] for state in filling["states"]]) for name in names))
 
 
 def rank_values(held: np.ndarray, trials: np.ndarray) -> np.ndarray:
