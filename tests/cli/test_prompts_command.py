@@ -64,7 +64,7 @@ def test_text_and_schema_are_exactly_what_was_asked(
 ) -> None:
     bodies, questions, _ = asked_and_built
     sent = asked_at_first(bodies)
-    assert len(sent) == 7 and len(questions.questions) == 10
+    assert len(sent) == 8 and len(questions.questions) == 11
     for body, one in zip(in_order(sent), questions.questions, strict=False):
         system, user = body["messages"]
         assert system["content"] == one.system
@@ -94,21 +94,21 @@ def test_folders_hold_text_with_picture_names_and_a_bill(
     _, questions, folder = asked_and_built
     write_questions(questions, tmp_path / "asked")
     names = sorted(path.name for path in (tmp_path / "asked").iterdir())
-    grasps = ["5_grasp_points_1", "6_grasp_points_2", "7_grasp_points_3"]
-    asked = ["1_quality", "2_physical", "3_captions", "4_functional_points", *grasps]
-    assert names == ["10_template_likeness", *asked, "8_template", "9_template_measures", "README.md"]
+    grasps = ["6_grasp_points_1", "7_grasp_points_2", "8_grasp_points_3"]
+    asked = ["1_quality", "2_physical", "3_captions", "4_functional_points", "5_closer_look", *grasps]
+    assert names == ["10_template_measures", "11_template_likeness", *asked, "9_template", "README.md"]
     for one in questions.questions:
         made = tmp_path / "asked" / one.folder
         lines = (made / "question.txt").read_text().splitlines()
         pictures = [line.strip("[]") for line in lines if line.startswith("[picture_")]
         assert pictures == sorted(path.name for path in made.glob("*.png"))
         assert json.loads((made / "schema.json").read_text()) == one.question.schema
-    template = json.loads((tmp_path / "asked" / "8_template" / "schema.json").read_text())
+    template = json.loads((tmp_path / "asked" / "9_template" / "schema.json").read_text())
     assert "mug" in template["properties"]["category"]["enum"]
-    likeness = (tmp_path / "asked" / "10_template_likeness" / "question.txt").read_text()
+    likeness = (tmp_path / "asked" / "11_template_likeness" / "question.txt").read_text()
     assert "built from the template: mug" in likeness and "The photo:" in likeness
     readme = (tmp_path / "asked" / "README.md").read_text()
-    assert "7_grasp_points_3" in readme and "usd_per_million_tokens" in readme
+    assert "8_grasp_points_3" in readme and "usd_per_million_tokens" in readme
     priced = BuildConfig(services=ServicesConfig(usd_per_million_tokens=(1.0, 10.0)))
     write_questions(questions_about(folder, priced, "openai:MODEL"), tmp_path / "priced")
     assert "usd_per_million" not in (tmp_path / "priced" / "README.md").read_text()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from handmade import candidates, mug, visual
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
 from manitwin.formats.glb import write_glb
-from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints, Subject
+from manitwin.models.annotators.protocol import CloserPlace, PointsRequest, SelectedPoints, Subject
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.pipeline.caption import CaptionStage
 from manitwin.pipeline.item import Item
@@ -98,6 +99,31 @@ class Changes(RulesAnnotator):
 def test_points_that_are_no_candidates_are_no_answer(draft: Draft, tmp_path: Path, change, message: str) -> None:
     with pytest.raises(BadReply, match=message):
         PointsStage(Changes(change), GRIPPER).run(draft, tmp_path)
+
+
+class _LooksCloser(RulesAnnotator):
+    """Moves every functional point up by a millimetre."""
+
+    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> dict[str, CloserPlace]:
+        up = np.array([0, 0, 0.001])
+        return {p.id: CloserPlace(np.array(p.position_m) + up, np.array([0, 0, 1.0])) for p in points}
+
+
+def test_points_go_where_the_closer_look_saw_them_and_say_where_they_were_marked(draft: Draft, tmp_path: Path) -> None:
+    fields = PointsStage(_LooksCloser(), GRIPPER).run(draft, tmp_path)
+    positions, moved = (
+        draft.field("candidates")["positions_m"],
+        {r["candidate"]: r for r in fields["refined_candidates"]},
+    )
+    shared = {p["candidate"] for p in (*fields["points"]["grasp"], *fields["spare_grasp_points"])}
+    functional = fields["points"]["functional"]
+    assert any(p["candidate"] not in shared for p in functional)
+    for each in functional:
+        was = positions[each["candidate"]]
+        if each["candidate"] in shared:  # a grasp point lies there too
+            assert each["position_m"] == was and each["candidate"] not in moved
+        else:
+            assert each["position_m"] != was and moved[each["candidate"]]["marked_position_m"] == was
 
 
 class _Asked(RulesAnnotator):

@@ -30,6 +30,7 @@ from manitwin.pipeline.views import draw_views, write_webp
 from manitwin.render.raycast import merged, seen_tolerance_m, visible_points
 from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
 from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.point_records import FunctionalPoint
 
 LIMITS = Limits(seconds=1200.0, memory_bytes=8 << 30)
 """Of reading a twin and drawing its pictures: 5 s and 1 GB for a photo twin on an idle machine, and far longer on a busy one,
@@ -116,7 +117,7 @@ def read_questions(
     with tempfile.TemporaryDirectory() as folder:
         request = _request(twin, config, Path(folder))
         physical = twin.physical
-        asked = annotator.questions(request, physical.material, np.array(physical.extents_m))
+        asked = annotator.questions(request, physical.material, np.array(physical.extents_m), _chosen(twin, request))
         more, remark = template_questions(twin, request.subject, config.vlm, annotator.prompts)
     return twin.record.twin_id, [*asked, *more], remark
 
@@ -133,6 +134,8 @@ def _request(twin: Twin, config: BuildConfig, folder: Path) -> PointsRequest:
         write_webp(picture, views[-1], config.views.webp_quality)
     surface = merged(parts)
     positions, normals = np.array(record.points.candidates.positions_m), np.array(record.points.candidates.normals)
+    for row in record.points.candidates.refined:  # where they were when the views were marked
+        positions[row.candidate], normals[row.candidate] = row.marked_position_m, row.marked_normal
     caster, tolerance_m = RayCaster(surface), seen_tolerance_m(surface.extents)
     seen = [visible_points(positions, normals, camera, caster, tolerance_m) for camera in cameras]
     subject = Subject(
@@ -156,6 +159,12 @@ def _request(twin: Twin, config: BuildConfig, folder: Path) -> PointsRequest:
         center_of_mass_m=np.array(physical.center_of_mass_m),
         max_opening_m=_gripper(record.grasps.gripper, config).opening_m,
     )
+
+
+def _chosen(twin: Twin, request: PointsRequest) -> list[FunctionalPoint]:
+    """Return the functional points as they were chosen: at their candidates, before they moved to what they mean."""
+    assert twin.record.points is not None
+    return [point.model_copy(update=request.place(point.candidate)) for point in twin.record.points.functional]
 
 
 def _photos(twin: Twin, config: BuildConfig, folder: Path) -> tuple[Path, ...]:

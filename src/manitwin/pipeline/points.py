@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -14,14 +14,14 @@ from manitwin.errors import BadReply
 from manitwin.geometry.distance import closest_points_on_triangles
 from manitwin.geometry.frames.feature import FramedMesh
 from manitwin.models.annotators.point_rules import spare_grasp_points
-from manitwin.models.annotators.protocol import Annotator, PointsRequest, SelectedPoints, Subject
+from manitwin.models.annotators.protocol import Annotator, LooksCloser, PointsRequest, SelectedPoints, Subject
 from manitwin.pipeline.frames import with_frames
 from manitwin.pipeline.human_corrections import corrected_points
 from manitwin.pipeline.object_state import findings_of, pictures, read_scaled_subject
-from manitwin.pipeline.refinement import refined_points
+from manitwin.pipeline.refinement import marked_at, refined_points
 from manitwin.render.raycast import merged, seen_tolerance_m
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.twin.point_records import FunctionalPoint, GraspPoint
+from manitwin.twin.point_records import FunctionalPoint, GraspPoint, RefinedCandidate
 
 FUNCTIONAL, GRASP = (2, 4), (2, 3)
 """How many points an object has (paper: 2-4 functional and 2-3 grasp points)."""
@@ -30,12 +30,12 @@ FUNCTIONAL, GRASP = (2, 4), (2, 3)
 class PointsStage:
     """Ask the annotator for points, see that each is one of the candidates, and give the functional ones their frames.
 
-    ``frames_missing`` says of each functional point without a frame why it has none, ``refined_candidates`` where the views
-    have marked those that have moved to their features since.
+    An annotator that can looks at the functional points once more, from nearby. ``frames_missing`` says of each functional point
+    without a frame why it has none, ``refined_candidates`` where the views have marked those that have moved since.
     """
 
     name: ClassVar[str] = "points"
-    version: ClassVar[str] = "8"
+    version: ClassVar[str] = "9"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "size", "language", "candidates", "visible_candidates",
         "cameras", "geometry?", "naming?",
@@ -71,9 +71,13 @@ class PointsStage:
         check_selection(selected, request.positions_m)
         surface = FramedMesh(request.subject.solid, request.center_of_mass_m, draft.seed)
         spares = _spares(selected, request)
-        framed, missing = with_frames(selected.functional, surface)
-        taken = {point.candidate for point in (*selected.grasp, *spares)} | _moved(framed)
+        taken = {point.candidate for point in (*selected.grasp, *spares)} | _moved(selected.functional)
+        looked, seen_nearby = self._looked_at(selected.functional, request, taken)
+        framed, missing = with_frames(looked, surface)
         functional, refined = refined_points(framed, surface, taken, _on(request.subject))
+        marked = {
+            row.candidate: row for row in (*refined, *seen_nearby)
+        }  # where the views marked it: before the first move
         return {
             "points": {
                 "functional": [point.model_dump() for point in functional],
@@ -82,8 +86,27 @@ class PointsStage:
             "spare_grasp_points": [point.model_dump() for point in spares],
             "points_findings": findings_of(selected),
             "frames_missing": missing,
-            "refined_candidates": [row.model_dump() for row in refined],
+            "refined_candidates": [marked[candidate].model_dump() for candidate in sorted(marked)],
         }
+
+    def _looked_at(
+        self, points: Sequence[FunctionalPoint], request: PointsRequest, kept: set[int]
+    ) -> tuple[list[FunctionalPoint], list[RefinedCandidate]]:
+        """Return the points at the places that the annotator chose from nearby, and where the views have marked those."""
+        if not isinstance(self._annotator, LooksCloser):
+            return list(points), []
+        better = self._annotator.look_closer(request, points)
+        moved = [point for point in points if point.id in better and point.candidate not in kept]
+        places = {point.id: better[point.id] for point in moved}
+        looked = [
+            point.model_copy(
+                update={"position_m": places[point.id].position_m.tolist(), "normal": places[point.id].normal.tolist()}
+            )
+            if point.id in places
+            else point
+            for point in points
+        ]
+        return looked, [marked_at(point) for point in moved]
 
 
 def _spares(selected: SelectedPoints, request: PointsRequest) -> list[GraspPoint]:

@@ -10,15 +10,14 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from manitwin.geometry.distance import closest_points_on_triangles
+from manitwin.geometry.frames.closer import REACH_SHARE, around, spread_over
 from manitwin.geometry.frames.feature import FramedMesh
 from manitwin.geometry.frames.words import is_end, means_place
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
-from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint, RefinedCandidate
 
 CLOSER = 12
 """How many places around a candidate are looked at."""
-_REACH_SHARE = 0.15  # of the longest side: how far from the candidate
 _LEAST_MOVE_M = 0.002  # less is not worth another place than the one that the views show
 _LEAST_LEVEL_M, _LEVEL_SHARE = (
     0.0005,
@@ -45,13 +44,15 @@ def refined_points(
     for point in points:
         place = None if point.frame is None or point.candidate in kept else _closer(point, point.frame, surface)
         if place is not None and is_seen(place[0]):
-            was = RefinedCandidate(
-                candidate=point.candidate, marked_position_m=point.position_m, marked_normal=point.normal
-            )
-            rows.append(was)
+            rows.append(marked_at(point))
             point = point.model_copy(update={"position_m": place[0].tolist(), "normal": place[1].tolist()})
         moved.append(point)
     return moved, rows
+
+
+def marked_at(point: FunctionalPoint) -> RefinedCandidate:
+    """Return what says of a point that is about to move where the views have marked its candidate."""
+    return RefinedCandidate(candidate=point.candidate, marked_position_m=point.position_m, marked_normal=point.normal)
 
 
 def _closer(
@@ -67,11 +68,9 @@ def _closer(
         level = abs(float((at - frame.position_m) @ z)) < max(_LEAST_LEVEL_M, _LEVEL_SHARE * surface.size_m)
         if z @ out < _BESIDE or not (level or is_end(point.label)):
             return None
-    around = surface.near(at, _REACH_SHARE * surface.size_m)
-    around = around[(normals[around] @ out > 0) | (np.linalg.norm(positions[around] - at, axis=1) < 0.01)]
-    if not len(around):
+    closer = spread_over(surface, around(surface, at, out), CLOSER - 1)
+    if not len(closer):
         return None
-    closer = around[farthest_point_sampling(positions[around], CLOSER - 1, 0)]
     places, outward = positions[closer], normals[closer]
     own = _own_place(frame, surface, at)
     if own is not None:
@@ -109,6 +108,6 @@ def _own_place(frame: FunctionalFrame, surface: FramedMesh, at: np.ndarray) -> t
     nearest, _ = closest_points_on_triangles(np.repeat(goal[None], len(corners), 0), corners)
     away = np.linalg.norm(nearest - goal, axis=1)
     face = int(away.argmin())
-    if away[face] > _ON_FRAME_M or np.linalg.norm(nearest[face] - at) > _REACH_SHARE * surface.size_m:
+    if away[face] > _ON_FRAME_M or np.linalg.norm(nearest[face] - at) > REACH_SHARE * surface.size_m:
         return None
     return nearest[face], np.asarray(surface.mesh.face_normals)[face]

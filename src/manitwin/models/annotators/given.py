@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar, get_args
 
@@ -11,6 +12,8 @@ from manitwin.config import Resource
 from manitwin.models.annotators.protocol import (
     Annotator,
     AnnotatorQuestion,
+    CloserPlace,
+    LooksCloser,
     PhysicalEstimates,
     PointsRequest,
     QualityVerdict,
@@ -184,6 +187,13 @@ class KeepsGiven:
         if points.enough():
             return points.selection(None)
         return points.selection(self._inner.select_points(request))
+
+    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> Mapping[str, CloserPlace]:
+        """Let the inner annotator look closer where it can; given points stay at their candidates."""
+        given = request.subject.given
+        if not isinstance(self._inner, LooksCloser) or (given is not None and given.functional_points):
+            return {}
+        return self._inner.look_closer(request, points)
 
 
 def _with_given(answer: PhysicalEstimates, given: ImportRecord) -> PhysicalEstimates:

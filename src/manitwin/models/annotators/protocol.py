@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
 import trimesh
@@ -107,6 +107,14 @@ class SelectedPoints:
     spare: tuple[GraspPoint, ...] = ()
 
 
+@dataclass(frozen=True)
+class CloserPlace:
+    """A place of the surface that a closer look has found: position and outward normal, ``(3,)`` each."""
+
+    position_m: np.ndarray
+    normal: np.ndarray
+
+
 AnnotatorQuestion = Literal["quality", "physical", "captions", "points"]
 """The paper's four questions to a VLM."""
 
@@ -143,4 +151,13 @@ class Annotator(Protocol):
 
     def select_points(self, request: PointsRequest) -> SelectedPoints:
         """Choose functional and grasp points among the candidates."""
+        ...
+
+
+@runtime_checkable
+class LooksCloser(Protocol):
+    """An annotator that looks at functional points once more, from nearby."""
+
+    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> Mapping[str, CloserPlace]:
+        """Return better places near the points, by the points' ids; one that is not named stays where it is."""
         ...

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -15,6 +15,7 @@ from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import (
     AnnotatorQuestion,
+    CloserPlace,
     PhysicalEstimates,
     PointsRequest,
     QualityVerdict,
@@ -22,6 +23,14 @@ from manitwin.models.annotators.protocol import (
     Subject,
 )
 from manitwin.models.annotators.vlm.captions import CaptionsAnswer, captions_question, examine_captions, language_of
+from manitwin.models.annotators.vlm.closer_look import (
+    CLOSER_FORM,
+    LETTERS,
+    chosen_places,
+    closer_answer,
+    closer_question,
+    nearby_places,
+)
 from manitwin.models.annotators.vlm.grasp_vote import Ballot, ballots, elect, runners_up
 from manitwin.models.annotators.vlm.physical import PhysicalAnswer, physical_estimates, physical_question
 from manitwin.models.annotators.vlm.physical_checks import (
@@ -57,18 +66,24 @@ from manitwin.models.vlm.protocol import ChatModel, Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.models.vlm.structured import Forgetful, ask, probe
 from manitwin.models.vlm.together import asked_together
+from manitwin.twin.point_records import FunctionalPoint
 from manitwin.twin.record import Language
 
 PROMPTS: dict[AnnotatorQuestion, tuple[str, ...]] = {
     "quality": ("quality",),
     "physical": ("physical",),
     "captions": ("captions",),
-    "points": ("functional_points", "grasp_points"),
+    "points": ("functional_points", "grasp_points", "closer_look"),
 }
 """The prompts of each question."""
 
 VIEWS = 8
-ANSWER_TOKENS = {"quality": 500, "physical": 700, "captions": 600, "functional_points": 500, "grasp_points": 500}
+PICTURES = {"functional_points": 2 * VIEWS, "grasp_points": 2 * VIEWS, "closer_look": 2 * len(LETTERS)}
+"""How many pictures the questions have that are not asked with the eight views alone: each clean and marked."""
+
+ANSWER_TOKENS = {
+    "quality": 500, "physical": 700, "captions": 600, "functional_points": 500, "grasp_points": 500, "closer_look": 300,
+}  # fmt: skip
 """About what an answer has: that of ``fakes.vlm_answers`` has 250 to 500; a model is wordier."""
 
 VALUES_CHARACTERS = 200
@@ -110,7 +125,7 @@ class VlmAnnotator:
             * expected_usd(
                 price,
                 characters=self._characters(name),
-                pictures=VIEWS * (2 if question == "points" else 1),
+                pictures=PICTURES.get(name, VIEWS),
                 picture_px=self.picture_px,
                 answer_tokens=ANSWER_TOKENS[name],
             )
@@ -181,13 +196,28 @@ class VlmAnnotator:
         spare = runners_up(cast, votes, checks, [point.candidate for point in grasp])
         return SelectedPoints(functional, grasp, findings + more, spare)
 
-    def questions(self, request: PointsRequest, material: str, extents_m: np.ndarray) -> list[Question]:
-        """Return all that an object is asked about in a build, in order, ``select_points`` and its votes last; asks nothing."""
+    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> Mapping[str, CloserPlace]:
+        """Choose for each point the best of twelve places around it, in one query with a picture of each from nearby."""
+        nearby = nearby_places(PlaceChecks(request), points, self.picture_px)
+        if not nearby:
+            return {}
+        question = closer_question(request, nearby, self.prompts["closer_look"])
+        return chosen_places(ask(self.chat, question, closer_answer(nearby)).value, nearby)
+
+    def questions(
+        self, request: PointsRequest, material: str, extents_m: np.ndarray, chosen: Sequence[FunctionalPoint] = ()
+    ) -> list[Question]:
+        """Return all that an object is asked about in a build, the votes last; asks nothing.
+
+        The closer look is among them where the functional points are given that were ``chosen``, at their candidates.
+        """
         subject, prompts, checks, votes = request.subject, self.prompts, PlaceChecks(request), self.config.vlm.votes
         grasps = [
             grasp_question(checks, grasp_numbering(request, vote, votes), prompts["grasp_points"], vote)
             for vote in range(votes)
         ]
+        nearby = nearby_places(checks, chosen, self.picture_px)
+        closer = [closer_question(request, nearby, prompts["closer_look"])] if nearby else []
         # what it is and how large is known from the physical question on
         unknown = replace(subject, known_as=None, metric=not subject.size_estimated)
         return [
@@ -195,6 +225,7 @@ class VlmAnnotator:
             physical_question(unknown, prompts["physical"]),
             captions_question(subject, material, extents_m, prompts["captions"]),
             functional_question(request, functional_numbering(request), prompts["functional_points"]),
+            *closer,
             *grasps,
         ]
 
@@ -246,6 +277,7 @@ _FORMS: dict[str, type[BaseModel]] = {
     "captions": CaptionsAnswer,
     "functional_points": functional_answer(["1"]),
     "grasp_points": grasp_answer(["1"]),
+    "closer_look": CLOSER_FORM,
 }
 
 

@@ -18,6 +18,7 @@ PLACEHOLDERS: dict[str, frozenset[str]] = {
     "captions": frozenset({"count", "name", "size", "material", "pictures"}),
     "functional_points": frozenset({"count", "name", "size", "marker", "ids", "pictures"}),
     "grasp_points": frozenset({"count", "name", "size", "opening", "pinch", "marker", "ids", "pictures"}),
+    "closer_look": frozenset({"name", "size", "marker", "letters", "pictures"}),
     "template": frozenset({"given", "name", "categories", "pictures"}),
     "template_measures": frozenset({"given", "name", "category", "about", "measures", "parts", "colors", "pictures"}),
     "template_likeness": frozenset(

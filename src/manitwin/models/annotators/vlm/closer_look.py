@@ -1,0 +1,171 @@
+"""The closer look: around each functional point a closer set of places on its part, in a picture from nearby."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
+
+from manitwin.formats.image_file import png_of
+from manitwin.geometry.frames.closer import REACH_SHARE, around, spread_over
+from manitwin.geometry.frames.feature import FramedMesh
+from manitwin.geometry.parts.part_rules import membership
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.models.annotators.priors import lookup
+from manitwin.models.annotators.protocol import CloserPlace, PointsRequest
+from manitwin.models.annotators.vlm.place_checks import PlaceChecks
+from manitwin.models.annotators.vlm.prompt_files import Prompt
+from manitwin.models.annotators.vlm.question_parts import extents_of, name_line, size_line
+from manitwin.models.vlm.protocol import Picture, Question
+from manitwin.models.vlm.strict_schema import strict_schema
+from manitwin.render.cameras import Camera, look_at, project
+from manitwin.render.grounds import ground_for, marker_color
+from manitwin.render.markers import draw_markers, font_px
+from manitwin.render.raycast import merged, seen_tolerance_m, silhouette, visible_points
+from manitwin.render.renderer import BACKDROP, shared_renderer
+from manitwin.twin.point_records import FunctionalPoint
+
+PLACES = 12
+"""How many places around a point are marked, the point's own among them."""
+LEAST_PLACES = 4
+"""Fewer that can be seen from nearby leave nothing to choose: such a point is not asked about."""
+LETTERS = "ABCD"
+_SHOWN = 1.6  # of the reach: half of what the picture is wide
+_STREAM = 3
+
+
+class CloserChoice(BaseModel):
+    """The best place for one point: reason before number."""
+
+    model_config = ConfigDict(frozen=True)
+
+    rationale: str = Field(description="where on the part the place is and why it is the best of them")
+    id: str = Field(description="the marker's number")
+
+
+@dataclass(frozen=True)
+class Nearby:
+    """One point with its closer set: positions and normals ``(K, 3)``, the number of each ``(K,)``, its camera and letter."""
+
+    point: FunctionalPoint
+    letter: str
+    camera: Camera
+    positions_m: np.ndarray
+    normals: np.ndarray
+    numbers: np.ndarray
+
+    def place(self, number: str) -> CloserPlace:
+        """Return the place that a number stands for."""
+        index = int(np.flatnonzero(self.numbers == int(number))[0])
+        return CloserPlace(self.positions_m[index], self.normals[index])
+
+
+def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_px: int) -> list[Nearby]:
+    """Return the points that can be looked at closer, each with its set: its own place and eleven around it.
+
+    These are samples of the surface that is seen, within 15 % of the longest side, on the point's side of the matter and on its
+    part where the form of such things tells one, as far apart as can be; what the camera does not see is left out. The camera
+    stands where that of the view does which sees the point most squarely, and looks at the point.
+    """
+    request = checks.request
+    surface = FramedMesh(merged(list(request.subject.parts)), request.center_of_mass_m, request.subject.seed)
+    found = list[Nearby]()
+    for letter, point in zip(LETTERS, points, strict=False):
+        camera = _camera(request, point, REACH_SHARE * surface.size_m, side_px)
+        if camera is None:
+            continue
+        indices = spread_over(surface, _of_part(checks, point, surface), PLACES - 1)
+        positions = np.concatenate([[point.position_m], surface.samples[0][indices]])
+        normals = np.concatenate([[point.normal], surface.samples[1][indices]])
+        seen = visible_points(positions, normals, camera, surface.caster, seen_tolerance_m(surface.mesh.extents))
+        if not seen[0] or seen.sum() < LEAST_PLACES:
+            continue
+        rng = np.random.default_rng([request.subject.seed, _STREAM, LETTERS.index(letter)])
+        numbers = rng.permutation(int(seen.sum())) + 1
+        found.append(Nearby(point, letter, camera, positions[seen], normals[seen], numbers))
+    return found
+
+
+def _camera(request: PointsRequest, point: FunctionalPoint, reach_m: float, side_px: int) -> Camera | None:
+    """Return the camera that looks at a point from nearby, None where no view shows it."""
+    at, outward = np.array(point.position_m), np.array(point.normal)
+    pairs = zip(request.subject.cameras, request.visible, strict=True)
+    eyes = [camera.position for camera, seen in pairs if point.candidate in seen]
+    if not eyes:
+        return None
+    eye = max(eyes, key=lambda place: float(outward @ (place - at)) / float(np.linalg.norm(place - at)))
+    tangent = _SHOWN * reach_m / float(np.linalg.norm(eye - at))
+    return Camera(look_at(eye, at), 2 * float(np.arctan(tangent)), side_px, side_px)
+
+
+def _of_part(checks: PlaceChecks, point: FunctionalPoint, surface: FramedMesh) -> np.ndarray:
+    """Return the indices of the samples around a point that are of its part, of all where no parts are told."""
+    subject, at = checks.request.subject, np.array(point.position_m)
+    near = around(surface, at, np.array(point.normal))
+    prior = lookup(subject.name or subject.known_as)
+    if prior is None or prior.parts is None:
+        return near
+    found = membership(prior.parts, checks.shape, np.concatenate([at[None], surface.samples[0][near]]))
+    return near if found is None else near[found.index[1:] == found.index[0]]
+
+
+def closer_answer(nearby: Sequence[Nearby]) -> type[BaseModel]:
+    """Return the model of an answer: for each point's letter one of the numbers in its picture."""
+    return _answer({each.letter: [str(number) for number in sorted(each.numbers)] for each in nearby})
+
+
+def _answer(ids: dict[str, list[str]]) -> type[BaseModel]:
+    fields: dict[str, Any] = {}
+    for letter, numbers in ids.items():
+        # texts, as in the points questions: a number written as a number is the same id
+        one_of = Annotated[Literal[tuple(numbers)], BeforeValidator(str)]  # type: ignore[valid-type]
+        choice = create_model(
+            f"CloserChoice{letter}", __base__=CloserChoice, id=(one_of, Field(description="the marker's number"))
+        )
+        fields[letter] = (choice, ...)
+    return create_model("CloserAnswer", __config__=ConfigDict(frozen=True), **fields)
+
+
+CLOSER_FORM = _answer({letter: ["1"] for letter in LETTERS})
+"""The form of an answer, for what does not depend on the object."""
+
+
+def closer_question(request: PointsRequest, nearby: Sequence[Nearby], prompt: Prompt) -> Question:
+    """Ask for the best place of each point; raises RendererMissing where nothing renders."""
+    subject = request.subject
+    parts = list(subject.parts)
+    frames = shared_renderer().render(parts, [each.camera for each in nearby])
+    ground = ground_for(frames)
+    pictures = [frame.over(BACKDROP, ground) for frame in frames]
+    color, surface = marker_color(pictures), RayCaster(merged(parts))
+    shown: list[str | Picture] = []
+    for each, clean in zip(nearby, pictures, strict=True):
+        marked = draw_markers(
+            clean,
+            project(each.positions_m, each.camera)[0],
+            [str(number) for number in each.numbers],
+            occupied=silhouette(surface, each.camera),
+            dot=color.rgb,
+            font_px=font_px(each.camera.width_px, each.camera.height_px),
+        )
+        words = f"Point {each.letter}, {each.point.label!r} ({each.point.description})"
+        shown += [f"{words}, from nearby, clean:", Picture(png_of(clean))]
+        shown += [f"Point {each.letter}, with markers:", Picture(png_of(marked))]
+    values = {
+        "name": name_line(subject.name, subject.known_as),
+        "size": size_line(subject, extents_of(subject.parts)),
+        "marker": color.name,
+        "letters": ", ".join(each.letter for each in nearby),
+    }
+    instructions, asked = prompt.filled(values, shown)
+    return Question("closer_look", instructions, asked, strict_schema(closer_answer(nearby)))
+
+
+def chosen_places(answer: BaseModel, nearby: Sequence[Nearby]) -> dict[str, CloserPlace]:
+    """Return the place chosen for each point that is not to stay where it is, by the point's id."""
+    chosen = {each.point.id: each.place(getattr(answer, each.letter).id) for each in nearby}
+    own = {each.point.id: each.point.position_m for each in nearby}
+    return {name: place for name, place in chosen.items() if not np.array_equal(place.position_m, own[name])}
