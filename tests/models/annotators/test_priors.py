@@ -163,3 +163,10 @@ def test_form_of_an_alias_is_that_of_its_head_noun() -> None:
     assert plastic is not None and spoon is not None and gun is not None
     assert [part.label for part in plastic.functional] == [part.label for part in spoon.functional]
     assert gun.parts == "pistol"
+
+
+def test_materials_are_matter_and_no_things() -> None:
+    """Captions say 'a can made of ...': of steel, not of a steel can."""
+    things = {"can", "tin", "box", "jar", "bottle", "jacket", "stand", "frame", "strap", "cards", "case", "tube"}
+    wrong = {name: prior.material for name, prior in load_priors().items() if things & set(prior.material.split())}
+    assert not wrong
