@@ -78,6 +78,21 @@ def test_grasp_of_a_teapots_knob_does_not_carry_the_handles_scenario() -> None:
     assert at_handle["part_id"] == f"p{handle}"
 
 
+def test_edge_of_a_wall_is_held_by_the_wall_and_a_place_well_inside_a_part_by_that_alone() -> None:
+    held, names = solid_of("cup")
+    rim, body = names.index("rim"), names.index("body")
+    centers = held.solid.triangles_center
+    edge_m = centers[held.labels == rim].copy()
+    edge_m = edge_m[np.abs(np.arctan2(edge_m[:, 1], edge_m[:, 0])).argmin()]  # towards +x
+    wall_m = edge_m - [0, 0, 0.012]
+    over_the_rim = grasp_at(wall_m, np.array([1.0, 0, 0]), 0.004)
+    at_rim = {"id": "g0", "position_m": edge_m.tolist()}
+    found = row(held, over_the_rim, [at_rim])
+    assert found["part_id"] in (f"p{body}", f"p{names.index('inside')}") and found["grasp_point_id"] == "g0"
+    floor = point("g1", held, names.index("base"))
+    assert row(held, over_the_rim, [floor])["grasp_point_id"] == ""
+
+
 def bar(told: bool) -> PartedSolid:
     """A bar along X whose half towards +X is another part."""
     solid = trimesh.creation.box((0.3, 0.02, 0.02)).subdivide().subdivide().subdivide()

@@ -8,15 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import trimesh
+from scipy.spatial import cKDTree
 
 from manitwin.engine.stage import Draft
 from manitwin.geometry.distance import closest_faces, closest_points_on_triangles
 from manitwin.geometry.grasp_diversity import fingertips
 from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.sampling import sample_surface
 from manitwin.pipeline.object_state import load_solid
 from manitwin.pipeline.parts import PARTS_FILE
 from manitwin.robots.grippers.gripper import Gripper
@@ -29,6 +32,13 @@ PAD_HALF_M = 0.006
 """Rays start from a grid of three by three over so much of each fingertip, and its middle: most pads are 16 to 22 mm wide."""
 REACH_M = 0.008
 """How far from the place that ``width_m`` says a contact may be: real ones lie up to 6 mm off (95 % of them, measured)."""
+PAD_M = 0.009
+"""Half of a pad's width: what is as near to a place is under the fingertip that holds it there."""
+_NARROW, _BESIDE = (
+    0.5,
+    0.25,
+)  # of the surface there: a part that has less is narrower than a fingertip; one beside it has more
+_SAMPLES = 20_000
 NOBODY = ""
 """The id of no part and of no point: null in the table."""
 
@@ -88,18 +98,37 @@ class PartedSolid:
     def served(self, contacts: Contacts, places_m: np.ndarray) -> np.ndarray:
         """Return which of places ``(P, 3)`` each grasp serves ``(N,)``, -1: none.
 
-        A fingertip touches the place's own part within the radius; of several places the nearest counts. Where no parts are told
-        the radius alone decides.
+        A fingertip touches the place's own part within the radius; of several places the nearest counts. A part that is narrower
+        there than a fingertip, as the edge of a wall, is held by what borders it. Without parts the radius alone decides.
         """
         if not len(places_m) or not len(contacts.part):
             return np.full(len(contacts.part), -1)
         away_m = np.linalg.norm(contacts.positions_m[:, :, None] - places_m, axis=3)
         reached = contacts.touches[:, :, None] & (away_m <= self.radius_m)
         if self.part_ids:
-            of_place = self.labels[closest_faces(places_m, self.solid)[0]]
-            reached &= (contacts.part[:, :, None] == of_place) & (of_place != NO_PART)
+            allowed = self._parts_at(places_m)
+            reached &= allowed[np.arange(len(places_m)), contacts.part[:, :, None]]
         nearest_m = np.where(reached, away_m, np.inf).min(1)
         return np.where(np.isfinite(nearest_m.min(1)), nearest_m.argmin(1), -1)
+
+    def _parts_at(self, places_m: np.ndarray) -> np.ndarray:
+        """Tell which parts a fingertip at each place may touch, ``(P, 256) bool``: its own, and what borders a narrow one."""
+        own = self.labels[closest_faces(places_m, self.solid)[0]]
+        allowed = np.zeros((len(places_m), NO_PART + 1), bool)
+        labels, tree = self._samples
+        for row, near in enumerate(tree.query_ball_point(places_m, PAD_M)):
+            shares = np.bincount(labels[near], minlength=NO_PART + 1) / max(len(near), 1)
+            if shares[own[row]] < _NARROW:
+                allowed[row] = shares >= _BESIDE
+            allowed[row, own[row]] = True
+        allowed[:, NO_PART] = False
+        return allowed
+
+    @cached_property
+    def _samples(self) -> tuple[np.ndarray, cKDTree]:
+        """The parts ``(N,)`` of samples of the surface, and these by place."""
+        positions, _, faces = sample_surface(self.solid, _SAMPLES, np.random.default_rng(0))
+        return self.labels[faces], cKDTree(positions)
 
     def _by_rays(
         self, place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float

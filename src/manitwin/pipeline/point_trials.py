@@ -37,7 +37,7 @@ class PointTrialsStage:
     """
 
     name: ClassVar[str] = "point_trials"
-    version: ClassVar[str] = "2"
+    version: ClassVar[str] = "3"
     reads: ClassVar[tuple[str, ...]] = (
         *READS, "hulls.npz", "points", "spare_grasp_points", "physical", "placements",
         PROPOSALS.format(""), VERDICTS.format(""),
