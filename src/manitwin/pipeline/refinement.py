@@ -10,10 +10,11 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 
 from manitwin.geometry.distance import closest_points_on_triangles
-from manitwin.geometry.frames.closer import REACH_SHARE, around, spread_over
+from manitwin.geometry.frames.closer import REACH_SHARE, around
 from manitwin.geometry.frames.feature import FramedMesh
 from manitwin.geometry.frames.words import is_end, means_place
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
+from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.twin.point_records import FunctionalFrame, FunctionalPoint, RefinedCandidate
 
 CLOSER = 12
@@ -68,9 +69,10 @@ def _closer(
         level = abs(float((at - frame.position_m) @ z)) < max(_LEAST_LEVEL_M, _LEVEL_SHARE * surface.size_m)
         if z @ out < _BESIDE or not (level or is_end(point.label)):
             return None
-    closer = spread_over(surface, around(surface, at, out), CLOSER - 1)
-    if not len(closer):
+    near = around(surface, at, out)
+    if not len(near):
         return None
+    closer = near[farthest_point_sampling(positions[near], CLOSER - 1, 0)]
     places, outward = positions[closer], normals[closer]
     own = _own_place(frame, surface, at)
     if own is not None:

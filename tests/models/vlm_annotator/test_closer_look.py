@@ -58,9 +58,11 @@ def test_places_are_around_the_point_on_its_part_and_in_the_picture(
 ) -> None:
     assert [each.letter for each in nearby] == ["A", "B"]
     for each, asked in zip(nearby, points, strict=True):
-        assert 4 <= len(each.numbers) <= PLACES and sorted(each.numbers) == list(range(1, len(each.numbers) + 1))
+        assert len(each.numbers) == PLACES and sorted(each.numbers) == list(range(1, len(each.numbers) + 1))
         away_m = np.linalg.norm(each.positions_m - asked.position_m, axis=1)
         assert away_m.min() == 0 and away_m.max() <= REACH_M
+        apart_m = np.linalg.norm(each.positions_m[:, None] - each.positions_m[None], axis=2)
+        assert apart_m[~np.eye(PLACES, dtype=bool)].min() > 0.1 * REACH_M, "no two dots are at one place"
         pixels, _ = project(each.positions_m, each.camera)
         assert (pixels > 0).all() and (pixels < 256).all()
         assert np.ptp(pixels, axis=0).max() > 0.3 * 256, "it is seen from nearby"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.geometry.frames.feature import FramedMesh
-from manitwin.geometry.sampling import farthest_point_sampling
 
 REACH_SHARE = 0.15  # of the longest side: how far from the point
 _SAME_PLACE_M = 0.01  # nearer than that a place may look another way: an edge is of both its sides
@@ -16,10 +15,3 @@ def around(surface: FramedMesh, at_m: np.ndarray, outward: np.ndarray) -> np.nda
     positions, normals = surface.samples
     near = surface.near(at_m, REACH_SHARE * surface.size_m)
     return near[(normals[near] @ outward > 0) | (np.linalg.norm(positions[near] - at_m, axis=1) < _SAME_PLACE_M)]
-
-
-def spread_over(surface: FramedMesh, indices: np.ndarray, count: int) -> np.ndarray:
-    """Return of the samples ``indices`` those at most ``count`` that are as far apart as can be."""
-    if not len(indices):
-        return indices
-    return np.asarray(indices[farthest_point_sampling(surface.samples[0][indices], min(count, len(indices)), 0)])

@@ -10,10 +10,11 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, create_model
 
 from manitwin.formats.image_file import png_of
-from manitwin.geometry.frames.closer import REACH_SHARE, around, spread_over
+from manitwin.geometry.frames.closer import REACH_SHARE, around
 from manitwin.geometry.frames.feature import FramedMesh
 from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.ray_caster import RayCaster
+from manitwin.geometry.sampling import farthest_point_sampling
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import CloserPlace, PointsRequest
 from manitwin.models.annotators.vlm.place_checks import PlaceChecks
@@ -66,9 +67,9 @@ class Nearby:
 def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_px: int) -> list[Nearby]:
     """Return the points that can be looked at closer, each with its set: its own place and eleven around it.
 
-    These are samples of the surface that is seen, within 15 % of the longest side, on the point's side of the matter and on its
-    part where the form of such things tells one, as far apart as can be; what the camera does not see is left out. The camera
-    stands where that of the view does which sees the point most squarely, and looks at the point.
+    These are samples of the surface that the camera sees, within 15 % of the longest side, on the point's side of the matter and
+    on its part where the form of such things tells one, as far apart as can be. The camera stands where that of the view does
+    which sees the point most squarely, and looks at the point.
     """
     request = checks.request
     surface = FramedMesh(merged(list(request.subject.parts)), request.center_of_mass_m, request.subject.seed)
@@ -77,15 +78,18 @@ def nearby_places(checks: PlaceChecks, points: Sequence[FunctionalPoint], side_p
         camera = _camera(request, point, REACH_SHARE * surface.size_m, side_px)
         if camera is None:
             continue
-        indices = spread_over(surface, _of_part(checks, point, surface), PLACES - 1)
-        positions = np.concatenate([[point.position_m], surface.samples[0][indices]])
-        normals = np.concatenate([[point.normal], surface.samples[1][indices]])
+        near = _of_part(checks, point, surface)
+        positions = np.concatenate([[point.position_m], surface.samples[0][near]])
+        normals = np.concatenate([[point.normal], surface.samples[1][near]])
         seen = visible_points(positions, normals, camera, surface.caster, seen_tolerance_m(surface.mesh.extents))
         if not seen[0] or seen.sum() < LEAST_PLACES:
             continue
+        chosen = np.flatnonzero(seen)[
+            farthest_point_sampling(positions[seen], PLACES, 0)
+        ]  # from the point's own place on
         rng = np.random.default_rng([request.subject.seed, _STREAM, LETTERS.index(letter)])
-        numbers = rng.permutation(int(seen.sum())) + 1
-        found.append(Nearby(point, letter, camera, positions[seen], normals[seen], numbers))
+        numbers = rng.permutation(len(chosen)) + 1
+        found.append(Nearby(point, letter, camera, positions[chosen], normals[chosen], numbers))
     return found
 
 
