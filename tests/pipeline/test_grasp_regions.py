@@ -127,6 +127,14 @@ def test_grasp_across_a_border_is_of_the_part_that_more_of_the_pads_touch() -> N
     assert row(bar(True), grasp_at(np.array([-0.003, 0, 0]), SIDE, 0.02), [ON_BAR])["part_id"] == "p0"
 
 
+@pytest.mark.parametrize("closing", [SIDE, -SIDE])
+def test_hand_turned_by_half_a_turn_holds_the_same_part(closing: np.ndarray) -> None:
+    held = bar(True)
+    sides = np.where(held.solid.triangles_center[:, 1] > 0, 1, 0).astype(np.uint8)  # one fingertip on each
+    across = PartedSolid(held.solid, held.surface, sides, held.part_ids, held.radius_m)
+    assert row(across, grasp_at(np.array([0.02, 0, 0]), closing, 0.02), [])["part_id"] == "p0"
+
+
 @pytest.mark.parametrize("width_m", [0.04, 0.1])
 def test_fingertips_that_end_away_from_the_surface_touch_nothing(width_m: float) -> None:
     found = row(bar(True), grasp_at(np.array([0.02, 0, 0]), SIDE, width_m), [ON_BAR])

@@ -39,6 +39,7 @@ _NARROW, _BESIDE = (
     0.25,
 )  # of the surface there: a part that has less is narrower than a fingertip; one beside it has more
 _SAMPLES = 20_000
+_TIE = 1e-6  # less than the ninth of a fingertip that shares are told to, over all of 255 parts
 NOBODY = ""
 """The id of no part and of no point: null in the table."""
 
@@ -88,9 +89,12 @@ class PartedSolid:
         return Contacts(*(np.stack(values, axis=1) for values in zip(*sides, strict=True)))
 
     def regions(self, contacts: Contacts) -> np.ndarray:
-        """Return the id of the part ``(N,)`` that more of the fingertips touches, at a tie of the first one; '' for none."""
+        """Return the id of the part ``(N,)`` that more of the fingertips touches, at a tie the first of the table; '' for none.
+
+        A hand turned by half a turn about its approach is the same grasp, and holds the same part.
+        """
         share = np.where(contacts.part == NO_PART, 0.0, contacts.share)
-        rows, most = np.arange(len(share)), share.argmax(1)
+        rows, most = np.arange(len(share)), (share - _TIE * contacts.part).argmax(1)
         index = np.where(share[rows, most] > 0, contacts.part[rows, most], NO_PART)
         names = np.array([*self.part_ids, *[NOBODY] * (NO_PART + 1 - len(self.part_ids))])
         return np.asarray(names[index])
