@@ -1,6 +1,6 @@
 """Score the parts that are told by form against the parts of templates, which are known by construction.
 
-    python benchmarks/parts.py [--seeds N] [--held-out] [--every K]
+    python benchmarks/parts.py [--seeds N] [--held-out] [--every K] [--rules NAME,NAME]
 
 The surface is told apart by the rule of its category's form alone: the template's own parts are not looked at. Clean is the mesh
 as built; rough has its edges cut to 1/40 of the size, is smoothed by 15 rounds of Taubin's filter and shaken by 0.3 mm of noise,
@@ -51,9 +51,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--every", type=int, default=1, help="every Kth category")
     parser.add_argument("--held-out", action="store_true")
+    parser.add_argument("--rules", help="only categories of these rules")
     arguments = parser.parse_args()
     half = [name for name in sorted(load_templates()) if held_out(name) == arguments.held_out]
     ruled = [name for name in half if (prior := lookup(name)) is not None and prior.parts is not None]
+    if arguments.rules:
+        ruled = [name for name in ruled if lookup(name).parts in arguments.rules.split(",")]  # type: ignore[union-attr]
     found: dict[bool, list[float | None]] = {False: [], True: []}
     started = time.process_time()
     for category in ruled[:: arguments.every]:
