@@ -126,9 +126,8 @@ def _answer(ids: dict[str, list[str]]) -> type[BaseModel]:
     for letter, numbers in ids.items():
         # texts, as in the points questions: a number written as a number is the same id
         one_of = Annotated[Literal[tuple(numbers)], BeforeValidator(str)]  # type: ignore[valid-type]
-        choice = create_model(
-            f"CloserChoice{letter}", __base__=CloserChoice, id=(one_of, Field(description="the marker's number"))
-        )
+        number: Any = (one_of, Field(description="the marker's number"))
+        choice = create_model(f"CloserChoice{letter}", __base__=CloserChoice, id=number)
         fields[letter] = (choice, ...)
     return create_model("CloserAnswer", __config__=ConfigDict(frozen=True), **fields)
 
