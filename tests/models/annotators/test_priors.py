@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from pydantic import ValidationError
 
@@ -28,6 +29,8 @@ YCB = {
 STANDARDS = {
     "aa battery": (0.0505, None), "golf ball": (0.04267, 0.0459), "billiard ball": (0.05715, 0.163),
     "hockey puck": (0.0762, 0.163), "id card": (0.0856, None), "drink can": (0.122, 0.345),
+    "basketball": (0.242, 0.6), "volleyball": (0.21, 0.27), "handball": (0.188, 0.45), "squash ball": (0.04, 0.024),
+    "cricket ball": (0.072, 0.16), "rugby ball": (0.29, 0.435),
 }  # fmt: skip
 
 
@@ -36,6 +39,15 @@ def test_the_table_has_at_least_200_categories_with_sources() -> None:
     assert len(table) >= 200
     assert all(prior.sources for prior in table.values())
     assert sum(bool(prior.measured) for prior in table.values()) >= 40
+
+
+def test_512_categories_have_numbers_of_their_own() -> None:
+    """The paper's 512 categories: form, size, mass, material, parts, use, and the kind of source that the numbers are of."""
+    own = [prior for prior in load_priors().values() if prior.like is None and prior.category != "unknown"]
+    assert len(own) >= 512
+    for prior in own:
+        assert prior.shape and prior.material and prior.function and prior.functional and prior.grasp, prior.category
+        assert not any(source.startswith("as a ") for source in prior.sources), prior.category
 
 
 def test_every_prior_has_the_papers_number_of_parts() -> None:
@@ -55,6 +67,24 @@ def test_mass_density_and_size_agree_in_every_category() -> None:
             assert prior.bulk_density_kg_m3.low >= 5 and prior.bulk_density_kg_m3.high <= 19_300, prior.category
         assert 0.1 < prior.mass_kg.typical / cube < 8_000, prior.category
         assert prior.longest_axis_m.low > 0 and prior.mass_kg.low > 0, prior.category
+
+
+def test_no_round_thing_is_heavier_than_its_ball() -> None:
+    """What fills a ball of its longest extent at its bulk density weighs pi/6 of that cube; a cluster or an egg less."""
+    for prior in load_priors().values():
+        if prior.shape == "round" and prior.bulk_density_kg_m3 is not None:
+            ball_kg = np.pi / 6 * prior.longest_axis_m.typical**3 * prior.bulk_density_kg_m3.typical
+            assert prior.mass_kg.typical < 1.1 * ball_kg, (prior.category, prior.mass_kg.typical, ball_kg)
+
+
+def test_ends_of_the_intervals_are_possible_together() -> None:
+    for prior in load_priors().values():
+        size, mass, bulk = prior.longest_axis_m, prior.mass_kg, prior.bulk_density_kg_m3
+        if bulk is not None:
+            assert mass.high <= bulk.high * size.high**3, f"{prior.category}: heavier than the largest box of it"
+            assert mass.low >= 1e-4 * bulk.low * size.low**3, f"{prior.category}: lighter than the thinnest sheet of it"
+        if prior.category != "unknown":
+            assert size.high / size.low < 25, f"{prior.category}: says nothing"
 
 
 def test_sliding_friction_is_below_static_friction() -> None:
