@@ -68,16 +68,18 @@ class Added:
 def add(catalogue: Path, given_place: Path, given: Given, root: Path | None = None) -> Added:
     """Add a folder of photos and meshes, or a CSV or JSONL list, to a catalogue, which is made where there is none.
 
-    Files of a list lie below ``root``: the list's own folder by default. Raises UsageError for what is neither, a list that
-    is broken as a whole (nothing of it is added then), and a source that nobody has named.
+    Files of a list lie below ``root``: the list's own folder by default; of a data set's listing, files are meant only where it
+    is given. Raises UsageError for what is neither, a list that is broken as a whole (nothing of it is added then), and a source
+    that nobody has named.
     """
     _require_usable(given)
     require_place(given_place, given.source, root)
     listing = not given_place.is_dir()
-    if listing and not _rows_of(given_place):
+    if listing and not _rows_of(given_place, files=root is not None):
         raise UsageError(f"{given_place}: no rows; a list has a column 'file' or 'url'")
     with Catalogue(catalogue, make=True) as store:
-        return _Intake(store, given_place, given, (root or given_place.parent) if listing else given_place).run()
+        below = (root or given_place.parent) if listing else given_place
+        return _Intake(store, given_place, given, below, files=root is not None).run()
 
 
 def _require_usable(given: Given) -> None:
@@ -91,16 +93,16 @@ def _require_usable(given: Given) -> None:
             raise UsageError(f"--{option}: {why}")
 
 
-def _rows_of(path: Path) -> int:
+def _rows_of(path: Path, *, files: bool) -> int:
     """Return how many rows a list has; reads it to its end, so that one that is broken adds nothing."""
-    return sum(1 for _ in read_list(path))
+    return sum(1 for _ in read_list(path, files=files))
 
 
 class _Intake:
     """One folder or list on its way into a catalogue."""
 
-    def __init__(self, store: Catalogue, place: Path, given: Given, root: Path):
-        self._store, self._place, self._given = store, place, given
+    def __init__(self, store: Catalogue, place: Path, given: Given, root: Path, *, files: bool):
+        self._store, self._place, self._given, self._files = store, place, given, files
         self._root = Path(os.path.realpath(root))
         self._causes: dict[str, tuple[int, str]] = {}
         self._seen: set[str] = set()
@@ -136,7 +138,7 @@ class _Intake:
                 yield row
 
     def _list(self) -> Iterator[Row]:
-        for line, listed in read_list(self._place):
+        for line, listed in read_list(self._place, files=self._files):
             example = example_of(self._place, line)
             if isinstance(listed, Unreadable):
                 self._refuse(str(listed), example)

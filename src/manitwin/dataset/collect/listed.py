@@ -10,6 +10,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from manitwin.dataset.collect.facts import UNKNOWN
+from manitwin.dataset.collect.listings import is_listing, read_listing
 from manitwin.errors import UsageError
 from manitwin.formats.csv_file import read_csv, read_lines
 from manitwin.formats.json_file import parse_json
@@ -41,12 +42,14 @@ class Listed:
     size_m: float | None
 
 
-def read_list(path: Path) -> Iterator[tuple[int, Listed | Unreadable]]:
+def read_list(path: Path, *, files: bool = False) -> Iterator[tuple[int, Listed | Unreadable]]:
     """Yield the rows of a list with their lines; raises UsageError where the file as a whole is none.
+
+    ``files``: of a data set's listing the files are meant, not their addresses.
 
     A wrong line of JSON costs that row; a CSV whose quotes are not closed has no rows that could be trusted behind it.
     """
-    for line, row in _rows(path):
+    for line, row in _rows(path, files=files):
         try:
             if isinstance(row, Unreadable):
                 raise row
@@ -55,7 +58,10 @@ def read_list(path: Path) -> Iterator[tuple[int, Listed | Unreadable]]:
             yield line, cause
 
 
-def _rows(path: Path) -> Iterator[tuple[int, Mapping[str, Any] | Unreadable]]:
+def _rows(path: Path, *, files: bool) -> Iterator[tuple[int, Mapping[str, Any] | Unreadable]]:
+    if is_listing(path):
+        yield from read_listing(path, files=files)
+        return
     if path.suffix.lower() == ".csv":
         yield from read_csv(path, UsageError)
         return

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from manitwin.dataset.collect.listings import is_listing
 from manitwin.errors import UsageError
 
 LIST_SUFFIXES = frozenset({".csv", ".jsonl"})
@@ -12,8 +13,10 @@ LIST_SUFFIXES = frozenset({".csv", ".jsonl"})
 def require_place(place: Path, source: str | None, root: Path | None) -> None:
     """Raise UsageError where a place is neither, a folder is of no named source, or a root is given for a folder."""
     if not place.is_dir():
-        if place.suffix.lower() not in LIST_SUFFIXES:
-            raise UsageError(f"{place}: is no folder and no list; give a folder, or a .csv or .jsonl file")
+        if place.suffix.lower() not in LIST_SUFFIXES and not is_listing(place):
+            raise UsageError(
+                f"{place}: is no folder and no list; give a folder, a .csv or .jsonl file, or a listing (.json)"
+            )
         return
     if root is not None:
         raise UsageError("--root: is of a list, and this is a folder; leave it out")
