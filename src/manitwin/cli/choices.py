@@ -149,7 +149,7 @@ WEIGHTS = Choices("weights", _of("isnet"))
 MODEL_ACTIONS = Choices("action", _of("list", "add"))
 SHELLS = Choices("shell", _of("bash", "zsh", "fish"))
 REHEARSALS = Choices(
-    "server", _of("openai", "anthropic", "rodin", "tripo", "meshy", "hunyuan3d", "fal", "graspgen", "graspgenx")
+    "server", _of("openai", "anthropic", "rodin", "tripo", "meshy", "hunyuan3d", "fal", "graspgen", "graspgenx", "pose")
 )
 
 

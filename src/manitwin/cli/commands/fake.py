@@ -51,7 +51,7 @@ def fake(
             out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)")
             if server.key_variable is not None:
                 out_console.print(f"export {server.key_variable}={server.key}")
-            out_console.print(f"manitwin build PHOTO -o OUT {server.option} {server.spec}")
+            out_console.print(f"manitwin {server.command} {server.option} {server.spec}")
             stop.wait()
         out_console.print("stopped")
     finally:

@@ -20,13 +20,14 @@ class Rehearsal:
     """A server that can be rehearsed with.
 
     ``option`` is the command line's for such a backend, ``spec`` what to give there (``{url}``: the server's address), and
-    ``key_variable`` where its client looks for a key (None: it has none).
+    ``key_variable`` where its client looks for a key (None: it has none). ``command`` is what takes the option.
     """
 
     target: str
     option: str
     spec: str
     key_variable: str | None = None
+    command: str = "build PHOTO -o OUT"
 
     @property
     def factory(self) -> Callable[..., Any]:
@@ -54,6 +55,9 @@ REHEARSALS = {
     "hunyuan3d": Rehearsal("manitwin.models.fakes.hunyuan3d:FakeHunyuan3d", "--generator", "hunyuan3d@{url}"),
     "fal": Rehearsal("manitwin.models.fakes.fal:FakeFal", "--generator", "fal@{url}", "FAL_KEY"),
     "graspgen": Rehearsal("manitwin.models.fakes.grasp_servers:FakeGraspGen", "--grasper", "graspgen@{url}"),
+    "pose": Rehearsal(
+        "manitwin.models.fakes.pose_estimator:FakePoseEstimator", "--estimator", "{url}", command="locate TWIN ..."
+    ),
     "graspgenx": Rehearsal("manitwin.models.fakes.grasp_servers:FakeGraspGenX", "--grasper", "graspgenx@{url}"),
 }
 
@@ -67,6 +71,7 @@ class Serving:
     option: str
     spec: str
     key_variable: str | None
+    command: str
 
 
 @contextmanager
@@ -92,7 +97,7 @@ def serving(
         key = takes["key"].default
     with _server(factory, given, port) as server:
         spec = rehearsal.spec.format(url=server.url)
-        yield Serving(server.url, key, rehearsal.option, spec, rehearsal.key_variable)
+        yield Serving(server.url, key, rehearsal.option, spec, rehearsal.key_variable, rehearsal.command)
 
 
 def _server(factory: Callable[..., Any], given: dict[str, Any], port: int) -> MessageServer | FakeServer:

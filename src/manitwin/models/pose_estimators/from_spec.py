@@ -1,0 +1,21 @@
+"""The estimator that a person names: ``command:...``, or a server's address."""
+
+from __future__ import annotations
+
+from manitwin.config import ServicesConfig
+from manitwin.errors import ConfigError
+from manitwin.models.pose_estimators.command import CommandEstimator
+from manitwin.models.pose_estimators.protocol import PoseEstimator
+from manitwin.models.pose_estimators.served import ServedEstimator
+
+
+def pose_estimator(spec: str, services: ServicesConfig) -> PoseEstimator:
+    """Return the estimator of a spec; raises ConfigError for what names none."""
+    kind, colon, rest = spec.partition(":")
+    if kind == "command" and colon:
+        return CommandEstimator(rest, services.timeout_s)
+    if kind in ("http", "https"):
+        return ServedEstimator(spec, services)
+    raise ConfigError(
+        f"--estimator {spec!r}: names none; give 'command:PROGRAM {{request}} {{out}}' or http://HOST:PORT"
+    )
