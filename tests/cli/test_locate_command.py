@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,8 +17,10 @@ from manitwin.cli.main import app
 from manitwin.dataset.index.rebuild import rebuild
 from manitwin.dataset.search import twin_looks
 from manitwin.formats.label_picture import label_picture
-from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform, transform_points
+from manitwin.geometry.poses import inverse, rotation_from_quaternion_wxyz, transform, transform_points
+from manitwin.scenes.loaded_scene import object_pose
 from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.scenes.scene_files import read_scene
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.loaded_twin import Twin
 from scene_twins import can, slab, write_thing
@@ -114,6 +117,31 @@ def test_grasps_at_the_pose_add_up_and_a_cloud_has_none(files: Files) -> None:
     assert "does not show what is beside it" in str(done.exception)
 
 
+def test_what_an_estimator_guesses_is_checked_and_says_who_guessed(files: Files) -> None:
+    program = f"command:{sys.executable} -m manitwin.models.fakes.pose_estimator {{request}} {{out}}"
+    code, said = run(files.box, *files.view, "--estimator", program, "--json")
+    told = json.loads(said)
+    check_keys(told, "locate")
+    assert code == 0 and told["estimator"] == "rehearsal" and told["status"] == "found"
+    assert run(files.can, *files.view, "--estimator", program)[0] == 3
+
+
+def test_the_scene_is_written_as_a_layout_in_the_robots_world(files: Files, tmp_path: Path) -> None:
+    object_to_base = transform(None, np.array([0.45, 0.0, 0.0]))
+    camera_to_base = object_to_base @ inverse(files.seen.object_to_camera)
+    (tmp_path / "base.json").write_text(json.dumps({"camera_to_base": camera_to_base.tolist()}))
+    options = (*files.view, "--base", tmp_path / "base.json", "--out", tmp_path / "place")
+    code, said = run(files.box, *options, "--robot", "panda", "--json")
+    told = json.loads(said)
+    check_keys(told, "locate")
+    assert code == 0 and told["layout"]["base"] == "given" and told["layout"]["reason"] == ""
+    scene = read_scene(tmp_path / "place" / told["layout"]["scene"])
+    (middle,) = transform_points(object_pose(scene.objects[0]), np.array([[0, 0, 0.025]]))
+    assert middle == pytest.approx([0.45, 0, 0.025], abs=0.006), "on either face: the box looks the same"
+    assert scene.robot == "panda"
+    assert told["grasps"]["robot"] == "panda" and told["grasps"]["reached"] <= len(told["grasps"]["free"])
+
+
 def without(words: tuple[str, ...], option: str) -> tuple[str, ...]:
     place = words.index(option)
     return words[:place] + words[place + 2 :]
@@ -131,6 +159,8 @@ def test_another_twin_is_refused_with_status_3(files: Files) -> None:
         (("--depth", "depth.png"), "--camera: missing"),
         (("--depth", "depth.png", "--cloud", "camera.json"), "a view by itself"),
         (("--cloud", "camera.json"), "is no cloud"),
+        (("--cloud", "camera.json", "--base", "camera.json"), "--base: a cloud of the thing alone"),
+        (("--depth", "depth.png", "--camera", "camera.json", "--base", "camera.json"), "says no pose of a camera"),
     ],
 )
 def test_what_cannot_be_asked_is_refused(files: Files, given: tuple[str, ...], said: str) -> None:

@@ -142,6 +142,7 @@ PAGES: dict[str, Arrangement] = {
         slow=(r"\bDATASET\b",),
         blocks={"^DATASET/": "tree DATASET"},
     ),
+    "docs/real_scene.md": Arrangement(slow=(r".",)),
     "docs/review.md": Arrangement(slow=(r"manitwin review (apply|tune|import|report|DATASET)", r"--form")),
     "docs/search.md": Arrangement(
         slow=(r"manitwin search DATASET --image",),

@@ -18,6 +18,7 @@ from PIL import Image
 from foreign_assets import mug_urdf
 from grasped_twins import write_brick
 from manitwin.formats.label_picture import label_picture
+from manitwin.geometry.poses import inverse, transform
 from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD, seal
@@ -143,7 +144,7 @@ class Folders:
                 shutil.copytree(folder(), page / name)
 
     def _view(self, page: Path) -> None:
-        """Show the first twin of the data set to a depth camera: D.png, C.png, M.png, K.json and CLOUD.npz."""
+        """Show the first twin of the data set to a depth camera: D.png, C.png, M.png, K.json, B.json and CLOUD.npz."""
         model = PoseModel.of_twin(Twin(sorted(self.dataset.glob("twins/*/*"))[0]))
         seen = seen_from(model, 0.5, table=True)
         (page / "D.png").write_bytes(label_picture(np.rint(seen.view.depth_m * 1000)))
@@ -152,6 +153,8 @@ class Folders:
         height, width = seen.mask.shape
         camera = {"K": seen.view.intrinsics.tolist(), "pixel_centers_at": 0.5, "width": width, "height": height}
         (page / "K.json").write_text(json.dumps({**camera, "depth_unit_m": 0.001}))
+        camera_to_base = transform(None, np.array([0.5, 0.0, 0.0])) @ inverse(seen.object_to_camera)
+        (page / "B.json").write_text(json.dumps({"camera_to_base": camera_to_base.tolist()}))
         np.savez(page / "CLOUD.npz", points=seen.view.points(np.flatnonzero(seen.mask & (seen.view.depth_m > 0))))
 
     def twin_id(self, folder: Path) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import json
 import sqlite3
 from pathlib import Path
 
@@ -51,6 +53,15 @@ def catalogue(folder: Path) -> None:
     lists(folder)
     for name in ("list.csv", "list.jsonl"):
         add(folder / "catalogue.sqlite", folder / name, Given())
+
+
+def listings(folder: Path) -> None:
+    user = {"username": "ada", "displayName": "Ada"}
+    objects = {uid: {"uid": uid, "name": "Mug", "license": "by", "user": user} for uid in ("a1" * 16, "b2" * 16)}
+    models = [{"owner": "GoogleResearch", "name": "Claw_Hammer", "license_name": "Creative Commons - Attribution"}] * 2
+    (folder / "000-001.json.gz").write_bytes(gzip.compress(json.dumps(objects).encode(), mtime=0))
+    (folder / "000-002.json").write_text(json.dumps(objects))
+    (folder / "models.json").write_text(json.dumps(models))
 
 
 def take_in(case: Case) -> None:
@@ -129,6 +140,7 @@ def embed(case: Case) -> None:
     embedder.texts(["a red mug"])
 
 
+target("collect-listing", listings, take_in, files=("*.json*",), fresh=True, named=True)
 target("collect-list", lists, take_in, files=("list.*",), fresh=True, named=True)
 target("catalogue", catalogue, use_catalogue, files=("catalogue.sqlite",), fresh=True, weight=0.5)
 target("verdicts", reviewed, import_verdicts, files=("verdicts.*",), named=True, weight=0.5)

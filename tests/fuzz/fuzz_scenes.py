@@ -16,7 +16,11 @@ from manitwin.dataset.evaluation.labels import read_labels
 from manitwin.episodes.batch import read_batch
 from manitwin.episodes.episode_pictures import read_pictures
 from manitwin.episodes.tasks.task_files import read_tasks
+from manitwin.errors import BadReply
+from manitwin.formats.json_file import read_json_object
 from manitwin.formats.label_picture import label_picture
+from manitwin.models.pose_estimators.protocol import parse_guesses
+from manitwin.scenes.locate.base_file import read_base
 from manitwin.scenes.locate.input_files import read_cloud, read_view
 from manitwin.scenes.perception.scene_truth import read_scene_truth
 from manitwin.scenes.scene_files import scene_files
@@ -77,6 +81,29 @@ def read_points(case: Case) -> None:
     assert seen.depth_m.shape == shown.shape
 
 
+def base(folder: Path) -> None:
+    (folder / "base.json").write_text(json.dumps({"camera_to_base": np.eye(4).tolist()}))
+    told = {"position_m": [0.4, 0.0, 0.6], "quaternion_wxyz": [0.0, 1.0, 0.0, 0.0]}
+    (folder / "pose.json").write_text(json.dumps(told))
+
+
+def read_camera_pose(case: Case) -> None:
+    pose = read_base(case.file)
+    assert np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-9)
+
+
+def guessed(folder: Path) -> None:
+    pose = np.eye(4)
+    pose[2, 3] = 0.6
+    told = {"model": "FoundationPose", "poses": [{"object_to_camera": pose.tolist(), "score": 0.9}] * 3}
+    (folder / "answer.json").write_text(json.dumps(told))
+
+
+def read_guesses(case: Case) -> None:
+    found = parse_guesses(read_json_object(case.file, BadReply), "command")
+    assert np.isfinite(found.poses).all() and (found.poses[:, 2, 3] > 0).all()
+
+
 def drawn(folder: Path) -> None:
     write_drawn_scenes(folder)
 
@@ -111,6 +138,8 @@ def batch(folder: Path) -> None:
 
 target("locate-view", view, read_seen, named=True)
 target("locate-cloud", clouds, read_points, named=True)
+target("locate-base", base, read_camera_pose, named=True)
+target("pose-answer", guessed, read_guesses, named=True)
 target("drawn-scene", drawn, read_drawn, files=("scene.json", "pictures.json", "front_*.png", "*.webp"), weight=0.3)
 target("tasks", tasks, lambda case: read_tasks(case.folder))
 target("labels", labels, lambda case: read_labels(case.file), named=True)

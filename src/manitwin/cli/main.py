@@ -22,6 +22,7 @@ from manitwin.cli.choices import SHELLS
 from manitwin.cli.commands.affordances import affordances
 from manitwin.cli.commands.audit import audit
 from manitwin.cli.commands.build import build, run
+from manitwin.cli.commands.capture import capture
 from manitwin.cli.commands.carve import carve
 from manitwin.cli.commands.catalog import catalog
 from manitwin.cli.commands.collect import collect_add, collect_plan, collect_status
@@ -102,7 +103,7 @@ for making in (index, stats, publish, export, segmentation, affordances, catalog
     register(app, reported(making))
 register(app, reported(import_), "import")
 for other in (
-    status, retry, check, query, search, plan, doctor, models, fake, prompts, audit, carve, evaluate, locate, view,
+    status, retry, check, query, search, plan, doctor, models, fake, prompts, audit, carve, evaluate, capture, locate, view,
 ):  # fmt: skip
     register(app, other)
 register(app, review)

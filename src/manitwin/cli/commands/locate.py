@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from manitwin.cli import choices, options
-from manitwin.cli.console import error_console, out_console
+from manitwin.cli.console import error_console
 from manitwin.cli.documents import Json, print_document
+from manitwin.cli.located import print_grasps, print_layout, print_thing
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from manitwin.scenes.locate.carried_grasps import CarriedGrasps
     from manitwin.scenes.locate.depth_view import DepthView
-    from manitwin.scenes.locate.recognition import Thing
-    from manitwin.twin.loaded_twin import Twin
 
 
 def _file(help: str, remedy: str) -> Any:
@@ -32,6 +29,15 @@ def locate(
             "The twin to look for, or a data set of twins.", "TWIN|DATASET", "a twin's folder or a data set"
         ),
     ],
+    seen: Annotated[
+        Path | None,
+        typer.Option(
+            "--view",
+            help="A folder of manitwin capture, for --depth, --camera, --rgb and --base.",
+            metavar="FOLDER",
+            callback=choices.must_exist("a folder that manitwin capture wrote"),
+        ),
+    ] = None,
     depth: Annotated[
         Path | None, _file("A depth picture: PNG of one channel; 0 is unknown.", "a depth picture")
     ] = None,
@@ -55,25 +61,42 @@ def locate(
             help="Twins of a data set to try of a thing, the most alike.", callback=choices.count_of("--tried")
         ),
     ] = 5,
+    estimator: Annotated[
+        str | None,
+        typer.Option(
+            help="Who guesses poses in the place of the search: 'command:PROGRAM {request} {out}', or http://HOST:PORT.",
+            metavar="SPEC",
+        ),
+    ] = None,
     grasps: Annotated[
         bool, typer.Option("--grasps", help="Also which verified grasps are free of all that is seen, the best first.")
     ] = False,
-    out: Annotated[Path | None, options.output_folder("A new folder for location.json and overlays.")] = None,
+    base: Annotated[
+        Path | None,
+        _file("JSON of the camera's pose in the frame of a robot's base: camera_to_base.", "a calibration's JSON"),
+    ] = None,
+    robot: Annotated[
+        str | None,
+        choices.ROBOTS.option(help="Also which free grasps this robot reaches; needs --base, and implies --grasps."),
+    ] = None,
+    out: Annotated[
+        Path | None, options.output_folder("A new folder for location.json, overlays, and the scene as a layout.")
+    ] = None,
     seed: Annotated[int, typer.Option(help="The seed of what is sampled.", min=0, max=options.LARGEST_SEED)] = 0,
     json_: Json = False,
 ) -> None:
     """Find where a twin is in a depth picture: its pose, several that look the same, or that it is not what is seen."""
-    from manitwin.errors import UsageError
-
-    if cloud is not None and any(each is not None for each in (depth, camera, mask, rgb)):
-        raise UsageError("--cloud: is a view by itself; leave out --depth, --camera, --mask and --rgb")
-    if cloud is not None and grasps:
-        raise UsageError(
-            "--grasps: a cloud of the thing alone does not show what is beside it; give --depth and --camera"
-        )
-    needed = {"--depth": depth, "--camera": camera}
-    if cloud is None and (missing := [name for name, each in needed.items() if each is None]):
-        raise UsageError(f"{', '.join(missing)}: missing; give --depth and --camera, or --cloud")
+    if seen is not None:
+        depth, camera, rgb, base = _of_folder(seen, depth, camera, rgb, base, cloud)
+    grasps = grasps or robot is not None
+    _check(depth, camera, mask, rgb, cloud, base, robot, grasps)
+    from manitwin.config import ServicesConfig
+    from manitwin.episodes.located_view import LocatedView
+    from manitwin.models.pose_estimators.from_spec import pose_estimator
+    from manitwin.scenes.locate.asked_estimator import AskedEstimator
+    from manitwin.scenes.locate.base_file import read_base
+    from manitwin.scenes.locate.layout_files import NoLayout, dataset_of_twin, layout_document
+    from manitwin.scenes.locate.located_scene import LocatedScene
     from manitwin.scenes.locate.pose_model import PoseModel
     from manitwin.scenes.locate.recognition import DatasetTwins, where_is, which_twin
     from manitwin.scenes.locate.report import location_document, things_document, write_location
@@ -81,25 +104,98 @@ def locate(
     from manitwin.twin.loaded_twin import Twin
     from manitwin.twin.store import RECORD
 
+    model = None if estimator is None else pose_estimator(estimator, ServicesConfig())
+    camera_to_base = None if base is None else read_base(base)
     one = Twin(source) if (source / RECORD).exists() else None
+    dataset = DatasetRoot(source).absolute() if one is None else dataset_of_twin(source)
     view, masks = _view(depth, camera, mask, rgb, cloud, seed)
-    carried = _carrier(view, seed) if grasps else lambda thing, twin: None
+    asked = None
     if one is not None:
-        things = [where_is(view, masks, PoseModel.of_twin(one), seed=seed)]
-        document = location_document(things[0], one, carried(things[0], one))
+        asked = None if model is None else AskedEstimator(model, lambda twin_id: Twin(source), seed)
+        things = [where_is(view, masks, PoseModel.of_twin(one), seed=seed, guess=asked)]
+        twins = [one]
     else:
-        twins = DatasetTwins(DatasetRoot(source), on_twin=_drawn)
-        things = [which_twin(view, each, twins, tried=tried, seed=seed) for each in masks]
-        document = things_document(str(source), things, twins.twin, carried)
+        known = DatasetTwins(DatasetRoot(source), on_twin=_drawn)
+        asked = None if model is None else AskedEstimator(model, known.twin, seed)
+        things = [which_twin(view, each, known, tried=tried, seed=seed, guess=asked) for each in masks]
+        twins = [known.twin(thing.location.twin_id) for thing in things]
+    place = LocatedView(view, list(zip(things, twins, strict=True)), camera_to_base, robot, seed)
+    carried = [place.grasps(number) if grasps else None for number in range(len(things))]
+    guessed = None if asked is None else asked.model
+    layout, written = None, None
+    if out is not None and any(thing.location.poses for thing in things):
+        scene: LocatedScene | NoLayout
+        if cloud is not None:
+            scene = NoLayout("a cloud of the thing alone shows no table")
+        elif dataset is None:
+            scene = NoLayout("the twin lies in no data set; give one where manitwin build left it")
+        else:
+            scene = place.scene
+        layout = layout_document(scene)
+        if isinstance(scene, LocatedScene) and dataset is not None:
+            written = scene, dataset
+    if one is not None:
+        document = location_document(things[0], one, carried[0], guessed)
+    else:
+        document = things_document(str(source), place.things, carried, guessed)
+    document["layout"] = layout
     if out is not None:
-        write_location(out, document, view, things)
+        write_location(out, document, view, things, written)
     if json_:
         print_document(document)
     else:
-        for thing, told in zip(things, [document] if one is not None else document["things"], strict=True):
-            _print(thing, told["name"] or told["twin_id"], one is None)
-            _print_grasps(told["grasps"])
+        for thing, said in zip(things, [document] if one is not None else document["things"], strict=True):
+            print_thing(thing, said["name"] or said["twin_id"], one is None)
+            print_grasps(said["grasps"])
+        print_layout(layout, out)
     raise typer.Exit(0 if any(thing.location.status != "none" for thing in things) else 3)
+
+
+def _of_folder(
+    folder: Path, depth: Path | None, camera: Path | None, rgb: Path | None, base: Path | None, cloud: Path | None
+) -> tuple[Path | None, Path | None, Path | None, Path | None]:
+    """Return the files of a captured folder; what is given by hand counts more. Raises UsageError with a cloud."""
+    from manitwin.errors import UsageError
+    from manitwin.scenes.locate.captured import capture_files
+
+    if cloud is not None:
+        raise UsageError("--cloud: is a view by itself; leave out --view")
+    there = capture_files(folder)
+    return (
+        depth or there.get("depth"),
+        camera or there.get("camera"),
+        rgb or there.get("rgb"),
+        base or there.get("base"),
+    )
+
+
+def _check(
+    depth: Path | None,
+    camera: Path | None,
+    mask: Path | None,
+    rgb: Path | None,
+    cloud: Path | None,
+    base: Path | None,
+    robot: str | None,
+    grasps: bool,
+) -> None:
+    """Raise UsageError for options that do not go together."""
+    from manitwin.errors import UsageError
+
+    if cloud is not None and any(each is not None for each in (depth, camera, mask, rgb)):
+        raise UsageError("--cloud: is a view by itself; leave out --depth, --camera, --mask and --rgb")
+    if cloud is not None and (grasps or base is not None):
+        raise UsageError(
+            f"{'--grasps' if grasps else '--base'}: a cloud of the thing alone does not show what is beside it; give --depth"
+            " and --camera"
+        )
+    if robot is not None and base is None:
+        raise UsageError(
+            "--robot: what its arm reaches depends on where it stands; give --base, the camera's calibration"
+        )
+    needed = {"--depth": depth, "--camera": camera}
+    if cloud is None and (missing := [name for name, each in needed.items() if each is None]):
+        raise UsageError(f"{', '.join(missing)}: missing; give --depth and --camera, or --cloud")
 
 
 def _view(
@@ -122,51 +218,6 @@ def _view(
     if not told.any():
         raise UsageError(f"{mask}: is empty: it shows no pixel of a thing; give a mask of the thing to locate")
     return view, [told]
-
-
-def _carrier(view: DepthView, seed: int) -> Callable[[Thing, Twin], CarriedGrasps | None]:
-    """Return what carries a twin's grasps to where it was found in a view, whose table is looked for once."""
-    import numpy as np
-
-    from manitwin.errors import UsageError
-    from manitwin.scenes.locate.carried_grasps import carry_grasps
-    from manitwin.scenes.locate.depth_view import measured_noise_m
-    from manitwin.scenes.locate.proposals import table_plane
-
-    try:
-        plane = table_plane(view, np.random.default_rng(seed))
-    except UsageError as error:
-        raise UsageError(f"--grasps: {error}, for the hand is to keep clear of the table") from error
-    noise_m = measured_noise_m(view, np.ones(view.depth_m.shape, bool))
-    return lambda thing, twin: carry_grasps(thing, twin, view, plane, noise_m)
-
-
-def _print_grasps(told: dict[str, Any] | None) -> None:
-    if told is None:
-        return
-    left = f"{told['obstructed']} are obstructed, {told['uncertain']} not in every pose"
-    out_console.print(
-        f"  {len(told['free'])} of {told['verified']} verified grasps of {told['gripper']} are free; {left}"
-    )
-    for grasp in told["free"][:1]:
-        x, y, z = grasp["position_m"]
-        out_console.print(
-            f"  the best, {grasp['grasp_id']}: at {x:.4f} {y:.4f} {z:.4f} m, {grasp['width_m'] * 1e3:.0f} mm wide"
-        )
-
-
-def _print(thing: Thing, name: str, is_one_of_many: bool) -> None:
-    location = thing.location
-    if location.status == "none":
-        alike = f" (and no other of {len(thing.tried)})" if is_one_of_many else ""
-        out_console.print(f"not {name}{alike}: {location.reason}")
-        return
-    out_console.print(f"{name}: {location.status}; {location.reason}")
-    for pose in location.poses:
-        x, y, z = pose.object_to_camera[:3, 3]
-        out_console.print(
-            f"  score {pose.score:.3f}, {pose.visible_share:.0%} of it seen, at {x:.4f} {y:.4f} {z:.4f} m in the camera's frame"
-        )
 
 
 def _drawn(twin_id: str) -> None:

@@ -101,9 +101,12 @@ class PickPlacePlanner:
 
     def reachable(self, problem: PickPlaceProblem) -> float:
         """Return the share of grasps with a collision-free inverse kinematics and a straight approach, in any turn."""
+        return sum(self.reached(problem)) / max(1, len(problem.grasps))
+
+    def reached(self, problem: PickPlaceProblem) -> list[bool]:
+        """Tell of each grasp whether the arm can be there free of collisions, and come on a straight line, in any turn."""
         world = self._world_of(problem, problem.goal_object_to_world)
-        good = sum(self._can_be_reached(world, grasp) for grasp in problem.grasps)
-        return good / max(1, len(problem.grasps))
+        return [self._can_be_reached(world, grasp) for grasp in problem.grasps]
 
     def _can_be_reached(self, world: ProblemWorld, grasp: Grasp) -> bool:
         world.shape_hand(grasp)

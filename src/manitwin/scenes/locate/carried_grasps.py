@@ -32,23 +32,31 @@ _SIGNS = np.array(np.meshgrid(*[(-1, 1)] * 3)).reshape(3, -1).T
 
 @dataclass(frozen=True)
 class CarriedGrasp:
-    """A verified grasp in the camera's frame: ``gripper_to_camera (4, 4)``, m; ``value`` (0 to 1) is how good it is thought."""
+    """A verified grasp in the camera's frame: ``gripper_to_camera (4, 4)``, m; ``value`` (0 to 1) is how good it is thought.
+
+    ``reached``: whether a robot's arm comes there; None: no robot was asked about.
+    """
 
     grasp_id: str
     gripper_to_camera: np.ndarray
     width_m: float
     value: float
+    reached: bool | None = None
 
 
 @dataclass(frozen=True)
 class CarriedGrasps:
-    """The grasps that can be used, the best first, and of how many verified ones: the others were not free, or not certain."""
+    """The grasps that can be used, the best first, and of how many verified ones: the others were not free, or not certain.
+
+    ``robot`` is the one that was asked whether it reaches them; those that it reaches come first.
+    """
 
     gripper: str
     verified: int
     obstructed: int
     uncertain: int
     grasps: tuple[CarriedGrasp, ...]
+    robot: str | None = None
 
 
 def carry_grasps(thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_m: float) -> CarriedGrasps | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -24,6 +25,8 @@ MOST_POSES = 8
 _POINTS = 80
 
 Status = Literal["found", "ambiguous", "none"]
+Guess = Callable[[DepthView, np.ndarray, PoseModel], np.ndarray]
+"""What returns poses ``(K, 4, 4)`` in which a twin may be seen where the mask is."""
 
 
 @dataclass(frozen=True)
@@ -51,11 +54,14 @@ class Location:
     tolerance_m: float
 
 
-def locate_in_view(view: DepthView, mask: np.ndarray, model: PoseModel, *, seed: int = 0) -> Location:
+def locate_in_view(
+    view: DepthView, mask: np.ndarray, model: PoseModel, *, seed: int = 0, guess: Guess | None = None
+) -> Location:
     """Find the pose of a twin that ``mask (H, W) bool`` shows in a view. Same input and seed, same answer.
 
     Candidates of the whole sphere are aligned and drawn (``search``); the score is the share of what is seen that the drawn twin
-    explains (``comparison.explained``). Raises UsageError for a mask that shows next to nothing at a known depth.
+    explains (``comparison.explained``). ``guess`` takes the place of the search, and no other; what it says is aligned, compared
+    and refused as what is searched for. Raises UsageError for a mask that shows next to nothing at a known depth.
     """
     pixels = int((mask & known_depth(view)).sum())
     if pixels < LEAST_PX:
@@ -68,7 +74,8 @@ def locate_in_view(view: DepthView, mask: np.ndarray, model: PoseModel, *, seed:
             pixels,
             0.0,
         )
-    found = find_candidates(view, mask, model, np.random.default_rng(seed))
+    guesses = None if guess is None else guess(view, mask, model)
+    found = find_candidates(view, mask, model, np.random.default_rng(seed), guesses)
     best = float(found.scores[0])
     if best < LEAST_SCORE:
         reason = (

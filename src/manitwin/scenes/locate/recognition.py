@@ -13,7 +13,7 @@ from manitwin.dataset.search.twin_looks import twin_looks
 from manitwin.errors import UsageError
 from manitwin.models.embedders.looks import look_of
 from manitwin.scenes.locate.depth_view import DepthView
-from manitwin.scenes.locate.estimate import Location, locate_in_view
+from manitwin.scenes.locate.estimate import Guess, Location, locate_in_view
 from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
@@ -74,7 +74,13 @@ class DatasetTwins:
 
 
 def which_twin(
-    view: DepthView, mask: np.ndarray, twins: DatasetTwins, *, tried: int = CANDIDATES, seed: int = 0
+    view: DepthView,
+    mask: np.ndarray,
+    twins: DatasetTwins,
+    *,
+    tried: int = CANDIDATES,
+    seed: int = 0,
+    guess: Guess | None = None,
 ) -> Thing:
     """Look for the twins that a thing looks most like, and return the one that explains it best, or that none does.
 
@@ -84,17 +90,19 @@ def which_twin(
         raise UsageError("which twin a thing is, is told by its looks first; give --rgb")
     answers = []
     for twin_id, alike in twins.ranked(view.rgb, mask)[:tried]:
-        location = locate_in_view(view, mask, twins.model(twin_id), seed=seed)
+        location = locate_in_view(view, mask, twins.model(twin_id), seed=seed, guess=guess)
         answers.append((location, Tried(twin_id, alike, location.best_score)))
     answers.sort(key=lambda each: -each[0].best_score)
     best = answers[0][0]
     return Thing(mask, best, twins.model(best.twin_id), tuple(each for _, each in answers))
 
 
-def where_is(view: DepthView, masks: Sequence[np.ndarray], model: PoseModel, *, seed: int = 0) -> Thing:
+def where_is(
+    view: DepthView, masks: Sequence[np.ndarray], model: PoseModel, *, seed: int = 0, guess: Guess | None = None
+) -> Thing:
     """Look for a twin in each of several masks, and return the one that it explains best, or that it is none of them."""
     if not masks:
         raise UsageError("nothing stands above the table in this picture; give --mask")
-    answers = [(locate_in_view(view, mask, model, seed=seed), mask) for mask in masks]
+    answers = [(locate_in_view(view, mask, model, seed=seed, guess=guess), mask) for mask in masks]
     best, mask = max(answers, key=lambda each: each[0].best_score)
     return Thing(mask, best, model, (Tried(model.twin_id, None, best.best_score),))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,8 @@ from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.scenes.locate.carried_grasps import CarriedGrasps
 from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.estimate import AMBIGUOUS_MARGIN, LEAST_SCORE
+from manitwin.scenes.locate.layout_files import write_layout
+from manitwin.scenes.locate.located_scene import LocatedScene
 from manitwin.scenes.locate.overlay import overlay
 from manitwin.scenes.locate.recognition import Thing
 from manitwin.scenes.perception.object_views import box_of
@@ -24,8 +26,13 @@ FRAME = "camera: x right, y down, z ahead (OpenCV); metres; quaternions wxyz"
 LOCATION = "location.json"
 
 
-def location_document(thing: Thing, twin: Twin, carried: CarriedGrasps | None = None) -> dict[str, Any]:
-    """Return a location as JSON values: the answer, its poses, what it was judged by, and the grasps that can be used there."""
+def location_document(
+    thing: Thing, twin: Twin, carried: CarriedGrasps | None = None, estimator: str | None = None
+) -> dict[str, Any]:
+    """Return a location as JSON values: the answer, its poses, what it was judged by, and the grasps that can be used there.
+
+    ``estimator`` is what guessed the poses in the place of the search.
+    """
     location, symmetries = thing.location, thing.model.symmetries
     return {
         "status": location.status,
@@ -49,6 +56,7 @@ def location_document(thing: Thing, twin: Twin, carried: CarriedGrasps | None = 
         "ambiguous_margin": AMBIGUOUS_MARGIN,
         "pixels": location.pixels,
         "tolerance_m": round(location.tolerance_m, 5),
+        "estimator": estimator,
         "symmetries": {
             "turns": sum(bool(np.linalg.det(motion) > 0) for motion in symmetries.motions),
             "axis": None if symmetries.axis is None else symmetries.axis.round(6).tolist(),
@@ -63,6 +71,8 @@ def _grasps(carried: CarriedGrasps) -> dict[str, Any]:
         "verified": carried.verified,
         "obstructed": carried.obstructed,
         "uncertain": carried.uncertain,
+        "robot": carried.robot,
+        "reached": None if carried.robot is None else sum(bool(grasp.reached) for grasp in carried.grasps),
         "free": [
             {
                 "grasp_id": grasp.grasp_id,
@@ -70,6 +80,7 @@ def _grasps(carried: CarriedGrasps) -> dict[str, Any]:
                 "quaternion_wxyz": quaternion_wxyz(grasp.gripper_to_camera[:3, :3]).round(7).tolist(),
                 "width_m": round(grasp.width_m, 5),
                 "value": round(grasp.value, 4),
+                "reached": grasp.reached,
             }
             for grasp in carried.grasps
         ],
@@ -78,16 +89,16 @@ def _grasps(carried: CarriedGrasps) -> dict[str, Any]:
 
 def things_document(
     dataset: str,
-    things: Sequence[Thing],
-    twins: Callable[[str], Twin],
-    carried: Callable[[Thing, Twin], CarriedGrasps | None] = lambda thing, twin: None,
+    things: Sequence[tuple[Thing, Twin]],
+    carried: Sequence[CarriedGrasps | None],
+    estimator: str | None = None,
 ) -> dict[str, Any]:
     """Return which twin of a data set each thing of a view is, what was tried in its place, and the grasps of each."""
     return {
         "dataset": dataset,
         "things": [
             {
-                **location_document(thing, twin := twins(thing.location.twin_id), carried(thing, twin)),
+                **location_document(thing, twin, grasps, estimator),
                 "tried": [
                     {
                         "twin_id": each.twin_id,
@@ -97,17 +108,25 @@ def things_document(
                     for each in thing.tried
                 ],
             }
-            for thing in things
+            for (thing, twin), grasps in zip(things, carried, strict=True)
         ],
     }
 
 
-def write_location(out: Path, document: dict[str, Any], view: DepthView, things: Sequence[Thing]) -> None:
-    """Write ``location.json`` and an ``overlay_<n>.png`` of each thing into a new folder, whole or not at all.
+def write_location(
+    out: Path,
+    document: dict[str, Any],
+    view: DepthView,
+    things: Sequence[Thing],
+    layout: tuple[LocatedScene, str] | None = None,
+) -> None:
+    """Write ``location.json``, an ``overlay_<n>.png`` of each thing, and the layout into a new folder, whole or not at all.
 
-    Equal input gives equal bytes.
+    ``layout`` is the located scene and the place of its twins. Equal input gives equal bytes.
     """
     with new_folder(out) as folder:
+        if layout is not None:
+            write_layout(folder, *layout)
         (folder / LOCATION).write_text(canonical_json(document), encoding="utf-8")
         for place, thing in enumerate(things):
             picture = overlay(view, thing.mask, thing.model, thing.location.poses, thing.location.tolerance_m)

@@ -38,15 +38,20 @@ class Candidates:
     gains: np.ndarray
 
 
-def find_candidates(view: DepthView, mask: np.ndarray, model: PoseModel, rng: np.random.Generator) -> Candidates:
-    """Search all orientations for those in which the object explains what ``mask (H, W) bool`` shows."""
+def find_candidates(
+    view: DepthView, mask: np.ndarray, model: PoseModel, rng: np.random.Generator, guesses: np.ndarray | None = None
+) -> Candidates:
+    """Search all orientations for those in which the object explains what ``mask (H, W) bool`` shows.
+
+    With ``guesses (K, 4, 4)`` these are aligned instead of starts from all sides; what follows is the same.
+    """
     observed = observed_points(view, mask, model.diameter_m, rng)
     tolerance_m = TOLERANCE_M + TOLERANCE_OF_NOISE * measured_noise_m(view, mask)
     reach_px = float(view.intrinsics[0, 0] * model.diameter_m / np.median(observed[:, 2]))
     evidence = Evidence.of(view, mask, reach_px, MANY, rng)
     first = Evidence.of(view, mask, reach_px, 2 * FEW, rng)
     few = observed[:FEW]
-    poses = starts(observed, model, hidden_direction(view, mask))
+    poses = starts(observed, model, hidden_direction(view, mask)) if guesses is None else guesses
     poses = align(few, model.surface, poses, iterations=8, kept_share=0.85)
     scores = explained(model, poses, first, ROUGHLY * tolerance_m)
     poses = align(few, model.surface, poses[_best(scores, FOLLOWED)], iterations=8, kept_share=0.9)

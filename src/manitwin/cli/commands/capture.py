@@ -1,0 +1,51 @@
+"""``manitwin capture``: a folder with what a depth camera sees, or would see of a drawn layout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from manitwin.cli import choices, options
+from manitwin.cli.console import out_console
+
+
+def capture(
+    out: Annotated[Path, options.output_folder("A new folder for depth.png, rgb.png and camera.json.")],
+    scene: Annotated[
+        Path | None,
+        typer.Option(
+            help="Instead of a camera: a drawn scene's folder; depths get a depth camera's noise.",
+            metavar="SCENE",
+            callback=choices.must_exist("a scene's folder"),
+        ),
+    ] = None,
+    camera: Annotated[str, typer.Option(help="Of a scene: which of its cameras.")] = "oblique",
+    seed: Annotated[int, typer.Option(help="Of a scene: the seed of the noise.", min=0, max=options.LARGEST_SEED)] = 0,
+    bag: Annotated[
+        Path | None,
+        typer.Option(
+            help="Instead of a camera: a file that a RealSense recorded.",
+            metavar="FILE",
+            callback=choices.must_exist("a recorded .bag"),
+        ),
+    ] = None,
+    serial: Annotated[str | None, typer.Option(help="The serial number of one of several RealSense cameras.")] = None,
+) -> None:
+    """Save what a RealSense camera sees, for manitwin locate --view; or rehearse it with a drawn layout."""
+    from manitwin.errors import UsageError
+    from manitwin.scenes.locate.captured import write_capture
+    from manitwin.scenes.locate.realsense import record, sdk
+    from manitwin.scenes.locate.rehearsed_capture import capture_of_scene
+
+    given = [name for name, each in (("--scene", scene), ("--bag", bag), ("--serial", serial)) if each is not None]
+    if len(given) > 1:
+        raise UsageError(f"{' and '.join(given)} name different sources; give one of them")
+    seen = record(sdk(), bag=bag, serial=serial) if scene is None else capture_of_scene(scene, camera, seed)
+    write_capture(out, seen)
+    height, width = seen.depth_m.shape
+    share = float((seen.depth_m > 0).mean())
+    out_console.print(f"{out}: {width} x {height} pixels, {share:.0%} with a depth, by {seen.device}")
+    if seen.masks:
+        out_console.print(f"masks of {', '.join(seen.masks)}")

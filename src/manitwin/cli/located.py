@@ -1,0 +1,66 @@
+"""What ``manitwin locate`` says: of each thing, of its grasps, and of the layout."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from manitwin.cli.console import out_console
+
+if TYPE_CHECKING:
+    from manitwin.scenes.locate.recognition import Thing
+
+
+def print_thing(thing: Thing, name: str, is_one_of_many: bool) -> None:
+    """Say where a thing is, or that it is not there."""
+    location = thing.location
+    if location.status == "none":
+        alike = f" (and no other of {len(thing.tried)})" if is_one_of_many else ""
+        out_console.print(f"not {name}{alike}: {location.reason}")
+        return
+    out_console.print(f"{name}: {location.status}; {location.reason}")
+    for pose in location.poses:
+        x, y, z = pose.object_to_camera[:3, 3]
+        out_console.print(
+            f"  score {pose.score:.3f}, {pose.visible_share:.0%} of it seen, at {x:.4f} {y:.4f} {z:.4f} m in the camera's frame"
+        )
+
+
+def print_grasps(told: dict[str, Any] | None) -> None:
+    """Say how many grasps are free, how many of them the robot reaches, and which is the best."""
+    if told is None:
+        return
+    left = f"{told['obstructed']} are obstructed, {told['uncertain']} not in every pose"
+    out_console.print(
+        f"  {len(told['free'])} of {told['verified']} verified grasps of {told['gripper']} are free; {left}"
+    )
+    if told["robot"] is not None:
+        out_console.print(f"  {told['robot']} reaches {told['reached']} of these")
+    for grasp in told["free"][:1]:
+        x, y, z = grasp["position_m"]
+        out_console.print(
+            f"  the best, {grasp['grasp_id']}: at {x:.4f} {y:.4f} {z:.4f} m, {grasp['width_m'] * 1e3:.0f} mm wide"
+        )
+
+
+def print_layout(told: dict[str, Any] | None, out: Path | None) -> None:
+    """Say what the layout has, or why there is none."""
+    if told is None:
+        return
+    for each in told["objects"]:
+        if each["as_boxes"] is not None:
+            out_console.print(f"{each['name']} is boxes in the layout: it {each['as_boxes']}")
+    if told["scene"] is None:
+        out_console.print(f"no layout: {told['reason']}")
+        return
+    rested = [each["moved_m"] for each in told["objects"] if each["moved_m"] is not None]
+    most_mm = 1000 * max(rested)
+    where = (
+        "the robot's base is the origin"
+        if told["base"] == "given"
+        else "where the robot's base is is assumed (--base says it)"
+    )
+    out_console.print(
+        f"layout of {len(rested)} objects and {told['obstacles']} boxes of what else is seen in {out}; they rest at most"
+        f" {most_mm:.1f} mm from where they were found; {where}"
+    )

@@ -1,0 +1,115 @@
+"""What can be done with what was found in a view: its grasps, which of them a robot reaches, and the view as a layout."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from manitwin.errors import UsageError
+from manitwin.geometry.poses import transform_points
+from manitwin.scenes.locate.carried_grasps import CarriedGrasps, carry_grasps
+from manitwin.scenes.locate.depth_view import DepthView, measured_noise_m
+from manitwin.scenes.locate.layout_files import NoLayout
+from manitwin.scenes.locate.located_furniture import located_furniture
+from manitwin.scenes.locate.located_objects import LocatedObject, located_objects
+from manitwin.scenes.locate.located_scene import LocatedScene, located_scene
+from manitwin.scenes.locate.proposals import Plane, table_plane
+from manitwin.scenes.locate.recognition import Thing
+from manitwin.scenes.locate.world_frame import WorldFrame, world_of_base, world_of_table
+from manitwin.scenes.scene import Furniture
+from manitwin.twin.loaded_twin import Twin
+
+if TYPE_CHECKING:  # what plans wants manitwin[robots]; to locate does not
+    from manitwin.episodes.planning.pick_place import PickPlacePlanner
+
+
+class LocatedView:
+    """A view with the things that were looked for in it; what all of them share is found once.
+
+    ``camera_to_base (4, 4)`` is where the camera is in the frame of a robot's base, if that is known; ``robot`` the arm that
+    stands there. Raises UsageError for a robot that these grasps are not for, Unavailable where planning is not installed.
+    """
+
+    def __init__(
+        self,
+        view: DepthView,
+        things: Sequence[tuple[Thing, Twin]],
+        camera_to_base: np.ndarray | None = None,
+        robot: str | None = None,
+        seed: int = 0,
+    ):
+        self.view, self.things, self.seed = view, tuple(things), seed
+        self._camera_to_base = camera_to_base
+        self._planner = None if robot is None else _planner_of(robot)
+
+    @cached_property
+    def plane(self) -> Plane:
+        """The table, of which the things are no part: a large box's side is none. Raises UsageError where none is seen."""
+        things = np.any([thing.mask for thing, _ in self.things], axis=0)
+        beside = replace(self.view, depth_m=np.where(things, 0.0, self.view.depth_m))
+        return table_plane(beside, np.random.default_rng(self.seed))
+
+    @cached_property
+    def world(self) -> WorldFrame:
+        """The robot's world, or one over the table; raises UsageError where the table leans in the base's frame."""
+        middles = [
+            transform_points(thing.location.poses[0].object_to_camera, thing.model.center[None])[0]
+            for thing, _ in self.things
+            if thing.location.poses
+        ]
+        about = np.mean(middles, axis=0)
+        if self._camera_to_base is None:
+            return world_of_table(self.plane, about)
+        return world_of_base(self._camera_to_base, self.plane, about)
+
+    def grasps(self, number: int) -> CarriedGrasps | None:
+        """Return the grasps of a thing that are free where it was found, with a robot also whether it reaches them.
+
+        None where it was not found, or its twin has none of jaws. Raises UsageError where no table is seen.
+        """
+        thing, twin = self.things[number]
+        try:
+            plane = self.plane
+        except UsageError as error:
+            raise UsageError(f"--grasps: {error}, for the hand is to keep clear of the table") from error
+        noise_m = measured_noise_m(self.view, np.ones(self.view.depth_m.shape, bool))
+        carried = carry_grasps(thing, twin, self.view, plane, noise_m)
+        if carried is None or self._planner is None:
+            return carried
+        from manitwin.episodes.located_reach import with_reach
+
+        place = sum(bool(each.location.poses) for each, _ in self.things[:number])
+        return with_reach(carried, place, self._objects, self._furniture, self.world, self._planner)
+
+    @cached_property
+    def scene(self) -> LocatedScene | NoLayout:
+        """The view as a layout; at least one thing was found."""
+        try:
+            self.plane  # noqa: B018  (that there is a table is asked first)
+        except UsageError as error:
+            return NoLayout(str(error))
+        robot = None if self._planner is None else self._planner.robot.name
+        return located_scene(self.view, self.things, self.world, robot, self.seed)
+
+    @cached_property
+    def _objects(self) -> tuple[LocatedObject, ...]:
+        return located_objects(self.things, self.world)
+
+    @cached_property
+    def _furniture(self) -> Furniture:
+        return located_furniture(self.view, self._objects, self.world)[0]
+
+
+def _planner_of(robot: str) -> PickPlacePlanner:
+    """Return the planner of a robot; raises UsageError for one that grasps of jaws are not for, Unavailable without planning."""
+    from manitwin.episodes.planning.pick_place import PickPlacePlanner
+    from manitwin.episodes.skills.hands import check_jaws
+    from manitwin.robots.load import load_robot
+
+    loaded = load_robot(robot)
+    check_jaws(loaded, "grasps that are carried over")
+    return PickPlacePlanner(loaded)

@@ -1,0 +1,74 @@
+"""A question to an estimator of the user's about a thing in a view."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import trimesh
+
+from manitwin.errors import UsageError
+from manitwin.formats.image_file import png_of
+from manitwin.formats.label_picture import label_picture
+from manitwin.models.pose_estimators.protocol import MOST_POSES, PROTOCOL, PoseEstimator, PoseRequest
+from manitwin.render.raycast import merged
+from manitwin.scenes.locate.depth_view import DepthView, known_depth
+from manitwin.scenes.locate.pose_model import PoseModel
+from manitwin.twin.loaded_twin import Twin
+
+MOST_NUMBER = 65535
+UNITS_M = (0.0001, 0.001, 0.01)
+"""Metres a unit of a depth picture: the finest with which all depths are numbers of 16 bits."""
+MESH, VISUAL, DEPTH, MASK, RGB = "model.ply", "visual.glb", "depth.png", "mask.png", "rgb.png"
+
+
+class AskedEstimator:
+    """Asks an estimator about twins in a view; ``model`` is what answered last."""
+
+    def __init__(self, estimator: PoseEstimator, twin: Callable[[str], Twin], seed: int):
+        """Take the estimator, what returns a twin by its id, and the seed that it is told."""
+        self._estimator, self._twin, self._seed = estimator, twin, seed
+        self.model: str | None = None
+
+    def __call__(self, view: DepthView, mask: np.ndarray, model: PoseModel) -> np.ndarray:
+        """Return its guesses ``object_to_camera (K, 4, 4)``; raises a BackendError where it does not answer as it has to."""
+        found = self._estimator.guess(pose_request(view, mask, model, self._twin(model.twin_id), self._seed))
+        self.model = found.model
+        return found.poses
+
+
+def pose_request(view: DepthView, mask: np.ndarray, model: PoseModel, twin: Twin, seed: int) -> PoseRequest:
+    """Return the question where a twin is that ``mask (H, W) bool`` shows; raises UsageError for depths that no picture holds."""
+    depth = np.where(known_depth(view), view.depth_m, 0.0)
+    unit_m = next((each for each in UNITS_M if depth.max() / each < MOST_NUMBER), None)
+    if unit_m is None:
+        raise UsageError(
+            f"--estimator: depths of up to {depth.max():.0f} m fit into no picture of 16 bits; give a nearer view"
+        )
+    shape = merged(twin.visual)
+    mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=False).export(file_type="ply")
+    assert isinstance(mesh, bytes)
+    files = {
+        MESH: mesh,
+        VISUAL: twin.read_bytes(VISUAL),
+        DEPTH: label_picture(np.rint(depth / unit_m)),
+        MASK: label_picture(mask * 255),
+    }
+    if view.rgb is not None:
+        files[RGB] = png_of(view.rgb)
+    k, (height, width) = view.intrinsics, depth.shape
+    document = {
+        "protocol": PROTOCOL,
+        "name": model.twin_id,
+        "seed": seed,
+        "most_poses": MOST_POSES,
+        "camera": {
+            "fx": float(k[0, 0]), "fy": float(k[1, 1]), "cx": float(k[0, 2]) - 0.5, "cy": float(k[1, 2]) - 0.5,
+            "width": width, "height": height,
+        },
+        "depth_unit_m": unit_m,
+        "diameter_m": model.diameter_m,
+        "symmetries": model.same_poses.tolist(),
+        "files": {"mesh": MESH, "visual": VISUAL, "depth": DEPTH, "mask": MASK, "rgb": RGB if RGB in files else None},
+    }  # fmt: skip
+    return PoseRequest(document, files)

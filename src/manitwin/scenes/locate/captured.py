@@ -1,0 +1,66 @@
+"""A folder with what a depth camera saw: what ``manitwin capture`` writes and ``manitwin locate --view`` reads."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from manitwin.errors import UsageError
+from manitwin.formats.image_file import png_of
+from manitwin.formats.label_picture import label_picture
+from manitwin.formats.output_folder import new_folder
+
+DEPTH, RGB, CAMERA, BASE = "depth.png", "rgb.png", "camera.json", "base.json"
+MOST_NUMBER = 65535
+
+
+@dataclass(frozen=True)
+class Capture:
+    """``depth_m (H, W)``, 0 unknown; ``rgb (H, W, 3) uint8`` aligned with it; ``intrinsics (3, 3)`` as OpenCV counts pixels.
+
+    ``camera_to_base (4, 4)`` where it is known; ``masks (H, W) bool`` of things by name, where these are; ``device`` says what
+    saw it.
+    """
+
+    depth_m: np.ndarray
+    depth_unit_m: float
+    intrinsics: np.ndarray
+    rgb: np.ndarray
+    device: str
+    camera_to_base: np.ndarray | None = None
+    masks: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+def write_capture(out: Path, capture: Capture) -> None:
+    """Write a new folder, whole or not at all; depths beyond what 16 bits hold are unknown. Raises UsageError."""
+    numbers = np.rint(capture.depth_m / capture.depth_unit_m)
+    numbers[~(numbers <= MOST_NUMBER)] = 0
+    k, (height, width) = capture.intrinsics, capture.depth_m.shape
+    names = ("fx", "fy", "cx", "cy")
+    lens = dict(zip(names, (float(each) for each in (k[0, 0], k[1, 1], k[0, 2], k[1, 2])), strict=True))
+    camera = {**lens, "width": width, "height": height, "depth_unit_m": capture.depth_unit_m, "device": capture.device}
+    with new_folder(out) as folder:
+        (folder / DEPTH).write_bytes(label_picture(numbers))
+        (folder / RGB).write_bytes(png_of(capture.rgb))
+        (folder / CAMERA).write_text(json.dumps(camera, indent=1) + "\n")
+        if capture.camera_to_base is not None:
+            base = {"camera_to_base": capture.camera_to_base.round(9).tolist()}
+            (folder / BASE).write_text(json.dumps(base, indent=1) + "\n")
+        for name, mask in capture.masks.items():
+            (folder / f"mask_{name}.png").write_bytes(label_picture(mask * 255))
+
+
+def capture_files(folder: Path) -> dict[str, Path]:
+    """Return the files of a folder by the options of ``manitwin locate``: depth, camera, and rgb and base where they are.
+
+    Raises UsageError where one that is needed is not there.
+    """
+    for name in (DEPTH, CAMERA):
+        if not (folder / name).is_file():
+            raise UsageError(f"{folder}: has no {name}; give a folder that manitwin capture wrote")
+    named = {"depth": DEPTH, "camera": CAMERA, "rgb": RGB, "base": BASE}
+    return {option: folder / name for option, name in named.items() if (folder / name).is_file()}

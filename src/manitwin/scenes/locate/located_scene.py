@@ -1,0 +1,172 @@
+"""A located view as a layout: twins where they were found, let go in physics, and all else that is seen as boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.geometry.hull_distance import least_distance
+from manitwin.geometry.poses import quaternion_wxyz, rotation_angle_rad, transform_points
+from manitwin.physics.sapien.settle import SettledScene, settle_scene
+from manitwin.scenes.layouts.surroundings import make_cameras, make_lights
+from manitwin.scenes.loaded_scene import furniture_boxes
+from manitwin.scenes.locate.depth_view import DepthView
+from manitwin.scenes.locate.located_furniture import located_furniture, triple
+from manitwin.scenes.locate.located_objects import LocatedObject, located_objects
+from manitwin.scenes.locate.recognition import Thing
+from manitwin.scenes.locate.world_frame import WorldFrame
+from manitwin.scenes.scene import SCENE_SCHEMA_VERSION, Furniture, SceneMeasures, SceneObject, SceneRecord
+from manitwin.scenes.settings import LayoutSettings
+from manitwin.twin.loaded_twin import Twin
+
+LOCATED = "located"
+"""What ``clutter`` says of a scene that was seen and not sampled."""
+GIVE_UP = 3.0  # times the limit: no need to see where it ends
+
+
+@dataclass(frozen=True)
+class LocatedScene:
+    """The layout (None: nothing stays where it was found) with its furniture and objects.
+
+    ``rest (N, 4, 4)`` are the objects' poses after they were let go, ``left_out`` counts the seen boxes that were in one of them.
+    ``as_boxes`` are those that do not stay, with the reason: of them the layout has what is seen, as of things that nobody knows.
+    """
+
+    record: SceneRecord | None
+    world: WorldFrame
+    furniture: Furniture | None
+    objects: tuple[LocatedObject, ...]
+    rest: np.ndarray
+    left_out: int
+    as_boxes: tuple[tuple[LocatedObject, str], ...]
+
+    @property
+    def motions(self) -> list[tuple[float, float]]:
+        """How far each object rests from where it was found: of its centre of mass, m, and turned, rad."""
+        return [_motion(each, each.seen, end) for each, end in zip(self.objects, self.rest, strict=True)]
+
+    def place_of(self, thing: Thing) -> int | None:
+        """Return the number of a thing's object; None where it is none of them."""
+        return next((number for number, each in enumerate(self.objects) if each.thing is thing), None)
+
+
+def scene_id_of(seed: int) -> str:
+    """Return the id of the one scene of a located view."""
+    return f"{LOCATED}_{seed}_000000"
+
+
+def located_scene(
+    view: DepthView, things: Sequence[tuple[Thing, Twin]], world: WorldFrame, robot: str | None, seed: int
+) -> LocatedScene:
+    """Return the layout of what was found in a view, of which at least one thing has a pose.
+
+    All objects are let go at once in PhysX, with the limits of ``manitwin layout``: of those that move by more than 1 cm, turn by
+    more than 5 degrees, or do not come to rest, the one that moves most becomes boxes, and the others are let go again. The same
+    arguments give the same record.
+    """
+    objects, settings = located_objects(things, world), LayoutSettings()
+    as_boxes: list[tuple[LocatedObject, str]] = []
+    while objects:
+        furniture, left_out = located_furniture(view, objects, world)
+        settled = settle_scene(
+            [each.placed for each in objects],
+            furniture_boxes(furniture),
+            seconds=settings.settle_s,
+            give_up_m=[GIVE_UP * settings.max_moved_m] * len(objects),
+        )
+        reasons = [_leaves_its_place(place, each, settled, settings) for place, each in enumerate(objects)]
+        if not any(reasons):
+            record = _record(objects, settled, furniture, robot, seed)
+            return LocatedScene(record, world, furniture, objects, settled.object_to_world, left_out, tuple(as_boxes))
+        moved = [
+            _motion(each, each.placed.object_to_world, end)[0] if reason else -1.0
+            for each, end, reason in zip(objects, settled.object_to_world, reasons, strict=True)
+        ]
+        worst = int(np.argmax(moved))
+        as_boxes.append((objects[worst], reasons[worst]))
+        objects = objects[:worst] + objects[worst + 1 :]
+    return LocatedScene(None, world, None, (), np.zeros((0, 4, 4)), 0, tuple(as_boxes))
+
+
+def _leaves_its_place(place: int, each: LocatedObject, settled: SettledScene, settings: LayoutSettings) -> str:
+    """Say why an object does not stay where it is let go; empty where it does."""
+    moved_m, turned_rad = _motion(each, each.placed.object_to_world, settled.object_to_world[place])
+    when = "when it is let go where it was found"
+    if settled.lost[place] or moved_m > settings.max_moved_m:
+        return f"moves by {1000 * moved_m:.0f} mm {when}"
+    if turned_rad > np.radians(settings.max_turned_deg):
+        return f"turns by {np.degrees(turned_rad):.0f} degrees {when}"
+    return "" if settled.at_rest[place] else f"does not come to rest {when}"
+
+
+def _record(
+    objects: Sequence[LocatedObject], settled: SettledScene, furniture: Furniture, robot: str | None, seed: int
+) -> SceneRecord:
+    rested = list(zip(objects, settled.object_to_world, strict=True))
+    bearers = [_bearer(place, objects, settled) for place in range(len(objects))]
+    names, parts = [each.placed.name for each in objects], [each.parts_at(end) for each, end in rested]
+    gap_m = least_distance(
+        [
+            (parts[i], parts[j])
+            for i in range(len(parts))
+            for j in range(i)
+            if bearers[i] != names[j] and bearers[j] != names[i]
+        ]
+    )
+    corners = np.concatenate([transform_points(end, np.concatenate(each.placed.body.hulls)) for each, end in rested])
+    motions = [_motion(each, each.placed.object_to_world, end) for each, end in rested]
+    ambient, lights = make_lights(np.random.default_rng([seed, 0]))
+    return SceneRecord(
+        schema_version=SCENE_SCHEMA_VERSION,
+        scene_id=scene_id_of(seed),
+        seed=seed,
+        number=0,
+        robot=robot,
+        clutter=LOCATED,
+        furniture=furniture,
+        objects=tuple(_scene_object(each, end, bearer) for (each, end), bearer in zip(rested, bearers, strict=True)),
+        ambient=ambient,
+        lights=lights,
+        cameras=make_cameras("table", corners.min(0), corners.max(0), np.random.default_rng([seed, 0, 1])),
+        measures=SceneMeasures(
+            max_moved_m=max(moved for moved, _ in motions),
+            max_turned_rad=max(turned for _, turned in motions),
+            max_penetration_m=max(settled.touching.values(), default=0.0),
+            min_gap_m=gap_m if np.isfinite(gap_m) else None,
+        ),
+        repairs=0,
+    )
+
+
+def _bearer(place: int, objects: Sequence[LocatedObject], settled: SettledScene) -> str | None:
+    """Return the located object that one stands on; None: the table, or what nobody named."""
+    own = objects[place].placed.name
+    touched = settled.neighbours(own)
+    if "table" in touched:
+        return None
+    height = {each.placed.name: settled.object_to_world[i][2, 3] for i, each in enumerate(objects)}
+    below = [name for name in touched if name in height and height[name] < height[own]]
+    return min(below, key=lambda name: (height[name], name), default=None)
+
+
+def _scene_object(each: LocatedObject, pose: np.ndarray, bearer: str | None) -> SceneObject:
+    record = each.twin.record
+    w, i, j, k = (float(v) for v in quaternion_wxyz(pose[:3, :3]))
+    return SceneObject(
+        name=each.placed.name,
+        twin_id=record.twin_id,
+        revision=record.revision,
+        category=record.language.category if record.language else "unknown",
+        placement=each.placement,
+        position_m=triple(pose[:3, 3]),
+        quaternion_wxyz=(w, i, j, k),
+        supported_by=bearer,
+    )
+
+
+def _motion(each: LocatedObject, before: np.ndarray, after: np.ndarray) -> tuple[float, float]:
+    """Return how far the centre of mass is from where it was, m, and by how much the object is turned, rad."""
+    first, second = (transform_points(pose, each.placed.body.center_of_mass_m[None])[0] for pose in (before, after))
+    return float(np.linalg.norm(second - first)), rotation_angle_rad(after[:3, :3] @ before[:3, :3].T)

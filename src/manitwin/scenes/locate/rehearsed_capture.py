@@ -1,0 +1,44 @@
+"""What a depth camera would see of a drawn layout: true colours, depths with its noise, and the masks of the objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from manitwin.errors import UsageError, choose_from
+from manitwin.geometry.poses import inverse
+from manitwin.scenes.locate.captured import Capture
+from manitwin.scenes.locate.depth_noise import DepthNoise
+from manitwin.scenes.perception.bop import OPENGL_TO_OPENCV
+from manitwin.scenes.perception.scene_truth import read_scene_truth
+from manitwin.scenes.scene_files import scene_files
+
+DEVICE = "rehearsal: a drawn layout with the noise of a depth camera"
+
+
+def capture_of_scene(place: Path, camera: str, seed: int) -> Capture:
+    """Return what one camera of a scene sees; the robot's base is the origin of its world.
+
+    Raises UsageError for a place that is no single drawn scene, or has no such camera.
+    """
+    files = scene_files(place)
+    if len(files) != 1:
+        raise UsageError(f"{place}: holds {len(files)} scenes; give the folder of one")
+    truth = read_scene_truth(files[0])
+    pictures = {each.name: each for each in truth.pictures}
+    if camera not in pictures:
+        raise UsageError(f"{place}: {choose_from('camera', camera, pictures)}")
+    picture, noise = pictures[camera], DepthNoise()
+    intrinsics = np.array(picture.intrinsics, float)
+    intrinsics[:2, 2] -= 0.5
+    masks = {each.name: picture.ids == truth.ids[each.name] for each in truth.record.objects}
+    return Capture(
+        depth_m=noise.observed(picture.depth_m, np.random.default_rng(seed)),
+        depth_unit_m=noise.step_m,
+        intrinsics=intrinsics,
+        rgb=picture.rgb,
+        device=DEVICE,
+        camera_to_base=inverse(OPENGL_TO_OPENCV @ inverse(picture.camera.camera_to_object)),
+        masks={name: mask for name, mask in masks.items() if mask.any()},
+    )
