@@ -74,7 +74,8 @@ def _text(path: Path) -> bytes:
 
 
 def _of_objaverse(uid: str, told: dict[str, Any], shard: str, *, files: bool) -> dict[str, Any]:
-    user = told.get("user") if isinstance(told.get("user"), dict) else {}
+    said = told.get("user")
+    user: dict[str, Any] = said if isinstance(said, dict) else {}
     address = told.get("viewerUrl") or f"{SKETCHFAB}/{quote(uid)}"
     place = {"file": f"glbs/{shard}/{uid}.glb"} if files else {"url": address}
     who = user.get("displayName") or user.get("username")

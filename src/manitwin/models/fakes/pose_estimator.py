@@ -80,7 +80,8 @@ def guesses(document: dict[str, Any], content: dict[str, bytes]) -> dict[str, An
     seen = np.stack([(columns - camera["cx"]) / camera["fx"] * z, (rows - camera["cy"]) / camera["fy"] * z, z], 1).mean(
         0
     )
-    vertices = trimesh.load(trimesh.util.wrap_as_stream(content[named["mesh"]]), file_type="ply").vertices
+    mesh = trimesh.load_mesh(trimesh.util.wrap_as_stream(content[named["mesh"]]), file_type="ply")
+    vertices = np.asarray(mesh.vertices)
     middle = (vertices.min(0) + vertices.max(0)) / 2
     seen += seen / np.linalg.norm(seen) * document["diameter_m"] / 4  # what is seen is the near side
     turn = Rotation.from_rotvec([0.2, 0.5, 0.3])

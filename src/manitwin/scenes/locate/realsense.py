@@ -58,7 +58,8 @@ def record(rs: Any, *, bag: Path | None = None, serial: str | None = None, frame
         device = profile.get_device()
         unit_m = float(device.first_depth_sensor().get_depth_scale())
         name = str(device.get_info(rs.camera_info.name))
-        align, depths, rgb, lens = rs.align(rs.stream.color), [], None, None
+        align, rgb, lens = rs.align(rs.stream.color), None, None
+        depths: list[np.ndarray] = []
         for _ in range(0 if bag is not None else WARM_UP):
             pipeline.wait_for_frames()
         while len(depths) < frames:
