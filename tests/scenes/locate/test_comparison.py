@@ -9,6 +9,7 @@ from manitwin.geometry.poses import rotation_angle_rad, transform
 from manitwin.scenes.locate.comparison import Evidence, explained, polished
 from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.scenes.locate.registration import align
+from manitwin.scenes.locate.search import climbed
 from seen_solids import seen_from
 
 TOLERANCE_M = 0.006
@@ -53,3 +54,16 @@ def test_alignment_undoes_a_known_motion(stool: PoseModel) -> None:
     finer = polished(stool, found, evidence, 0.004, 10)[0]
     off = np.linalg.inv(true) @ finer
     assert rotation_angle_rad(off[:3, :3]) < 0.01 and np.linalg.norm(off[:3, 3]) < 0.001
+
+
+def test_a_pose_beside_the_true_one_climbs_back_and_none_explains_less_than_before(stool: PoseModel) -> None:
+    seen = seen_from(stool, 0.6, hidden_right=0.5)
+    evidence = Evidence.of(seen.view, seen.mask, 200, 800, np.random.default_rng(0))
+    true = seen.object_to_camera
+    starts = np.array([moved(true, by_m=(0.005, -0.003, 0.004)), moved(true, by_m=(0.0, 0.008, 0.0)), true])
+    before = explained(stool, starts, evidence, TOLERANCE_M)
+    after = climbed(stool, starts, evidence, TOLERANCE_M)
+    scores = explained(stool, after, evidence, TOLERANCE_M)
+    assert (scores >= before).all() and (scores[:2] > before[:2] + 0.1).all()
+    off_m = np.linalg.norm(after[:2, :3, 3] - true[:3, 3], axis=1)
+    assert off_m.max() < 0.004
