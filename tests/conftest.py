@@ -13,6 +13,7 @@ import pytest
 import typer.main
 import typer.testing
 
+from manitwin.cli.console import out_console
 from manitwin.errors import RendererMissing
 from manitwin.render.device import require_renderer
 
@@ -50,6 +51,12 @@ def commands_built_once() -> Iterator[None]:
         patch.setattr(typer.main, "get_command", built)
         patch.setattr(typer.testing, "_get_command", built)
         yield
+
+
+@pytest.fixture(autouse=True)
+def commands_print_for_a_person() -> None:
+    """Begin each test as a process begins: an earlier one's ``--json`` left what is for a person on stderr."""
+    out_console.stderr = False
 
 
 @pytest.fixture(scope="session", autouse=True)

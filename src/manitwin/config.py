@@ -232,15 +232,15 @@ class PhysicalConfig(Section):
 class MattingConfig(Section):
     """Reading a photo and cutting its object out. ``frame`` chooses a picture of an animation, counted from 0.
 
-    ``network`` is a learned opinion beside the built-in ones: ``isnet``, once ``manitwin models add isnet`` has fetched it, or an
-    ONNX file of U2-Net, IS-Net or BiRefNet; without one nothing is loaded.
+    ``network`` takes the place of the built-in one: ``isnet``, once ``manitwin models add isnet`` has fetched it, or an ONNX file
+    of U2-Net, IS-Net or BiRefNet. Below ``min_confidence``, the probability that the cut-out is right, a photo is rejected.
     """
 
     network: str | None = Field(default=None, min_length=1, max_length=4096)
     frame: int | None = Field(default=None, ge=0)
     photo_side_px: int = Field(default=2048, ge=256)
     working_side_px: int = Field(default=512, ge=128)
-    min_confidence: float = Field(default=0.5, ge=0, le=1)
+    min_confidence: float = Field(default=0.85, ge=0, le=1)
     min_area_share: float = Field(default=0.002, gt=0, lt=1)
     second_object_share: float = Field(default=0.12, gt=0, le=1)
 

@@ -14,6 +14,7 @@ from manitwin.errors import InputError, Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.learned import Network
+from manitwin.models.matting.object_network import built_in_model
 from manitwin.pipeline.item import Item
 
 
@@ -21,7 +22,7 @@ class PhotoStage:
     """Write ``photo.png`` (RGBA, upright, alpha is the matte) and the field ``matte``."""
 
     name: ClassVar[str] = "photo"
-    version: ClassVar[str] = "5"
+    version: ClassVar[str] = "6"
     reads: ClassVar[tuple[str, ...]] = ()
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "matte")
     needs: ClassVar[Resource] = "cpu"
@@ -30,8 +31,8 @@ class PhotoStage:
         """Take the settings, and the network that they name: it decides by its content, wherever its file is."""
         self.settings = settings.model_copy(update={"network": None})
         self.network = network
-        self.backend: str = "classical" if network is None else "classical+learned"
-        self.model: str | None = None if network is None else network.model
+        self.backend: str = "rules+network"
+        self.model: str | None = built_in_model() if network is None else network.model
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:
         """Read and matte; raises InputError, or Rejected where no single object can be told from the background."""
@@ -76,7 +77,7 @@ class PhotosStage(PhotoStage):
     One that cannot be cut out is left out, with a finding; the field ``matte`` is that of the least sure of the others.
     """
 
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     writes: ClassVar[tuple[str, ...]] = ("photo.png", "photos/", "matte")
 
     def run(self, draft: Draft[Item], folder: Path) -> dict[str, Any]:

@@ -37,14 +37,14 @@ def test_the_sign_test_is_that_of_a_fair_coin() -> None:
 
 @pytest.fixture(scope="module")
 def reviewed(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Twins of which those whose cut-out was less sure than 0.7 are called wrong in their mesh; radii tell nothing."""
+    """Twins of which those whose cut-out was less sure than 0.91 are called wrong in their mesh; radii tell nothing."""
     root = tmp_path_factory.mktemp("tuned") / "set"
     rng = np.random.default_rng(0)
     for number, each in enumerate(write_set(root, accepted=TWINS, rejected=0)):
         folder = root / twin_name(each)
         record = json.loads((folder / RECORD).read_text())
         del record["revision"]
-        confidence = 0.5 + 0.5 * number / TWINS
+        confidence = 0.85 + 0.15 * number / TWINS
         record["quality"]["checks"].append(
             {"name": "matte", "passed": True, "value": confidence, "limit": None, "message": ""}
         )
@@ -56,7 +56,7 @@ def reviewed(tmp_path_factory: pytest.TempPathFactory) -> Path:
             record = read_record(path)
             (matte,) = (check for check in record.quality.checks if check.name == "matte")
             answers = {
-                "mesh": "yes" if float(str(matte.value)) > 0.7 else "no",
+                "mesh": "yes" if float(str(matte.value)) > 0.91 else "no",
                 "grasp": "yes" if rng.random() < 0.5 else "no",
                 "category": "yes",
             }
@@ -70,11 +70,13 @@ def test_a_threshold_that_holds_on_other_twins_is_proposed_as_a_configuration(re
     done = CliRunner().invoke(app, ["review", "tune", str(reviewed), "-o", str(out)])
     assert done.exit_code == 0, done.output
     said = " ".join(done.output.split())
-    assert "matting.min_confidence = 0.5: propose 0.7" in said and "would refuse 13 of 13 called wrong in mesh" in said
+    assert (
+        "matting.min_confidence = 0.85: propose 0.91" in said and "would refuse 13 of 13 called wrong in mesh" in said
+    )
     assert "grasps.association_radius_m = 0.03: not proposed, may be luck" in said or "nothing stricter" in said
     assert "naming.min_probability = 0.7: too few verdicts" in said
     tuned = tomllib.loads(out.read_text())
-    assert list(tuned) == ["matting"] and tuned["matting"]["min_confidence"] == pytest.approx(0.708, abs=0.01)
+    assert list(tuned) == ["matting"] and tuned["matting"]["min_confidence"] == pytest.approx(0.912, abs=0.003)
 
 
 def test_without_verdicts_it_says_so(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from manitwin.errors import Rejected
 from manitwin.models.matting import matte_photo
+from manitwin.models.matting.matte import study_photo
 
 SIZE = (384, 512)
 LENS_PX = 0.7  # the blur of a photo in focus
@@ -108,12 +109,18 @@ def test_grey_object_without_a_shadow_is_whole(grey: float) -> None:
 
 
 @pytest.mark.parametrize("share", [0.25, pytest.param(0.4, marks=pytest.mark.slow), 0.6])
-def test_grey_blade_of_a_coloured_handle_stays(share: float) -> None:
+def test_grey_blade_of_a_coloured_handle_stays_or_the_photo_is_rejected(share: float) -> None:
     """The blade has exactly the background's colour, dimmed: only its sharp outline tells it from a shadow."""
     blade = _polygon([(330, 110), (470, 170), (470, 182), (350, 170)])
     scene = _painted(_plain(0), BODY, (0.03, 0.10, 0.45))
     scene = np.where((blade > 0)[..., None], _plain(0) * share, scene)
-    assert _overlap(_photo(scene), np.maximum(BODY, blade)) > 0.96
+    try:
+        assert _overlap(_photo(scene), np.maximum(BODY, blade)) > 0.96
+    except Rejected as rejection:
+        assert rejection.reason == "low_confidence_matte"
+        found = study_photo(_photo(scene)).alpha > 127
+        truth = np.maximum(BODY, blade) > 0.5
+        assert (found & truth).sum() / (found | truth).sum() > 0.96
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5])
@@ -126,7 +133,7 @@ def test_grey_stripe_along_a_coloured_body_is_not_cut_off(share: float) -> None:
     try:
         assert _overlap(_photo(scene), np.maximum(BODY, stripe)) > 0.97
     except Rejected as rejection:
-        assert "a shadow may hang on it" in rejection.detail
+        assert "a shadow may hang on it" in rejection.detail or "do not agree" in rejection.detail
 
 
 def test_black_object_without_a_shadow_is_whole() -> None:

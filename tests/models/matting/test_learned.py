@@ -9,10 +9,11 @@ import cv2
 import numpy as np
 import pytest
 
-from manitwin.errors import UsageError
+from manitwin.errors import Rejected, UsageError
 from manitwin.formats.isolated import Limits, run_isolated
 from manitwin.models.matting import learned, matte_photo
 from manitwin.models.matting.learned import find_network, learned_alpha, require_working
+from manitwin.models.matting.matte import study_photo
 from manitwin.models.weights.store import FOLDER
 from tiny_networks import tiny_network
 
@@ -57,13 +58,15 @@ def test_a_network_that_agrees_is_one_of_the_opinions(tmp_path: Path) -> None:
 
 
 def test_a_network_that_nothing_bears_out_is_not_believed(tmp_path: Path) -> None:
-    """It calls the whole picture an object but for the object: what explains every edge in focus is believed against it."""
+    """It calls the whole picture an object but for the object: the rules' mask stands, and is doubted."""
     photo, truth = _photo((30, 30, 220))
     network = find_network(_network(tmp_path, weights=(20.0, 20.0, 0.0)))
-    matte = matte_photo(photo, "x.png", network=network)
-    assert matte.agreement["network"] < 0.1
-    found = matte.rgba[..., 3] > 127
+    study = study_photo(photo, network=network)
+    assert study.agreement["network"] < 0.2 and study.judged[0].candidate.maker == "rules"
+    found = study.alpha > 127
     assert (found & truth).sum() / (found | truth).sum() > 0.97
+    with pytest.raises(Rejected, match="do not agree"):
+        matte_photo(photo, "x.png", network=network)
 
 
 def test_networks_are_run_once_before_a_build(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -94,8 +94,8 @@ def _feature_network() -> cv2.dnn.Net:
 
 def network_bytes(weights: dict[str, np.ndarray]) -> bytes:
     """Return the network as ONNX: input ``(1, 3, 224, 224)``, output ``logits (1, 1000)``; batch norms are folded in."""
-    network = _Layers(weights)
-    graph, value = network.graph, _trunk(network)["feature"]
+    graph, values = trunk(weights, SIDE_PX)
+    value = values["feature"]
     value = graph.node("Flatten", [graph.node("GlobalAveragePool", [value], "pooled")], "feature", axis=1)
     dense = [value, graph.weight("_fc.weight", weights["_fc.weight"]), graph.weight("_fc.bias", weights["_fc.bias"])]
     return graph.to_bytes(graph.node("Gemm", dense, "logits", transB=1), (1, CLASSES))
@@ -103,8 +103,7 @@ def network_bytes(weights: dict[str, np.ndarray]) -> bytes:
 
 def feature_network_bytes(weights: dict[str, np.ndarray]) -> bytes:
     """Return the network as ONNX whose output ``(1, 1456)`` are the means of ``FEATURE_LAYERS``."""
-    network = _Layers(weights)
-    graph, values = network.graph, _trunk(network)
+    graph, values = trunk(weights, SIDE_PX)
     means = [
         graph.node(
             "Flatten", [graph.node("GlobalAveragePool", [values[name]], f"{name}.pooled")], f"{name}.mean", axis=1
@@ -114,10 +113,15 @@ def feature_network_bytes(weights: dict[str, np.ndarray]) -> bytes:
     return graph.to_bytes(graph.node("Concat", means, "features", axis=1), (1, FEATURES))
 
 
-def _trunk(network: _Layers) -> dict[str, str]:
-    """Add all convolutions; return the names of the blocks' values, ``feature`` being the last before the mean."""
+def trunk(weights: dict[str, np.ndarray], side_px: int) -> tuple[OnnxGraph, dict[str, str]]:
+    """Return a graph of all convolutions with input ``(1, 3, side_px, side_px)``, and the names of the blocks' values.
+
+    ``_blocks.0`` to ``_blocks.15``, and ``feature``, the last before the mean. The input is 8-bit sRGB less ``MEAN``, by
+    ``DEVIATION``.
+    """
+    network = _Layers(weights, side_px)
     values = {}
-    side, value = network.convolution("input", SIDE_PX, "_conv_stem", "_bn0", 3, stride=2)
+    side, value = network.convolution("input", side_px, "_conv_stem", "_bn0", 3, stride=2)
     for block, (kernel, stride, expansion, repeated) in enumerate(_blocks()):
         begin, name = value, f"_blocks.{block}."
         if expansion > 1:
@@ -129,7 +133,8 @@ def _trunk(network: _Layers) -> dict[str, str]:
         if repeated:
             value = network.graph.node("Add", [begin, value], f"{name}sum")
         values[f"_blocks.{block}"] = value
-    return values | {"feature": network.convolution(value, side, "_conv_head", "_bn1", 1)[1]}
+    values["feature"] = network.convolution(value, side, "_conv_head", "_bn1", 1)[1]
+    return network.graph, values
 
 
 def _blocks() -> list[tuple[int, int, int, bool]]:
@@ -143,8 +148,8 @@ def _blocks() -> list[tuple[int, int, int, bool]]:
 class _Layers:
     """Adds convolutions with their batch norm and ReLU6 to a graph."""
 
-    def __init__(self, weights: dict[str, np.ndarray]):
-        self.graph = OnnxGraph((1, 3, SIDE_PX, SIDE_PX))
+    def __init__(self, weights: dict[str, np.ndarray], side_px: int):
+        self.graph = OnnxGraph((1, 3, side_px, side_px))
         self._weights = weights
         self._bounds = [self.graph.weight("zero", np.array(0.0)), self.graph.weight("six", np.array(6.0))]
 

@@ -77,7 +77,7 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0) -> MatteScores:
     border[:, :2] = border[:, -2:] = True
     sharpest = cv2.dilate(segmentation.gradient, disk(3))
     free = outline & ~border
-    typical = float(np.percentile(sharpest[mask], 75))
+    typical = max(float(np.percentile(sharpest[mask], 75)), 1e-6)
     on_edges = float((sharpest[free] > 1.6 * segmentation.edge_threshold).mean()) if free.any() else 0.0
     reach = max(4, round(0.015 * max(mask.shape)))
     inside = mask & ~eroded(mask, reach)

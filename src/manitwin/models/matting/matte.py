@@ -9,16 +9,21 @@ import cv2
 import numpy as np
 from scipy import ndimage
 
+from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
-from manitwin.models.matting.confidence import MatteScores, frame_cause, score
+from manitwin.models.matting.belief import WHOLE, doubts_of, features, probability
+from manitwin.models.matting.candidates import Candidate, alike, at_size, candidates, completed
+from manitwin.models.matting.confidence import MatteScores, frame_cause
 from manitwin.models.matting.fine_outline import fine_outline
-from manitwin.models.matting.joined import LearnedOpinion, asked
 from manitwin.models.matting.learned import Network, learned_alpha
+from manitwin.models.matting.object_network import in_two_looks, object_share
 from manitwin.models.matting.outline import dilated, without_small_holes
 from manitwin.models.matting.segmentation import Segmentation, segment
 
 TRANSPARENT_SHARE = 0.02
 PLAIN_NOISE_LAB = 4.0
+MIN_CONFIDENCE = MattingConfig().min_confidence
+LIKELY = 0.5  # that pieces are things: the photo is rejected in any case, and that is the cause
 
 _CAUSES = {
     "on_edges": "its outline does not follow edges of the photo",
@@ -33,6 +38,7 @@ _CAUSES = {
     "solid": "the ground may be seen through it, or it has parts of the ground's colour inside",
     "thick": "it is thin for so small a photo, so its outline is a large part of it",
     "sharply_bounded": "it is as grey as a shadow, and part of its outline as soft as one: a shadow may hang on it",
+    "kept": "a part of it whose outline is as sharp may be lost",
     "outermost": "what looks like its shadow has edges as sharp as its outline, so a clear or grey part of it may be lost",
 }
 _REMEDY = "photograph it whole on a plain surface of another colour, or give an image with an alpha channel"
@@ -42,11 +48,12 @@ _REMEDY = "photograph it whole on a plain surface of another colour, or give an 
 class Matte:
     """``rgba (H, W, 4) uint8``, alpha 255 on the object; ``confidence`` in [0, 1]; ``scores`` say where it comes from.
 
-    ``agreement`` is that of each opinion with the matte, in [0, 1], by the opinion's name.
+    ``confidence`` is how likely the cut-out is right (``belief``); ``agreement`` is that of each opinion with the matte, in
+    [0, 1], by the opinion's name.
     """
 
     rgba: np.ndarray
-    method: Literal["alpha", "flat_border", "grabcut", "learned"]
+    method: Literal["alpha", "flat_border", "grabcut", "network"]
     confidence: float
     findings: tuple[str, ...]
     scores: dict[str, float]
@@ -54,18 +61,40 @@ class Matte:
 
 
 @dataclass(frozen=True)
+class Judged:
+    """A candidate with its ``features``."""
+
+    candidate: Candidate
+    features: np.ndarray
+
+    @property
+    def confidence(self) -> float:
+        """How likely the candidate is right."""
+        return probability(self.features)
+
+    @property
+    def of_pieces(self) -> float:
+        """How likely it is that what was found is no background, be it one piece or several."""
+        return probability(np.where(WHOLE, 0.0, self.features))
+
+
+@dataclass(frozen=True)
 class Study:
-    """What was found in a photo before anything is decided: ``alpha (H, W) uint8`` at the photo's size, empty without scores."""
+    """What was found in a photo before anything is decided.
+
+    ``found`` is that of the rules, ``judged`` every candidate, the likeliest first, ``alpha (H, W) uint8`` the first at the
+    photo's size, empty where there is none, ``share`` (h, w) what the network says, filled within its outline.
+    """
 
     found: Segmentation
-    scores: MatteScores | None
+    judged: list[Judged]
     alpha: np.ndarray
-    learned: LearnedOpinion | None = None
+    share: np.ndarray
 
     @property
     def confidence(self) -> float:
         """The confidence in ``alpha``, 0 where nothing was found."""
-        return 0.0 if self.scores is None else self.scores.confidence
+        return self.judged[0].confidence if self.judged else 0.0
 
     @property
     def plain(self) -> bool:
@@ -76,27 +105,53 @@ class Study:
     @property
     def agreement(self) -> dict[str, float]:
         """The agreement of each opinion with the mask, by the opinion's name."""
-        said = {"surfaces": self.found.agreement, "colours": self.found.known_to_colours}
-        if self.learned is not None:
-            said["network"] = self.learned.agreement
+        chosen = self.judged[0].candidate.found
+        said = {
+            "rules": alike(chosen.mask, self.found.mask),
+            "colours": chosen.known_to_colours,
+            "network": alike(chosen.mask, at_size(self.share, chosen.mask.shape) > 0.5),
+        }
         return {name: round(value, 4) for name, value in said.items()}
 
 
 def study_photo(rgb: np.ndarray, *, working_side_px: int = 512, network: Network | None = None) -> Study:
-    """Find the object in ``rgb`` (H, W, 3) uint8 upright sRGB and judge what was found; nothing is rejected here."""
+    """Find the object in ``rgb`` (H, W, 3) uint8 upright sRGB and judge what was found; nothing is rejected here.
+
+    ``network`` takes the place of the built-in one. Raises Unavailable without the built-in network's weights, BadReply where
+    the given one cannot be run.
+    """
+    found, judged, share = judged_candidates(rgb, working_side_px=working_side_px, network=network)
+    if not judged:
+        return Study(found, [], np.zeros(rgb.shape[:2], np.uint8), share)
+    judged = sorted(judged, key=lambda each: -each.confidence)
+    return Study(found, judged, drawn(rgb, judged[0].candidate.found.mask, working_side_px), share)
+
+
+def judged_candidates(
+    rgb: np.ndarray, *, working_side_px: int = 512, network: Network | None = None
+) -> tuple[Segmentation, list[Judged], np.ndarray]:
+    """Return what the rules found, every candidate with its features, and the network's share of object, as ``study_photo``."""
     found = segment(_scaled(rgb, working_side_px))
     if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
         found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
-    learned = None
-    if network is not None:
-        found, learned = asked(found, learned_alpha(network, _scaled(rgb, max(network.side_px))))
-    if not found.mask.any():
-        return Study(found, None, np.zeros(rgb.shape[:2], np.uint8), learned)
-    scores = score(found, zoom=max(rgb.shape[:2]) / max(found.mask.shape))
-    alpha = fine_outline(rgb, _largest(found.mask))
+    share = completed(network_share(rgb, max(found.mask.shape), network), found)
+    made = candidates(found, share, zoom=max(rgb.shape[:2]) / max(found.mask.shape))
+    return found, [Judged(each, features(each, [o for o in made if o is not each], share)) for each in made], share
+
+
+def network_share(rgb: np.ndarray, side_px: int, network: Network | None) -> np.ndarray:
+    """Return the share of object (h, w) of each pixel of ``rgb``, at most ``side_px`` large, as a network has it."""
+    if network is None:
+        return object_share(_scaled(rgb, side_px))
+    return in_two_looks(_scaled(rgb, max(side_px, *network.side_px)), lambda seen: learned_alpha(network, seen))
+
+
+def drawn(rgb: np.ndarray, mask: np.ndarray, working_side_px: int = 512) -> np.ndarray:
+    """Return the largest piece of a mask (any size) as alpha (H, W) uint8 at the size of ``rgb``, with a soft outline."""
+    alpha = fine_outline(rgb, _largest(mask))
     if max(rgb.shape[:2]) <= 2 * working_side_px:  # of larger photos the first look is finer than is needed
         alpha = fine_outline(rgb, alpha > 127)
-    return Study(found, scores, alpha, learned)
+    return alpha
 
 
 def matte_photo(
@@ -104,16 +159,17 @@ def matte_photo(
     name: str,
     *,
     working_side_px: int = 512,
-    min_confidence: float = 0.5,
+    min_confidence: float = MIN_CONFIDENCE,
     min_area_share: float = 0.002,
     second_object_share: float = 0.12,
     network: Network | None = None,
 ) -> Matte:
     """Find the object in ``image`` (H, W, 3 or 4) uint8 upright sRGB; ``name`` is used in messages only.
 
-    A real alpha channel (more than 2 % transparent) is believed. Else two opinions are asked, of smooth surfaces grown from the
-    border and flooded up to the photo's edges, and of colours alone, and a matte is believed where they agree: ``flat_border``
-    where smooth surfaces explain the border, ``grabcut`` where they do not, ``learned`` where it is that of the ``network``.
+    A real alpha channel (more than 2 % transparent) is believed. Else two ways of looking each propose a mask: rules (smooth
+    surfaces grown from the border, flooded up to the photo's edges, and colours) and a network; the likelier one is taken, by
+    its scores and by how far all opinions agree with it: ``flat_border`` is the rules' where smooth surfaces explain the
+    border, ``grabcut`` the rules' where they do not, ``network`` the network's, which is the built-in one or ``network``.
 
     Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy.
     """
@@ -121,20 +177,20 @@ def matte_photo(
         return _given_matte(image, name, min_area_share, second_object_share)
     rgb = np.ascontiguousarray(image[..., :3])
     study = study_photo(rgb, working_side_px=working_side_px, network=network)
-    scores = decided(
+    chosen = decided(
         study,
         name,
         min_confidence=min_confidence,
         min_area_share=min_area_share,
         second_object_share=second_object_share,
     )
-    learned = study.learned is not None and study.learned.chosen
+    by_network = chosen.candidate.maker == "network"
     return Matte(
         rgba=np.dstack([rgb, study.alpha]),
-        method="learned" if learned else "flat_border" if study.plain else "grabcut",
-        confidence=round(scores.confidence, 4),
-        findings=tuple(_findings(scores, study.found)),
-        scores={key: round(value, 4) for key, value in asdict(scores).items()},
+        method="network" if by_network else "flat_border" if study.plain else "grabcut",
+        confidence=round(chosen.confidence, 4),
+        findings=tuple(_findings(chosen.candidate.scores, chosen.candidate.found)),
+        scores={key: round(value, 4) for key, value in asdict(chosen.candidate.scores).items()},
         agreement=study.agreement,
     )
 
@@ -143,13 +199,12 @@ def decided(
     study: Study,
     name: str,
     *,
-    min_confidence: float = 0.5,
+    min_confidence: float = MIN_CONFIDENCE,
     min_area_share: float = 0.002,
     second_object_share: float = 0.12,
-) -> MatteScores:
-    """Return the scores of a study that is believed; raises Rejected as ``matte_photo`` for any other."""
-    found, scores = study.found, study.scores
-    if scores is None or found.mask.mean() < min_area_share:
+) -> Judged:
+    """Return the candidate of a study that is believed; raises Rejected as ``matte_photo`` where none is."""
+    if not study.judged or study.judged[0].candidate.found.mask.mean() < min_area_share:
         if not study.plain:
             raise Rejected(
                 "low_confidence_matte", f"{name}: {_CAUSES['plain']} to tell an object from it; {_REMEDY}", "generate"
@@ -157,8 +212,8 @@ def decided(
         raise Rejected(
             "no_object", f"{name}: nothing stands out of the background; photograph the object larger", "generate"
         )
-    _reject_doubtful(name, scores, found, min_confidence, second_object_share)
-    return scores
+    _reject_doubtful(name, study.judged[0], min_confidence, second_object_share)
+    return study.judged[0]
 
 
 def _scaled(rgb: np.ndarray, side_px: int) -> np.ndarray:
@@ -187,19 +242,25 @@ def _given_matte(image: np.ndarray, name: str, min_area_share: float, second_obj
     return Matte(np.dstack([colours, alpha]), "alpha", 1.0, findings, {})
 
 
-def _reject_doubtful(
-    name: str, scores: MatteScores, found: Segmentation, min_confidence: float, second_object_share: float
-) -> None:
-    if scores.confidence_of_pieces >= min_confidence:
+def _reject_doubtful(name: str, judged: Judged, min_confidence: float, second_object_share: float) -> None:
+    found = judged.candidate.found
+    if judged.of_pieces >= min(min_confidence, LIKELY):
         _reject_several(name, found.mask, second_object_share)
-    if scores.confidence < min_confidence:
-        cause = frame_cause(found.background, found.gradient) or scores.worst
+    if judged.confidence < min_confidence:
+        cause = frame_cause(found.background, found.gradient) or _cause(judged)
         raise Rejected(
             "low_confidence_matte",
-            f"{name}: the object cannot be told from the background (confidence {scores.confidence:.2f} <"
+            f"{name}: the object cannot be told from the background (confidence {judged.confidence:.2f} <"
             f" {min_confidence:g}): {_CAUSES[cause]}; {_REMEDY}",
             "generate",
         )
+
+
+def _cause(judged: Judged) -> str:
+    """Return the score that costs a mask the most of its confidence; ``stable`` where it is that the opinions differ."""
+    doubts = doubts_of(judged.features)
+    worst = max(doubts, key=lambda name: doubts[name])
+    return worst if worst in _CAUSES else "stable"
 
 
 def _reject_several(name: str, mask: np.ndarray, second_object_share: float) -> None:

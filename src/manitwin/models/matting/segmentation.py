@@ -131,12 +131,6 @@ def _open_to_outside(regions: np.ndarray, solid: np.ndarray, near_narrow: np.nda
     return kept
 
 
-def holes_seen_through(found: Segmentation, mask: np.ndarray) -> np.ndarray:
-    """Return the regions of ``mask`` through which the background is seen, as both built-in opinions have them."""
-    seen = gaps(found.background, mask, found.gradient, found.edge_threshold)
-    return seen & ~found.colours.certain
-
-
 def _away(mask: np.ndarray) -> np.ndarray:
     return ~dilated(mask, 3)
 

@@ -1,0 +1,144 @@
+"""Fit how likely a cut-out is right to composites whose mask is known, and print what limits of confidence would accept.
+
+    python benchmarks/matting_belief.py [--first 0] [--count 600] [--jobs 2] [-o src/manitwin/models/matting/belief.json]
+
+The composites are of the calibration part (``composites.py``), which nothing else is set on. Logistic regression with an L2
+penalty and no negative weight; the penalty is chosen by cross-validation over composites, and the table is of predictions for
+composites that were left out. ``matting.py`` measures what comes out on the held-out part.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import cv2
+import numpy as np
+from composites import Composite, composite
+from matting import RIGHT_IOU
+from scipy.optimize import minimize
+
+from manitwin.models.matting import belief
+from manitwin.models.matting.matte import drawn, judged_candidates
+
+FOLDS, SEED = 5, 0
+PENALTIES = (0.00003, 0.0001, 0.0003, 0.001, 0.003, 0.01)
+LIMITS = (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
+
+
+@dataclass(frozen=True)
+class Example:
+    """A candidate mask of a composite: its ``features``, whether it is ``right``, whether the composite shows one whole thing."""
+
+    number: int
+    features: np.ndarray
+    right: bool
+    whole: bool
+
+
+def examples(number: int) -> list[Example]:
+    """Make one composite; return its candidates."""
+    cv2.setNumThreads(1)
+    return examples_of(number, composite("calibration", number))
+
+
+def examples_of(number: int, picture: Composite) -> list[Example]:
+    """Return the candidates of a composite, each with its truth."""
+    made = []
+    for judged in judged_candidates(picture.rgb)[1]:
+        found = drawn(picture.rgb, judged.candidate.found.mask) > 127
+        iou = (found & picture.truth).sum() / max(int((found | picture.truth).sum()), 1)
+        whole = picture.kind == "single"
+        made.append(Example(number, judged.features, bool(whole and iou > RIGHT_IOU), whole))
+    return made
+
+
+def fitted(features: np.ndarray, right: np.ndarray, penalty: float) -> tuple[float, np.ndarray]:
+    """Return bias and weights (F,), none negative but the maker's, of features (N, F) in their own units."""
+    spread = np.maximum(features.std(0), 1e-6)
+    x = (features - belief.BEST) / spread
+
+    def loss(parameters: np.ndarray) -> tuple[float, np.ndarray]:
+        margin = parameters[0] + x @ parameters[1:]
+        error = 1 / (1 + np.exp(-np.clip(margin, -30, 30))) - right
+        value = float(np.logaddexp(0, np.where(right, -margin, margin)).mean() + penalty * (parameters[1:] ** 2).sum())
+        return value, np.concatenate([[error.mean()], x.T @ error / len(x) + 2 * penalty * parameters[1:]])
+
+    bounds = [(None, None), *[(0, None)] * (x.shape[1] - 1), (None, None)]
+    found = minimize(loss, np.zeros(x.shape[1] + 1), jac=True, bounds=bounds, method="L-BFGS-B").x
+    weights = found[1:] / spread
+    return float(found[0] - weights @ belief.BEST), weights
+
+
+def predicted(features: np.ndarray, right: np.ndarray, numbers: np.ndarray, penalty: float) -> np.ndarray:
+    """Return the probability (N,) of each example from fits to the composites of other folds."""
+    fold = np.random.default_rng(SEED).integers(0, FOLDS, int(numbers.max()) + 1)[numbers]
+    out = np.zeros(len(features))
+    for each in range(FOLDS):
+        bias, weights = fitted(features[fold != each], right[fold != each], penalty)
+        out[fold == each] = 1 / (1 + np.exp(-np.clip(bias + features[fold == each] @ weights, -30, 30)))
+    return out
+
+
+def report(made: list[Example]) -> tuple[float, np.ndarray]:
+    """Print what limits would accept, by predictions for composites that were left out; return bias and weights of all."""
+    features = np.array([each.features for each in made])
+    right = np.array([each.right for each in made])
+    numbers = np.array([each.number for each in made])
+    losses = {}
+    for penalty in PENALTIES:
+        likely = np.clip(predicted(features, right, numbers, penalty), 1e-6, 1 - 1e-6)
+        losses[penalty] = float(-np.where(right, np.log(likely), np.log(1 - likely)).mean())
+    best = min(losses, key=lambda penalty: losses[penalty])
+    print("cross-validated loss by penalty: " + ", ".join(f"{key:g}: {value:.4f}" for key, value in losses.items()))
+    likely = predicted(features, right, numbers, best)
+    chosen = {number: np.flatnonzero(numbers == number) for number in np.unique(numbers)}
+    first = np.array([some[np.argmax(likely[some])] for some in chosen.values()])
+    whole = {each.number for each in made if each.whole}
+    print(f"{len(chosen)} composites with a candidate, {len(whole)} of one whole thing; a right one in", end=" ")
+    print(f"{len({each.number for each in made if each.right})}, chosen in {int(right[first].sum())}")
+    for limit in LIMITS:
+        taken = first[likely[first] >= limit]
+        print(
+            f"  at {limit:4.2f}: accepted {sum(numbers[k] in whole for k in taken)} of {len(whole)}, and"
+            f" {sum(numbers[k] not in whole for k in taken)} others; right {int(right[taken].sum())}"
+        )
+    return fitted(features, right, best)
+
+
+def write(path: Path, bias: float, weights: np.ndarray, made: list[Example]) -> None:
+    """Write bias and weights, and what they were fitted to."""
+    numbers = sorted({each.number for each in made})
+    content = {
+        "fitted_to": f"{len(made)} masks of calibration composites {numbers[0]} to {numbers[-1]}",
+        "bias": round(bias, 4),
+        "weights": {name: round(float(value), 4) for name, value in zip(belief.FEATURES, weights, strict=True)},
+    }
+    path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+
+
+def main() -> None:
+    """Make composites, fit, and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--count", type=int, default=600)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("-o", "--out", type=Path)
+    given = parser.parse_args()
+    with ProcessPoolExecutor(given.jobs, mp_context=get_context("spawn")) as pool:
+        made = [
+            each
+            for some in pool.map(examples, range(given.first, given.first + given.count), chunksize=4)
+            for each in some
+        ]
+    bias, weights = report(made)
+    if given.out is not None:
+        write(given.out, bias, weights, made)
+
+
+if __name__ == "__main__":
+    main()

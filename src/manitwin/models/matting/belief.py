@@ -1,0 +1,94 @@
+"""How likely a mask is right: a logistic function of its scores and of how far the opinions agree, fitted on composites.
+
+Every feature is such that more is better, and no weight is negative, so that no doubt can make a mask more likely.
+``benchmarks/matting_belief.py`` fits the weights on composites whose masks are known (their calibration part); a mask is right
+where one whole thing is in the picture and the intersection over union with its truth is above 0.95.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from manitwin.models.matting.candidates import Candidate, alike, at_size, doubts, lost, overlap
+from manitwin.models.matting.outline import eroded
+
+WEIGHTS_FILE = "belief.json"
+LEAST = 0.02
+"""A score below that is as bad as none."""
+SCORES = (
+    *("on_edges", "crisp", "separable", "complete", "uncut", "stable", "whole", "plain", "outermost"),
+    *("sharply_bounded", "unshaded", "solid", "thick"),
+)
+OPINIONS = (
+    *("network_overlap", "network_alike", "network_sure", "network_sharp", "network_within", "network_beyond"),
+    *("colours", "rival"),
+)
+BULKY = 15.0
+"""Pixels of area for each of the outline, at working size: a fraction of a pixel off costs a bulkier thing next to nothing."""
+MOST_SOFT_PX = 8.0
+MOST_LOST = 0.05
+"""Of a mask's area: a cut-out that may lack so much of the thing is not believed, whatever else speaks for it."""
+FEATURES = (*SCORES, *OPINIONS, "kept", "bulk", "made_by_rules")
+BEST = np.array([1.0 if name in ("network_overlap", "network_alike", "colours", "rival") else 0.0 for name in FEATURES])
+"""What nothing can be better than, by feature; who made the mask is no doubt of it."""
+WHOLE = np.array([name == "whole" for name in FEATURES])
+
+
+def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -> np.ndarray:
+    """Return the features (24,) of a candidate beside the ``others``, given a network's ``share`` of object (any size)."""
+    mask = candidate.found.mask
+    share = at_size(share, mask.shape)
+    unsure, within, beyond = doubts(share, mask)
+    bulk_px = float(mask.sum() / max(int((mask & ~eroded(mask, 1)).sum()), 1))
+    scores = asdict(candidate.scores)
+    rivals = [alike(mask, other.found.mask) for other in others]
+    opinions = {
+        "network_overlap": overlap(mask, share > 0.5),
+        "network_alike": alike(mask, share > 0.5),
+        "network_sure": -min(unsure, 1.0),
+        "network_sharp": -min(unsure * bulk_px, MOST_SOFT_PX),
+        "network_within": -min(within, 1.0),
+        "network_beyond": -min(beyond, 1.0),
+        "colours": candidate.found.known_to_colours,
+        "rival": min(rivals, default=0.0),
+    }
+    return np.array(
+        [
+            *(np.log(max(scores[name], LEAST)) for name in SCORES),
+            *(opinions[name] for name in OPINIONS),
+            -min(lost(candidate, others) / MOST_LOST, 1.0),
+            min(0.0, float(np.log(bulk_px / BULKY))),
+            float(candidate.maker == "rules"),
+        ]
+    )
+
+
+def probability(values: np.ndarray) -> float:
+    """Return how likely a mask with these ``features`` is right, in [0, 1].
+
+    Two doubts count besides the fitted ones, since composites hardly show them: a part in focus that may be lost (``kept``), and
+    ground that may be seen through the mask (``solid``).
+    """
+    bias, weights = _weights()
+    kept = (1 + values[FEATURES.index("kept")]) * np.exp(values[FEATURES.index("solid")])
+    return float(kept / (1 + np.exp(-np.clip(bias + weights @ values, -30, 30))))
+
+
+def doubts_of(values: np.ndarray) -> dict[str, float]:
+    """Return what each of the ``features`` but the maker costs a mask, in log-odds against the best that there is."""
+    _, weights = _weights()
+    doubts = dict(zip(FEATURES[:-1], (weights * (BEST - values))[:-1].tolist(), strict=True))
+    doubts["kept"] -= float(np.log(max(1 + values[FEATURES.index("kept")], LEAST)))
+    doubts["solid"] -= float(values[FEATURES.index("solid")])
+    return doubts
+
+
+@cache
+def _weights() -> tuple[float, np.ndarray]:
+    fitted = json.loads((files("manitwin.models.matting") / WEIGHTS_FILE).read_text(encoding="utf-8"))
+    return float(fitted["bias"]), np.array([fitted["weights"][name] for name in FEATURES])

@@ -1,0 +1,117 @@
+"""The masks that a photo's matte is chosen from: that of the built-in rules, and a network's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import cv2
+import numpy as np
+from scipy import ndimage
+
+from manitwin.models.matting.confidence import MatteScores, score
+from manitwin.models.matting.outline import dilated, eroded, opened
+from manitwin.models.matting.segmentation import MOSTLY_NARROW, Segmentation, without_specks
+
+Maker = Literal["rules", "network"]
+SURE = 0.9
+"""Share of object of a pixel that a network calls certain; below one less that, it is certain of the ground."""
+LEAST_PIXELS = 30
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A mask that may be the object, with its scores on the photo; ``maker`` says who found it."""
+
+    maker: Maker
+    found: Segmentation
+    scores: MatteScores
+
+
+def candidates(found: Segmentation, share: np.ndarray, *, zoom: float) -> list[Candidate]:
+    """Return the masks to choose from, given what the rules ``found`` and a network's ``share`` of object (any size) in [0, 1].
+
+    ``zoom`` is the photo's size over the mask's. None of them is empty or the whole picture.
+    """
+    masks: list[tuple[Maker, Segmentation]] = [("rules", found)]
+    learned = network_mask(share, found.mask.shape)
+    if learned.any():
+        seen = replace(found, mask=learned, shadow=found.shadow & ~learned, hard=found.hard & ~learned)
+        masks.append(("network", seen))
+    return [Candidate(maker, each, score(each, zoom=zoom)) for maker, each in masks if _has_outline(each.mask)]
+
+
+def _has_outline(mask: np.ndarray) -> bool:
+    return bool(mask.any() and (mask & ~eroded(mask, 1)).any())
+
+
+def completed(share: np.ndarray, found: Segmentation) -> np.ndarray:
+    """Return a network's share of object (any size) at the size of the mask that the rules ``found``, filled within its outline.
+
+    A large plain or printed surface tells a network little, so what it leaves out within its own outline is object where the
+    rules say so and the colours are neither the ground's nor its shade's. What is seen through a hole has the ground's
+    colours, and stays out.
+    """
+    share = at_size(share, found.mask.shape)
+    mask = share > 0.5
+    within = eroded(ndimage.binary_fill_holes(mask), 2)
+    told = opened(within & found.mask & found.colours.certain, 1)
+    return np.asarray(np.where(told, 1.0, share), np.float32)
+
+
+def network_mask(share: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return what a network calls more object than ground, at a ``shape`` (H, W), without specks; empty of next to nothing."""
+    mask = at_size(share, shape) > 0.5
+    return without_specks(mask) if mask.sum() >= LEAST_PIXELS else np.zeros(shape, bool)
+
+
+def at_size(share: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Return a network's share of object, scaled to a mask's ``shape`` (H, W)."""
+    return np.asarray(cv2.resize(share, shape[::-1], interpolation=cv2.INTER_AREA))
+
+
+def alike(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the overlap of two masks but for slivers along their outlines: 1 less what differs, as a share of both."""
+    both = int((one | other).sum())
+    return float(np.clip(1 - opened(one ^ other, 2).sum() / both, 0, 1)) if both else 0.0
+
+
+def overlap(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the intersection of two masks over their union, 0 of empty ones."""
+    both = int((one | other).sum())
+    return float((one & other).sum() / both) if both else 0.0
+
+
+def lost(candidate: Candidate, others: list[Candidate]) -> float:
+    """Return the area of pieces that others have and a candidate lacks, with an outline in focus all around, by its own area.
+
+    A shadow's edge is soft, and ground has none: such a piece is a part of the thing, a grey blade or a dark tip.
+    """
+    found = candidate.found
+    near_narrow = dilated(found.narrow, 3)
+    total = 0
+    for other in others:
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(
+            opened(other.found.mask & ~found.mask, 2).astype(np.uint8), connectivity=4
+        )
+        for index in range(1, count):
+            left, top, width, height, area = stats[index]
+            box = np.s_[max(0, top - 3) : top + height + 3, max(0, left - 3) : left + width + 3]
+            piece = labels[box] == index
+            free = (piece & ~eroded(piece, 1)) & ~dilated(found.mask[box], 3)
+            if free.any() and near_narrow[box][free].mean() > MOSTLY_NARROW:
+                total += int(area)
+    return total / max(int(found.mask.sum()), 1)
+
+
+def doubts(share: np.ndarray, mask: np.ndarray) -> tuple[float, float, float]:
+    """Return how unsure a network's ``share`` (H, W) is, and how much it says against a mask within and beyond it.
+
+    Each as a share of the mask's area: pixels between certain object and certain ground; ground within, object beyond, both but
+    for a rim of two pixels.
+    """
+    area = max(int(mask.sum()), 1)
+    unsure = float(((share > 1 - SURE) & (share < SURE)).sum() / area)
+    within = float((1 - share)[eroded(mask, 2)].sum() / area)
+    beyond = float(share[~dilated(mask, 2)].sum() / area)
+    return unsure, within, beyond

@@ -1,0 +1,127 @@
+"""The built-in network that tells a thing from its ground: a decoder of the project's own over EfficientNet-Lite0's features.
+
+The encoder knows real photos (ImageNet) and is not trained further; the decoder (a feature pyramid, Lin et al. 2017, of 0.28
+million weights) learned from composites that ``benchmarks/train_object_network.py`` draws of templates. It looks twice: at the
+whole picture, then at the thing with its surroundings, larger.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+from collections.abc import Callable
+from functools import cache
+from importlib.resources import files
+
+import cv2
+import numpy as np
+
+from manitwin.models.classifiers.efficientnet_lite import DEVIATION, MEAN, WEIGHTS_SHA256, load_weights, trunk
+from manitwin.models.classifiers.efficientnet_lite import NAME as ENCODER
+
+NAME = "object-network"
+WEIGHTS_FILE = "object_network.npz"
+SIDE_PX = 288
+BLOCKS = (0, 2, 4, 10, 15)
+"""Of the encoder, after which the picture is 1/2, 1/4, 1/8, 1/16 and 1/32 as large."""
+CHANNELS = (24, 32, 48, 64, 96)
+MIXES = 2
+"""Convolutions at each size but the smallest."""
+MARGIN = 0.2
+"""Of a thing's longer side: the surroundings that the second look takes in."""
+CLOSER = 1.25
+"""Times as large, or a second look is not worth it."""
+LEAST_SHARE = 0.5
+LEAST_PIXELS = 16
+
+
+def object_share(rgb: np.ndarray) -> np.ndarray:
+    """Return the share of object (H, W) float32 in [0, 1] of each pixel of ``rgb`` (H, W, 3) uint8 sRGB.
+
+    Raises Unavailable without the encoder's weights.
+    """
+    return in_two_looks(rgb, _seen)
+
+
+def in_two_looks(rgb: np.ndarray, look: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return what ``look`` says of a picture, (H, W) in [0, 1], of a small thing's surroundings by a second, closer look."""
+    share = look(rgb)
+    rows, columns = np.nonzero(share > LEAST_SHARE)
+    if len(rows) < LEAST_PIXELS:
+        return share
+    height, width = share.shape
+    margin = MARGIN * max(np.ptp(rows), np.ptp(columns)) + 8
+    top, left = (max(0, int(low - margin)) for low in (rows.min(), columns.min()))
+    bottom, right = min(height, int(rows.max() + margin) + 1), min(width, int(columns.max() + margin) + 1)
+    if max(height / (bottom - top), width / (right - left)) < CLOSER:
+        return share
+    joined = share.copy()
+    box = np.s_[top:bottom, left:right]
+    joined[box] = look(np.ascontiguousarray(rgb[box]))
+    return joined
+
+
+def _seen(rgb: np.ndarray) -> np.ndarray:
+    shrinks = max(rgb.shape[:2]) > SIDE_PX
+    picture = cv2.resize(rgb, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    network = _network()
+    network.setInput(((picture.astype(np.float32) - MEAN) / DEVIATION).transpose(2, 0, 1)[None].copy())
+    share = np.asarray(network.forward()[0, 0], np.float32)
+    return np.asarray(np.clip(cv2.resize(share, rgb.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1))
+
+
+@cache
+def _network() -> cv2.dnn.Net:
+    return cv2.dnn.readNetFromONNX(np.frombuffer(network_bytes(load_weights(), decoder_weights()), np.uint8))
+
+
+def built_in_model() -> str:
+    """Return what a twin's provenance calls the network: both files by their digests."""
+    return (
+        f"{NAME} sha256:{hashlib.sha256(_decoder_file()).hexdigest()[:12]} over {ENCODER} sha256:{WEIGHTS_SHA256[:12]}"
+    )
+
+
+def decoder_weights() -> dict[str, np.ndarray]:
+    """Return the decoder's weights, float16, by the names of its layers."""
+    with np.load(io.BytesIO(_decoder_file())) as arrays:
+        return dict(arrays)
+
+
+def _decoder_file() -> bytes:
+    return (files("manitwin.models.matting") / WEIGHTS_FILE).read_bytes()
+
+
+def network_bytes(encoder: dict[str, np.ndarray], decoder: dict[str, np.ndarray]) -> bytes:
+    """Return encoder and decoder as ONNX: input ``(1, 3, 288, 288)`` as the encoder's, output the share of object."""
+    graph, values = trunk(encoder, SIDE_PX)
+    sides = [SIDE_PX // 2 ** (level + 1) for level in range(len(BLOCKS))]
+
+    def convolved(name: str, value: str, *, active: bool = True) -> str:
+        kernel = decoder[f"{name}.weight"].astype(np.float32)
+        weights = [
+            graph.weight(f"decoder.{name}.weight", kernel),
+            graph.weight(f"decoder.{name}.bias", decoder[f"{name}.bias"].astype(np.float32)),
+        ]
+        side = kernel.shape[-1]
+        output = f"decoder.{name}"
+        graph.node("Conv", [value, *weights], f"{output}.sum", kernel_shape=[side, side], pads=[side // 2] * 4)
+        return graph.node("Relu", [f"{output}.sum"], output) if active else f"{output}.sum"
+
+    def resized(name: str, value: str, channels: int, side: int) -> str:
+        none = [graph.weight(f"{name}.{kind}", np.zeros(0, np.float32)) for kind in ("region", "scales")]
+        sizes = graph.weight(f"{name}.sizes", np.array([1, channels, side, side], np.int64))
+        how = {"mode": "linear", "coordinate_transformation_mode": "half_pixel"}
+        return graph.node("Resize", [value, *none, sizes], f"{name}.larger", **how)
+
+    laterals = [convolved(f"lateral{level}", values[f"_blocks.{block}"]) for level, block in enumerate(BLOCKS)]
+    value = convolved("top", laterals[-1])
+    for level in reversed(range(len(BLOCKS) - 1)):
+        narrowed = convolved(f"narrow{level}", value, active=False)
+        larger = resized(f"level{level}", narrowed, CHANNELS[level], sides[level])
+        value = graph.node("Add", [larger, laterals[level]], f"level{level}.joined")
+        for mix in range(MIXES):
+            value = convolved(f"mix{level}.{mix}", value)
+    quarters = convolved("answer", value, active=False)
+    share = graph.node("Sigmoid", [graph.node("DepthToSpace", [quarters], "whole", blocksize=2, mode="CRD")], "share")
+    return graph.to_bytes(share, (1, 1, SIDE_PX, SIDE_PX))
