@@ -42,7 +42,7 @@ def test_object_on_an_unevenly_lit_wall_is_cut_out_exactly() -> None:
     scene, truth = _scene(), _blob((200, 150), (80, 50))
     scene[truth] = (40, 90, 160)
     matte = matte_photo(_photo(scene), "x.png")
-    assert matte.method in ("flat_border", "network") and matte.confidence > 0.9
+    assert matte.method in ("flat_border", "network") and matte.confidence > 0.85
     assert _overlap(matte.rgba, truth) > 0.97
 
 

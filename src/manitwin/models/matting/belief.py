@@ -14,7 +14,7 @@ from importlib.resources import files
 
 import numpy as np
 
-from manitwin.models.matting.candidates import Candidate, alike, at_size, doubts, lost, overlap
+from manitwin.models.matting.candidates import Candidate, alike, at_size, doubts, misjudged, overlap
 from manitwin.models.matting.outline import eroded
 
 WEIGHTS_FILE = "belief.json"
@@ -31,8 +31,8 @@ OPINIONS = (
 BULKY = 15.0
 """Pixels of area for each of the outline, at working size: a fraction of a pixel off costs a bulkier thing next to nothing."""
 MOST_SOFT_PX = 8.0
-MOST_LOST = 0.05
-"""Of a mask's area: a cut-out that may lack so much of the thing is not believed, whatever else speaks for it."""
+MOST_MISJUDGED = 0.05
+"""Of a mask's area: a cut-out that may be wrong of so much of the thing is not believed, whatever else speaks for it."""
 FEATURES = (*SCORES, *OPINIONS, "kept", "bulk", "made_by_rules")
 BEST = np.array([1.0 if name in ("network_overlap", "network_alike", "colours", "rival") else 0.0 for name in FEATURES])
 """What nothing can be better than, by feature; who made the mask is no doubt of it."""
@@ -61,7 +61,7 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
         [
             *(np.log(max(scores[name], LEAST)) for name in SCORES),
             *(opinions[name] for name in OPINIONS),
-            -min(lost(candidate, others) / MOST_LOST, 1.0),
+            -min(misjudged(candidate, others) / MOST_MISJUDGED, 1.0),
             min(0.0, float(np.log(bulk_px / BULKY))),
             float(candidate.maker == "rules"),
         ]
@@ -71,8 +71,8 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
 def probability(values: np.ndarray) -> float:
     """Return how likely a mask with these ``features`` is right, in [0, 1].
 
-    Two doubts count besides the fitted ones, since composites hardly show them: a part in focus that may be lost (``kept``), and
-    ground that may be seen through the mask (``solid``).
+    Two doubts count besides the fitted ones, since composites hardly show them: a part in focus that may be lost, or a hole
+    that may be filled (``kept``), and ground that may be seen through the mask (``solid``).
     """
     bias, weights = _weights()
     kept = (1 + values[FEATURES.index("kept")]) * np.exp(values[FEATURES.index("solid")])

@@ -82,26 +82,35 @@ def overlap(one: np.ndarray, other: np.ndarray) -> float:
     return float((one & other).sum() / both) if both else 0.0
 
 
-def lost(candidate: Candidate, others: list[Candidate]) -> float:
-    """Return the area of pieces that others have and a candidate lacks, with an outline in focus all around, by its own area.
+def misjudged(candidate: Candidate, others: list[Candidate]) -> float:
+    """Return the area, by the candidate's own, of what others see otherwise and what has an outline in focus all around.
 
-    A shadow's edge is soft, and ground has none: such a piece is a part of the thing, a grey blade or a dark tip.
+    That is a piece that they have and the candidate lacks, or a hole of theirs that it fills. A shadow's edge is soft, and
+    ground has none: such a piece is a part of the thing, a grey blade or a dark tip, and such a hole the loop of scissors.
     """
     found = candidate.found
     near_narrow = dilated(found.narrow, 3)
     total = 0
     for other in others:
-        count, labels, stats, _ = cv2.connectedComponentsWithStats(
-            opened(other.found.mask & ~found.mask, 2).astype(np.uint8), connectivity=4
-        )
-        for index in range(1, count):
-            left, top, width, height, area = stats[index]
-            box = np.s_[max(0, top - 3) : top + height + 3, max(0, left - 3) : left + width + 3]
-            piece = labels[box] == index
-            free = (piece & ~eroded(piece, 1)) & ~dilated(found.mask[box], 3)
-            if free.any() and near_narrow[box][free].mean() > MOSTLY_NARROW:
-                total += int(area)
+        theirs = other.found.mask
+        total += _in_focus(opened(theirs & ~found.mask, 2), ~dilated(found.mask, 3), near_narrow)
+        holes = ndimage.binary_fill_holes(theirs) & ~theirs
+        total += _in_focus(opened(holes & found.mask, 2), np.ones_like(holes), near_narrow)
     return total / max(int(found.mask.sum()), 1)
+
+
+def _in_focus(pieces: np.ndarray, free: np.ndarray, near_narrow: np.ndarray) -> int:
+    """Return the area of those pieces (H, W) whose outline, where it is ``free``, is mostly near narrow edges."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(pieces.astype(np.uint8), connectivity=4)
+    total = 0
+    for index in range(1, count):
+        left, top, width, height, area = stats[index]
+        box = np.s_[max(0, top - 3) : top + height + 3, max(0, left - 3) : left + width + 3]
+        piece = labels[box] == index
+        outline = piece & ~eroded(piece, 1) & free[box]
+        if outline.any() and near_narrow[box][outline].mean() > MOSTLY_NARROW:
+            total += int(area)
+    return total
 
 
 def doubts(share: np.ndarray, mask: np.ndarray) -> tuple[float, float, float]:

@@ -38,7 +38,7 @@ _CAUSES = {
     "solid": "the ground may be seen through it, or it has parts of the ground's colour inside",
     "thick": "it is thin for so small a photo, so its outline is a large part of it",
     "sharply_bounded": "it is as grey as a shadow, and part of its outline as soft as one: a shadow may hang on it",
-    "kept": "a part of it whose outline is as sharp may be lost",
+    "kept": "a part of it with a sharp outline may be lost, or a hole in it filled",
     "outermost": "what looks like its shadow has edges as sharp as its outline, so a clear or grey part of it may be lost",
 }
 _REMEDY = "photograph it whole on a plain surface of another colour, or give an image with an alpha channel"
