@@ -111,7 +111,7 @@ def embodiedgen(folder: Path, *, turned: bool = True, failed: bool = False) -> P
 
 def given_record(**given: Any) -> ImportRecord:
     """An import record of a RoboTwin asset that gives only what is said."""
-    lists = ("captions", "functional_points", "grasp_points", "grasps", "rests", "missing", "remarks")
+    lists = ("captions", "functional_points", "grasp_points", "grasps", "rests", "missing", "remarks", "dropped")
     nothing: dict[str, Any] = {name: [] if name in lists else None for name in ImportRecord.model_fields}
     named = {"import_version": 1, "format": "robotwin", "file": "x", "name": "x", "asset_to_object": np.eye(4).tolist()}
     return ImportRecord.model_validate(nothing | named | given)

@@ -84,7 +84,7 @@ PAGES: dict[str, Arrangement] = {
     ),
     "docs/affordances.md": Arrangement(slow=(r"manitwin affordances",)),
     "docs/audit.md": Arrangement(
-        exits={r"PATH\.\.\.": 1, "--fix": 1, "--engines": 1}, slow=(r"--fix", r"baseline", r"--engines")
+        exits={r"PATH\.\.\.": 1, "--fix": 1, "--engine": 1}, slow=(r"--fix", r"baseline", r"--engines")
     ),  # the mug there is wrong: its collision shape fills it
     "docs/audit_in_ci.md": Arrangement(blocks={"^repos:": "hooks", "^on: ": "workflow"}),
     "docs/backends.md": Arrangement(blocks={"entry-points": "entry_point"}, slow=(DOCTOR,)),
@@ -112,7 +112,8 @@ PAGES: dict[str, Arrangement] = {
     "docs/json.md": Arrangement(blocks={"nothing_here": "answer manitwin build nothing_here.png -o out --json"}),
     "docs/layouts.md": Arrangement(rewritten={"layout_1_000017": "layout_1_000001"}),
     "docs/locate.md": Arrangement(
-        rewritten={r"locate TWIN": "locate $(ls -d DATASET/twins/*/* | head -1)"}, slow=(r"manitwin locate",)
+        rewritten={r"locate TWIN": "locate $(ls -d DATASET/twins/*/* | head -1)"},
+        slow=(r"manitwin locate",),
     ),
     "docs/photos.md": Arrangement(
         # without weights, which only a person adds, each is refused

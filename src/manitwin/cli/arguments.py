@@ -37,6 +37,8 @@ PLACES = frozenset(
         "seen",
         "scene",
         "bag",
+        "report",
+        "html",
         "verdicts",
         "export",
         "form",

@@ -98,7 +98,7 @@ def test_no_camera_and_a_bent_picture_are_refused_in_one_line() -> None:
 
 def test_without_the_sdk_the_remedy_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pyrealsense2", None)
-    with pytest.raises(Unavailable, match="pip install pyrealsense2"):
+    with pytest.raises(UsageError, match="pip install pyrealsense2"):
         sdk()
 
 

@@ -16,7 +16,6 @@ from urllib.parse import quote
 
 from manitwin.errors import UsageError
 from manitwin.formats.bounded_file import open_regular
-from manitwin.formats.json_file import MAX_JSON_BYTES, parse_json
 
 SUFFIXES = (".json", ".json.gz")
 FUEL = "https://fuel.gazebosim.org/1.0"
@@ -46,6 +45,8 @@ def read_listing(path: Path, *, files: bool) -> Iterator[tuple[int, dict[str, An
 
     With ``files`` a row names the file below the data set's folder, else the address where the thing is shown.
     """
+    from manitwin.formats.json_file import parse_json  # imports NumPy, and a place that is no listing does not need it
+
     told = parse_json(_text(path), str(path), UsageError, remedy="give it as it was published")
     if isinstance(told, dict) and told and all(isinstance(each, dict) and "license" in each for each in told.values()):
         shard = path.name.split(".", 1)[0]
@@ -62,6 +63,8 @@ def read_listing(path: Path, *, files: bool) -> Iterator[tuple[int, dict[str, An
 
 
 def _text(path: Path) -> bytes:
+    from manitwin.formats.json_file import MAX_JSON_BYTES
+
     with open_regular(path, UsageError, name=str(path)) as stream:
         try:
             source = gzip.GzipFile(fileobj=stream) if path.suffix.lower() == ".gz" else stream

@@ -110,9 +110,9 @@ class Prior(Form):
 
     ``longest_axis_m`` is that of the oriented box. ``bulk_density_kg_m3`` is mass per volume of a repaired scan, not of
     the matter; None where a scan's volume says nothing of the mass. ``stands``: whether it is put down upright (None:
-    either). ``like`` is the category whose numbers it has for want of its own. ``counter`` is what such things are counted
-    by ('pair of'). ``part_materials`` are the materials of its parts by role, where they are of unlike matter. ``measured``
-    names the published measurements; ``sources`` says where the rest is from.
+    either). ``like`` is the category whose numbers it has for want of its own, ``kin_of`` that whose form it has. ``counter``
+    is what such things are counted by ('pair of'). ``part_materials`` are the materials of its parts by role, where they are
+    of unlike matter. ``measured`` names the published measurements; ``sources`` says where the rest is from.
     """
 
     category: str
@@ -128,6 +128,7 @@ class Prior(Form):
     restitution: LowTypicalHigh
     function: str
     like: str | None = None
+    kin_of: str | None = None
     counter: str | None = None
     part_materials: dict[PartRole, str] = Field(default_factory=dict)
     sources: tuple[str, ...] = Field(min_length=1)
@@ -210,7 +211,7 @@ def _kin_row(category: str, row: dict[str, Any], own: dict[str, Any]) -> dict[st
     """Return the row of a thing that is another one, but about as large and heavy: what it does not say is the category's."""
     said = {key: value for key, value in row.items() if key not in ("aliases", "measured", "sources")}
     borrowed = {} if own.keys() >= _NUMBERS else {"sources": [f"as a {category}"], "like": category}
-    return {**said, **borrowed, **own}
+    return {**said, **borrowed, **own, "kin_of": category}
 
 
 @cache

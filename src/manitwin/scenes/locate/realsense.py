@@ -25,11 +25,11 @@ MOST_DISTORTION_PX = 1.5
 
 
 def sdk() -> Any:
-    """Return the module; raises Unavailable where it is not installed."""
+    """Return the module; raises UsageError where it is not installed."""
     try:
         return importlib.import_module("pyrealsense2")
     except ImportError as error:
-        raise Unavailable(
+        raise UsageError(
             f"pyrealsense2 cannot be imported ({error}); pip install pyrealsense2, or give a layout's scene"
         ) from error
 

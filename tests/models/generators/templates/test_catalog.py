@@ -65,7 +65,7 @@ def test_names_and_looks_of_a_template_mean_it(category: str) -> None:
     template = TEMPLATES[category]
     for name in template.names:
         prior = lookup(name)
-        assert prior is not None and category in (prior.category, prior.like), name  # like it, or of its shape
+        assert prior is not None and category in (prior.category, prior.kin_of), name  # it, or of its shape
     for looks in template.slots.values():
         assert all(words == "" or look_of(words).density_kg_m3 > 0 for words in looks)
     assert next(iter(template.slots.values()))[0] != "", "the first slot looks like itself"
