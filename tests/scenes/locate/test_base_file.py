@@ -47,6 +47,7 @@ def test_a_rounded_rotation_is_made_one_again(tmp_path: Path) -> None:
         ({"camera_to_base": np.diag([1.0, 1, -1, 1]).tolist()}, "its rotation is none"),
         ({"camera_to_base": transform(TURN, np.array([500.0, 0, 900])).tolist()}, "no rigid motion in metres"),
         ({"position_m": [0, 0, 0], "quaternion_wxyz": [2, 0, 0, 0]}, "not the length 1"),
+        ({"position_m": [0, 0, 0], "quaternion_wxyz": [1e300, 1e300, 0, 0]}, "not the length 1"),
     ],
 )
 def test_what_is_no_pose_is_refused(told: Any, said: str, tmp_path: Path) -> None:

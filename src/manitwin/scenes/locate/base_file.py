@@ -28,7 +28,7 @@ def read_base(path: Path) -> np.ndarray:
             pose = np.array(told["camera_to_base"], float).reshape(4, 4)
         else:
             position, quaternion = (np.array(told[key], float) for key in ("position_m", "quaternion_wxyz"))
-            if abs(np.linalg.norm(quaternion.reshape(4)) - 1) > _OFF:
+            if not np.abs(quaternion).max() < 2 or abs(np.linalg.norm(quaternion.reshape(4)) - 1) > _OFF:
                 raise UsageError(f"{path}: quaternion_wxyz has not the length 1; {REMEDY}")
             pose = transform(rotation_from_quaternion_wxyz(quaternion), position.reshape(3))
     except (KeyError, TypeError, ValueError, OverflowError) as error:
