@@ -110,17 +110,20 @@ def test_grey_object_without_a_shadow_is_whole(grey: float) -> None:
 
 @pytest.mark.parametrize("share", [0.25, pytest.param(0.4, marks=pytest.mark.slow), 0.6])
 def test_grey_blade_of_a_coloured_handle_stays_or_the_photo_is_rejected(share: float) -> None:
-    """The blade has exactly the background's colour, dimmed: only its sharp outline tells it from a shadow."""
+    """The blade has exactly the background's colour, dimmed: only its sharp outline tells it from a shadow.
+
+    It is found whole. Where the network calls it a shadow, the two ways of looking differ, and it may not be believed.
+    """
     blade = _polygon([(330, 110), (470, 170), (470, 182), (350, 170)])
     scene = _painted(_plain(0), BODY, (0.03, 0.10, 0.45))
     scene = np.where((blade > 0)[..., None], _plain(0) * share, scene)
+    photo, truth = _photo(scene), np.maximum(BODY, blade) > 0.5
+    found = study_photo(photo).alpha > 127
+    assert (found & truth).sum() / (found | truth).sum() > 0.96
     try:
-        assert _overlap(_photo(scene), np.maximum(BODY, blade)) > 0.96
+        matte_photo(photo, "x.png")
     except Rejected as rejection:
-        assert rejection.reason == "low_confidence_matte"
-        found = study_photo(_photo(scene)).alpha > 127
-        truth = np.maximum(BODY, blade) > 0.5
-        assert (found & truth).sum() / (found | truth).sum() > 0.96
+        assert rejection.reason == "low_confidence_matte" and "do not agree" in rejection.detail
 
 
 @pytest.mark.parametrize("share", [0.3, 0.5])
@@ -133,7 +136,7 @@ def test_grey_stripe_along_a_coloured_body_is_not_cut_off(share: float) -> None:
     try:
         assert _overlap(_photo(scene), np.maximum(BODY, stripe)) > 0.97
     except Rejected as rejection:
-        assert "a shadow may hang on it" in rejection.detail or "do not agree" in rejection.detail
+        assert "a shadow may hang on it" in rejection.detail
 
 
 def test_black_object_without_a_shadow_is_whole() -> None:

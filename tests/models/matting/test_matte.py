@@ -11,7 +11,7 @@ import pytest
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
-from manitwin.models.matting.matte import study_photo
+from manitwin.models.matting.matte import MIN_CONFIDENCE, study_photo
 
 SIZE = (300, 400)
 
@@ -42,7 +42,7 @@ def test_object_on_an_unevenly_lit_wall_is_cut_out_exactly() -> None:
     scene, truth = _scene(), _blob((200, 150), (80, 50))
     scene[truth] = (40, 90, 160)
     matte = matte_photo(_photo(scene), "x.png")
-    assert matte.method in ("flat_border", "network") and matte.confidence > 0.85
+    assert matte.method == "network" and matte.confidence > 0.9
     assert _overlap(matte.rgba, truth) > 0.97
 
 
@@ -56,8 +56,11 @@ def test_soft_shadow_is_not_part_of_the_object() -> None:
     assert "a cast shadow was left out" in matte.findings
 
 
-@pytest.mark.parametrize("light", [1.1, 0.8], ids=["paler than the ground", "dimmer than the ground"])
-def test_cap_of_the_ground_s_colour_with_an_outline_in_focus_is_no_shadow(light: float) -> None:
+@pytest.mark.parametrize(
+    ("light", "believed"), [(1.1, False), (0.8, True)], ids=["paler than the ground", "dimmer than the ground"]
+)
+def test_cap_of_the_ground_s_colour_with_an_outline_in_focus_is_no_shadow(light: float, believed: bool) -> None:
+    """Both are found whole; of the paler one the network knows too little for the cut-out to be believed."""
     scene, body = _scene(), _blob((200, 190), (75, 60))
     cap = np.zeros(SIZE, bool)
     cap[90:150, 155:245] = True
@@ -67,6 +70,7 @@ def test_cap_of_the_ground_s_colour_with_an_outline_in_focus_is_no_shadow(light:
     matted, truth = study.alpha > 127, cap | body
     assert (matted & truth).sum() / (matted | truth).sum() > 0.95
     assert study.judged[0].candidate.scores.stable > 0.9  # it has all edges in focus for its outline
+    assert (study.confidence >= MIN_CONFIDENCE) == believed
 
 
 def test_grey_body_that_fills_the_frame_is_no_gap() -> None:
@@ -121,14 +125,13 @@ def test_second_thing_of_a_tenth_is_no_speck() -> None:
     assert caught.value.reason == "low_confidence_matte"
 
 
-def test_grey_thing_in_a_soft_photo_is_found() -> None:
+def test_grey_thing_in_a_soft_photo_is_cut_out() -> None:
     """Its edges are as wide as a hard shadow's, and so are all of the photo's."""
     scene, truth = np.full((*SIZE, 3), 232.0), _blob((200, 150), (80, 50))
     scene[truth] = 150
     noise = np.random.default_rng(0).normal(0, 1.0, scene.shape)
     photo = np.clip(cv2.GaussianBlur(scene, (0, 0), 1.5) + noise, 0, 255).astype(np.uint8)
-    found = study_photo(photo).alpha > 127
-    assert (found & truth).sum() / (found | truth).sum() > 0.97
+    assert _overlap(matte_photo(photo, "x.png").rgba, truth) > 0.97
 
 
 def test_clutter_is_low_confidence() -> None:
@@ -208,3 +211,4 @@ def test_real_photos_are_accepted_where_two_opinions_agree(shared_data: Path) ->
     assert set(reasons.values()) == {"low_confidence_matte"}
     assert "the image border cuts it off" in details["yogurt_carton_box"]
     assert "cluttered" in details["whisk_ai"]
+    assert "seen through it" in details["hand_sanitizer"]
