@@ -109,7 +109,7 @@ def test_the_same_view_makes_the_same_file_which_knows_its_twins(seen: BrickView
     (first,), (second,) = (scene_files(tmp_path / name) for name in ("one", "two"))
     assert first.read_bytes() == second.read_bytes()
     assert dataset_of(first) == dataset and read_scene(first).clutter == "located"
-    assert dataset_of_twin(tmp_path) is None
+    assert dataset_of_twin(tmp_path) is None, "it holds no twin, whatever lies beside it"
 
 
 def test_a_calibration_gives_the_base_and_one_of_another_table_is_refused(seen: BrickView, plane: Plane) -> None:

@@ -7,13 +7,14 @@ where one whole thing is in the picture and the intersection over union with its
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from functools import cache
 from importlib.resources import files
 
 import numpy as np
 
+from manitwin.errors import ConfigError
+from manitwin.formats.json_file import parse_json_object
 from manitwin.models.matting.candidates import Candidate, alike, at_size, doubts, misjudged, overlap
 from manitwin.models.matting.outline import eroded
 
@@ -90,5 +91,6 @@ def doubts_of(values: np.ndarray) -> dict[str, float]:
 
 @cache
 def _weights() -> tuple[float, np.ndarray]:
-    fitted = json.loads((files("manitwin.models.matting") / WEIGHTS_FILE).read_text(encoding="utf-8"))
+    content = (files("manitwin.models.matting") / WEIGHTS_FILE).read_bytes()
+    fitted = parse_json_object(content, WEIGHTS_FILE, ConfigError, remedy="install the package again")
     return float(fitted["bias"]), np.array([fitted["weights"][name] for name in FEATURES])

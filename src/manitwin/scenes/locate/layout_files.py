@@ -13,7 +13,7 @@ from manitwin.scenes.locate.located_scene import LocatedScene
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_files import CONFIG, scene_name, write_scene
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.twin.store import canonical_json
+from manitwin.twin.store import RECORD, canonical_json
 
 KIND = "located"
 
@@ -26,8 +26,10 @@ class NoLayout:
 
 
 def dataset_of_twin(folder: Path) -> str | None:
-    """Return the data set, or flat folder of twins, that a twin's folder lies in; None: in none."""
+    """Return the data set, or flat folder of twins, that a twin's folder lies in; None: in none, or it holds no twin."""
     place = folder.resolve()
+    if not (place / RECORD).is_file():
+        return None
     for root in (place.parents[2], place.parent) if len(place.parents) > 2 else (place.parent,):
         found = DatasetRoot(root)
         if found.has_twins and Path(found.full(found.twin_name(place.name))) == place:
