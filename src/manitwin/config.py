@@ -232,7 +232,7 @@ class PhysicalConfig(Section):
 class MattingConfig(Section):
     """Reading a photo and cutting its object out. ``frame`` chooses a picture of an animation, counted from 0.
 
-    ``network`` takes the place of the built-in one: ``isnet``, once ``manitwin models add isnet`` has fetched it, or an ONNX file
+    ``network`` is asked besides the built-in one: ``isnet``, once ``manitwin models add isnet`` has fetched it, or an ONNX file
     of U2-Net, IS-Net or BiRefNet. Below ``min_confidence``, the probability that the cut-out is right, a photo is rejected.
     """
 

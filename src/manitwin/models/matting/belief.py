@@ -41,7 +41,10 @@ WHOLE = np.array([name == "whole" for name in FEATURES])
 
 
 def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -> np.ndarray:
-    """Return the features (24,) of a candidate beside the ``others``, given a network's ``share`` of object (any size)."""
+    """Return the features (24,) of a candidate beside the ``others``, given a network's ``share`` of object (any size).
+
+    Of several others the one that is most like it counts.
+    """
     mask = candidate.found.mask
     share = at_size(share, mask.shape)
     unsure, within, beyond = doubts(share, mask)
@@ -56,7 +59,7 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
         "network_within": -min(within, 1.0),
         "network_beyond": -min(beyond, 1.0),
         "colours": candidate.found.known_to_colours,
-        "rival": min(rivals, default=0.0),
+        "rival": max(rivals, default=0.0),
     }
     return np.array(
         [
@@ -64,7 +67,7 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
             *(opinions[name] for name in OPINIONS),
             -min(misjudged(candidate, others) / MOST_MISJUDGED, 1.0),
             min(0.0, float(np.log(bulk_px / BULKY))),
-            float(candidate.maker == "rules"),
+            float(not candidate.by_network),
         ]
     )
 

@@ -1,7 +1,8 @@
-"""The masks that a photo's matte is chosen from: that of the built-in rules, and a network's."""
+"""The masks that a photo's matte is chosen from: that of the built-in rules, and those of one or two networks."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -13,7 +14,11 @@ from manitwin.models.matting.confidence import MatteScores, score
 from manitwin.models.matting.outline import dilated, eroded, opened
 from manitwin.models.matting.segmentation import MOSTLY_NARROW, Segmentation, without_specks
 
-Maker = Literal["rules", "network"]
+Maker = Literal["rules", "network", "built_in_network"]
+"""``network`` is the one that a person named, or else the built-in one; that one's second opinion has a name of its own."""
+NETWORKS: tuple[Maker, ...] = ("network", "built_in_network")
+AGREEING = 0.98
+"""Likeness of two masks beyond which rules and a network have found the same thing."""
 SURE = 0.9
 """Share of object of a pixel that a network calls certain; below one less that, it is certain of the ground."""
 LEAST_PIXELS = 30
@@ -27,17 +32,24 @@ class Candidate:
     found: Segmentation
     scores: MatteScores
 
+    @property
+    def by_network(self) -> bool:
+        """Whether a network found it."""
+        return self.maker in NETWORKS
 
-def candidates(found: Segmentation, share: np.ndarray, *, zoom: float) -> list[Candidate]:
-    """Return the masks to choose from, given what the rules ``found`` and a network's ``share`` of object (any size) in [0, 1].
 
-    ``zoom`` is the photo's size over the mask's. None of them is empty or the whole picture.
+def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float) -> list[Candidate]:
+    """Return the masks to choose from, given what the rules ``found`` and each network's share of object (any size) in [0, 1].
+
+    ``shares`` has one or two, as ``NETWORKS`` names them; ``zoom`` is the photo's size over the mask's. None of the masks is
+    empty or the whole picture.
     """
     masks: list[tuple[Maker, Segmentation]] = [("rules", found)]
-    learned = network_mask(share, found.mask.shape)
-    if learned.any():
-        seen = replace(found, mask=learned, shadow=found.shadow & ~learned, hard=found.hard & ~learned)
-        masks.append(("network", seen))
+    for maker, share in zip(NETWORKS, shares, strict=False):
+        learned = network_mask(share, found.mask.shape)
+        if learned.any():
+            seen = replace(found, mask=learned, shadow=found.shadow & ~learned, hard=found.hard & ~learned)
+            masks.append((maker, seen))
     return [Candidate(maker, each, score(each, zoom=zoom)) for maker, each in masks if _has_outline(each.mask)]
 
 
@@ -87,11 +99,17 @@ def misjudged(candidate: Candidate, others: list[Candidate]) -> float:
 
     That is a piece that they have and the candidate lacks, or a hole of theirs that it fills. A shadow's edge is soft, and
     ground has none: such a piece is a part of the thing, a grey blade or a dark tip, and such a hole the loop of scissors.
+    Where rules and a network have found the same, what a third sees alone is outvoted.
     """
     found = candidate.found
     near_narrow = dilated(found.narrow, 3)
+    agreeing = [
+        other
+        for other in others
+        if other.by_network != candidate.by_network and alike(found.mask, other.found.mask) > AGREEING
+    ]
     total = 0
-    for other in others:
+    for other in agreeing or others:
         theirs = other.found.mask
         total += _in_focus(opened(theirs & ~found.mask, 2), ~dilated(found.mask, 3), near_narrow)
         holes = ndimage.binary_fill_holes(theirs) & ~theirs

@@ -1,4 +1,4 @@
-"""Mattes of a network that a person has added or names, in place of the built-in one, run by OpenCV on the CPU.
+"""Mattes of a network that a person has added or names, beside the built-in one, run by OpenCV on the CPU.
 
 Networks for salient objects and dichotomous segmentation have one picture as input and the share of object of each pixel as
 first output: U2-Net (320 px), IS-Net (1024 px), BiRefNet (1024 px, its output before the logistic function).

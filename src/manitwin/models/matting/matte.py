@@ -12,7 +12,7 @@ from scipy import ndimage
 from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
 from manitwin.models.matting.belief import WHOLE, doubts_of, features, probability
-from manitwin.models.matting.candidates import Candidate, alike, at_size, candidates, completed
+from manitwin.models.matting.candidates import NETWORKS, Candidate, alike, at_size, candidates, completed
 from manitwin.models.matting.confidence import MatteScores, frame_cause
 from manitwin.models.matting.fine_outline import fine_outline
 from manitwin.models.matting.learned import Network, learned_alpha
@@ -83,13 +83,13 @@ class Study:
     """What was found in a photo before anything is decided.
 
     ``found`` is that of the rules, ``judged`` every candidate, the likeliest first, ``alpha (H, W) uint8`` the first at the
-    photo's size, empty where there is none, ``share`` (h, w) what the network says, filled within its outline.
+    photo's size, empty where there is none, ``shares`` (h, w) what each of the ``NETWORKS`` says, filled within its outline.
     """
 
     found: Segmentation
     judged: list[Judged]
     alpha: np.ndarray
-    share: np.ndarray
+    shares: list[np.ndarray]
 
     @property
     def confidence(self) -> float:
@@ -109,34 +109,44 @@ class Study:
         said = {
             "rules": alike(chosen.mask, self.found.mask),
             "colours": chosen.known_to_colours,
-            "network": alike(chosen.mask, at_size(self.share, chosen.mask.shape) > 0.5),
         }
+        for name, share in zip(NETWORKS, self.shares, strict=False):
+            said[name] = alike(chosen.mask, at_size(share, chosen.mask.shape) > 0.5)
         return {name: round(value, 4) for name, value in said.items()}
 
 
 def study_photo(rgb: np.ndarray, *, working_side_px: int = 512, network: Network | None = None) -> Study:
     """Find the object in ``rgb`` (H, W, 3) uint8 upright sRGB and judge what was found; nothing is rejected here.
 
-    ``network`` takes the place of the built-in one. Raises Unavailable without the built-in network's weights, BadReply where
+    A ``network`` is asked besides the built-in one. Raises Unavailable without the built-in network's weights, BadReply where
     the given one cannot be run.
     """
-    found, judged, share = judged_candidates(rgb, working_side_px=working_side_px, network=network)
+    found, judged, shares = judged_candidates(rgb, working_side_px=working_side_px, network=network)
     if not judged:
-        return Study(found, [], np.zeros(rgb.shape[:2], np.uint8), share)
+        return Study(found, [], np.zeros(rgb.shape[:2], np.uint8), shares)
     judged = sorted(judged, key=lambda each: -each.confidence)
-    return Study(found, judged, drawn(rgb, judged[0].candidate.found.mask, working_side_px), share)
+    return Study(found, judged, drawn(rgb, judged[0].candidate.found.mask, working_side_px), shares)
 
 
 def judged_candidates(
     rgb: np.ndarray, *, working_side_px: int = 512, network: Network | None = None
-) -> tuple[Segmentation, list[Judged], np.ndarray]:
-    """Return what the rules found, every candidate with its features, and the network's share of object, as ``study_photo``."""
+) -> tuple[Segmentation, list[Judged], list[np.ndarray]]:
+    """Return what the rules found, every candidate with its features, and each network's share of object, as ``study_photo``.
+
+    Of two networks the one counts that speaks better for a candidate.
+    """
     found = segment(_scaled(rgb, working_side_px))
     if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
         found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
-    share = completed(network_share(rgb, max(found.mask.shape), network), found)
-    made = candidates(found, share, zoom=max(rgb.shape[:2]) / max(found.mask.shape))
-    return found, [Judged(each, features(each, [o for o in made if o is not each], share)) for each in made], share
+    asked = (None,) if network is None else (network, None)
+    shares = [completed(network_share(rgb, max(found.mask.shape), each), found) for each in asked]
+    made = candidates(found, shares, zoom=max(rgb.shape[:2]) / max(found.mask.shape))
+    judged = []
+    for each in made:
+        others = [other for other in made if other is not each]
+        beside = [Judged(each, features(each, others, share)) for share in shares]
+        judged.append(max(beside, key=lambda one: one.confidence))
+    return found, judged, shares
 
 
 def network_share(rgb: np.ndarray, side_px: int, network: Network | None) -> np.ndarray:
@@ -167,9 +177,9 @@ def matte_photo(
     """Find the object in ``image`` (H, W, 3 or 4) uint8 upright sRGB; ``name`` is used in messages only.
 
     A real alpha channel (more than 2 % transparent) is believed. Else two ways of looking each propose a mask: rules (smooth
-    surfaces grown from the border, flooded up to the photo's edges, and colours) and a network; the likelier one is taken, by
-    its scores and by how far all opinions agree with it: ``flat_border`` is the rules' where smooth surfaces explain the
-    border, ``grabcut`` the rules' where they do not, ``network`` the network's, which is the built-in one or ``network``.
+    surfaces grown from the border, flooded up to the photo's edges, and colours) and the built-in network, and a third, where
+    it is given, ``network``; the likeliest is taken, by its scores and by how far opinions agree with it: ``flat_border`` is the
+    rules' where smooth surfaces explain the border, ``grabcut`` the rules' where they do not, ``network`` a network's.
 
     Raises Rejected: ``no_object``, ``several_objects``, ``low_confidence_matte``, naming cause and remedy.
     """
@@ -184,10 +194,9 @@ def matte_photo(
         min_area_share=min_area_share,
         second_object_share=second_object_share,
     )
-    by_network = chosen.candidate.maker == "network"
     return Matte(
         rgba=np.dstack([rgb, study.alpha]),
-        method="network" if by_network else "flat_border" if study.plain else "grabcut",
+        method="network" if chosen.candidate.by_network else "flat_border" if study.plain else "grabcut",
         confidence=round(chosen.confidence, 4),
         findings=tuple(_findings(chosen.candidate.scores, chosen.candidate.found)),
         scores={key: round(value, 4) for key, value in asdict(chosen.candidate.scores).items()},

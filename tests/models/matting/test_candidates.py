@@ -1,0 +1,70 @@
+"""What opinions see otherwise: a part in focus that one lacks, a hole that one fills, and who is outvoted."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import cv2
+import numpy as np
+import pytest
+
+from manitwin.models.matting.candidates import Candidate, candidates, misjudged
+from manitwin.models.matting.segmentation import Segmentation, segment
+
+SIZE = (300, 400)
+CENTER = (200, 150)
+
+
+@cache
+def ring_found() -> tuple[Segmentation, np.ndarray]:
+    """Return what rules find of a ring on plain ground, and its true mask."""
+    truth = cv2.ellipse(np.zeros(SIZE, np.uint8), CENTER, (110, 80), 0, 0, 360, 1, -1)
+    truth = cv2.ellipse(truth, CENTER, (50, 35), 0, 0, 360, 0, -1)
+    scene = np.full((*SIZE, 3), (205.0, 200.0, 190.0)) + np.random.default_rng(0).normal(0, 1.5, (*SIZE, 3))
+    scene[truth > 0] = (30, 90, 160)
+    photo = np.clip(cv2.GaussianBlur(scene, (0, 0), 0.8), 0, 255).astype(np.uint8)
+    return segment(photo), truth > 0
+
+
+def made(*shares: np.ndarray) -> dict[str, Candidate]:
+    return {each.maker: each for each in candidates(ring_found()[0], [s.astype(np.float32) for s in shares], zoom=1.0)}
+
+
+def filled() -> np.ndarray:
+    return cv2.ellipse(np.zeros(SIZE, np.uint8), CENTER, (110, 80), 0, 0, 360, 1, -1) > 0
+
+
+def half() -> np.ndarray:
+    truth = ring_found()[1].copy()
+    truth[:, CENTER[0] :] = False
+    return truth
+
+
+def test_one_network_is_one_candidate_and_a_second_has_its_own_name() -> None:
+    truth = ring_found()[1]
+    assert set(made(truth)) == {"rules", "network"}
+    assert set(made(truth, filled())) == {"rules", "network", "built_in_network"}
+    assert set(made(np.zeros(SIZE), truth)) == {"rules", "built_in_network"}, "what is empty is no candidate"
+
+
+def test_a_filled_hole_in_focus_is_counted_by_its_area() -> None:
+    both = made(filled())
+    hole = int((filled() & ~ring_found()[1]).sum())
+    area = misjudged(both["network"], [both["rules"]]) * filled().sum()
+    assert area == pytest.approx(hole, rel=0.1)
+
+
+def test_a_lost_part_is_counted_and_agreement_is_not() -> None:
+    truth = ring_found()[1]
+    agreeing, cut = made(truth), made(half())
+    assert misjudged(agreeing["network"], [agreeing["rules"]]) < 0.01
+    assert misjudged(cut["network"], [cut["rules"]]) == pytest.approx(1.0, abs=0.25), "as much again as it has"
+
+
+def test_what_a_third_sees_alone_is_outvoted_where_rules_and_a_network_agree() -> None:
+    truth = ring_found()[1]
+    three = made(filled(), truth)
+    others = [three["rules"], three["network"]]
+    assert misjudged(three["built_in_network"], others) < 0.01
+    assert misjudged(three["rules"], [three["network"], three["built_in_network"]]) < 0.01
+    assert misjudged(three["network"], [three["rules"], three["built_in_network"]]) > 0.05, "two networks are not enough"
