@@ -67,4 +67,6 @@ def test_what_a_third_sees_alone_is_outvoted_where_rules_and_a_network_agree() -
     others = [three["rules"], three["network"]]
     assert misjudged(three["built_in_network"], others) < 0.01
     assert misjudged(three["rules"], [three["network"], three["built_in_network"]]) < 0.01
-    assert misjudged(three["network"], [three["rules"], three["built_in_network"]]) > 0.05, "two networks are not enough"
+    assert misjudged(three["network"], [three["rules"], three["built_in_network"]]) > 0.05, (
+        "two networks are not enough"
+    )
