@@ -8,7 +8,6 @@ import sysconfig
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -144,6 +143,8 @@ def _python() -> str:
 
 
 def _packages() -> str:
+    from importlib.metadata import PackageNotFoundError, version  # a tenth of what --help takes
+
     missing, found = [], []
     for package in PACKAGES:
         try:
