@@ -182,6 +182,39 @@ def test_a_bottle_says_what_it_weighs_empty_half_full_and_full(tmp_path: Path) -
     contents = half.mass_kg - empty.mass_kg
     expected = (empty.mass_kg * empty.center_of_mass_m[2] + contents * 0.22 / 4) / half.mass_kg
     assert half.center_of_mass_m[2] == pytest.approx(expected, abs=5e-4)
+    assert full.center_of_mass_uncertainty_m == physical.center_of_mass_uncertainty_m
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5])
+@pytest.mark.parametrize("thick_m", [(0.0005, 0.0005), (0.0015, 0.0005), (0.0005, 0.0015)])
+@pytest.mark.parametrize("wall_factor", [0.6, 1.0, 1.8])
+def test_true_center_of_a_bottle_with_an_uneven_wall_is_within_its_states_uncertainty(
+    tmp_path: Path, share: float, thick_m: tuple[float, float], wall_factor: float
+) -> None:
+    """The truth is the closed form of a tube with two ends of unlike thickness, and water to a level."""
+    physical = run(bottle(), tmp_path, "water bottle")
+    assert physical.filling is not None
+    state = physical.filling.at(share)
+    assert state is not None and state.center_of_mass_uncertainty_m is not None
+    radius, height = 0.035, 0.22
+    areas = np.array([2 * np.pi * radius * height * 0.0005, *(np.pi * radius**2 * each for each in thick_m)])
+    wall_kg = wall_factor * physical.filling.states[0].mass_kg
+    wall_m = float(areas @ [height / 2, 0.0, height] / areas.sum())
+    water_kg = share * (physical.mass_kg.value - wall_kg)
+    true_m = (wall_kg * wall_m + water_kg * share * height / 2) / (wall_kg + water_kg)
+    off_m = abs(true_m - state.center_of_mass_m[2])
+    assert off_m <= state.center_of_mass_uncertainty_m + 5e-4
+    assert state.center_of_mass_uncertainty_m < 0.15 * height
+
+
+def test_a_bottle_says_how_far_its_center_goes_between_empty_and_full(tmp_path: Path) -> None:
+    physical = run(bottle(), tmp_path, "water bottle")
+    assert physical.filling is not None
+    empty_kg, full_kg = physical.filling.states[0].mass_kg, physical.mass_kg.value
+    levels = np.linspace(0, 1, 201)
+    water_kg = levels * (full_kg - empty_kg)
+    centers_m = (empty_kg * 0.11 + water_kg * levels * 0.11) / (empty_kg + water_kg)
+    assert physical.filling.center_of_mass_shift_m == pytest.approx(0.11 - centers_m.min(), abs=1e-3)
 
 
 @pytest.mark.parametrize(

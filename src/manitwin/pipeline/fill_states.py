@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import trimesh
 
 from manitwin.geometry.mass_properties import MassProperties
-from manitwin.geometry.vessel_filling import filled_mass_properties
+from manitwin.geometry.vessel_filling import Vessel
 from manitwin.models.annotators.priors import Prior
 from manitwin.twin.fill_records import Filling, FillState
 from manitwin.twin.record_values import Estimate
@@ -15,16 +16,28 @@ HEAVIEST_EMPTY = 0.75
 """Of the mass said: with an empty vessel that heavy, what was said is hardly that of a full one, and nothing is known of it."""
 KNOWN = ("measured", "user", "human:", "imported:")
 """Sources whose mass is that of one thing in one state, which they do not tell."""
+UNEVEN_WALL = 0.2
+"""Of the wall's matter that may all be in its cap, or all in its base, instead of being even: an assumption, of the size of what
+caps, necks and bottoms of bottles weigh."""
+WALL_FACTORS = (0.5, 2.0)
+"""The wall may weigh so many times what the prior's least bulk density makes of it."""
+LEVELS = 20  # steps from empty to full at which the centre of mass is looked at
 
 
 def filling_of(
-    solid: trimesh.Trimesh, mass: Estimate, full: MassProperties, prior: Prior | None, wall_thickness_m: float
+    solid: trimesh.Trimesh,
+    mass: Estimate,
+    full: MassProperties,
+    full_uncertainty_m: float,
+    prior: Prior | None,
+    wall_thickness_m: float,
 ) -> Filling | None:
     """Return the states of a vessel whose mass is that of a full one; None for what is none, or where that is not known.
 
-    ``full`` are its mass properties as the twin has them. The empty one weighs what the prior's least bulk density makes of the
-    volume (docs/priors.md: there the interval begins with the empty one), its wall is even. The contents of the half-full one
-    fill the lower half of the volume, the object standing as in its frame.
+    ``full`` are its mass properties as the twin has them, ``full_uncertainty_m`` how far its centre of mass may be off. That of
+    another state is uncertain by what a wall of another weight, uneven besides, would make of it. The empty one weighs what the
+    prior's least bulk density makes of the volume (docs/priors.md: there the interval begins with the empty one), its wall is
+    even. The contents of the half-full one fill the lower half of the volume, the object standing as in its frame.
     """
     if prior is None or not prior.vessel or prior.bulk_density_kg_m3 is None or mass.source.startswith(KNOWN):
         return None
@@ -32,20 +45,40 @@ def filling_of(
     empty_kg = max(least_kg_m3 * float(solid.volume), prior.mass_kg.low)
     if empty_kg > HEAVIEST_EMPTY * mass.value:
         return None
+    contents_kg = mass.value - empty_kg
+    vessel = Vessel(solid, wall_thickness_m)
     states = []
     for share in SHARES:
-        contents_kg = share * (mass.value - empty_kg)
-        found = filled_mass_properties(solid, empty_kg, wall_thickness_m, contents_kg, share) if share < 1 else full
+        found = vessel.filled(empty_kg, share * contents_kg, share) if share < 1 else full
         states.append(
             FillState(
                 share=share,
-                mass_kg=empty_kg + contents_kg,
+                mass_kg=empty_kg + share * contents_kg,
                 center_of_mass_m=found.center_of_mass_m.tolist(),
+                center_of_mass_uncertainty_m=_uncertainty_m(vessel, solid, empty_kg, mass.value, share)
+                if share < 1
+                else full_uncertainty_m,
                 inertia_kg_m2=found.inertia_kg_m2.tolist(),
             )
         )
+    centers_m = [vessel.center_m(empty_kg, share * contents_kg, share) for share in np.arange(LEVELS) / LEVELS]
     return Filling(
         assumption=f"the twin is a full {prior.category}; an empty one has {least_kg_m3:g} kg/m3 of its volume in an even"
         " wall, and contents are level, standing as in the object frame",
         states=states,
+        center_of_mass_shift_m=float(np.linalg.norm(np.array(centers_m) - full.center_of_mass_m, axis=1).max()),
     )
+
+
+def _uncertainty_m(vessel: Vessel, solid: trimesh.Trimesh, empty_kg: float, full_kg: float, share: float) -> float:
+    """Return how far (m) the centre of mass would be off with a wall of another weight that is uneven besides."""
+
+    def center_m(wall_kg: float) -> np.ndarray:
+        return vessel.center_m(wall_kg, share * (full_kg - wall_kg), share)
+
+    middle_m, wall_m = center_m(empty_kg), vessel.center_m(empty_kg, 0.0, 0.0)
+    others = [min(factor * empty_kg, HEAVIEST_EMPTY * full_kg) for factor in WALL_FACTORS]
+    off_m = [float(np.linalg.norm(center_m(wall_kg) - middle_m)) for wall_kg in others]
+    wall_share = empty_kg / (empty_kg + share * (full_kg - empty_kg))
+    arm_m = float(np.abs(solid.bounds[:, 2] - wall_m[2]).max())
+    return max(off_m) + UNEVEN_WALL * wall_share * arm_m

@@ -41,7 +41,7 @@ class PhysicalStage:
     """Ask for size, mass and friction, scale the object, and compute the mass properties of its real shape."""
 
     name: ClassVar[str] = "physical"
-    version: ClassVar[str] = "7"
+    version: ClassVar[str] = "8"
     reads: ClassVar[tuple[str, ...]] = ("canonical.glb", "canonical.npz", "geometry", "views/", "cameras", "naming?")
     writes: ClassVar[tuple[str, ...]] = ("visual.glb", "solid.npz", "physical", "physical_findings", "size", "called")
 
@@ -99,7 +99,7 @@ class PhysicalStage:
             mass_distribution=_distribution(estimates, by_parts),
             filling=None
             if estimates.wall_thickness_m is not None
-            else filling_of(solid, mass, properties, _prior_of(draft, estimates), NOMINAL_WALL_M),
+            else filling_of(solid, mass, properties, uncertainty, _prior_of(draft, estimates), NOMINAL_WALL_M),
         )
         given = estimates.longest_axis_m
         said = None if given is None or (metric and not is_human(given.source)) else given.model_dump()

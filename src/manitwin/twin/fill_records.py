@@ -10,19 +10,28 @@ from manitwin.twin.record_values import LARGEST_KG, LARGEST_M, Finite, Matrix3, 
 
 
 class FillState(Record):
-    """A vessel filled to a share of its volume: mass, centre of mass (object frame) and inertia about it, as of ``Physical``."""
+    """A vessel filled to a share of its volume: mass, centre of mass (object frame) and inertia about it, as of ``Physical``.
+
+    ``center_of_mass_uncertainty_m``: how far the centre of mass may be off in this state; None in twins made without it.
+    """
 
     share: Unit
     mass_kg: Annotated[Finite, Field(gt=0, le=LARGEST_KG)]
     center_of_mass_m: Vector3
+    center_of_mass_uncertainty_m: Annotated[Finite, Field(ge=0, le=LARGEST_M)] | None = None
     inertia_kg_m2: Matrix3
 
 
 class Filling(Record):
-    """A vessel's states from empty to full, and the assumption that they rest on, in words."""
+    """A vessel's states from empty to full, and the assumption that they rest on, in words.
+
+    ``center_of_mass_shift_m``: how far from that of the full one the centre of mass is at most, at any level; where nobody knows
+    how full a vessel is, its centre of mass is uncertain by so much. None in twins that were made without it.
+    """
 
     assumption: str = Field(min_length=1)
     states: list[FillState] = Field(min_length=2)
+    center_of_mass_shift_m: Annotated[Finite, Field(ge=0, le=LARGEST_M)] | None = None
 
     @model_validator(mode="after")
     def _possible(self) -> Filling:

@@ -37,18 +37,21 @@ def _filled(physical: Physical) -> list[tuple[Any, ...]]:
         (
             f"filled to {number(100 * each.share)} %",
             f"{number(each.mass_kg)} kg, centre of mass at z {number(1000 * each.center_of_mass_m[2])} mm",
-            None,
+            _spread(each.center_of_mass_uncertainty_m),
             physical.filling.assumption,
         )
         for each in physical.filling.states[:-1]
     ]
 
 
+def _spread(uncertainty_m: float | None) -> str | None:
+    return None if uncertainty_m is None else f"± {number(1000 * uncertainty_m)} mm"
+
+
 def _physical(physical: Physical, stages: Any) -> str:
     along = [f"{number(100 * each)}" for each in physical.extents_m]
     box = [f"{number(100 * each)}" for each in physical.obb.extents_m]
     com = ", ".join(f"{round(1000 * each, 2) + 0.0:.2f}" for each in physical.center_of_mass_m)  # no -0.00
-    spread = f"± {number(1000 * physical.center_of_mass_uncertainty_m)} mm"
     weighed = f"computed: a {physical.mass_distribution} of even density"
     if physical.mass_distribution == "parts":
         weighed = "computed: parts of different density"
@@ -64,7 +67,7 @@ def _physical(physical: Physical, stages: Any) -> str:
         _estimate("friction, static", physical.friction_static, ""),
         _estimate("friction, dynamic", physical.friction_dynamic, ""),
         _estimate("restitution", physical.restitution, ""),
-        ("centre of mass (x, y, z)", f"{com} mm", spread, weighed),
+        ("centre of mass (x, y, z)", f"{com} mm", _spread(physical.center_of_mass_uncertainty_m), weighed),
         ("inertia (xx, yy, zz)", f"{', '.join(moments)} kg m²", None, weighed),
         ("inertia (xy, xz, yz)", f"{', '.join(products)} kg m²", None, weighed),
         ("material", physical.material, None, physical.mass_kg.source),

@@ -141,10 +141,47 @@ def test_both_sides_of_a_wall_are_inside_and_body_and_its_edge_is_the_rim(noise_
     assert (found.role[(clean[:, 2] < 0.001) & (away_m < 0.038)] == 3).mean() > 0.99
 
 
-def test_wall_of_one_face_from_top_to_bottom_shows_no_rim() -> None:
+def test_wall_of_one_face_from_top_to_bottom_is_no_rim_but_its_edge_is() -> None:
     mesh = cup()
     found = told(mesh, "open", stands=True)
-    assert found is not None and set(np.unique(found.role)) == {0, 1, 3}
+    assert found is not None and set(np.unique(found.role)) == {0, 1, 2, 3}
+    edge = (mesh.face_normals[:, 2] > 0.9) & (mesh.triangles_center[:, 2] > 0.08)
+    assert np.array_equal(found.role == 2, edge)
+
+
+def test_sloping_underside_beside_the_foot_of_a_saucer_is_no_base() -> None:
+    saucer = turned((0, 0), (0.03, 0), (0.075, 0.012), (0.075, 0.015), (0.03, 0.004), (0, 0.004)).subdivide_to_size(
+        0.005
+    )
+    mesh = trimesh.Trimesh(saucer.vertices, saucer.faces)
+    found = told(mesh, "open", stands=True)
+    assert found is not None
+    flat = mesh.face_normals[:, 2] < -0.999
+    assert mesh.area_faces[(found.role == 3) != flat].sum() < 0.03 * mesh.area  # the band of 5 % that may be a fillet
+
+
+def test_hollow_underside_is_base() -> None:
+    bowl = turned(
+        *((0, 0.02), (0.05, 0.02), (0.06, 0), (0.07, 0), (0.07, 0.06), (0.066, 0.06), (0.066, 0.024), (0, 0.024)),
+    ).subdivide_to_size(0.005)
+    mesh = trimesh.Trimesh(bowl.vertices, bowl.faces)
+    found = told(mesh, "open", stands=True)
+    assert found is not None
+    under = mesh.face_normals[:, 2] < -0.3
+    assert mesh.area_faces[(found.role == 3) != under].sum() < 0.03 * mesh.area
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 0.0002])
+def test_sunk_lid_with_its_bead_is_the_top_of_a_can(noise_m: float) -> None:
+    half = [(0.0, 0.003), (0.03, 0.003), (0.03, 0.0), (0.0335, 0.0), (0.0335, 0.004), (0.032, 0.006)]
+    can = turned(*half, *((r, 0.1 - z) for r, z in reversed(half))).subdivide_to_size(0.002)
+    mesh = trimesh.Trimesh(can.vertices, can.faces)
+    height = mesh.triangles_center[:, 2].copy()
+    mesh.vertices += np.random.default_rng(0).normal(0, noise_m, mesh.vertices.shape) if noise_m else 0.0
+    found = told(mesh, "closed", stands=True)
+    assert found is not None
+    truth = np.where(height > 0.095, 1, np.where(height < 0.005, 2, 0))
+    assert mesh.area_faces[found.role != truth].sum() < 0.03 * mesh.area
 
 
 def test_inside_of_a_vase_goes_on_behind_its_shoulder() -> None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 import trimesh
-from scipy.spatial import cKDTree
+from scipy.spatial import ConvexHull, cKDTree
 
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.parts.part_rules import Membership, PartRule
@@ -27,10 +27,8 @@ def skin_membership(rule: PartRule, shape: Shape, graph: SurfaceGraph, mesh: tri
     return None if told is None else told(shape, graph, mesh)
 
 
-_RIM_M, _RIM_SHARE = (
-    0.018,
-    0.4,
-)  # m: a finger pad of a common gripper; at most so much of the larger of depth and radius
+_RIM_M = 0.018  # a finger pad of a common gripper
+_RIM_SHARE = 0.4  # of the larger of depth and radius: a rim is at most so wide
 _UP = 0.9  # cosine: an opening that looks up
 _SECTORS = 72
 _LEAST_SECTORS = 0.6  # of the sectors: a rim that goes less far around is none
@@ -38,6 +36,10 @@ _CREST_M = 0.0015  # what is as near to the highest of its sector is its crest t
 _LOOKOUTS = 6  # places on the opening's axis from which the inside is looked at
 _LEAST_INSIDE = 0.05  # of the area
 _DOWN, _LOW, _LOW_M = -0.6, 0.1, 0.003  # z of the normal, share of the height, m: what a vessel stands on
+_FOOT_SHARE, _FOOT_M = 0.02, 0.001  # of the height, m: as near to the ground as that touches it
+_FOOT_MARGIN = 1.05  # the fillet of a bottom's edge is of it
+_VAULT = -0.1  # z of the normal: a vault between the feet is of the base, however steep; the wall above a foot is not
+_OFF_M = 1e-5  # above the surface: where a ray begins
 
 
 def _open(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membership | None:
@@ -49,19 +51,44 @@ def _open(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membershi
     if opening is None or opening.axis[2] < _UP:
         return None
     centers, normals = graph.centers_m, graph.normals
-    inside = _seen_from_within(opening, RayCaster(mesh), centers, normals)
+    caster = RayCaster(mesh)
+    inside = _seen_from_within(opening, caster, centers, normals)
     if graph.areas_m2[inside].sum() < _LEAST_INSIDE * graph.areas_m2.sum():
         return None
     low, high = shape.bounds_m[:, 2]
-    base = ~inside & (normals[:, 2] < _DOWN) & (centers[:, 2] < low + max(_LOW * (high - low), _LOW_M))
+    flat = (normals[:, 2] < _DOWN) & (centers[:, 2] < low + max(_LOW * (high - low), _LOW_M))
+    base = flat & _over_footprint(centers, graph.corners_m, _FOOT_MARGIN)
+    base |= (normals[:, 2] < _VAULT) & _over_footprint(centers, graph.corners_m, 1.0)
+    base &= ~inside & _seen_from_below(caster, centers, normals, asked=base & ~inside)
     index = np.where(inside, 1, np.where(base, 3, 0))
     crest, around = _crest(opening, graph.corners_m)
     if around >= _LEAST_SECTORS:
         reach_m = min(_RIM_M, _RIM_SHARE * max(opening.depth_m, opening.rim_radius_m))
         rim = cKDTree(crest).query(centers, distance_upper_bound=reach_m)[0] <= reach_m
-        rim &= ~base
-        index = np.where(rim & _shown_by_faces(rim, graph), 2, index)
+        index = np.where(rim & ~base, 2, index)
     return Membership(("body", "inside", "rim", "base"), index, 0.8, _BAND)
+
+
+def _over_footprint(centers_m: np.ndarray, corners_m: np.ndarray, margin: float) -> np.ndarray:
+    """Tell which pieces ``(P,)`` are over the feet of a thing: in the hull of its lowest corners, ``margin`` times as wide."""
+    low, high = corners_m[:, 2].min(), corners_m[:, 2].max()
+    feet = corners_m[corners_m[:, 2] < low + max(_FOOT_SHARE * (high - low), _FOOT_M), :2]
+    if len(feet) < 3 or np.linalg.matrix_rank(feet - feet.mean(0), tol=1e-6) < 2:
+        return np.zeros(len(centers_m), bool)
+    hull = ConvexHull(feet)
+    middle = (feet.min(0) + feet.max(0)) / 2
+    planes, offsets = hull.equations[:, :2], hull.equations[:, 2]
+    widened = (centers_m[:, :2] - middle) / margin + middle
+    return np.asarray((widened @ planes.T + offsets <= 0).all(1))
+
+
+def _seen_from_below(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Tell of the pieces ``asked`` ``(P,)`` whether nothing is between them and the ground; False of all others."""
+    seen, which = np.zeros(len(centers_m), bool), np.flatnonzero(asked)
+    if len(which):
+        start = centers_m[which] + _OFF_M * normals[which]
+        seen[which] = caster.first_hits(start, np.broadcast_to([0.0, 0.0, -1.0], start.shape))[1] < 0
+    return seen
 
 
 def _seen_from_within(opening: Opening, caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -108,6 +135,14 @@ _FLAT, _ROUNDED = 0.8, 0.35  # z of a normal: what looks up or down, what looks 
 _MOST_ROUNDED = 0.2  # of the area, in between: with more it has no faces that end somewhere
 _LEAST_FACE = 0.03  # of the area
 _UPPER, _LOWER = 0.6, 0.4  # shares of the height
+_LID_SHARE, _LID_LEVELS, _LID_WINDOW = (
+    0.12,
+    48,
+    8,
+)  # of the height at either end; its levels; those on either side of a hollow
+_LID_DIRECTIONS = 24
+_LID_HOLLOW = 0.012  # of the radius, below the chord over the hollow
+_INWARD = -0.5  # outward part of a normal: the wall of a sunk lid looks at the axis
 
 
 def _closed(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membership | None:
@@ -120,8 +155,42 @@ def _closed(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Members
     top, base = (up > middle) & (height > _UPPER), (up < -middle) & (height < _LOWER)
     if rounded > _MOST_ROUNDED or min(share[top].sum(), share[base].sum(), share[~top & ~base].sum()) < _LEAST_FACE:
         return None
+    first, last = _lids(RayCaster(mesh), shape)
+    inward = _outward(graph.centers_m, graph.normals, shape) < _INWARD
+    top |= (height > last) | (inward & (height > 1 - _LID_SHARE))
+    base |= (height < first) | (inward & (height < _LID_SHARE))
     confidence = float(np.clip(0.9 - 2 * rounded, 0.5, 0.9))
     return Membership(("body", "top", "base"), np.where(top, 1, np.where(base, 2, 0)), confidence, _BAND)
+
+
+def _lids(caster: RayCaster, shape: Shape) -> tuple[float, float]:
+    """Return the shares of the height below which all is base, and above which all is top: beads, seams and necks at the ends.
+
+    They end at the deepest hollow that the outline has near the end; without one there is only the face (0 and 1).
+    """
+    (low, high), middle = shape.bounds_m[:, 2], shape.bounds_m[:, :2].mean(0)
+    reach_m = float(np.ptp(shape.bounds_m[:, :2], axis=0).max())
+    turn = (np.arange(_LID_DIRECTIONS) + 0.5) / _LID_DIRECTIONS * 2 * np.pi
+    inward = -np.stack([np.cos(turn), np.sin(turn), np.zeros(_LID_DIRECTIONS)], axis=1)
+    depth = (np.arange(_LID_LEVELS) + 0.5) / _LID_LEVELS * _LID_SHARE
+    found = []
+    for share in (depth, 1 - depth):
+        heights = np.repeat(low + share * (high - low), _LID_DIRECTIONS)
+        rays = np.tile(inward, (_LID_LEVELS, 1))
+        start = -reach_m * rays + np.column_stack([np.tile(middle, (len(heights), 1)), heights])
+        away_m = caster.first_hits(start, rays)[0]
+        radius = np.where(np.isfinite(away_m), reach_m - away_m, 0.0).reshape(_LID_LEVELS, -1).mean(1)
+        chord = (radius[: -2 * _LID_WINDOW] + radius[2 * _LID_WINDOW :]) / 2
+        hollow = (chord - radius[_LID_WINDOW:-_LID_WINDOW]) / max(float(radius.max()), 1e-9)
+        deepest = int(hollow.argmax())
+        found.append(float(share[deepest + _LID_WINDOW]) if hollow[deepest] > _LID_HOLLOW else float(share[0] > 0.5))
+    return found[0], found[1]
+
+
+def _outward(centers_m: np.ndarray, normals: np.ndarray, shape: Shape) -> np.ndarray:
+    """Return how far normals ``(P, 3)`` look away from the upright axis through the middle: 1 outward, -1 at the axis."""
+    radial = centers_m[:, :2] - shape.bounds_m[:, :2].mean(0)
+    return np.asarray(np.einsum("ij,ij->i", normals[:, :2], radial) / np.maximum(np.linalg.norm(radial, axis=1), 1e-9))
 
 
 _RULES: dict[PartRule, Callable[[Shape, SurfaceGraph, trimesh.Trimesh], Membership | None]] = {
