@@ -38,8 +38,9 @@ TRUE_ROLES: dict[PartRule, tuple[str, dict[str, str]]] = {
     "pistol": ("housing", {"handle": "grip", "switch": "grip"}),
     "open": ("body", {"inside": "inside", "rim": "rim", "base": "base", "underside": "base", "knob": "body"}),
     "closed": ("body", {"top": "top", "base": "base"}),
+    "arched": ("band", {"cups": "cup"}),
 }
-"""By rule, the role of parts that are not named here, and of those that are."""
+"""By rule, the role of parts that are not named here, and of those that are. The faces of flat things are not built as parts."""
 RIM_M, RIM_SHARE = 0.018, 0.4
 """A rim is what a finger pad covers on either side of the template's own rim, at most so much of height or radius."""
 CLEAN_BAR, ROUGH_BAR = 0.88, 0.78
@@ -55,7 +56,7 @@ def main() -> None:
     parser.add_argument("--rules", help="only categories of these rules")
     arguments = parser.parse_args()
     half = [name for name in sorted(load_templates()) if held_out(name) == arguments.held_out]
-    ruled = [name for name in half if (prior := lookup(name)) is not None and prior.parts is not None]
+    ruled = [name for name in half if (prior := lookup(name)) is not None and prior.parts in TRUE_ROLES]
     if arguments.rules:
         ruled = [name for name in ruled if lookup(name).parts in arguments.rules.split(",")]  # type: ignore[union-attr]
     found: dict[bool, list[float | None]] = {False: [], True: []}

@@ -144,3 +144,19 @@ def test_tip_of_what_ends_in_two_directions_is_not_clear() -> None:
     nearest = on_claw[np.linalg.norm(points[on_claw] - claw.position_m, axis=1).argmin()]
     nothing = find_frame(framed(hammer), points[nearest], normals[nearest], "claw")
     assert isinstance(nothing, Unclear) and "several directions" in nothing.reason
+
+
+def test_place_on_a_thin_rod_has_a_frame_as_small_as_what_is_flat_there() -> None:
+    rod = trimesh.creation.cylinder(0.003, 0.06, sections=48).apply_translation([0, 0, 0.03])
+    thing = trimesh.creation.box((0.12, 0.12, 0.02)).apply_translation([0, 0, -0.01]).union(rod)
+    frame = found(thing, [0.003, 0, 0.04], [1, 0, 0], "joint")
+    assert frame.kind == "surface" and frame.z @ [1, 0, 0] > np.cos(np.radians(10))
+    assert frame.size_m < 0.003
+
+
+def test_place_on_a_thorn_has_no_frame() -> None:
+    thorn = trimesh.creation.cone(0.001, 0.01, sections=24)
+    thing = trimesh.creation.box((0.12, 0.12, 0.02)).apply_translation([0, 0, -0.009]).union(thorn)
+    surface = framed(thing)
+    tip = find_frame(surface, np.array([0.0, 0.0, 0.0099]), np.array([0.8, 0.0, 0.6]), "joint")
+    assert isinstance(tip, Unclear)

@@ -208,6 +208,29 @@ def test_top_and_base_of_a_can_end_at_its_edges(noise_m: float) -> None:
     assert mesh.area_faces[found.role != truth].sum() < 0.03 * mesh.area
 
 
+@pytest.mark.parametrize("noise_m", [0.0, 0.0002])
+def test_large_faces_and_edge_of_a_slab_in_any_pose(noise_m: float) -> None:
+    slab = box((0.1, 0.07, 0.02)).subdivide_to_size(0.004)
+    mesh = trimesh.Trimesh(slab.vertices, slab.faces)
+    truth = np.where(mesh.face_normals[:, 2] > 0.9, 1, np.where(mesh.face_normals[:, 2] < -0.9, 2, 0))
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(0.5, [1, 2, 0.5]))
+    mesh.vertices += np.random.default_rng(0).normal(0, noise_m, mesh.vertices.shape) if noise_m else 0.0
+    found = told(mesh, "faced", stands=False)
+    assert found is not None and found.roles == ("side", "front", "back")
+    assert mesh.area_faces[found.role != truth].sum() < 0.04 * mesh.area
+
+
+def test_cups_of_headphones_end_where_the_band_is_thin() -> None:
+    band = annulus(0.08, 0.085, 0.02).difference(at(box((0.2, 0.2, 0.1)), 0, -0.1, 0))
+    cups = [at(box((0.03, 0.07, 0.07)), side * 0.082, -0.02, 0) for side in (1, -1)]
+    mesh = trimesh.boolean.union([band, *cups])
+    mesh.apply_transform(trimesh.transformations.rotation_matrix(0.7, [1, 0, 2]))
+    found = told(mesh, "arched", stands=False)
+    assert found is not None and found.roles == ("band", "cup")
+    true = trimesh.boolean.union(cups).area / mesh.area
+    assert areas(mesh, found)["cup"] == pytest.approx(true, abs=0.06)
+
+
 @pytest.mark.parametrize(
     ("mesh", "rule", "stands"),
     [
@@ -217,6 +240,9 @@ def test_top_and_base_of_a_can_end_at_its_edges(noise_m: float) -> None:
         (at(cylinder(0.03, 0.12), 0, 0, 0.06), "spouted", True),
         (at(cylinder(0.03, 0.12), 0, 0, 0.06), "stemmed", True),
         (box((0.1, 0.1, 0.1)), "pistol", False),
+        (box((0.1, 0.1, 0.1)), "arched", False),
+        (icosphere(3, 0.05), "faced", False),
+        (box((0.2, 0.02, 0.02)).union(at(icosphere(3, 0.02), 0.1, 0, 0)), "faced", False),
         (box((0.1, 0.1, 0.1)), "open", True),
         (icosphere(3, 0.05), "closed", True),
     ],

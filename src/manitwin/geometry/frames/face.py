@@ -76,14 +76,25 @@ def button_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -
     return FeatureFrame("button", best.center_m, rotation_of(best.normal, x), _radius(best), best.elongation <= _OBLONG)
 
 
+_NEARER = (1.0, 0.5, 0.25)  # of the reach: within which one normal is looked for
+_STEADY, _STEADY_COSINE = 0.85, 0.7  # length of the mean of unit normals, and its cosine with the point's own
+
+
+def _is_steady(mean: np.ndarray, normal: np.ndarray) -> bool:
+    length = float(np.linalg.norm(mean))
+    return length >= _STEADY and float(mean @ normal) >= _STEADY_COSINE * length
+
+
 def surface_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
-    """Return a place of the surface: the point itself, Z the mean normal around it, the radius of what is flat there."""
+    """Return a place of the surface: the point itself, Z the mean normal around it, the radius of what is flat there.
+
+    On a thin or bent part what is near enough to have one normal is less: it is looked for twice nearer.
+    """
     positions, normals = surface.samples
     reach = max(0.02 * surface.size_m, 2.5 * surface.spacing_m)
-    around = surface.near(point_m, reach)
-    same = around[normals[around] @ normal > 0]
-    mean = normals[same].mean(0) if len(same) else normal
-    if np.linalg.norm(mean) < 0.85 or mean @ normal < 0.7 * np.linalg.norm(mean):
+    means = (surface.mean_normal(point_m, normal, share * reach) for share in _NEARER)
+    mean = next((mean for mean in means if _is_steady(mean, normal)), None)
+    if mean is None:
         return Unclear("the surface turns too sharply where the point is")
     z = mean / np.linalg.norm(mean)
     near = surface.near(point_m, 0.25 * surface.size_m)

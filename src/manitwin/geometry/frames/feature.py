@@ -18,6 +18,7 @@ from manitwin.geometry.sampling import sample_surface
 Kind = Literal["opening", "face", "tip", "edge", "hole", "axis", "button", "surface"]
 UP = np.array([0.0, 0.0, 1.0])
 _SAMPLES = 6000
+_LOCAL_SAMPLES, _MOST_LOCAL_SAMPLES = 500, 200_000  # within a circle of that radius, of all faces that reach into it
 
 
 @dataclass(frozen=True)
@@ -127,3 +128,20 @@ class FramedMesh:
     def near(self, point_m: np.ndarray, radius_m: float) -> np.ndarray:
         """Return the indices of the samples within a radius of a point."""
         return np.array(sorted(self.tree.query_ball_point(point_m, radius_m)), dtype=int)
+
+    def mean_normal(self, point_m: np.ndarray, normal: np.ndarray, radius_m: float) -> np.ndarray:
+        """Return the mean ``(3,)`` of unit normals by area within a radius of a point, on its side: shorter as they differ.
+
+        Samples are drawn anew of the faces there: those of the whole are too far apart for a thin part.
+        """
+        triangles, centers = self.mesh.triangles, self.mesh.triangles_center
+        reach_m = radius_m + np.linalg.norm(triangles - centers[:, None], axis=2).max(1)
+        near = np.flatnonzero(np.linalg.norm(centers - point_m, axis=1) <= reach_m)
+        if not len(near):
+            return np.zeros(3)
+        corners = triangles[near].reshape(-1, 3)
+        there = trimesh.Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
+        count = int(np.clip(_LOCAL_SAMPLES * there.area / (np.pi * radius_m**2), _LOCAL_SAMPLES, _MOST_LOCAL_SAMPLES))
+        positions, normals, _ = sample_surface(there, count, np.random.default_rng(self.seed))
+        mine = (np.linalg.norm(positions - point_m, axis=1) <= radius_m) & (normals @ normal > 0)
+        return np.asarray(normals[mine].mean(0)) if mine.any() else np.zeros(3)

@@ -233,9 +233,7 @@ def _center(shape: Shape, points: SurfacePoints) -> np.ndarray:
 
 def _large_face(shape: Shape, points: SurfacePoints, side: int) -> np.ndarray:
     """The face across the box's shortest axis: the upper one first, or the one towards -y of a thing that stands."""
-    axis = shape.obb_to_object[:3, int(shape.obb_extents_m.argmin())]
-    leading = axis[2] if abs(axis[2]) > 0.3 else -axis[1] - 0.1 * axis[0]
-    axis = axis * (side if leading > 0 else -side)
+    axis = side * shape.front
     offset = points.positions_m - shape.obb_to_object[:3, 3]
     in_plane = np.linalg.norm(offset - (offset @ axis)[:, None] * axis, axis=1)
     return np.maximum(points.normals @ axis, 0) * _near(in_plane, 0.3 * shape.size_m)

@@ -12,12 +12,16 @@ from typing import Literal
 
 import numpy as np
 
+from manitwin.geometry.parts.arch import Arch
 from manitwin.geometry.parts.protrusions import Protrusion
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape
 
-PartRule = Literal["handled", "spouted", "capped", "stemmed", "ended", "pistol", "open", "closed"]
+PartRule = Literal[
+    "handled", "spouted", "capped", "stemmed", "ended", "pistol", "arched", "open", "closed", "faced",
+]  # fmt: skip
 PartRole = Literal[
     "body", "handle", "spout", "cap", "bowl", "stem", "foot", "head", "neck", "housing", "grip", "inside", "rim", "base", "top",
+    "band", "cup", "side", "front", "back",
 ]  # fmt: skip
 ROLES: dict[PartRule, tuple[PartRole, ...]] = {
     "handled": ("body", "handle"),
@@ -26,10 +30,12 @@ ROLES: dict[PartRule, tuple[PartRole, ...]] = {
     "stemmed": ("bowl", "stem", "foot"),
     "ended": ("head", "neck", "handle"),
     "pistol": ("housing", "grip"),
+    "arched": ("band", "cup"),
     "open": ("body", "inside", "rim", "base"),
     "closed": ("body", "top", "base"),
+    "faced": ("side", "front", "back"),
 }
-"""The parts that each rule may tell; those of ``open`` and ``closed`` are of the surface alone (``skin_rules``)."""
+"""The parts that each rule may tell; those of ``open``, ``closed`` and ``faced`` are of the surface alone (``skin_rules``)."""
 
 
 @dataclass(frozen=True)
@@ -246,15 +252,19 @@ def _section_outline(shape: Shape) -> np.ndarray:
     along = shape.axis.along(shape.surface_m)
     across = (shape.surface_m - shape.axis.origin_m) @ shape.axis.across.T
     level = np.clip((along * _SLICES).astype(int), 0, _SLICES - 1)
-    least_m = 1e-3 * shape.size_m
+    return _filled_outline([across[level == k] for k in range(_SLICES)], 1e-3 * shape.size_m)
+
+
+def _filled_outline(slices: list[np.ndarray], least_m: float) -> np.ndarray:
+    """Return the logs of both extents of each slice's samples ``(N, 2)``; a slice of few is between its neighbours."""
     rows = [
-        np.log(np.maximum(np.ptp(np.quantile(across[level == k], (0.03, 0.97), axis=0), axis=0), least_m))
-        if (level == k).sum() > 3
+        np.log(np.maximum(np.ptp(np.quantile(each, (0.03, 0.97), axis=0), axis=0), least_m))
+        if len(each) > 3
         else np.full(2, np.nan)
-        for k in range(_SLICES)
+        for each in slices
     ]
     outline = np.array(rows)
-    places = np.arange(_SLICES)
+    places = np.arange(len(rows))
     for column in outline.T:
         known = np.isfinite(column)
         column[~known] = np.interp(places[~known], places[known], column[known])
@@ -269,6 +279,32 @@ def _pistol(shape: Shape, points_m: np.ndarray) -> Membership | None:
     return Membership(("housing", "grip"), (down > 1.0).astype(int), 0.75)
 
 
+_ARCH_TOP = 0.5  # of the way from the middle to the apex: above it the legs of an arch come together
+
+
+def _arched(shape: Shape, points_m: np.ndarray) -> Membership | None:
+    """Band and ear cups: the legs of an arch widen at its ends; one change point of width and thickness, as of a handle."""
+    if shape.arch is None:
+        return None
+    outline = _leg_outline(shape.arch, shape.surface_m, shape.size_m)
+    explained, (split,) = _best_splits(outline, 1)
+    wider = float((outline[:split].mean(0) - outline[split:].mean(0)).mean())
+    if explained < _LEAST_EXPLAINED or wider < np.log(_LEAST_CONTRAST):
+        return None
+    border = -1 + (1 + _ARCH_TOP) * split / _SLICES
+    towards, _ = shape.arch.places(points_m)
+    return Membership(("band", "cup"), (towards < border).astype(int), _explained_confidence(explained))
+
+
+def _leg_outline(arch: Arch, surface_m: np.ndarray, size_m: float) -> np.ndarray:
+    """Return log width and log thickness ``(48, 2)`` of an arch's legs, from their ends up."""
+    towards, across = arch.places(surface_m)
+    width = (surface_m - arch.origin_m) @ np.cross(arch.apex, arch.apart)
+    level = np.floor((towards + 1) / (1 + _ARCH_TOP) * _SLICES).astype(int)
+    leg = np.stack([width, np.abs(across) * arch.half_m[1]], axis=1)
+    return _filled_outline([leg[level == k] for k in range(_SLICES)], 1e-3 * size_m)
+
+
 _RULES: dict[PartRule, Callable[[Shape, np.ndarray], Membership | None]] = {
     "handled": _handled,
     "spouted": _spouted,
@@ -276,4 +312,5 @@ _RULES: dict[PartRule, Callable[[Shape, np.ndarray], Membership | None]] = {
     "stemmed": _stemmed,
     "ended": _ended,
     "pistol": _pistol,
+    "arched": _arched,
 }

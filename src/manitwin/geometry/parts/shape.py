@@ -170,6 +170,13 @@ class Shape:
         steeper = tallest.height_m / tallest.reach_m > _STEEPER * first.height_m / first.reach_m
         return tallest if steeper and tallest.height_m > _TALLER * first.height_m else first
 
+    @property
+    def front(self) -> np.ndarray:
+        """The direction ``(3,)`` of its large face: across the box's shortest axis, up, or towards -y of a thing that stands."""
+        axis = self.obb_to_object[:3, int(self.obb_extents_m.argmin())]
+        leading = axis[2] if abs(axis[2]) > 0.3 else -axis[1] - 0.1 * axis[0]
+        return np.asarray(axis if leading > 0 else -axis)
+
     @cached_property
     def pistol(self) -> Pistol | None:
         """The barrel and grip, where it has the outline of a pistol."""

@@ -1,4 +1,4 @@
-"""Rules of what is on a surface alone: the inside and rim of an open vessel, the lid and base of a closed one.
+"""Rules of what is on a surface alone: inside and rim of an open vessel, lid and base of a closed one, faces of a flat thing.
 
 Unlike handle or head these are zones of a skin, told by where they look and not by where they are: both sides of a wall are at
 one place. What a form does not show is not told.
@@ -131,7 +131,7 @@ def _shown_by_faces(rim: np.ndarray, graph: SurfaceGraph) -> bool:
     return bool(both > 0.5 * either)
 
 
-_FLAT, _ROUNDED = 0.8, 0.35  # z of a normal: what looks up or down, what looks sideways
+_FLAT, _ROUNDED = 0.8, 0.35  # of a normal, along the axis: what looks up or down, what looks sideways
 _MOST_ROUNDED = 0.2  # of the area, in between: with more it has no faces that end somewhere
 _LEAST_FACE = 0.03  # of the area
 _UPPER, _LOWER = 0.6, 0.4  # shares of the height
@@ -161,6 +161,26 @@ def _closed(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Members
     base |= (height < first) | (inward & (height < _LID_SHARE))
     confidence = float(np.clip(0.9 - 2 * rounded, 0.5, 0.9))
     return Membership(("body", "top", "base"), np.where(top, 1, np.where(base, 2, 0)), confidence, _BAND)
+
+
+_LEAST_LARGE_FACE = 0.15  # of the area, each of the two
+_OUTER = 0.25  # of the thickness, below the outermost: a groove deeper is not of the face
+
+
+def _faced(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membership | None:
+    """Front, back and the narrow side of what is flat: a book, a phone, a sponge."""
+    looks = graph.normals @ shape.front
+    along = graph.centers_m @ shape.front
+    thick_m = float(np.ptp(along))
+    middle = (_FLAT + _ROUNDED) / 2
+    front = (looks > middle) & (along > along.max() - _OUTER * thick_m)
+    back = (looks < -middle) & (along < along.min() + _OUTER * thick_m)
+    share = graph.areas_m2 / graph.areas_m2.sum()
+    if share[(np.abs(looks) > _ROUNDED) & (np.abs(looks) < _FLAT)].sum() > _MOST_ROUNDED:
+        return None
+    if min(share[front].sum(), share[back].sum()) < _LEAST_LARGE_FACE or share[~front & ~back].sum() < _LEAST_FACE:
+        return None
+    return Membership(("side", "front", "back"), np.where(front, 1, np.where(back, 2, 0)), 0.8, _BAND)
 
 
 def _lids(caster: RayCaster, shape: Shape) -> tuple[float, float]:
@@ -196,4 +216,5 @@ def _outward(centers_m: np.ndarray, normals: np.ndarray, shape: Shape) -> np.nda
 _RULES: dict[PartRule, Callable[[Shape, SurfaceGraph, trimesh.Trimesh], Membership | None]] = {
     "open": _open,
     "closed": _closed,
+    "faced": _faced,
 }

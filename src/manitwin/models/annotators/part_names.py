@@ -22,6 +22,11 @@ _FEATURES: dict[str, tuple[Feature, ...]] = {
     "foot": ("base",),
     "grip": ("grip",),
     "housing": ("housing",),
+    "band": ("apex",),
+    "cup": ("arch_end",),
+    "side": ("side", "end"),
+    "front": ("front",),
+    "back": ("back",),
 }
 """By role, the features whose label in a prior is the name of the whole part, the best first."""
 _WORDS: dict[str, frozenset[str]] = {
@@ -40,6 +45,11 @@ _WORDS: dict[str, frozenset[str]] = {
     "top": frozenset(["top", "lid"]),
     "grip": frozenset(["grip", "handle"]),
     "housing": frozenset(["housing", "body", "barrel"]),
+    "band": frozenset(["band", "headband"]),
+    "cup": frozenset(["cup", "cups"]),
+    "side": frozenset(["side", "sides", "edge", "edges"]),
+    "front": frozenset(["front", "cover", "surface", "wiping", "screen", "display"]),
+    "back": frozenset(["back"]),
 }
 """By role, the words of which a label has one where it names the whole part and no place on it."""
 
