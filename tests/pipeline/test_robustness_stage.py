@@ -11,6 +11,7 @@ import pytest
 from grasp_drafts import PANDA, Scripted, number_of, proposed_draft, run_all
 from manitwin.config import RobustnessConfig, VerifyConfig
 from manitwin.geometry.rigid_body import RigidBody
+from manitwin.physics.robustness import FillCurve, Spread, draw_perturbations
 from manitwin.physics.trial import TrialResult
 from manitwin.pipeline.robustness import RobustnessStage, rank_values
 from manitwin.twin.grasp_summary import RobustnessSummary
@@ -98,6 +99,19 @@ def test_a_vessel_that_weighs_less_has_less_in_it_and_its_centre_of_mass_lies_lo
     assert len(bodies) == 10 and weights.min() < 0.1 and weights.max() > 0.3
     assert np.allclose([body.center_of_mass_m[2] for body in bodies], np.interp(weights, masses, heights_m))
     assert np.allclose([body.inertia_kg_m2[0, 0] for body in bodies], 0.001 * weights)
+
+
+def test_center_of_a_half_empty_vessel_is_moved_by_what_its_own_state_says() -> None:
+    filling = FillCurve(np.array([0.1, 0.5]), np.zeros((2, 3)), np.zeros((2, 3, 3)), np.array([0.02, 0.0]))
+    spread = Spread(0.0, 0.0, (1.0, 1.0), (1.0, 1.0), (0.1, 0.5), center_of_mass_m=0.02)
+    body = RigidBody((np.eye(3),), 0.5, np.zeros(3), np.eye(3), 0.5, 0.5)
+    shares = []
+    for draw in draw_perturbations(spread, 64, 0):
+        moved_m = float(np.linalg.norm(draw.body(body, filling).center_of_mass_m))
+        allowed_m = 0.02 * (0.5 - draw.mass_kg) / 0.4
+        assert moved_m <= allowed_m + 1e-12
+        shares.append(moved_m / allowed_m)
+    assert max(shares) > 0.9 and min(shares) < 0.6
 
 
 def test_nothing_held_is_nothing_tried(tmp_path: Path) -> None:

@@ -95,12 +95,19 @@ class Spread:
 class FillCurve:
     """How centre of mass and inertia of a vessel go with its mass, from empty to full.
 
-    ``masses_kg (K,)`` rising, ``centers_m (K, 3)`` and ``inertias_kg_m2 (K, 3, 3)`` about them, object frame.
+    ``masses_kg (K,)`` rising, ``centers_m (K, 3)`` and ``inertias_kg_m2 (K, 3, 3)`` about them, object frame;
+    ``uncertainties_m (K,)``: how far each centre may be off.
     """
 
     masses_kg: np.ndarray
     centers_m: np.ndarray
     inertias_kg_m2: np.ndarray
+    uncertainties_m: np.ndarray
+
+    def uncertainty_share(self, mass_kg: float) -> float:
+        """Return how far the centre of mass of the vessel that weighs so much may be off, by that of the least certain state."""
+        most_m = float(self.uncertainties_m.max())
+        return float(np.interp(mass_kg, self.masses_kg, self.uncertainties_m)) / most_m if most_m > 0 else 0.0
 
     def filled(self, body: RigidBody, mass_kg: float) -> RigidBody:
         """Return the body as the vessel is that weighs so much: states between two known ones are in line with both.
@@ -138,14 +145,17 @@ class Perturbation:
     def body(self, body: RigidBody, filling: FillCurve | None = None) -> RigidBody:
         """Return the body with another mass, centre of mass and friction; the inertia goes with the mass.
 
-        Of a vessel the drawn mass says how full it is, and ``filling`` where its centre of mass then is.
+        Of a vessel the drawn mass says how full it is, and ``filling`` where its centre of mass then is, and how certainly; the
+        shift is that of its least certain state.
         """
+        shift_m = self.center_of_mass_shift_m
         if filling is not None:
             body = filling.filled(body, self.mass_kg)
+            shift_m = shift_m * filling.uncertainty_share(self.mass_kg)
         return replace(
             body,
             mass_kg=self.mass_kg,
-            center_of_mass_m=body.center_of_mass_m + self.center_of_mass_shift_m,
+            center_of_mass_m=body.center_of_mass_m + shift_m,
             inertia_kg_m2=body.inertia_kg_m2 * (self.mass_kg / body.mass_kg),
             friction_static=body.friction_static * self.friction,
             friction_dynamic=body.friction_dynamic * self.friction,

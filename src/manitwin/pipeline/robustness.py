@@ -32,7 +32,7 @@ ROBUSTNESS = "robustness{}"
 class RobustnessStage:
     """Try each held grasp again and again; writes ``held (N,)`` and ``trials (N,)``, zero trials where it never held."""
 
-    version = "3"
+    version = "4"
     needs: Resource = "cpu"
 
     def __init__(
@@ -55,10 +55,10 @@ class RobustnessStage:
         chosen = ~np.char.endswith(proposals["proposer"], UNFILTERED)
         good = np.flatnonzero((verdicts["outcome"] == "held") & chosen)
         joints = joints_of(proposals, np.arange(len(poses)))
-        spread = self._spread(draft.field("physical"))
+        filling = fill_curve(draft.field("physical"))
+        spread = self._spread(draft.field("physical"), filling)
         draws = draw_perturbations(spread, self.settings.max_trials, draft.seed)
         body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
-        filling = fill_curve(draft.field("physical"))
         variants = [(draw, draw.body(body, filling), draw.settings(settings)) for draw in draws]
 
         def survives(index: int, number: int) -> bool:
@@ -78,7 +78,7 @@ class RobustnessStage:
         np.savez(folder / self.file, held=held, trials=trials)
         return {self.field: self._summary(spread, test, held[good], trials[good]).model_dump(mode="json")}
 
-    def _spread(self, physical: dict[str, Any]) -> Spread:
+    def _spread(self, physical: dict[str, Any], filling: FillCurve | None) -> Spread:
         settings, mass = self.settings, physical["mass_kg"]
         return Spread(
             pose_m=settings.pose_m,
@@ -86,7 +86,9 @@ class RobustnessStage:
             friction=settings.friction,
             force=settings.force,
             mass_kg=(mass["low"], mass["high"]),
-            center_of_mass_m=physical["center_of_mass_uncertainty_m"],
+            center_of_mass_m=physical["center_of_mass_uncertainty_m"]
+            if filling is None
+            else float(filling.uncertainties_m.max()),
         )
 
     def _summary(self, spread: Spread, test: SequentialTest, held: np.ndarray, trials: np.ndarray) -> RobustnessSummary:
@@ -108,7 +110,10 @@ def fill_curve(physical: dict[str, Any]) -> FillCurve | None:
     if filling is None:
         return None
     names = ("mass_kg", "center_of_mass_m", "inertia_kg_m2")
-    return FillCurve(*(np.array([state[name] for state in filling["states"]]) for name in names))
+    known_m = physical["center_of_mass_uncertainty_m"]  # of the full one, where a state does not say its own
+    off_m = [state.get("center_of_mass_uncertainty_m") for state in filling["states"]]
+    masses, centers, inertias = (np.array([state[name] for state in filling["states"]]) for name in names)
+    return FillCurve(masses, centers, inertias, np.array([known_m if each is None else each for each in off_m]))
 
 
 def rank_values(held: np.ndarray, trials: np.ndarray) -> np.ndarray:

@@ -91,6 +91,22 @@ def test_axis_and_tip_of_a_rod() -> None:
     assert np.allclose(tip.position_m, TURN @ [0, 0, 0.1], atol=0.002) and tip.z @ (TURN @ [0, 0, 1]) > 0.999
 
 
+def legged(feet: float) -> trimesh.Trimesh:
+    """An animal of 13 cm whose four legs end in discs of a radius (m)."""
+    places = [(x, y) for x in (-0.05, 0.05) for y in (-0.02, 0.02)]
+    legs = [trimesh.creation.cylinder(0.006, 0.05).apply_translation([x, y, 0.025]) for x, y in places]
+    discs = [trimesh.creation.cylinder(feet, 0.006).apply_translation([x, y, 0.003]) for x, y in places]
+    trunk = trimesh.creation.box((0.13, 0.06, 0.04)).apply_translation([0, 0, 0.065])
+    return trimesh.boolean.union([trunk, *legs, *discs])
+
+
+def test_feet_look_down_and_the_side_of_a_leg_is_no_foot() -> None:
+    under = found(legged(0.012), [0.055, 0.02, 0], [0, 0, -1], "feet")
+    assert under.kind in ("tip", "face") and under.z @ [0, 0, -1] > 0.999 and abs(under.position_m[2]) < 1e-3
+    beside = found(legged(0.007), [0.056, 0.02, 0.03], [1, 0, 0], "leg")
+    assert beside.kind != "face"
+
+
 def test_edge_of_a_wedge_is_its_sharp_side() -> None:
     wedge = trimesh.convex.convex_hull(
         [[x, y, z] for x in (-0.08, 0.08) for y, z in ((-0.02, 0), (0.02, 0.0015), (0.02, -0.0015))]
@@ -121,6 +137,7 @@ def test_frame_beside_its_feature_is_told() -> None:
 def test_words_choose_the_kind() -> None:
     assert kinds_for("Mouth")[0] == "opening" and kinds_for("cutting edge") == ("edge",)
     assert kinds_for("pouring spout") == ("tip",) and kinds_for("base")[0] == "face"
+    assert kinds_for("front feet")[0] == kinds_for("toe")[0] == "tip" and kinds_for("foot")[0] == "face"
     assert fits("handle", "hole") and fits("thing", "edge") and not fits("blade", "opening")
 
 

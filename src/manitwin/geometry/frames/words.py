@@ -15,6 +15,8 @@ _KINDS: tuple[tuple[str, tuple[Kind, ...]], ...] = (
     (r"finger|\bhole|holes\b|\bbore\b|\bcore\b|socket|keyhole|\beye\b|\bring\b|\bloops?\b|\bbow\b|inner side", ("hole",)),
     (r"opening|mouth|\brim\b|inside|interior|cavity|hollow|basin|pour|\blip\b|outlet", ("opening",)),
     (r"edge|blade|teeth|cutter|serration", ("edge",)),
+    (r"\bfeet\b|\bpaws?\b", ("tip", "face", "surface")),
+    (r"\blegs?\b|\btoe\b", ("tip", "surface")),
     (
         r"striking|face\b|base\b|bottom|underside|\bfoot\b|sole|screen|display|lens|cover|panel|front|back\b|\btop\b"
         r"|surface|flat|label|scourer|scouring|glass|cone\b|spine|picture|mirror|anvil",
@@ -34,7 +36,7 @@ _ALSO: tuple[tuple[str, tuple[Kind, ...]], ...] = (
 )
 """What a word may mean of some things besides: not looked for by it, but no contradiction."""
 _UNSAID: tuple[Kind, ...] = ("surface",)
-_DOWN = re.compile(r"base\b|bottom|underside|\bfoot\b|sole", re.IGNORECASE)
+_DOWN = re.compile(r"base\b|bottom|underside|\bfoot\b|\bfeet\b|\bpaws?\b|sole", re.IGNORECASE)
 _POURS = re.compile(r"spout|pour", re.IGNORECASE)
 _AIMS = re.compile(r"nozzle|sprayer|outlet|muzzle|\blens\b|scan|\bbeam", re.IGNORECASE)
 _GRIPS = (r"trigger", r"grip", r"handle|\bbody\b")
@@ -42,7 +44,7 @@ _CUTS = re.compile(r"(?<!putty )knife|cleaver|scalpel|cutting|\bblades?\b", re.I
 _WIPES = re.compile(r"wip(e|ing)|scour|scrub|bristles", re.IGNORECASE)
 _WIPERS = re.compile(r"sponge|eraser|cloth\b|towel|duster|\bsoap\b(?! (dispenser|bottle|dish))", re.IGNORECASE)
 _WHOLE = re.compile(
-    r"bristles|jaws?\b|wires|\bend\b|base\b|bottom|underside|\bfoot\b|sole|front|back\b|\btop\b|upper|surface|flap|\blid\b|\bcap\b",
+    r"bristles|jaws?\b|wires|\bfeet\b|\blegs?\b|\bpaws?\b|\btoe\b|\bend\b|base\b|bottom|underside|\bfoot\b|sole|front|back\b|\btop\b|upper|surface|flap|\blid\b|\bcap\b",
     re.IGNORECASE,
 )
 _AHEAD_OR_ASIDE = re.compile(r"bristles", re.IGNORECASE)
