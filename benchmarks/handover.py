@@ -22,6 +22,7 @@ from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
+from manitwin.episodes.planning.put_down import PutDown
 from manitwin.episodes.planning.two_arms import Take, TwoArmPlanner
 from manitwin.episodes.setting import table_setting
 from manitwin.episodes.settings import EpisodeSettings
@@ -47,16 +48,17 @@ class Deceived(TwoArmPlanner):
         giver_rad: np.ndarray,
         opening_m: float,
         giver_to_object: np.ndarray,
+        put_down: PutDown,
         first: Sequence[Grasp] = (),
     ) -> Take | None:
         """Plan for the wrong place where a plan is made anew."""
         for angle in np.arange(0, 2 * np.pi, np.pi / 4) if first else ():
             way = BESIDE_M * np.array([np.cos(angle), np.sin(angle), 0.0])
             beside = transform(translation=way) @ object_to_world
-            found = super().plan_take(problem, beside, giver_rad, opening_m, giver_to_object, first)
+            found = super().plan_take(problem, beside, giver_rad, opening_m, giver_to_object, put_down, first)
             if found is not None:
                 return found
-        return super().plan_take(problem, object_to_world, giver_rad, opening_m, giver_to_object, first)
+        return super().plan_take(problem, object_to_world, giver_rad, opening_m, giver_to_object, put_down, first)
 
 
 class Bench:

@@ -141,21 +141,32 @@ def test_upright_lifted_pushed_and_undisturbed() -> None:
 
 
 @pytest.mark.parametrize(
-    ("pose", "touching", "still", "failure"),
+    ("touching", "still", "rise_m", "fell_m", "failure"),
     [
-        (at(0.3, 0, 0.12), [("item", "taker")], True, None),
-        (at(0.3, 0, 0.12), [("item", "taker"), ("item", "giver")], True, "giver_holds"),
-        (at(0.3, 0, 0.12), [("item", "giver")], True, "not_held"),
-        (at(0.3, 0, 0.12), [], True, "not_held"),
-        (at(0.3, 0, 0.12), [("item", "taker"), ("item", "table")], True, "held_by_something_else"),
-        (at(0.3, 0, 0.06), [("item", "taker")], True, "low"),
-        (at(0.3, 0, 0.12), [("item", "taker")], False, "moving"),
+        ([("item", "table")], True, 0.3, 0.001, None),
+        ([("item", "table")], True, 0.3, 0.03, "dropped"),
+        ([("item", "table")], True, 0.04, 0.001, "low"),
+        ([("item", "table")], True, None, 0.0, "not_taken"),
+        ([("item", "taker")], True, 0.3, 0.0, "not_released"),
+        ([("item", "table"), ("item", "taker")], True, 0.3, 0.0, "not_released"),
+        ([("item", "table"), ("item", "giver")], True, 0.3, 0.0, "not_released"),
+        ([("item", "other")], True, 0.3, 0.0, "not_put_down"),
+        ([], True, 0.3, 0.0, "not_put_down"),
+        ([("item", "table")], False, 0.3, 0.001, "moving"),
     ],
 )
-def test_handed_over(pose: np.ndarray, touching: list[tuple[str, str]], still: bool, failure: str | None) -> None:
-    held = replace(state(thing(pose, still=still, start=at(0.3, 0, 0.02)), *touching), arms=("giver", "taker"))
-    assert judge(held, Literal("handed_over", "item")).failure == failure
-    assert judge(replace(held, arms=()), Literal("handed_over", "item")).failure == "one_arm"
+def test_handed_over(
+    touching: list[tuple[str, str]], still: bool, rise_m: float | None, fell_m: float, failure: str | None
+) -> None:
+    values = {"rise_m": rise_m, "fell_m": fell_m, "time_s": 5.0}
+    events = () if rise_m is None else (Event("handed_over", "item", None, values),)
+    put = replace(
+        state(thing(at(0.8, 0, 0.02), still=still, start=at(0.3, 0, 0.02)), *touching),
+        arms=("giver", "taker"),
+        events=events,
+    )
+    assert judge(put, Literal("handed_over", "item")).failure == failure
+    assert judge(replace(put, arms=()), Literal("handed_over", "item")).failure == "one_arm"
 
 
 def poured(inside: int, spilt: int, left: int) -> WorldState:

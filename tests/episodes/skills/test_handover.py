@@ -1,4 +1,4 @@
-"""Handing over: the second arm alone holds the bar in the end; where it goes 15 cm beside, or does not close, nobody does."""
+"""Handing over: the second arm takes the bar and puts it down; where it goes 15 cm beside, or does not close, it has nothing."""
 
 from __future__ import annotations
 
@@ -70,20 +70,36 @@ def kept() -> tuple[EpisodeFacts, Recording]:
     return facts, recording
 
 
-def test_the_second_arm_alone_holds_the_bar_in_the_end() -> None:
+def test_the_second_arm_takes_the_bar_holds_it_alone_and_puts_it_down() -> None:
     facts, recording = kept()
     assert facts.outcome == "kept", (facts.evaluation, facts.unplanned, facts.plan_failures)
     assert facts.grasp is not None
     assert facts.taker_grasp is not None
     giver_n, taker_n = recording.finger_forces_n[:, :2], recording.finger_forces_n[:, 2:]
-    assert giver_n[-1].max() == 0
-    assert taker_n[-1].min() > 10
-    assert recording.object_positions_m[-1, 0, 2] > recording.object_positions_m[0, 0, 2] + 0.05
     lifted = np.flatnonzero(recording.phase == Phase.LIFT)
     assert giver_n[lifted + 1].min() > 0, "the first arm picks it"
     assert taker_n[lifted + 1].max() == 0
     assert (np.minimum(giver_n.min(1), taker_n.min(1)) > 0).any(), "for a while both hold it"
-    assert (recording.finger_forces_n.max(1) > 0)[lifted[0] :].all(), "it is never let fall"
+    lowered = np.flatnonzero(recording.phase == Phase.LOWER)
+    assert taker_n[lowered].min() > 10, "the second one puts it down"
+    assert giver_n[lowered].max() == 0
+    held = slice(lifted[0], lowered[-1])
+    assert (recording.finger_forces_n.max(1) > 0)[held].all(), "it is never let fall"
+    assert recording.object_positions_m[lowered[0], 0, 2] > recording.object_positions_m[0, 0, 2] + 0.05
+
+
+def test_the_bar_ends_on_the_table_before_the_second_arm_let_go_by_both() -> None:
+    facts, recording = kept()
+    assert recording.finger_forces_n[-1].max() == 0
+    assert recording.target_on_support[-1]
+    end = recording.object_positions_m[-1, 0]
+    assert end[2] == pytest.approx(BAR_AT[2, 3], abs=1e-3)
+    from_taker_m = np.linalg.norm(end[:2] - [1.2, 0])
+    workspace = load_robot("panda").workspace
+    assert workspace.min_radius_m - 0.02 < from_taker_m < workspace.max_radius_m + 0.02
+    event = next(each for each in facts.events if each.kind == "handed_over")
+    assert event.values["rise_m"] > 0.2
+    assert event.values["fell_m"] < 0.005
 
 
 def test_both_hands_hold_it_by_grasps_that_were_given_and_6_cm_apart() -> None:
@@ -105,11 +121,11 @@ def test_the_same_seed_gives_the_same_episode() -> None:
 class Beside(TwoArmPlanner):
     """Plans the second arm for where the bar is not: 15 cm to the side, once the first one has brought it."""
 
-    def plan_take(self, problem, object_to_world, giver_rad, opening_m, giver_to_object, first=()) -> Take | None:
+    def plan_take(self, problem, object_to_world, giver_rad, opening_m, giver_to_object, put_down, first=()):
         ways = [0.15 * np.array([x, y, 0.0]) for x, y in ((0, 1), (0, -1), (1, 0))] if first else [np.zeros(3)]
         plans = (
             super(Beside, self).plan_take(
-                problem, transform(None, way) @ object_to_world, giver_rad, opening_m, giver_to_object, first
+                problem, transform(None, way) @ object_to_world, giver_rad, opening_m, giver_to_object, put_down, first
             )
             for way in ways
         )
@@ -118,9 +134,8 @@ class Beside(TwoArmPlanner):
 
 def test_a_second_arm_15_cm_beside_takes_nothing() -> None:
     facts, recording = attempt(Beside(load_robot("two_pandas")))
-    assert facts.outcome == "goal_missed"
-    assert facts.evaluation is not None
-    assert facts.evaluation.literals[0].failure == "not_held"
+    assert facts.outcome == "dropped"
+    assert facts.events == (), "nobody took it"
     assert recording is not None
     assert recording.object_positions_m[-1, 0, 2] < 0.1, "it fell"
 
@@ -129,9 +144,8 @@ def test_a_second_arm_that_does_not_close_takes_nothing(monkeypatch: pytest.Monk
     close = Execution.close
     monkeypatch.setattr(Execution, "close", lambda self: close(self) if self.used == GIVER else None)
     facts, recording = attempt()
-    assert facts.outcome == "goal_missed"
-    assert facts.evaluation is not None
-    assert facts.evaluation.literals[0].failure in ("not_held", "held_by_something_else", "low")
+    assert facts.outcome == "dropped"
+    assert facts.events == ()
     assert recording is not None
     assert recording.finger_forces_n[-1].max() == 0
 
@@ -141,11 +155,27 @@ def test_a_first_arm_that_does_not_let_go_has_not_handed_over(monkeypatch: pytes
         course._giver_rad = execution.commanded_rad
 
     monkeypatch.setattr(HandoverCourse, "_let_go", stay)
-    monkeypatch.setattr(TwoArmPlanner, "plan_bring_home", lambda *_: None)
+    monkeypatch.setattr(HandoverCourse, "_set_down", lambda *_: None)
     facts, _ = attempt()
     assert facts.outcome == "goal_missed"
     assert facts.evaluation is not None
-    assert facts.evaluation.literals[0].failure == "giver_holds"
+    assert facts.evaluation.literals[0].failure == "not_taken"
+
+
+def test_a_second_arm_that_keeps_the_bar_has_not_handed_it_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(HandoverCourse, "_set_down", lambda *_: None)
+    facts, _ = attempt()
+    assert facts.outcome == "goal_missed"
+    assert facts.evaluation is not None
+    assert facts.evaluation.literals[0].failure == "not_released"
+
+
+def test_a_second_arm_that_lets_the_bar_fall_has_not_put_it_down(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(HandoverCourse, "_set_down", lambda _, __, execution: execution.open())
+    facts, _ = attempt()
+    assert facts.outcome == "goal_missed"
+    assert facts.evaluation is not None
+    assert facts.evaluation.literals[0].failure == "dropped"
 
 
 def test_grasps_at_one_place_leave_no_room_for_a_second_hand() -> None:

@@ -1,19 +1,27 @@
-"""From hand to hand: the first arm brings the target to a meeting place, the second takes it, the first lets go and goes home."""
+"""From hand to hand: the first arm brings the target to a meeting place, the second takes it there and puts it down before it."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.courses.course import Course, Ended, Start
 from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
+from manitwin.episodes.handover_watch import HandoverWatch
 from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner
+from manitwin.episodes.planning.placement import Placement
 from manitwin.episodes.planning.problem import Motion, Phase
+from manitwin.episodes.planning.put_down import Held, put_down_poses
 from manitwin.episodes.planning.two_arms import HandoverPlan, Take, TwoArmPlanner
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
-from manitwin.physics.sapien.contacts import MeantContacts
+from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
+from manitwin.physics.sapien.world import RobotWorld
 from manitwin.robots.two_arms import base_to_world
 
 GIVER, TAKER = 0, 1
@@ -26,35 +34,58 @@ BOTH_HOLD_S, HOLD_S = 0.2, 0.5
 
 
 class HandoverCourse(Course):
-    """Gives with the first arm, takes with the second, and ends with the target in the second hand."""
+    """Gives with the first arm, takes with the second, which puts the target down on its side of the table."""
 
     def __init__(self, start: Start, facts: EpisodeFacts):
-        """Draw where the arms may meet."""
+        """Draw where the arms may meet, and where the target may be put down."""
         super().__init__(start, facts)
         assert isinstance(start.planner, TwoArmPlanner), "a handover is planned for two arms"
         self._arms = start.planner
         bases = [base_to_world(planner.robot)[:3, 3] for planner in (self._arms, self._arms.taker)]
-        rng = np.random.default_rng((self.problem.seed, 3))
-        self._meetings = meetings(self.problem.target, (bases[GIVER] + bases[TAKER]) / 2, rng)
+        self._meetings = meetings(self.problem.target, (bases[GIVER] + bases[TAKER]) / 2, self._rng(3))
+        goals = put_down_poses(
+            self.problem.target,
+            (self.problem.target.object_to_world, *(() if start.skill_goal is None else start.skill_goal.poses[1:])),
+            self._arms.taker.robot.workspace,
+            base_to_world(self._arms.taker.robot),
+            (*self.problem.static_boxes, *self.problem.fixtures),
+            self.problem.obstacles,
+            start.settings.release_height_m,
+            self._rng(9),
+        )
+        self._put_down, self._goal = self._arms.put_down(self.problem, goals), start.problem.goal_object_to_world
 
     @property
     def ends_at(self) -> np.ndarray | None:
-        """In the second hand."""
-        return None
+        """Where the second arm is to put it down."""
+        return self._goal
+
+    def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
+        """Return the watch of who holds the target."""
+        target = self.problem.target
+        giver, taker = (each.robot.name for each in world.robots)
+
+        def center() -> np.ndarray:
+            return transform_points(world.pose_of(target.name), target.body.center_of_mass_m[None])[0]
+
+        return (HandoverWatch(target.name, giver, taker, center),)
 
     def plan(self) -> bool:
         """Plan both halves with the first pair of grasps and the first meeting that serve."""
-        plan, report = self._arms.plan_handover(self.problem, self._meetings, longest_s=LONGEST_S)
+        plan, report = self._arms.plan_handover(self.problem, self._meetings, self._put_down, longest_s=LONGEST_S)
         self.facts.grasps_tried = report.tried
         self.facts.plan_failures += report.failures
         if plan is None:
             return False
         self._plan = plan
         self.facts.grasp, self.facts.taker_grasp = plan.give.grasp, plan.take.grasp
+        goal = self._put_down.goal_of(Held(plan.take.grasp, plan.take.gripper_to_object))
+        assert goal is not None, "the second grasp was chosen so"
+        self._goal = goal
         return True
 
     def execute(self, execution: Execution) -> None:
-        """Give, take, let go, withdraw, and hold; raises Ended where the first hand loses the target, or none can take it."""
+        """Give, take, let go, withdraw, hold, and put down; raises Ended where a hand loses the target, or there is no way."""
         execution.use(GIVER)
         self._bring(self._plan, execution)
         here, giver_to_object = execution.target_to_world(), execution.gripper_to_object()
@@ -65,6 +96,7 @@ class HandoverCourse(Course):
             giver_rad,
             self._plan.give.grasp.width_m,
             giver_to_object,
+            self._put_down,
             first=(self._plan.take.grasp,),
         )
         self.facts.replans["take" if take is not None else "take_failed"] += 1
@@ -79,13 +111,56 @@ class HandoverCourse(Course):
         execution.use(GIVER)
         self._let_go(take, execution)
         execution.use(TAKER)
+        execution.wait_s(Phase.HOLD, HOLD_S)
+        self.check_held(execution)
+        self._set_down(Held(take.grasp, take.gripper_to_object), execution)
+
+    def _set_down(self, held: Held, execution: Execution) -> None:
+        """Carry the target to the table before the second arm, let go and go home; raises Ended where there is no way."""
+        placement = self._placement(held, execution)
+        if placement is None:
+            self._bring_home(execution)
+            placement = self._placement(held, execution)
+        if placement is None:
+            raise Ended("replan_failed")
+        carry, lower, retreat = placement
+        assert carry is not None, "it is carried there"
+        execution.follow(carry)
+        self.check_held(execution)
+        asked = self._arms.with_giver_at(self.problem, self._giver_rad)
+        where = execution.commanded_rad, execution.gripper_to_object(), self._goal
+        found = self._arms.taker.plan_place(asked, held, *where, False)
+        self.facts.replans["late" if found is not None else "late_failed"] += 1
+        if found is not None:
+            _, lower, retreat = found
+        execution.meant = NONE_MEANT
+        execution.follow(lower)
+        execution.open()
+        execution.follow(retreat)
+        target = replace(self.problem.target, object_to_world=execution.target_to_world())
+        home = self._arms.plan_taker_home(replace(self.problem, target=target), execution.commanded_rad, self._giver_rad)
+        if home is not None:
+            execution.follow(home)
+        execution.use(GIVER)
+
+    def _placement(self, held: Held, execution: Execution) -> Placement | None:
+        """Plan where to put the target down, and the way there, from where the second arm is."""
+        asked = self._arms.with_giver_at(self.problem, self._giver_rad)
+        found = self._put_down.plan(asked, held, execution.commanded_rad, execution.gripper_to_object())
+        self.facts.replans["put_down" if found is not None else "put_down_failed"] += 1
+        if found is None:
+            return None
+        self._goal, placement = found
+        return placement
+
+    def _bring_home(self, execution: Execution) -> None:
+        """Bring the target out of the way that the second arm is in: to its home, or straight up."""
         carry = self._arms.plan_bring_home(
             self.problem, execution.gripper_to_object(), execution.commanded_rad, self._giver_rad
         )
         self.facts.replans["brought_home" if carry is not None else "not_brought_home"] += 1
         if carry is not None:
             execution.follow(carry)
-        execution.wait_s(Phase.HOLD, HOLD_S)
 
     def _bring(self, plan: HandoverPlan, execution: Execution) -> None:
         """Grasp, lift, measure the object in the hand, plan carry and meeting anew, and go there."""
@@ -109,6 +184,9 @@ class HandoverCourse(Course):
         execution.follow(held.timed(joints, MEET_S, Phase.ACT))
         self.measure_slip(give, execution)
         self.check_held(execution)
+
+    def _rng(self, purpose: int) -> np.random.Generator:
+        return np.random.default_rng((self.problem.seed, purpose))
 
     def _let_go(self, take: Take, execution: Execution) -> None:
         """Open the first hand, withdraw it and bring its arm home, as far as there is a way."""

@@ -19,6 +19,7 @@ CORNER_OF_SQUARE = np.sqrt(np.pi / 2)  # 1.25: half a square's diagonal by the r
 HANG_SLACK_M = 0.006
 INSERTED_RAD, INSERTED_SLACK_M = np.radians(45), 0.002  # what a bore is wide for leans on its rim, tip down
 BELLY = 1.5  # rim radii
+FELL_M = 0.02  # what is let go with some tilt comes to lie by its own weight
 OBLONG, CLOSED_SHARE, LEAST_SLOPE = 4.5, 0.9, 0.3  # as holes are taken for holes (geometry.frames.hole)
 
 
@@ -160,23 +161,27 @@ def inserted(state: WorldState, literal: Literal) -> Judgement:
 
 
 def handed_over(state: WorldState, literal: Literal) -> Judgement:
-    """Judge that the second arm alone holds an object: nothing else touches it, and it is the value higher than it was."""
+    """Judge that the second arm took an object from the first, held it alone the value higher than it lay, and put it down.
+
+    Down is: let go by both, at rest on the furniture alone, and no more than 2 cm lower than where it was let go.
+    """
     assert literal.value is not None
     thing, touched = state.of(literal.subject), state.neighbours(literal.subject)
     if len(state.arms) != 2:
         return Judgement(False, "one_arm", {})
-    giver, taker = state.arms
-    before_m = transform_points(thing.start_object_to_world, thing.body.center_of_mass_m[None])[0, 2]
-    rise_m = float(thing.center_of_mass_m[2] - before_m)
+    found = _events(state, "handed_over", literal)
+    if not found:
+        return Judgement(False, "not_taken", {})
+    values = found[-1].values
     return judged(
         {
-            "not_held": taker in touched,
-            "giver_holds": giver not in touched,
-            "held_by_something_else": touched <= {taker},
-            "low": rise_m >= literal.value,
+            "low": values["rise_m"] >= literal.value,
+            "not_released": not touched & frozenset(state.arms),
+            "not_put_down": bool(touched) and touched <= state.furniture,
+            "dropped": values["fell_m"] <= FELL_M,
             "moving": thing.at_rest,
         },
-        {"rise_m": rise_m},
+        values,
     )
 
 

@@ -23,6 +23,7 @@ from manitwin.episodes.planning.problem import (
     PlannerSettings,
     PlanReport,
 )
+from manitwin.episodes.planning.put_down import Held, PutDown
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.geometry.poses import transform_points
 from manitwin.robots.robot import Robot
@@ -70,9 +71,11 @@ class TwoArmPlanner(PickPlacePlanner):
         self._tip_m = np.array([[0.0, 0, giver.gripper.tip_depth_m]])
 
     def plan_handover(
-        self, problem: PickPlaceProblem, meetings: Sequence[HeldPath], *, longest_s: float
+        self, problem: PickPlaceProblem, meetings: Sequence[HeldPath], put_down: PutDown, *, longest_s: float
     ) -> tuple[HandoverPlan | None, PlanReport]:
         """Plan with the first of the grasps that leaves room for a second one, and the first meeting where both arms can be.
+
+        The second grasp is one by which the object can be ``put_down``.
 
         The report has no plan of its own, only what was tried and what it failed of.
         """
@@ -81,7 +84,7 @@ class TwoArmPlanner(PickPlacePlanner):
         found: list[Take] = []
 
         def can_be_taken(grasp: Grasp, path: HeldPath, joints_rad: np.ndarray) -> bool:
-            take = self.plan_take(problem, path.poses[-1], joints_rad, grasp.width_m, grasp.gripper_to_object)
+            take = self.plan_take(problem, path.poses[-1], joints_rad, grasp.width_m, grasp.gripper_to_object, put_down)
             if take is None:
                 return False
             found.append(take)
@@ -98,12 +101,13 @@ class TwoArmPlanner(PickPlacePlanner):
         giver_rad: np.ndarray,
         opening_m: float,
         giver_to_object: np.ndarray,
+        put_down: PutDown,
         first: Sequence[Grasp] = (),
     ) -> Take | None:
         """Plan how the second arm, at home, takes the object that the first holds at ``object_to_world (4, 4)``.
 
         ``opening_m`` is that of the first hand, which is at ``giver_to_object``. Grasps of ``first`` are tried before all
-        others. None: none can be approached, or the first hand could not withdraw from any.
+        others. None: none can be approached, by none it can be put down, or the first hand could not withdraw from any.
         """
         parts, ends = self.taker.parts, self.taker.parts.ends
         asked = self._at_meeting(problem, object_to_world, giver_rad, opening_m)
@@ -116,6 +120,8 @@ class TwoArmPlanner(PickPlacePlanner):
             for turn in parts.candidates.turns:
                 gripper_to_object = grasp.gripper_to_object @ turn
                 if parts.candidates.look_at_approach(world, gripper_to_object) is not None:
+                    continue
+                if put_down.goal_of(Held(grasp, gripper_to_object)) is None:
                     continue
                 tried += 1
                 there = object_to_world @ gripper_to_object
@@ -162,12 +168,25 @@ class TwoArmPlanner(PickPlacePlanner):
         found = self.parts.motions.free(world.arm, Phase.REACH, giver_rad, self.arm.home, rng)
         return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
 
+    def plan_taker_home(
+        self, problem: PickPlaceProblem, taker_rad: np.ndarray, giver_rad: np.ndarray
+    ) -> Motion | None:
+        """Plan the second arm's way home with its hand empty and open; None: there is none."""
+        asked, parts = self.with_giver_at(problem, giver_rad), self.taker.parts
+        world, rng = parts.world_of(asked, problem.target.object_to_world), np.random.default_rng((problem.seed, 10))
+        found = parts.motions.free(world.arm, Phase.REACH, taker_rad, parts.arm.home, rng)
+        return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
+
+    def put_down(self, problem: PickPlaceProblem, goals: Sequence[np.ndarray]) -> PutDown:
+        """Return how the second arm puts the target down at one of ``goals (4, 4)``, the first one at home."""
+        return PutDown(self.taker, self.with_giver_at(problem, self.arm.home), goals)
+
     def plan_bring_home(
         self, problem: PickPlaceProblem, gripper_to_object: np.ndarray, taker_rad: np.ndarray, giver_rad: np.ndarray
     ) -> Motion | None:
         """Plan the second arm's way home with what it holds, else straight up with it; None: there is no way."""
         parts = self.taker.parts
-        asked = replace(problem, obstacles=(*problem.obstacles, *self._giver_shapes.at(giver_rad, (self._open_m,))))
+        asked = self.with_giver_at(problem, giver_rad)
         world, rng = parts.world_of(asked, problem.target.object_to_world), np.random.default_rng((problem.seed, 8))
         world.hold(gripper_to_object)
         home = parts.motions.free(world.arm, Phase.CARRY, taker_rad, parts.arm.home, rng)
@@ -177,6 +196,10 @@ class TwoArmPlanner(PickPlacePlanner):
             world.arm, Phase.CARRY, taker_rad, parts.ends.above(parts.arm.gripper_pose(taker_rad))
         )
         return None if line is None else parts.motions.timed(Phase.CARRY, line)
+
+    def with_giver_at(self, problem: PickPlaceProblem, giver_rad: np.ndarray) -> PickPlaceProblem:
+        """Return the second arm's problem with the first as an obstacle, its hand open."""
+        return replace(problem, obstacles=(*problem.obstacles, *self._giver_shapes.at(giver_rad, (self._open_m,))))
 
     def with_taker_at(self, problem: PickPlaceProblem, taker_rad: np.ndarray, grasp: Grasp | None) -> PickPlaceProblem:
         """Return the first arm's problem with the second as an obstacle, open, or closed on a grasp."""

@@ -1,4 +1,4 @@
-"""``handover``: one arm picks the target, a second one takes it by another grasp, and the first lets go and withdraws."""
+"""``handover``: one arm picks the target, a second one takes it by another grasp, and puts it down on its side of the table."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
+from manitwin.geometry.poses import transform
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 
 LEAST_LENGTH_M = 0.10  # of what has room for two hands
+LEAST_LIKELY, SAME = 0.05, 0.02  # of a way to lie, and of the upward direction's coordinates between two
 
 
 class Handover(Skill):
@@ -25,8 +27,13 @@ class Handover(Skill):
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield where the target is: what counts is who holds it."""
-        yield around.objects[target].object_to_world
+        """Yield where the target is, then the other ways in which it stays, at the same place: how it may be put down."""
+        here = around.objects[target].object_to_world
+        yield here
+        for placement in around.twin(target).poses:
+            turned = placement.object_to_plane
+            if placement.probability >= LEAST_LIKELY and abs(here[2, :3] - turned[2, :3]).max() > SAME:
+                yield transform(turned[:3, :3], here[:3, 3])
 
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator

@@ -1,0 +1,128 @@
+"""Putting down what a second arm was handed: places on the table before it, and the way to one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprint_at
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.placement import Placement
+from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem
+from manitwin.geometry.boxes import separation_m
+from manitwin.geometry.poses import inverse, transform, transform_points
+from manitwin.geometry.rigid_body import PlacedObject, StaticBox
+from manitwin.robots.robot import Workspace
+
+PLACES, DRAWS = 32, 400
+MOST_PLANNED = 4  # places that are planned for with one grasp, beyond a look at the hand
+TABLE_M = 0.001  # from z = 0, where a robot's table has its top
+
+
+@dataclass(frozen=True)
+class Held:
+    """A grasp of the hand that puts down, as it is used: ``gripper_to_object (4, 4)``."""
+
+    grasp: Grasp
+    gripper_to_object: np.ndarray
+
+
+class PutDown:
+    """Goals of one problem for one arm, and which of them a grasp can be let go at; deterministic for the problem's seed."""
+
+    def __init__(self, arm: PickPlacePlanner, problem: PickPlaceProblem, goals: Sequence[np.ndarray]):
+        """Take poses ``(4, 4)`` of the target at rest, best first; the other arm is an obstacle of ``problem``, out of the way."""
+        self._arm, self._problem, self._goals = arm, problem, tuple(goals)
+        self._found: dict[tuple[str, bytes], np.ndarray | None] = {}
+
+    def goal_of(self, held: Held) -> np.ndarray | None:
+        """Return the first goal ``(4, 4)`` that the arm can put the target down at with a grasp, from home; None: there is none."""
+        key = held.grasp.grasp_id, held.gripper_to_object.tobytes()
+        if key not in self._found:
+            home = self._arm.arm.home
+            found = self.plan(self._problem, held, home, held.gripper_to_object)
+            self._found[key] = None if found is None else found[0]
+        return self._found[key]
+
+    def plan(
+        self, problem: PickPlaceProblem, held: Held, joints_rad: np.ndarray, gripper_to_object: np.ndarray
+    ) -> tuple[np.ndarray, Placement] | None:
+        """Plan from where the arm is, with the pose in the hand ``(4, 4)`` that was measured: the goal and the way to it."""
+        planned = 0
+        for goal in self._with_room(problem, held, gripper_to_object):
+            found = self._arm.plan_place(problem, held, joints_rad, gripper_to_object, goal, True)
+            if found is not None:
+                return goal, found
+            planned += 1
+            if planned == MOST_PLANNED:
+                break
+        return None
+
+    def _with_room(
+        self, problem: PickPlaceProblem, held: Held, gripper_to_object: np.ndarray
+    ) -> Iterator[np.ndarray]:
+        """Yield the goals at which the hand alone is free: where it lets go, above it, and after it has drawn back."""
+        parts = self._arm.parts
+        for goal in self._goals:
+            there = goal @ gripper_to_object
+            if parts.known.out_of_reach(there):
+                continue
+            world = parts.world_of(problem, goal)
+            world.shape_hand(held.grasp)
+            world.hold(gripper_to_object)
+            lowers = world.is_hand_free(Phase.LOWER, there, parts.ends.above(there))
+            if lowers and world.is_hand_free(Phase.RETREAT, there, parts.ends.before(there)):
+                yield goal
+
+
+def put_down_poses(
+    target: PlacedObject,
+    at_rest: Sequence[np.ndarray],
+    workspace: Workspace,
+    base_to_world: np.ndarray,
+    boxes: Sequence[StaticBox],
+    others: Sequence[PlacedObject],
+    release_height_m: float,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, ...]:
+    """Draw poses of a target on the table, in the sector before an arm's base, in the ways that it lies or stands.
+
+    ``at_rest`` are poses ``(4, 4)`` in which it stays, wherever; turned about the vertical at random, those first come first.
+    Each is clear of what stands there, and ``release_height_m`` above the table. None where no table has its top at z = 0.
+    """
+    tables = [box for box in boxes if box.box_to_world[2, 2] > 1 - 1e-9 and abs(_top_m(box)) < TABLE_M]
+    if not tables:
+        return ()
+    table = max(tables, key=lambda box: float(np.prod(box.half_extents_m[:2])))
+    standing = [box for box in boxes if box is not table and _top_m(box) > TABLE_M]
+    taken = [footprint_at(each.body, each.object_to_world) for each in others] + [_footprint(box) for box in standing]
+    points, found = np.concatenate(target.body.hulls), list[tuple[int, np.ndarray]]()
+    for number in range(DRAWS):
+        place = number % len(at_rest)
+        angle_rad = rng.uniform(-workspace.half_angle_rad, workspace.half_angle_rad)
+        radius_m, yaw_rad = rng.uniform(workspace.min_radius_m, workspace.max_radius_m), rng.uniform(-np.pi, np.pi)
+        at_m = transform_points(base_to_world, radius_m * np.array([[np.cos(angle_rad), np.sin(angle_rad), 0]]))[0]
+        cos, sin = np.cos(yaw_rad), np.sin(yaw_rad)
+        rotation = np.array([[cos, -sin, 0], [sin, cos, 0], [0, 0, 1.0]]) @ at_rest[place][:3, :3]
+        corners = points @ rotation.T
+        offset = np.array([*(rotation @ target.body.center_of_mass_m)[:2], corners[:, 2].min()])
+        pose = transform(rotation, np.array([*at_m[:2], release_height_m]) - offset)
+        covered = footprint_at(target.body, pose)
+        local = transform_points(inverse(table.box_to_world), np.column_stack([covered, np.zeros(len(covered))]))
+        on_table = bool((np.abs(local[:, :2]) <= table.half_extents_m[:2]).all())
+        if on_table and all(separation_m(covered, each) >= MIN_GAP_M for each in taken):
+            found.append((place, pose))
+            if len(found) == PLACES:
+                break
+    return tuple(pose for _, pose in sorted(found, key=lambda each: each[0]))
+
+
+def _top_m(box: StaticBox) -> float:
+    return float(box.box_to_world[2, 3] + np.abs(box.box_to_world[2, :3]) @ box.half_extents_m)
+
+
+def _footprint(box: StaticBox) -> np.ndarray:
+    signs = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
+    return transform_points(box.box_to_world, signs * box.half_extents_m)[:, :2]
