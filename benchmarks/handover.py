@@ -130,11 +130,12 @@ def main() -> None:
                 for facts, _ in done
                 if facts.evaluation is not None and facts.evaluation.failure is not None
             )
+            unplanned = Counter(pair for facts, _ in done for pair in facts.unplanned)
             replans = sum((facts.replans for facts, _ in done), Counter[str]())
             cpu_s = float(np.median([spent for _, spent in done])) if done else 0.0
             print(
                 f"{twin.category:16} {wrong or 'handover':9} {count} attempts, {executed} executed, "
-                f"{outcomes['kept']} kept, {cpu_s:.1f} CPU-s; {dict(outcomes)} {dict(reasons)} {dict(replans)}",
+                f"{outcomes['kept']} kept, {cpu_s:.1f} CPU-s; {dict(outcomes)} {dict(reasons)} {dict(replans)} {dict(unplanned)}",
                 flush=True,
             )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -24,11 +25,12 @@ from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.skills.handover import Handover
-from manitwin.episodes.skills.hands import check_hand, check_jaws
+from manitwin.episodes.skills.hands import check_hand
 from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.tasks.task_files import TASKS, read_tasks
+from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.robots.load import load_robot
@@ -155,6 +157,14 @@ def _check_twins(dataset: str, scenes: Path) -> None:
     source.check(named)
 
 
+def _with_robot_of(tasks: Sequence[TaskRecord], config: TrajectoriesConfig) -> TrajectoriesConfig:
+    """Return settings with the robot that tasks were made for, where none is named and all are of the same."""
+    robots = {task.robot for task in tasks}
+    if len(robots) != 1 or "robot" in config.model_fields_set:
+        return config
+    return config.model_copy(update={"robot": robots.pop()})
+
+
 def _check_out(out: DatasetRoot, source: EpisodesSource) -> None:
     """Raise UsageError where a folder has episodes of scenes and is to get some of twins alone, or the other way."""
     if not out.exists(CONFIG):
@@ -188,10 +198,13 @@ def make_episodes(
     if not 1 <= count <= LARGEST_COUNT:
         raise UsageError(f"{count:.6g} episodes; ask for 1 or more, at most {LARGEST_COUNT}")
     skill = load_skill(config.skill)
-    robot, source, root = load_robot(config.robot), EpisodesSource.of(place, twins), DatasetRoot(out)
+    source, root = EpisodesSource.of(place, twins), DatasetRoot(out)
+    tasks = [] if source.tasks is None else read_tasks(source.tasks)
+    config = _with_robot_of(tasks, config)
+    robot = load_robot(config.robot)
     check_hand(robot, skill)
-    if source.tasks is not None:
-        check_jaws(robot, "tasks")
+    for name in sorted({step.skill for task in tasks for step in task.steps}):
+        check_hand(robot, load_skill(name))
     _check_out(root, source)
     configuration = {"kind": KIND, "dataset": source.dataset, "scenes": source.scenes, **config.model_dump(mode="json")}
     if source.tasks is not None:
@@ -200,7 +213,7 @@ def make_episodes(
     there = _batches_there(root)
     try:
         if source.tasks is not None:
-            ids = [task.task_id for task in read_tasks(source.tasks)]
+            ids = [task.task_id for task in tasks]
             deal = batches(robot.name, count, config.batch, task_ids=ids, there=there)
         elif source.scenes is None:
             twin_ids = _twins_for(skill, pool_of(source.dataset))

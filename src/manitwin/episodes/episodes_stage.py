@@ -24,7 +24,7 @@ from manitwin.episodes.instructions import episode_instructions
 from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
-from manitwin.episodes.planning.two_arms import TwoArmPlanner
+from manitwin.episodes.planning.two_arms import planner_of
 from manitwin.episodes.sealing_surface import with_surface
 from manitwin.episodes.setting import Setting, scene_setting, table_setting
 from manitwin.episodes.settings import TrajectoriesConfig
@@ -74,8 +74,7 @@ class EpisodesStage:
 
     @cached_property
     def _planner(self) -> PickPlacePlanner:
-        planner = TwoArmPlanner if self._robot.arms else PickPlacePlanner
-        return planner(self._robot, timestep_s=self.settings.episode.timestep_s)
+        return planner_of(self._robot, self.settings.episode.timestep_s)
 
     @cached_property
     def _source(self) -> TwinSource:

@@ -17,6 +17,7 @@ from manitwin.episodes.execution import Execution
 from manitwin.episodes.goals.goal import Goal
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase, PickPlaceProblem
+from manitwin.episodes.planning.two_arms import TwoArmPlanner, alone
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.contacts import NONE_MEANT
@@ -80,11 +81,13 @@ def merged(goals: Sequence[SkillGoal]) -> SkillGoal:
 
 
 def course_of(start: Start, facts: EpisodeFacts) -> Course:
-    """Return the course of a start's goal."""
-    if start.skill_goal is not None and start.skill_goal.pushes:
-        return PushCourse(start, facts)
+    """Return the course of a start's goal; what one arm does alone is done by the first of two."""
     if start.skill_goal is not None and start.skill_goal.hands_over:
         return HandoverCourse(start, facts)
+    if isinstance(start.planner, TwoArmPlanner):
+        start = replace(start, planner=start.planner.alone)
+    if start.skill_goal is not None and start.skill_goal.pushes:
+        return PushCourse(start, facts)
     held = start.skill_goal is not None and start.skill_goal.is_of_a_path
     return HeldCourse(start, facts) if held else PickPlaceCourse(start, facts)
 
@@ -152,7 +155,7 @@ def _goal_now(step: Step, around: Surroundings, target: int, seed: int) -> Skill
 def _way_home(planner: Planner, problem: PickPlaceProblem, joints_rad: np.ndarray) -> Motion | None:
     """Return the motion of the open hand, which has let go of everything, to where every plan begins."""
     assert isinstance(planner, PickPlacePlanner), "sequences are planned with the models of this planner"
-    parts = planner.parts
+    parts = alone(planner).parts
     world = parts.world_of(problem, problem.goal_object_to_world)
     rng = np.random.default_rng((problem.seed, 5))
     found = parts.motions.free(world.arm, Phase.REACH, joints_rad, parts.arm.home, rng)

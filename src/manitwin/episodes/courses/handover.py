@@ -53,6 +53,7 @@ class HandoverCourse(Course):
             start.settings.release_height_m,
             self._rng(9),
         )
+        self._giver_is_home = False
         self._put_down, self._goal = self._arms.put_down(self.problem, goals), start.problem.goal_object_to_world
 
     @property
@@ -113,13 +114,20 @@ class HandoverCourse(Course):
         execution.use(TAKER)
         execution.wait_s(Phase.HOLD, HOLD_S)
         self.check_held(execution)
-        self._set_down(Held(take.grasp, take.gripper_to_object), execution)
+        self._set_down(take, execution)
 
-    def _set_down(self, held: Held, execution: Execution) -> None:
+    def _set_down(self, take: Take, execution: Execution) -> None:
         """Carry the target to the table before the second arm, let go and go home; raises Ended where there is no way."""
-        placement = self._placement(held, execution)
+        held = Held(take.grasp, take.gripper_to_object)
+        placement = self._placement(held, execution) if self._giver_is_home else None
         if placement is None:
             self._bring_home(execution)
+            if not self._giver_is_home:
+                taker_rad = execution.commanded_rad
+                execution.use(GIVER)
+                self._bring_giver_home(taker_rad, take, execution)
+                self._giver_rad = execution.commanded_rad
+                execution.use(TAKER)
             placement = self._placement(held, execution)
         if placement is None:
             raise Ended("replan_failed")
@@ -138,7 +146,9 @@ class HandoverCourse(Course):
         execution.open()
         execution.follow(retreat)
         target = replace(self.problem.target, object_to_world=execution.target_to_world())
-        home = self._arms.plan_taker_home(replace(self.problem, target=target), execution.commanded_rad, self._giver_rad)
+        home = self._arms.plan_taker_home(
+            replace(self.problem, target=target), execution.commanded_rad, self._giver_rad
+        )
         if home is not None:
             execution.follow(home)
         execution.use(GIVER)
@@ -194,15 +204,19 @@ class HandoverCourse(Course):
         where = self.problem, execution.target_to_world(), execution.commanded_rad, take.joints_rad, take.grasp
         back = self._arms.plan_withdrawal(*where)
         self.facts.replans["withdrawn" if back is not None else "not_withdrawn"] += 1
-        home: Motion | None = None
         if back is not None:
             execution.follow(back)
-            where = self.problem, execution.target_to_world(), execution.commanded_rad, take.joints_rad, take.grasp
-            home = self._arms.plan_home(*where)
-            self.facts.replans["home" if home is not None else "not_home"] += 1
+            self._bring_giver_home(take.joints_rad, take, execution)
+        self._giver_rad = execution.commanded_rad
+
+    def _bring_giver_home(self, taker_rad: np.ndarray, take: Take, execution: Execution) -> None:
+        """Bring the first arm home around the second, which holds the target, if there is a way."""
+        where = self.problem, execution.target_to_world(), execution.commanded_rad, taker_rad, take.grasp
+        home = self._arms.plan_home(*where)
+        self.facts.replans["home" if home is not None else "not_home"] += 1
+        self._giver_is_home = home is not None
         if home is not None:
             execution.follow(home)
-        self._giver_rad = execution.commanded_rad
 
 
 def meetings(target: PlacedObject, middle_m: np.ndarray, rng: np.random.Generator) -> tuple[HeldPath, ...]:

@@ -11,6 +11,8 @@ import numpy as np
 from gymnasium import spaces
 
 from manitwin.episodes.courses.course import Start
+from manitwin.episodes.environment.action_limits import action_limits
+from manitwin.episodes.environment.arms import Arms, by_arm
 from manitwin.episodes.environment.start_noise import DrawnStart, StartNoise, draw_start
 from manitwin.episodes.episode import closing_of, settled, world_of
 from manitwin.episodes.episode_facts import EpisodeFacts
@@ -28,10 +30,10 @@ from manitwin.episodes.tasks.task_setting import TaskSetting
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.physics.sapien.world import RobotWorld
+from manitwin.robots.robot import Robot
 
 MOST_METRES, MOST_SPEED = 10.0, 100.0
 STARTS_TRIED = 8  # with noise: settled, and refused where something falls or the goal is true already
-HELD_M = 1e-3  # a hand that is told to open less far than this below its widest holds something, or is about to
 
 
 class Painter(Protocol):
@@ -47,11 +49,13 @@ class Painter(Protocol):
 
 
 class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
-    """A task in physics: the arm's joint targets and the fingers' target opening in, states out, 1 for success.
+    """A task in physics: what the joints of arm and hand are told in, states out, 1 for success.
 
-    ``action (n + 1,) float32``: what the arm's n joints are to be at the end of the step, rad, in the order of
-    ``robot.arm_joints``, and the distance between the pads, m; what is beyond the joints' limits is clipped. Within a step
-    targets move evenly from where they were. A hand that closes on something presses the harder the smaller its target is
+    ``action (n + h,) float32``: what the arm's n joints are to be at the end of the step, rad, in the order of
+    ``robot.arm_joints``, and what the hand is told, by ``robot.hand_action_names``: the distance between jaws (m), more than
+    0.5 for a cup's vacuum, or the targets of a hand's joints (rad). Of two arms there are the joints of both, then what both
+    hands are told. What is beyond the limits is clipped. Within a step joints move as ``arms.JointTargets`` says, hands evenly
+    from what they were told. Jaws that close on something press the harder the smaller their target is
     (``FINGER_STIFFNESS_N_M``). ``observation``: see docs/policies.md. ``info``: ``success``, ``failure`` (the first literal
     that is not true, and why), ``literals`` (each with whether it holds).
     """
@@ -61,6 +65,7 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     def __init__(
         self,
         setting: TaskSetting,
+        robot: Robot,
         planner: PickPlacePlanner,
         settings: EpisodeSettings,
         *,
@@ -74,21 +79,20 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         self.task, self.instructions = setting.task, setting.task.instructions
         self.render_mode = "rgb_array" if painter is not None else None
         self._setting, self._planner, self._settings, self._painter = setting, planner, settings, painter
-        self._robot, self._max_steps, self._noise = planner.robot, max_steps, start_noise
+        self._robot, self._max_steps, self._noise = robot, max_steps, start_noise
         self._closing = closing_of(self._robot, settings)
         self._substeps = round(1 / RATE_HZ / settings.timestep_s)
         self._per_look = max(1, int(WATCH_S / settings.timestep_s + 1e-9))
         self._world: RobotWorld | None = None
-        arm, things = planner.arm, len(setting.scene.objects)
-        opening_m = np.float32(self._robot.gripper.opening_m)
-        self._lowest = np.append(arm.lower, -opening_m).astype(np.float32)
-        self._highest = np.append(arm.upper, opening_m).astype(np.float32)
+        arms, things = len(robot.arms) or 1, len(setting.scene.objects)
+        self._lowest, self._highest = action_limits(robot, planner)
         self.action_space = spaces.Box(self._lowest, self._highest)
+        joints = len(robot.arm_joints)
         seen: dict[str, spaces.Space[Any]] = {
-            "joint_positions_rad": _box(2 * np.pi, arm.joints),
-            "joint_velocities_rad_s": _box(MOST_SPEED, arm.joints),
-            "gripper_opening_m": _box(1.0, 1),
-            "tip_pose": _box(MOST_METRES, 7),
+            "joint_positions_rad": _box(2 * np.pi, joints),
+            "joint_velocities_rad_s": _box(MOST_SPEED, joints),
+            self._hand_name: _box(2 * np.pi, len(robot.hand_state_names)),
+            "tip_pose": _box(MOST_METRES, 7 * arms),
             "object_poses": _box(MOST_METRES, things, 7),
         }
         if cameras:
@@ -96,6 +100,11 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
             seen["pictures"] = spaces.Dict(dict.fromkeys(cameras, picture))
         self._seen = seen
         self.observation_space = spaces.Dict(seen)
+
+    @property
+    def _hand_name(self) -> str:
+        """What the hand's state is called in observations."""
+        return "gripper_opening_m" if self._robot.has_jaws else "hand"
 
     @property
     def object_names(self) -> tuple[str, ...]:
@@ -115,9 +124,9 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         start, world, drawn = self._begun()
         start.moved, start.partners = self._setting.sequence.moved, self._setting.sequence.partners
         self._start, self._steps = start, 0
-        self._target_rad = np.array(self._robot.home_rad if drawn is None else drawn.joints_rad, float)
-        self._opening_target_m = float(self._robot.gripper.opening_m)
-        self._velocities = np.zeros(len(self._target_rad))
+        start_rad = np.array(self._robot.home_rad if drawn is None else drawn.joints_rad, float)
+        self._arms = Arms(world, self._closing, start_rad, (self._lowest, self._highest))
+        self._velocities = np.zeros(len(start_rad))
         self._watches = self._event_watches(start, world)
         self._poses = deque([self._object_poses()], maxlen=REST_ROWS)
         self._pressing = deque([self._pairs()], maxlen=STILL_ROWS)
@@ -130,7 +139,8 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         if world is None:
             raise UsageError("step before reset; call reset first")
         told = np.clip(np.asarray(action, float), self._lowest, self._highest)
-        self._move(world, told[:-1], float(told[-1]))
+        joints = len(self._robot.arm_joints)
+        self._move(world, told[:joints], told[joints:])
         self._steps += 1
         self._poses.append(self._object_poses())
         self._pressing.append(self._pairs())
@@ -177,7 +187,8 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
         self._leave()
         self._world = world = world_of(problem, self._robot, self._settings, self._closing.force_n)
         if joints_rad is not None:
-            world.robot.set_state(joints_rad, float(self._robot.gripper.opening_m))
+            for arm, part in zip(world.robots, by_arm(world, joints_rad), strict=True):
+                arm.put(part, arm.robot.open_hand)
         return settled(problem, self._planner, self._settings, self._setting.goal, world), world
 
     def _leave(self) -> None:
@@ -186,26 +197,19 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
             world, self._world = self._world, None
             world.__exit__(None, None, None)
 
-    def _move(self, world: RobotWorld, joints_rad: np.ndarray, opening_m: float) -> None:
-        dt, count = self._settings.timestep_s, self._substeps
-        before_rad, before_m = self._target_rad, self._opening_target_m
-        velocities = (joints_rad - before_rad) / (count * dt)
-        world.expect_load(min(opening_m, before_m) < self._robot.gripper.opening_m - HELD_M)
-        for number in range(1, count + 1):
-            share = number / count
-            at = before_rad + share * (joints_rad - before_rad)
-            # as episodes do: the drives pull to where the arm is to be in the middle of the step
-            world.robot.set_targets(at - velocities * (dt / 2), velocities)
-            world.robot.set_opening_target(before_m + share * (opening_m - before_m))
-            last = world.robot.joint_positions() if number == count else None
+    def _move(self, world: RobotWorld, joints_rad: np.ndarray, hand: np.ndarray) -> None:
+        arms, dt, count = self._arms, self._settings.timestep_s, self._substeps
+        world.expect_load(arms.may_hold(hand))
+        for number in arms.towards(joints_rad, hand, count):
+            last = arms.joint_positions() if number == count else None
             world.step()
-            if self._watches and number % self._per_look == 0:
+            if number % self._per_look == 0 and (self._watches or arms.feel):
                 contacts = world.contacts.read()
+                arms.look(contacts)
                 for watch in self._watches:
                     watch.look(world.contacts, contacts, self._steps / RATE_HZ + number * dt)
             if last is not None:
-                self._velocities = (world.robot.joint_positions() - last) / dt
-        self._target_rad, self._opening_target_m = joints_rad, opening_m
+                self._velocities = (arms.joint_positions() - last) / dt
 
     def _event_watches(self, start: Start, world: RobotWorld) -> list[EventWatch]:
         """Return what latches the events of every step's goal, as its course in an episode would."""
@@ -247,12 +251,11 @@ class TaskEnvironment(gymnasium.Env[dict[str, Any], np.ndarray]):
     def _observation(self) -> dict[str, Any]:
         world = self._world
         assert world is not None
-        joints = world.robot.joint_positions()
         seen: dict[str, Any] = {
-            "joint_positions_rad": joints,
+            "joint_positions_rad": self._arms.joint_positions(),
             "joint_velocities_rad_s": self._velocities,
-            "gripper_opening_m": np.array([world.robot.opening_m()]),
-            "tip_pose": _pose(world.robot.gripper_pose()),
+            self._hand_name: self._arms.hands(),
+            "tip_pose": np.concatenate([_pose(arm.gripper_pose()) for arm in world.robots]),
             "object_poses": np.array([_pose(pose) for pose in self._poses[-1]]),
         }
         found: dict[str, Any] = {}

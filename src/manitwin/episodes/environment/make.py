@@ -9,9 +9,10 @@ from pathlib import Path
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.environment.environment import TaskEnvironment
 from manitwin.episodes.environment.start_noise import StartNoise
-from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.two_arms import planner_of
 from manitwin.episodes.settings import EpisodeSettings
-from manitwin.episodes.skills.hands import check_jaws
+from manitwin.episodes.skills.hands import check_hand
+from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.target_grasps import TargetGrasp, usable_grasps
 from manitwin.episodes.tasks.task_files import one_task
 from manitwin.episodes.tasks.task_setting import task_setting
@@ -48,8 +49,9 @@ def make_env(
         raise UsageError(f"{folder / CONFIG}: does not say of which scenes its tasks are; {_REMEDY}")
     dataset = said["dataset"] if twins is None else DatasetRoot(twins).absolute()
     settings, chosen = EpisodeSettings(), load_robot(task.robot if robot is None else robot)
-    check_jaws(chosen, "environments")
-    source, planner = TwinSource(dataset), PickPlacePlanner(chosen, timestep_s=settings.timestep_s)
+    for step in task.steps:
+        check_hand(chosen, load_skill(step.skill))
+    source, planner = TwinSource(dataset), planner_of(chosen, settings.timestep_s)
 
     @lru_cache(maxsize=64)
     def grasps(twin_id: str) -> tuple[TargetGrasp, ...]:
@@ -67,6 +69,7 @@ def make_env(
         painter = WorldPainter(setting, source, chosen, cameras, picture_px)
     return TaskEnvironment(
         setting,
+        chosen,
         planner,
         settings,
         max_steps=max_steps,

@@ -9,6 +9,7 @@ import numpy as np
 from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.replay_pictures import EpisodeReplay, twin_drawable
 from manitwin.episodes.tasks.task_setting import TaskSetting
+from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.render.device import require_renderer
 from manitwin.robots.robot import Robot
@@ -37,8 +38,8 @@ class WorldPainter:
         poses = [world.object_to_world(number) for number in range(len(world.placed))]
         pictures = self._replay.picture(
             poses,
-            world.robot.joint_positions(),
-            np.array([world.robot.opening_m()]),
+            np.concatenate([arm.joint_positions() for arm in world.robots]),
+            np.concatenate([_hand_of(arm) for arm in world.robots]),
             self._cameras,
             size_px=self._size_px,
         )
@@ -47,3 +48,8 @@ class WorldPainter:
     def close(self) -> None:
         """Give back what the driver holds."""
         self._replay.close()
+
+
+def _hand_of(arm: SapienRobot) -> np.ndarray:
+    """Return a hand's state ``(h,)`` as recordings have it."""
+    return np.array([arm.opening_m()]) if arm.robot.has_jaws else arm.hand_positions()

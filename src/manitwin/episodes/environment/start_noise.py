@@ -10,6 +10,7 @@ import numpy as np
 
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Phase, PickPlaceProblem
+from manitwin.episodes.planning.two_arms import TwoArmPlanner
 from manitwin.episodes.tasks.task_setting import TaskSetting
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform, transform_points
@@ -72,8 +73,8 @@ def draw_start(
     its free ways. Raises UsageError where so many draws were all refused.
     """
     problem, moves = _with_objects_moved(noise, setting, planner, rng)
-    joints_rad = _joints(noise, problem, planner, rng)
-    return DrawnStart(problem, joints_rad, joints_rad - planner.robot.home_rad, moves)
+    joints_rad, home_rad = _joints(noise, problem, planner, rng)
+    return DrawnStart(problem, joints_rad, joints_rad - home_rad, moves)
 
 
 def _with_objects_moved(
@@ -143,6 +144,18 @@ def _in_reach(object_to_world: np.ndarray, center_of_mass_m: np.ndarray, planner
 
 
 def _joints(
+    noise: StartNoise, problem: PickPlaceProblem, planner: PickPlacePlanner, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the joints of all arms, and where they are at home."""
+    if not isinstance(planner, TwoArmPlanner):
+        return _of_one_arm(noise, problem, planner, rng), planner.arm.home
+    taker = planner.taker
+    first = _of_one_arm(noise, planner.with_taker_at(problem, taker.arm.home, None), planner, rng)
+    second = _of_one_arm(noise, planner.with_giver_at(problem, first), taker, rng)
+    return np.concatenate([first, second]), np.concatenate([planner.arm.home, taker.arm.home])
+
+
+def _of_one_arm(
     noise: StartNoise, problem: PickPlaceProblem, planner: PickPlacePlanner, rng: np.random.Generator
 ) -> np.ndarray:
     home_rad, arm = np.array(planner.robot.home_rad, float), planner.arm

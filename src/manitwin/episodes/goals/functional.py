@@ -7,7 +7,7 @@ from scipy.spatial import ConvexHull
 
 from manitwin.episodes.goals.goal import Literal
 from manitwin.episodes.goals.spatial import Judgement, judged
-from manitwin.episodes.goals.world_state import ROBOT, Event, Granules, Hole, ObjectState, Peg, WorldState
+from manitwin.episodes.goals.world_state import Event, Granules, Hole, ObjectState, Peg, WorldState
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.hull_holes import enclosed_share
 from manitwin.geometry.poses import inverse, transform_points
@@ -127,7 +127,7 @@ def hung(state: WorldState, literal: Literal) -> Judgement:
             and (off_m <= thing.hole.radius_m + HANG_SLACK_M or _encloses(thing, thing.hole, peg)),
             "not_touching": state.touch(literal.subject, literal.second),
             "on_furniture": not state.neighbours(literal.subject) & state.furniture,
-            "not_released": not state.touch(literal.subject, ROBOT),
+            "not_released": not state.is_handled(literal.subject),
             "moving": thing.at_rest,
         },
         {"along_m": along_m, "off_m": off_m},
@@ -152,8 +152,8 @@ def inserted(state: WorldState, literal: Literal) -> Judgement:
             "lying": angle_rad <= INSERTED_RAD,
             "not_deep": literal.value <= below_m <= into.depth_m + INSERTED_SLACK_M,
             "not_touching": bool(touched & into.bodies),
-            "held_by_something_else": touched <= into.bodies | {ROBOT},
-            "not_released": ROBOT not in touched,
+            "held_by_something_else": touched <= into.bodies | state.robots,
+            "not_released": not touched & state.robots,
             "moving": thing.at_rest,
         },
         {"off_m": off_m, "below_rim_m": below_m, "angle_rad": angle_rad},
@@ -176,7 +176,7 @@ def handed_over(state: WorldState, literal: Literal) -> Judgement:
     return judged(
         {
             "low": values["rise_m"] >= literal.value,
-            "not_released": not touched & frozenset(state.arms),
+            "not_released": not touched & state.robots,
             "not_put_down": bool(touched) and touched <= state.furniture,
             "dropped": values["fell_m"] <= FELL_M,
             "moving": thing.at_rest,

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from manitwin.episodes.goals.goal import Literal
-from manitwin.episodes.goals.world_state import ROBOT, ObjectState, WorldState
+from manitwin.episodes.goals.world_state import ObjectState, WorldState
 from manitwin.geometry.boxes import separation_m
 from manitwin.geometry.poses import rotation_angle_rad, transform_points
 
@@ -78,7 +78,7 @@ def on(state: WorldState, literal: Literal) -> Judgement:
     moved, other = _both(state, literal)
     base = other.footprint_m
     outside_m = separation_m(base, moved.center_of_mass_m[None, :2] + _DOT_M)
-    strange = state.neighbours(literal.subject) - {literal.second, ROBOT}
+    strange = state.neighbours(literal.subject) - {literal.second} - state.robots
     return judged(
         {
             "not_touching": state.touch(literal.subject, str(literal.second)),
@@ -105,7 +105,7 @@ def inside(state: WorldState, literal: Literal) -> Judgement:
     center = transform_points(vessel.object_to_world, opening.center_m[None])[0]
     off_axis_m = float(np.linalg.norm(moved.center_of_mass_m[:2] - center[:2]))
     below_m = float(center[2] - moved.points_m[:, 2].min())
-    touched = state.neighbours(literal.subject) - {ROBOT}
+    touched = state.neighbours(literal.subject) - state.robots
     return judged(
         {
             "turned_over": up >= OPENS_UPWARD,
@@ -132,7 +132,7 @@ def lifted(state: WorldState, literal: Literal) -> Judgement:
     start_m = transform_points(moved.start_object_to_world, moved.body.center_of_mass_m[None])[0, 2]
     rise_m = float(moved.center_of_mass_m[2] - start_m)
     return judged(
-        {"not_held": state.touch(literal.subject, ROBOT), "too_low": rise_m >= literal.value}, {"rise_m": rise_m}
+        {"not_held": state.is_handled(literal.subject), "too_low": rise_m >= literal.value}, {"rise_m": rise_m}
     )
 
 
@@ -170,7 +170,7 @@ def pushed_to(state: WorldState, literal: Literal) -> Judgement:
             "beside_it": off_m <= literal.value,
             "not_touched": bool(rises_m),
             "lifted": max(rises_m, default=0.0) <= MOST_RISE_M,
-            "not_released": not state.touch(literal.subject, ROBOT),
+            "not_released": not state.is_handled(literal.subject),
             "moving": thing.at_rest,
         },
         {"off_m": off_m, "rise_m": max(rises_m, default=0.0)},
@@ -187,4 +187,4 @@ def _both(state: WorldState, literal: Literal) -> tuple[ObjectState, ObjectState
 
 def _set_down(state: WorldState, name: str) -> dict[str, bool]:
     """Return the conditions of whatever was put somewhere: let go, and still."""
-    return {"not_released": not state.touch(name, ROBOT), "moving": state.of(name).at_rest}
+    return {"not_released": not state.is_handled(name), "moving": state.of(name).at_rest}

@@ -140,6 +140,15 @@ class WorldState:
         """Return a holder; raises UsageError naming those that there are."""
         return self._named(self.holders, name, "holder")
 
+    @property
+    def robots(self) -> frozenset[str]:
+        """The names that robots touch under: those of two arms, or that of the only one."""
+        return frozenset(self.arms or (ROBOT,))
+
+    def is_handled(self, name: str) -> bool:
+        """Tell whether a robot touches an object."""
+        return bool(self.neighbours(name) & self.robots)
+
     def touch(self, first: str, second: str) -> bool:
         """Tell whether two bodies press on each other."""
         return frozenset((first, second)) in self.touching

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
@@ -14,6 +16,7 @@ from manitwin.episodes.planning.kinematic_body import floating_hand_of
 from manitwin.episodes.planning.motions import Motions
 from manitwin.episodes.planning.problem import PickPlaceProblem, PlannerSettings
 from manitwin.episodes.planning.straight_lines import LineEnds
+from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.robot import Robot
 
@@ -27,8 +30,12 @@ class ArmPlanning:
         timestep_s: float = 1 / 120,
         settings: PlannerSettings | None = None,
         opening_m: float | None = None,
+        standing: tuple[PlacedObject, ...] = (),
     ):
-        """Build the models of arm and hand; ``opening_m`` 0: the closed hand, which presses and pushes."""
+        """Build the models of arm and hand; ``opening_m`` 0: the closed hand, which presses and pushes.
+
+        ``standing`` are obstacles of every problem: another arm that does not move.
+        """
         self.robot, self.timestep_s, self.settings = robot, timestep_s, settings or PlannerSettings()
         self.arm = ArmKinematics(robot, opening_m)
         self.hand = floating_hand_of(self.arm.body)
@@ -45,12 +52,14 @@ class ArmPlanning:
         self.motions = Motions(robot, self.arm, timestep_s, self.settings)
         self._shapes = ShapeStore()
         self._world: ProblemWorld | None = None
+        self._standing = standing
+        self._asked: tuple[PickPlaceProblem | None, PickPlaceProblem | None] = None, None
 
     def world_of(
         self, problem: PickPlaceProblem, goal_object_to_world: np.ndarray, *, as_hulls: bool = False
     ) -> ProblemWorld:
         """Return the world of a problem; that of the last one is kept, for what is planned anew in it."""
-        last = self._world
+        problem, last = self._with_standing(problem), self._world
         if last is None or not last.is_of(problem, goal_object_to_world, as_hulls=as_hulls):
             self._world = last = ProblemWorld(
                 problem,
@@ -63,3 +72,13 @@ class ArmPlanning:
                 as_hulls=as_hulls,
             )
         return last
+
+    def _with_standing(self, problem: PickPlaceProblem) -> PickPlaceProblem:
+        """Return a problem with what stands in every one; the same for the same problem."""
+        if not self._standing:
+            return problem
+        asked, found = self._asked
+        if asked is not problem or found is None:
+            found = replace(problem, obstacles=(*problem.obstacles, *self._standing))
+            self._asked = problem, found
+        return found

@@ -22,15 +22,23 @@ from manitwin.episodes.planning.problem import (
     PlanReport,
     later,
 )
+from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.robot import Robot
 
 
 class PickPlacePlanner:
     """Plans for one robot; deterministic for a problem's seed, with work counted and never timed."""
 
-    def __init__(self, robot: Robot, timestep_s: float = 1 / 120, settings: PlannerSettings | None = None):
-        """Build the models of arm and hand."""
-        self.parts = parts = ArmPlanning(robot, timestep_s, settings)
+    def __init__(
+        self,
+        robot: Robot,
+        timestep_s: float = 1 / 120,
+        settings: PlannerSettings | None = None,
+        standing: tuple[PlacedObject, ...] = (),
+    ):
+        """Build the models of arm and hand; ``standing`` are obstacles of every problem: another arm that does not move."""
+        self.parts = parts = ArmPlanning(robot, timestep_s, settings, standing=standing)
+        self._standing = standing
         self.robot, self.settings, self.arm = robot, parts.settings, parts.arm
         self._ends, self._candidates, self._solutions = parts.ends, parts.candidates, parts.solutions
         self._motions, self._world_of = parts.motions, parts.world_of
@@ -39,7 +47,7 @@ class PickPlacePlanner:
     @cached_property
     def closed(self) -> ArmPlanning:
         """The same arm with a closed hand, which presses and pushes."""
-        return ArmPlanning(self.robot, self.parts.timestep_s, self.settings, opening_m=0.0)
+        return ArmPlanning(self.robot, self.parts.timestep_s, self.settings, opening_m=0.0, standing=self._standing)
 
     def tip_pose(self, joint_positions_rad: np.ndarray) -> np.ndarray:
         """Return the twin's grasp frame in the world ``(4, 4)`` (+Z approach, X closing)."""

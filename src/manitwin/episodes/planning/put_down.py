@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -33,12 +34,12 @@ class PutDown:
     """Goals of one problem for one arm, and which of them a grasp can be let go at; deterministic for the problem's seed."""
 
     def __init__(self, arm: PickPlacePlanner, problem: PickPlaceProblem, goals: Sequence[np.ndarray]):
-        """Take poses ``(4, 4)`` of the target at rest, best first; the other arm is an obstacle of ``problem``, out of the way."""
+        """Take poses ``(4, 4)`` of the target at rest, best first; the other arm is an obstacle of ``problem``, at home."""
         self._arm, self._problem, self._goals = arm, problem, tuple(goals)
         self._found: dict[tuple[str, bytes], np.ndarray | None] = {}
 
     def goal_of(self, held: Held) -> np.ndarray | None:
-        """Return the first goal ``(4, 4)`` that the arm can put the target down at with a grasp, from home; None: there is none."""
+        """Return the first goal ``(4, 4)`` at which a grasp can put the target down, the arm coming from home; None: no goal."""
         key = held.grasp.grasp_id, held.gripper_to_object.tobytes()
         if key not in self._found:
             home = self._arm.arm.home
@@ -50,19 +51,13 @@ class PutDown:
         self, problem: PickPlaceProblem, held: Held, joints_rad: np.ndarray, gripper_to_object: np.ndarray
     ) -> tuple[np.ndarray, Placement] | None:
         """Plan from where the arm is, with the pose in the hand ``(4, 4)`` that was measured: the goal and the way to it."""
-        planned = 0
-        for goal in self._with_room(problem, held, gripper_to_object):
+        for goal in islice(self._with_room(problem, held, gripper_to_object), MOST_PLANNED):
             found = self._arm.plan_place(problem, held, joints_rad, gripper_to_object, goal, True)
             if found is not None:
                 return goal, found
-            planned += 1
-            if planned == MOST_PLANNED:
-                break
         return None
 
-    def _with_room(
-        self, problem: PickPlaceProblem, held: Held, gripper_to_object: np.ndarray
-    ) -> Iterator[np.ndarray]:
+    def _with_room(self, problem: PickPlaceProblem, held: Held, gripper_to_object: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the goals at which the hand alone is free: where it lets go, above it, and after it has drawn back."""
         parts = self._arm.parts
         for goal in self._goals:

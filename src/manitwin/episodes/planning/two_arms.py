@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -69,6 +70,12 @@ class TwoArmPlanner(PickPlacePlanner):
         self.taker = PickPlacePlanner(taker, timestep_s, settings)
         self._giver_shapes, self._taker_shapes = ArmObstacles(giver), ArmObstacles(taker)
         self._tip_m = np.array([[0.0, 0, giver.gripper.tip_depth_m]])
+
+    @cached_property
+    def alone(self) -> PickPlacePlanner:
+        """The planner of the first arm for what it does alone, the second one at home, its hand open."""
+        resting = self._taker_shapes.at(self.taker.arm.home, (self._open_m,))
+        return PickPlacePlanner(self.robot, self.parts.timestep_s, self.settings, resting)
 
     def plan_handover(
         self, problem: PickPlaceProblem, meetings: Sequence[HeldPath], put_down: PutDown, *, longest_s: float
@@ -168,9 +175,7 @@ class TwoArmPlanner(PickPlacePlanner):
         found = self.parts.motions.free(world.arm, Phase.REACH, giver_rad, self.arm.home, rng)
         return replace(found, phase=Phase.RETURN) if isinstance(found, Motion) else None
 
-    def plan_taker_home(
-        self, problem: PickPlaceProblem, taker_rad: np.ndarray, giver_rad: np.ndarray
-    ) -> Motion | None:
+    def plan_taker_home(self, problem: PickPlaceProblem, taker_rad: np.ndarray, giver_rad: np.ndarray) -> Motion | None:
         """Plan the second arm's way home with its hand empty and open; None: there is none."""
         asked, parts = self.with_giver_at(problem, giver_rad), self.taker.parts
         world, rng = parts.world_of(asked, problem.target.object_to_world), np.random.default_rng((problem.seed, 10))
@@ -231,3 +236,13 @@ class TwoArmPlanner(PickPlacePlanner):
     def _are_apart(self, first: np.ndarray, second: np.ndarray) -> bool:
         tips = [transform_points(pose, self._tip_m)[0] for pose in (first, second)]
         return float(np.linalg.norm(tips[0] - tips[1])) >= APART_M
+
+
+def planner_of(robot: Robot, timestep_s: float) -> PickPlacePlanner:
+    """Return the planner of a robot of one arm, or of two."""
+    return (TwoArmPlanner if robot.arms else PickPlacePlanner)(robot, timestep_s=timestep_s)
+
+
+def alone(planner: PickPlacePlanner) -> PickPlacePlanner:
+    """Return the planner of what one arm does alone: of two arms that of the first."""
+    return planner.alone if isinstance(planner, TwoArmPlanner) else planner

@@ -17,18 +17,21 @@ def wants_jaws(skill: Skill | None) -> bool:
     return isinstance(skill, HeldSkill | Push | Handover)
 
 
+def skills_of(robot: Robot) -> tuple[Skill, ...]:
+    """Return the skills that a robot's arms and hand can do; what one arm does alone, the first of two does."""
+    return tuple(skill for skill in SKILLS.values() if _has_arms(robot, skill) and _has_hand(robot, skill))
+
+
 def check_hand(robot: Robot, skill: Skill | None) -> None:
     """Raise UsageError where a robot's arms or hand are none for a skill, naming what would do."""
-    if isinstance(skill, Handover) and not robot.arms:
+    if skill is not None and not _has_arms(robot, skill):
         raise UsageError(
             f"skill {skill.name} wants two arms, {robot.name} has one; "
             f"give one of {', '.join(shipped_two_arms())}, or a .toml file of two arms"
         )
-    if robot.arms and not isinstance(skill, Handover):
-        raise UsageError(_of_one_arm(f"skill {PICK_PLACE if skill is None else skill.name} wants", robot))
-    if robot.has_jaws or skill is None or not wants_jaws(skill):
+    if skill is None or _has_hand(robot, skill):
         return
-    others = ", ".join([PICK_PLACE, *(name for name, each in SKILLS.items() if not wants_jaws(each))])
+    others = ", ".join([PICK_PLACE, *(each.name for each in skills_of(robot))])
     raise UsageError(
         f"skill {skill.name} wants a hand of two jaws, {robot.name} has {robot.gripper.name} ({robot.gripper.kind}); "
         f"give one of {_with_jaws()}, or with this robot one of the skills {others}"
@@ -36,9 +39,9 @@ def check_hand(robot: Robot, skill: Skill | None) -> None:
 
 
 def check_jaws(robot: Robot, what: str) -> None:
-    """Raise UsageError where a robot has no two jaws, which ``what`` is made for."""
+    """Raise UsageError where a robot is none of one arm with two jaws, which ``what`` is made for."""
     if robot.arms:
-        raise UsageError(_of_one_arm(f"{what} want", robot))
+        raise UsageError(f"{what} want one arm, {robot.name} has two; give one of {_with_jaws()}")
     if not robot.has_jaws:
         raise UsageError(
             f"{what} want a hand of two jaws, {robot.name} has {robot.gripper.name} ({robot.gripper.kind}); "
@@ -46,8 +49,12 @@ def check_jaws(robot: Robot, what: str) -> None:
         )
 
 
-def _of_one_arm(who_wants: str, robot: Robot) -> str:
-    return f"{who_wants} one arm, {robot.name} has two, for the skill {Handover.name}; give one of {_with_jaws()}"
+def _has_arms(robot: Robot, skill: Skill) -> bool:
+    return skill.arms <= max(1, len(robot.arms))
+
+
+def _has_hand(robot: Robot, skill: Skill) -> bool:
+    return robot.has_jaws or not wants_jaws(skill)
 
 
 def _with_jaws() -> str:

@@ -46,9 +46,6 @@ _SKILLS: tuple[Skill, ...] = (
 
 SKILLS: Mapping[str, Skill] = {skill.name: skill for skill in _SKILLS}
 
-ONE_ARM_SKILLS: Mapping[str, Skill] = {name: skill for name, skill in SKILLS.items() if skill.arms == 1}
-"""Those that tasks are made of."""
-
 
 def skill_names() -> tuple[str, ...]:
     """Return the names of all skills, pick-and-place first."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from manitwin.episodes.goals.evaluation import evaluate
 from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.naming import tells_apart
-from manitwin.episodes.skills.registry import ONE_ARM_SKILLS
+from manitwin.episodes.skills.hands import skills_of
 from manitwin.episodes.tasks.task_record import kind_of
 from manitwin.episodes.tasks.task_scene import TaskScene
 
@@ -58,7 +58,7 @@ def single_actions(scene: TaskScene, dropped: Counter[str]) -> list[Action]:
             dropped[why] += 1
     twins = [scene.pool.twin(each.twin_id) for each in scene.objects]
     unnamed = {number for number in range(len(scene.objects)) if not _is_named(scene, number)}
-    for skill in ONE_ARM_SKILLS.values():
+    for skill in skills_of(scene.robot):
         for target in able:
             partners = [each for each in range(len(twins)) if each != target] if skill.has_partner else [None]
             for partner in partners:

@@ -8,18 +8,19 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict, create_model
 
-from manitwin.episodes.skills.registry import ONE_ARM_SKILLS
+from manitwin.episodes.skills.hands import skills_of
 from manitwin.episodes.tasks.candidates import Action, Candidate, single_actions, undoes
 from manitwin.episodes.tasks.task_scene import TaskScene
 from manitwin.models.vlm.client import ChatClient
 from manitwin.models.vlm.protocol import Question
 from manitwin.models.vlm.strict_schema import strict_schema
 from manitwin.models.vlm.structured import ask
+from manitwin.robots.robot import Robot
 
 NOTHING = "nothing"
 MOST_LITERALS = 2
 INSTRUCTIONS = (
-    "You propose tasks for a robot arm with a two-finger gripper at a table. A task is a goal: one or two literals that are to"
+    "You propose tasks for {robot} at a table. A task is a goal: one or two literals that are to"
     " become true one after the other, each a predicate about an object and, where it needs one, a second object. Propose what a"
     " person would want done with these things. Use only the predicates and the objects that are listed, and answer in JSON."
 )
@@ -31,7 +32,12 @@ def propose(scene: TaskScene, chat: ChatClient, count: int) -> tuple[list[Candid
     Raises what the model raises, BadReply for an answer that is not of the schema.
     """
     answer = answer_type(scene)
-    question = Question("task_proposals", INSTRUCTIONS, (described(scene, count),), strict_schema(answer))
+    question = Question(
+        "task_proposals",
+        INSTRUCTIONS.format(robot=_who(scene.robot)),
+        (described(scene, count),),
+        strict_schema(answer),
+    )
     said: Any = ask(chat, question, answer).value
     possible = {_key(action): action for action in single_actions(scene, Counter())}
     found, thrown = list[Candidate](), Counter[str]()
@@ -55,7 +61,7 @@ def answer_type(scene: TaskScene) -> type[BaseModel]:
     """Return the type of an answer: the objects' names and the predicates of all skills are enumerations."""
     names = Enum("Object", {name: name for name in scene.names}, type=str)  # type: ignore[misc]
     seconds = Enum("Second", {name: name for name in (*scene.names, NOTHING)}, type=str)  # type: ignore[misc]
-    known = sorted({skill.predicate for skill in ONE_ARM_SKILLS.values()})
+    known = sorted({skill.predicate for skill in skills_of(scene.robot)})
     predicates = Enum("Predicate", {name: name for name in known}, type=str)  # type: ignore[misc]
     strict = ConfigDict(extra="forbid")
     literal = create_model("Literal", __config__=strict, predicate=(predicates, ...), a=(names, ...), b=(seconds, ...))
@@ -73,9 +79,16 @@ def described(scene: TaskScene, count: int) -> str:
         x_m, y_m = placed.object_to_world[:2, 3]
         lines.append(f"- {placed.name}: {language.category if language else 'unknown'} at x {x_m:.2f}, y {y_m:.2f}")
     lines.append("The predicates; b is an object, or nothing:")
-    told = {skill.predicate: skill.has_partner for skill in ONE_ARM_SKILLS.values()}
+    told = {skill.predicate: skill.has_partner for skill in skills_of(scene.robot)}
     lines += [f"- {name}(a, b)" if pair else f"- {name}(a), b nothing" for name, pair in sorted(told.items())]
     return "\n".join(lines)
+
+
+def _who(robot: Robot) -> str:
+    if robot.arms:
+        return "two robot arms with two-finger grippers that face each other"
+    hands = {"parallel": "a two-finger gripper", "suction": "a suction cup"}
+    return f"a robot arm with {hands.get(robot.gripper.kind, 'a hand of several fingers')}"
 
 
 def _why_not(actions: list[Action | None], literals: int, chosen: list[Action]) -> str | None:

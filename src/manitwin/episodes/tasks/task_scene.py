@@ -11,6 +11,7 @@ import numpy as np
 from manitwin.episodes.goals.world_state import ObjectState, WorldState
 from manitwin.episodes.pick_place_tasks import PlacingArea
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
+from manitwin.episodes.sealing_surface import with_surface
 from manitwin.episodes.sequence import Step
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings, openings_of
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled
@@ -32,8 +33,9 @@ class TaskScene:
 
     @cached_property
     def objects(self) -> tuple[PlacedObject, ...]:
-        """The objects in the order of their names, which is that of an episode's world."""
-        return tuple(sorted(self.scene.placed_objects(), key=lambda each: each.name))
+        """The objects in the order of their names, which is that of an episode's world; with what a cup seals on."""
+        placed = sorted(self.scene.placed_objects(), key=lambda each: each.name)
+        return tuple(with_surface(each, self.scene.twin(each.twin_id), self.robot.gripper) for each in placed)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from manitwin.engine.stage import Draft, Stage, tell_part
 from manitwin.engine.stage_runner import StageCost
 from manitwin.engine.task import Payload
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.two_arms import planner_of
 from manitwin.episodes.settings import TasksConfig
 from manitwin.episodes.target_grasps import TargetGrasp, usable_grasps
 from manitwin.episodes.tasks.candidates import Candidate
@@ -86,7 +87,7 @@ class TasksStage:
 
     @cached_property
     def _planner(self) -> PickPlacePlanner:
-        return PickPlacePlanner(self._robot, timestep_s=self.settings.episode.timestep_s)
+        return planner_of(self._robot, self.settings.episode.timestep_s)
 
     @cached_property
     def _source(self) -> TwinSource:

@@ -13,7 +13,6 @@ from manitwin.engine.drive import RunOptions, RunReport, drive
 from manitwin.engine.ledger.location import CONFIG
 from manitwin.episodes.episodes_run import EpisodesSource
 from manitwin.episodes.settings import TasksConfig
-from manitwin.episodes.skills.hands import check_jaws
 from manitwin.episodes.tasks.bddl import write_bddl
 from manitwin.episodes.tasks.task_files import TASKS, read_tasks, write_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
@@ -62,7 +61,7 @@ def make_tasks(
     Scenes whose tasks are there are left. Raises UsageError for a place without scenes, an unknown robot or model, an ``out``
     with tasks of other settings, or where another run is at work there.
     """
-    check_jaws(load_robot(config.robot), "tasks")
+    load_robot(config.robot)
     chat_of(config.vlm, "propose tasks")
     source, root = EpisodesSource.of(scenes, twins), DatasetRoot(out)
     if source.scenes is None:

@@ -36,6 +36,10 @@ class HandControl(Protocol):
         """Whether it holds what it closes on as hard as it should."""
         ...
 
+    def tell(self, told: np.ndarray) -> None:
+        """Tell it ``(h,)``, as a policy does; what it held it lets go of where that says so."""
+        ...
+
     def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
         """Take the first of a grasp's joints ``(2, J)``, those before closing and those to close to; others do nothing."""
         ...

@@ -24,6 +24,7 @@ from manitwin.robots.grippers.suction import SuctionGripper
 
 # Of the sealed bellows: 1 kg hangs 1 mm lower, and turns by 1 degree with its weight 9 cm beside the lip.
 STIFFNESS_N_M, DAMPING_N_S_M = 1e4, 100.0
+VACUUM_ON = 0.5  # what is told of the vacuum is 0 or 1
 TURN_STIFFNESS_NM_RAD, TURN_DAMPING_NM_S_RAD = 50.0, 1.0
 
 
@@ -64,6 +65,13 @@ class CupControl:
         """Whether it has sealed."""
         return self._sealed is not None
 
+    def tell(self, told: np.ndarray) -> None:
+        """Switch the vacuum on where more than a half is told, else off."""
+        on = float(told[0]) > VACUUM_ON
+        if self._on and not on:
+            self._let_go()
+        self._on = on
+
     def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
         """Stay as it is."""
         return iter(())
@@ -87,20 +95,21 @@ class CupControl:
         if self._sealed is not None:
             self._bear(self._sealed, contacts)
         elif self._on:
-            placed = self._world.placed[self._world.target]
-            if self._world.contacts.push(contacts, placed.name, frozenset({self._lip_name})) is not None:
-                self._try_to_seal(self._world.target)
+            for number, placed in enumerate(self._world.placed):
+                touched = self._world.contacts.push(contacts, placed.name, frozenset({self._lip_name})) is not None
+                if touched and self._try_to_seal(number):
+                    break
 
     def touches(self, touches: Touches) -> Touches:
         """Return how hard the lip presses on the target: the vacuum's force less what pulls at it; 0 where it is not sealed."""
         return Touches((self._pressure_n, self._pressure_n), touches.on_support)
 
-    def _try_to_seal(self, number: int) -> None:
+    def _try_to_seal(self, number: int) -> bool:
         lip_to_world = self._world.robot.gripper_pose() @ transform(translation=np.array([0, 0, self.state[0]]))
         object_to_world = self._world.object_to_world(number)
         found = seal(self._gripper, (inverse(object_to_world) @ lip_to_world)[None], self._surface(number))
         if not found.sealed[0]:
-            return
+            return False
         body = self._world.bodies[number]
         drive = physx.PhysxDriveComponent(body)
         drive.parent = lip = self._world.robot.links[self._lip_name]
@@ -115,6 +124,7 @@ class CupControl:
         self._sealed = _Sealed(number, drive, found.center_m[0], found.inward[0], velocity_m_s)
         self._pressure_n = vacuum_n
         self._world.robot.block_plunger(True)
+        return True
 
     def _bear(self, held: _Sealed, contacts: Sequence[physx.PhysxContact]) -> None:
         """Take down how the lip is loaded, and let go where it is too much."""

@@ -39,6 +39,11 @@ class FingersControl:
         """Whether every finger presses, or has come to the end of its way."""
         return self._closing is not None and self._closing.all_press
 
+    def tell(self, told: np.ndarray) -> None:
+        """Tell the joints' targets."""
+        self._closing = None
+        self._tell(np.asarray(told, float))
+
     def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
         """Move to the joints before closing; those to close to are kept for ``squeeze``."""
         if grasp_joints_rad is None:

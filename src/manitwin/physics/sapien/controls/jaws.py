@@ -47,6 +47,10 @@ class JawsControl:
         pressing_n = (self._robot.opening_m() - self._target_m) / 2 * self._settings.finger_stiffness_n_m
         return pressing_n > PRESSING_SHARE * self._settings.force_n
 
+    def tell(self, told: np.ndarray) -> None:
+        """Tell the opening."""
+        self._tell(float(told[0]))
+
     def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
         """Stay open."""
         return iter(())
