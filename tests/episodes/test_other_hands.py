@@ -142,5 +142,7 @@ def test_what_wants_jaws_is_refused_in_one_line() -> None:
     check_hand(robot, load_skill("place_in"))
     check_hand(robot, None)
     check_hand(load_robot("panda"), load_skill("pour"))
-    with pytest.raises(UsageError, match=r"^environments want a hand of two jaws, xarm7_allegro has allegro"):
-        check_jaws(load_robot("xarm7_allegro"), "environments")
+    with pytest.raises(
+        UsageError, match=r"^grasps that are carried over want a hand of two jaws, xarm7_allegro has allegro"
+    ):
+        check_jaws(load_robot("xarm7_allegro"), "grasps that are carried over")

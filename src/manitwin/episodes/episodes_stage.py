@@ -25,6 +25,7 @@ from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.planning.two_arms import planner_of
+from manitwin.episodes.room_for_hand import placement_with_room
 from manitwin.episodes.sealing_surface import with_surface
 from manitwin.episodes.setting import Setting, scene_setting, table_setting
 from manitwin.episodes.settings import TrajectoriesConfig
@@ -35,6 +36,7 @@ from manitwin.episodes.tasks.task_files import read_tasks
 from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.episodes.tasks.task_setting import TaskSetting, task_setting
 from manitwin.errors import UsageError
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
@@ -85,7 +87,12 @@ class EpisodesStage:
         return pool_of(self.dataset)
 
     def _read_placeable(self, twin_id: str) -> Placeable:
-        return Placeable.of(self._pool, self._pool.twin(twin_id))
+        twin, gripper = self._pool.twin(twin_id), self._robot.gripper
+        if not isinstance(gripper, MultiFingerGripper):
+            return Placeable.of(self._pool, twin)
+        grasps = [each.grasp for each in self._grasps(twin_id).values()]
+        placement = placement_with_room(twin.poses, grasps, gripper)
+        return Placeable.of(self._pool, twin) if placement is None else Placeable.in_pose(self._pool, twin, placement)
 
     def _read_twin(self, twin_id: str) -> Twin:
         return self._source.twin(twin_id)

@@ -15,7 +15,7 @@ from manitwin.episodes.execution import Execution
 from manitwin.episodes.handover_watch import HandoverWatch
 from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner
 from manitwin.episodes.planning.placement import Placement
-from manitwin.episodes.planning.problem import Motion, Phase
+from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.planning.put_down import Held, put_down_poses
 from manitwin.episodes.planning.two_arms import HandoverPlan, Take, TwoArmPlanner
 from manitwin.geometry.poses import transform, transform_points

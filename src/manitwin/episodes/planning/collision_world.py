@@ -200,11 +200,15 @@ class ProblemWorld:
         same = self.problem is problem and self._as_hulls == as_hulls
         return same and np.array_equal(self.goal_object_to_world, goal_object_to_world)
 
-    def shape_hand(self, grasp: Grasp) -> None:
-        """Give the hand the joints that a grasp has before it closes; one without joints of its own stays as it is."""
+    def shape_hand(self, grasp: Grasp, closed: float = 0.0) -> None:
+        """Give the hand the joints that a grasp has before it closes, or ``closed`` of the way to those that it closes to.
+
+        A hand without joints of its own stays as it is.
+        """
         if self._shapings is not None and grasp.joints_rad is not None:
+            before, to = grasp.joints_rad
             for world, shaping in zip((self.arm, self._hand), self._shapings, strict=True):
-                world.shape_hand(shaping.placements(grasp.joints_rad[0]))
+                world.shape_hand(shaping.placements(before + closed * (to - before)))
 
     def hold(self, gripper_to_object: np.ndarray) -> None:
         """Put the held target where a grasp has it."""

@@ -12,7 +12,7 @@ from manitwin.episodes.planning.arm_solutions import KnownPoses
 from manitwin.episodes.planning.collision_world import ProblemWorld
 from manitwin.episodes.planning.convex_shapes import corners_of
 from manitwin.episodes.planning.kinematic_body import KinematicBody
-from manitwin.episodes.planning.problem import Phase, PlanFailure, PlannerSettings
+from manitwin.episodes.planning.problem import Grasp, Phase, PlanFailure, PlannerSettings
 from manitwin.episodes.planning.straight_lines import HALF_TURN, LineEnds
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.rigid_body import StaticBox
@@ -20,6 +20,7 @@ from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
 from manitwin.robots.grippers.suction import SuctionGripper
 
+CLOSED = (0.15, 0.3, 0.5)  # of the way to the joints that a hand closes to: what it holds stops it before their end
 QUARTER_TURN = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 
 
@@ -96,6 +97,8 @@ class GraspCandidates:
                     failure = "lower_blocked"
                 else:
                     failure = self.first_look(world, poses[index, turn])
+                    if failure is None and grasps[index].joints_rad is not None:
+                        failure = self._look_at_closing(world, grasps[index], poses[index, turn])
                 yield Candidate(index, poses[index, turn], failure)
 
     def _without_room(self, world: ProblemWorld, gripper_to_world: np.ndarray) -> np.ndarray:
@@ -120,6 +123,17 @@ class GraspCandidates:
             return "lower_blocked"
         if not world.is_hand_free(Phase.RETREAT, placed, self._ends.before(placed)):
             return "retreat_blocked"
+        return None
+
+    def _look_at_closing(self, world: ProblemWorld, grasp: Grasp, gripper_to_object: np.ndarray) -> PlanFailure | None:
+        """Return what forbids fingers with joints to close: on their way they curl towards what the target stands on."""
+        grasped = world.problem.target.object_to_world @ gripper_to_object
+        for closed in CLOSED:
+            world.shape_hand(grasp, closed)
+            if not world.is_hand_free(Phase.LIFT, grasped):
+                world.shape_hand(grasp)
+                return "approach_blocked"
+        world.shape_hand(grasp)
         return None
 
     def look_at_approach(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> PlanFailure | None:

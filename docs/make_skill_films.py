@@ -1,0 +1,119 @@
+"""Make films/SKILL.webp beside this file: an episode of each skill, seen from near the place where it happens.
+
+    manitwin build --quick --text "a mug" --text "a mixing bowl" --text "a wooden spoon" --text "a hammer" \
+        --text "a remote control" --text "a sponge" --text "a chef's knife" --text "a spray bottle" --text "a screwdriver" \
+        --text "a plastic bottle" --text "a tea box" --text "a cup" --text "a plate" -o THINGS
+    python docs/make_skill_films.py THINGS [--skills pour,hang]
+
+Each is the first kept episode of a few attempts, shown at three times its speed, and films/films.json says of which objects
+and which motion of the arm it is.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from picture_file import of_episode
+
+from manitwin.episodes.cameras import FOV_Y_RAD, NamedCamera
+from manitwin.episodes.collect import batch_folders, stored_episodes
+from manitwin.episodes.episodes_run import make_episodes
+from manitwin.episodes.recording import RATE_HZ, Recording
+from manitwin.episodes.replay_pictures import EpisodeReplay, twin_drawable
+from manitwin.episodes.settings import TrajectoriesConfig
+from manitwin.episodes.skills.registry import skill_names
+from manitwin.episodes.stored_episode import StoredEpisode
+from manitwin.episodes.video import write_animation
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.geometry.rigid_body import StaticBox
+from manitwin.render.cameras import look_at
+from manitwin.robots.load import load_robot
+from manitwin.scenes.scene import Furniture
+from manitwin.twin.loaded_twin import TwinSource
+
+FILMS = Path(__file__).resolve().parent / "films"
+RECORD = FILMS / "films.json"
+SIZE_PX, EVERY, SPEED, QUALITY = 224, 5, 3.0, 45
+SEED, ATTEMPTS, TRIES = 7, 4, 4
+EYE = np.array([0.45, -0.85, 0.55])  # from what is shown, in a direction that an arm at the origin does not hide
+LEAST_WAY_M, WAY_SHARE = 0.45, 1.5  # of the camera from there, and by how far all of it reaches
+
+
+def an_episode(twins: Path, skill: str) -> StoredEpisode:
+    """Record a few episodes of a skill, with one seed after the other, until one is kept; raises LookupError where none is."""
+    for number in range(TRIES):
+        with tempfile.TemporaryDirectory() as folder:
+            config = TrajectoriesConfig(seed=SEED + number, skill=skill, batch=ATTEMPTS)
+            make_episodes(twins, Path(folder) / "e", ATTEMPTS, config, executor="inline")
+            found = next(iter(stored_episodes(batch_folders(Path(folder) / "e"))), None)
+            if found is not None:
+                return found
+    raise LookupError(f"no episode of {skill} was kept")
+
+
+def camera_for(recording: Recording) -> NamedCamera:
+    """Return a camera that sees where the target and the hands go."""
+    arms = recording.tip_position_m.shape[1] // 3
+    places = [recording.object_positions_m[:, recording.target], *np.split(recording.tip_position_m, arms, axis=1)]
+    seen = np.concatenate(places)
+    low, high = np.percentile(seen, 2, axis=0), np.percentile(seen, 98, axis=0)
+    middle, reach_m = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    way = EYE / np.linalg.norm(EYE)
+    if arms > 1:
+        way = np.array([0.0, -0.94, 0.34])
+    return NamedCamera("film", look_at(middle + max(LEAST_WAY_M, WAY_SHARE * reach_m + 0.35) * way, middle), FOV_Y_RAD)
+
+
+def film(episode: StoredEpisode, twins: Path) -> list[np.ndarray]:
+    """Draw every fifth state of an episode."""
+    recording, source = episode.recording, TwinSource(twins)
+    granules = recording.granule_positions_m
+    radius_m = episode.facts.get("granule_radius_m")
+    with EpisodeReplay(
+        load_robot(episode.robot.name),
+        [twin_drawable(source.folder(thing.twin_id)) for thing in episode.objects],
+        furniture=Furniture(**episode.facts["furniture"]),
+        fixtures=[_box(each) for fixture in episode.facts.get("fixtures", ()) for each in fixture["boxes"]],
+        granules=None if granules is None or radius_m is None else (granules.shape[1], float(radius_m)),
+        seed=1,
+    ) as replay:
+        camera = [camera_for(recording)]
+        frames = replay.frames(recording, camera, width_px=SIZE_PX, height_px=SIZE_PX, every=EVERY)
+        return [views[0].rgb for views in frames]
+
+
+def _box(said: dict[str, Any]) -> StaticBox:
+    rotation = rotation_from_quaternion_wxyz(np.array(said["quaternion_wxyz"]))
+    return StaticBox(said["name"], np.array(said["half_extents_m"]), transform(rotation, np.array(said["position_m"])))
+
+
+def main() -> None:
+    """Make the films."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("twins", type=Path)
+    parser.add_argument("--skills", default=",".join(skill_names()))
+    asked = parser.parse_args()
+    shown = json.loads(RECORD.read_text()) if RECORD.exists() else {}
+    for skill in asked.skills.split(","):
+        episode = an_episode(asked.twins, skill)
+        write_animation(
+            film(episode, asked.twins), FILMS / f"{skill}.webp", rate_hz=SPEED * RATE_HZ / EVERY, quality=QUALITY
+        )
+        names = [TwinSource(asked.twins).twin(each.twin_id).record.language for each in episode.objects]
+        shown[skill] = {
+            "episode": of_episode(episode),
+            "goal": episode.attempt.goal,
+            "objects": [None if each is None else each.category for each in names],
+            "seconds": round(episode.attempt.length_s, 1),
+        }
+        print(skill, shown[skill], (FILMS / f"{skill}.webp").stat().st_size, flush=True)
+        RECORD.write_text(json.dumps(dict(sorted(shown.items())), indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()
