@@ -3,7 +3,7 @@
     manitwin build --quick --text "a hammer" -o HAMMER
     python docs/make_handover_picture.py HAMMER
 
-Lifted, at the meeting, taken, let go, and in the second hand.
+Lifted, at the meeting, taken, let go by the first hand, and put down by the second.
 """
 
 from __future__ import annotations
@@ -42,7 +42,9 @@ def moments(recording: Recording) -> list[int]:
     def last(phase: Phase) -> int:
         return int(np.flatnonzero(recording.phase == phase)[-1])
 
-    return [last(Phase.LIFT), last(Phase.ACT), last(Phase.CLOSE), last(Phase.RETREAT), recording.steps]
+    retreats = np.flatnonzero(recording.phase == Phase.RETREAT)
+    withdrawn = int(retreats[np.flatnonzero(np.diff(retreats) > 1)[0]])  # the first of two
+    return [last(Phase.LIFT), last(Phase.ACT), last(Phase.CLOSE), withdrawn, last(Phase.LOWER)]
 
 
 def row(episode: StoredEpisode, twins: Path) -> np.ndarray:

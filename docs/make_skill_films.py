@@ -2,7 +2,7 @@
 
     manitwin build --quick --text "a mug" --text "a mixing bowl" --text "a wooden spoon" --text "a hammer" \
         --text "a remote control" --text "a sponge" --text "a chef's knife" --text "a spray bottle" --text "a screwdriver" \
-        --text "a plastic bottle" --text "a tea box" --text "a cup" --text "a plate" -o THINGS
+        --text "a plastic bottle" --text "a tea box" --text "a large tea box" --text "a cup" --text "a plate" -o THINGS
     python docs/make_skill_films.py THINGS [--skills pour,hang]
 
 Each is the first kept episode of a few attempts, shown at three times its speed, and films/films.json says of which objects
@@ -33,6 +33,7 @@ from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import StaticBox
 from manitwin.render.cameras import look_at
 from manitwin.robots.load import load_robot
+from manitwin.scenes.layouts.pool import pool_of
 from manitwin.scenes.scene import Furniture
 from manitwin.twin.loaded_twin import TwinSource
 
@@ -40,26 +41,40 @@ FILMS = Path(__file__).resolve().parent / "films"
 RECORD = FILMS / "films.json"
 SIZE_PX, EVERY, SPEED, QUALITY = 224, 5, 3.0, 45
 SEED, ATTEMPTS, TRIES = 7, 4, 4
+TARGETS = {
+    "pick_place": "mug",
+    "left_of": "bottle",
+    "right_of": "cup",
+    "behind": "mug",
+    "in_front_of": "box",
+    "near": "mug",
+    "upright": "bottle",
+    "push": "box",
+    "handover": "hammer",
+}  # of skills that take anything, what shows them best; each twin is then tried once a seed
 EYE = np.array([0.45, -0.85, 0.55])  # from what is shown, in a direction that an arm at the origin does not hide
 LEAST_WAY_M, WAY_SHARE = 0.45, 1.5  # of the camera from there, and by how far all of it reaches
 
 
 def an_episode(twins: Path, skill: str) -> StoredEpisode:
     """Record a few episodes of a skill, with one seed after the other, until one is kept; raises LookupError where none is."""
+    wanted = TARGETS.get(skill)
+    count = ATTEMPTS if wanted is None else len(pool_of(str(twins)).twins)
     for number in range(TRIES):
         with tempfile.TemporaryDirectory() as folder:
-            config = TrajectoriesConfig(seed=SEED + number, skill=skill, batch=ATTEMPTS)
-            make_episodes(twins, Path(folder) / "e", ATTEMPTS, config, executor="inline")
-            found = next(iter(stored_episodes(batch_folders(Path(folder) / "e"))), None)
-            if found is not None:
-                return found
+            config = TrajectoriesConfig(seed=SEED + number, skill=skill, batch=count)
+            make_episodes(twins, Path(folder) / "e", count, config, executor="inline")
+            for found in stored_episodes(batch_folders(Path(folder) / "e")):
+                if wanted in (None, found.attempt.category):
+                    return found
     raise LookupError(f"no episode of {skill} was kept")
 
 
 def camera_for(recording: Recording) -> NamedCamera:
-    """Return a camera that sees where the target and the hands go."""
-    arms = recording.tip_position_m.shape[1] // 3
-    places = [recording.object_positions_m[:, recording.target], *np.split(recording.tip_position_m, arms, axis=1)]
+    """Return a camera that sees all objects and where the hands go."""
+    arms, things = recording.tip_position_m.shape[1] // 3, recording.object_positions_m.shape[1]
+    objects = [recording.object_positions_m[:, number] for number in range(things)]
+    places = [*objects, *np.split(recording.tip_position_m, arms, axis=1)]
     seen = np.concatenate(places)
     low, high = np.percentile(seen, 2, axis=0), np.percentile(seen, 98, axis=0)
     middle, reach_m = (low + high) / 2, float(np.linalg.norm(high - low)) / 2

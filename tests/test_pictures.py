@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from PIL import Image
 
 import manitwin
+from manitwin.episodes.skills.registry import skill_names
 from manitwin.render.false_colors import NOTHING_RGB, depth_in_colors, id_color
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -71,6 +73,20 @@ def test_pictures_are_small(picture: Path) -> None:
 def test_pictures_of_twins_say_what_they_show(name: str) -> None:
     assert set(made_of(name)) == MADE_OF[name]
     assert all(len(digest) == 16 for digest in made_of(name).values())
+
+
+def test_every_skill_has_a_film_of_an_episode_that_moves() -> None:
+    said = json.loads((DOCS / "films" / "films.json").read_text())
+    assert set(said) == set(skill_names()) == {path.stem for path in (DOCS / "films").glob("*.webp")}
+    for skill, told in said.items():
+        assert len(told["episode"]) == 16
+        with Image.open(DOCS / "films" / f"{skill}.webp") as film:
+            assert film.n_frames > 4 * told["seconds"] * 0.9, "every fifth of 20 states a second"
+            first = np.asarray(film.convert("RGB"), float)
+            film.seek(film.n_frames // 2)
+            assert np.abs(np.asarray(film.convert("RGB"), float) - first).mean() > 1
+    text = (DOCS / "skills.md").read_text()
+    assert all(f"(films/{skill}.webp)" in text for skill in said)
 
 
 def test_layouts_show_depth_and_ids_in_the_colours_of_previews(make_data_pictures: ModuleType) -> None:

@@ -24,9 +24,7 @@ from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
 from manitwin.episodes.settings import TrajectoriesConfig
-from manitwin.episodes.skills.handover import Handover
 from manitwin.episodes.skills.hands import check_hand
-from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.registry import load_skill
 from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.tasks.task_files import TASKS, read_tasks
@@ -34,7 +32,7 @@ from manitwin.episodes.tasks.task_record import TaskRecord
 from manitwin.errors import Rejected, UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import Pool, pool_of
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
 from manitwin.scenes.run_settings import check_settings
 from manitwin.scenes.scene_files import SCENES, read_scene, scene_ids, scene_name
 from manitwin.twin.dataset_root import DatasetRoot
@@ -42,6 +40,7 @@ from manitwin.twin.loaded_twin import TwinSource
 from manitwin.twin.store import RUN, canonical_json, digests_below, sha256_of_json, write_bytes_atomically
 
 KIND = "trajectories"
+MOST_PAIRED = 200  # twins of a pool, of whose pairs it is asked whether they suit a skill
 DECIDE_NO_EPISODE = frozenset(("dataset", "scenes", "tasks", "run", "batch", "retire_failed_share"))
 
 
@@ -235,10 +234,18 @@ def make_episodes(
 
 
 def _twins_for(skill: Skill | None, pool: Pool) -> list[str]:
-    """Return the ids of the twins that episodes are of: all, but of a skill that uses a thing alone those it can be used with."""
-    if not isinstance(skill, HeldSkill | Handover) or skill.has_partner:
+    """Return the ids of the twins that episodes are of: all, but of a skill those that it suits, with some partner if it has one.
+
+    Partners are asked about in small pools alone: they are pairs, and each asks for the shapes of two twins.
+    """
+    if skill is None or (skill.has_partner and len(pool.twins) > MOST_PAIRED):
         return [twin.twin_id for twin in pool.twins]
-    found = [twin.twin_id for twin in pool.twins if skill.suits(pool, twin, None)]
+
+    def suits(target: PoolTwin) -> bool:
+        partners = [each for each in pool.twins if each is not target] if skill.has_partner else [None]
+        return any(skill.suits(pool, target, partner) for partner in partners)
+
+    found = [twin.twin_id for twin in pool.twins if suits(twin)]
     if not found:
         raise UsageError(
             f"none of {len(pool.twins)} twins can be used to {skill.name}; docs/skills.md says what it takes"

@@ -34,7 +34,7 @@ class Beside(Skill):
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield free poses in the sector, by their centres of mass."""
+        """Yield free poses in the sector, by their centres of mass: in the workspace, then beyond, as far as an arm may come."""
         assert partner is not None
         moved, other = around.objects[target], around.objects[partner]
         object_to_plane, corners = on_its_surface(moved, around.area.support.height_m)
@@ -47,14 +47,14 @@ class Beside(Skill):
         middle = transform_points(other.object_to_world, other.body.center_of_mass_m[None])[0, :2]
         center = transform_points(object_to_plane, moved.body.center_of_mass_m[None])[0, :2]
         reach_m = _reach_m(beside, middle) + _reach_m(corners, center) + SIDE_GAP_M[1]
-        for _ in range(TRIED):
+        for area in [around.area] * TRIED + [around.area.wider()] * TRIED:
             angle, yaw = self._direction_rad(rng), rng.uniform(-np.pi, np.pi)
             turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
             at = middle + rng.uniform(0.02, reach_m) * np.array([np.cos(angle), np.sin(angle)]) - turn @ center
             plane_to_world = transform(_about_z(yaw), np.array([*at, 0.0]))
             placed = corners @ turn.T + at
             gap_m = separation_m(placed, beside)
-            if not MIN_GAP_M <= gap_m <= self._most_gap_m * INSIDE_SHARE or not around.area.reaches(at, placed):
+            if not MIN_GAP_M <= gap_m <= self._most_gap_m * INSIDE_SHARE or not area.reaches(at, placed):
                 continue
             if all(separation_m(placed, each) >= MIN_GAP_M for each in taken):
                 yield plane_to_world @ object_to_plane
