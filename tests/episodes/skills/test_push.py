@@ -22,7 +22,7 @@ from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal, Surroundings
 from manitwin.episodes.tool_watches import PushWatch
 from manitwin.geometry.poses import transform, transform_points
-from rigid_boxes import above, box
+from rigid_boxes import above, block, box
 
 BESIDE = np.array([0.0, 0.15, 0.0])
 UP = np.array([0.0, 0.0, 0.02])
@@ -34,6 +34,16 @@ def goal_of(surroundings: Surroundings, seed: int) -> SkillGoal:
     goal = SKILLS["push"].set_goal(surroundings, 0, None, np.random.default_rng(seed))
     assert goal is not None
     return goal
+
+
+def test_what_is_round_would_roll_and_is_not_pushed() -> None:
+    around_m = np.linspace(0, 2 * np.pi, 32, endpoint=False)
+    ring = np.column_stack([np.zeros(32), 0.017 * np.sin(around_m), 0.017 + 0.017 * np.cos(around_m)])
+    rod = replace(box([0.2, 0.034, 0.034], 0.1), hulls=(np.concatenate([ring, ring + np.array([0.2, 0, 0])]),))
+    bar = replace(box([0.2, 0.034, 0.034], 0.1), hulls=(block([0, -0.017, 0], [0.2, 0.017, 0.034]),))
+    for body, slides in ((rod, False), (bar, True)):
+        spot = around(body, (), 0.5, 0.05)
+        assert SKILLS["push"].suits(spot.pool, spot.twin(0), None) == slides
 
 
 def attempt(goal: SkillGoal, grasps: tuple[Grasp, ...] = ()) -> EpisodeFacts:

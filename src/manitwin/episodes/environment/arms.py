@@ -11,37 +11,44 @@ from manitwin.physics.sapien.controls.control import control_of
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
 
+ORDER = 3  # of the polynomial between actions
 HELD = 1e-3  # m or rad, or of 1: a hand that is told so much else than it began with holds something, or is about to
 
 
 class JointTargets:
-    """Where an arm is told to be within a step, from the targets ``(n,)`` rad at the ends of the last two and of this one.
+    """Where an arm is told to be within a step: on the cubic through the targets ``(n,)`` rad at the ends of the last four.
 
-    An episode follows smooth motions at every timestep, of which actions are samples; between three samples of such a motion
-    a parabola is off by a term of third order, where a straight line is off by one of second order (Lagrange's remainder).
-    The parabola passes through the targets, and goes beyond them by an eighth of their second difference at most.
+    An episode follows smooth motions at every timestep, of which actions are samples; between four samples of such a motion a
+    cubic is off by a term of fourth order (Newton's backward differences), and so little beside its speed, which the drives'
+    dampers follow. It passes through the targets, and goes beyond them by about a quarter of a jump at most.
     """
 
     def __init__(self, start_rad: np.ndarray, lowest_rad: np.ndarray, highest_rad: np.ndarray):
         """Begin at rest; what would be beyond the joints' limits is clipped."""
-        self._before = self._now = np.asarray(start_rad, float)
+        self._last = np.repeat(np.asarray(start_rad, float)[None], ORDER, axis=0)
         self._lowest, self._highest = lowest_rad, highest_rad
 
-    @property
-    def now_rad(self) -> np.ndarray:
-        """The target at the end of the last step ``(n,)``."""
-        return self._now
+    def towards(self, target_rad: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the targets ``(count, n)`` at even times until the end of the step, which is ``target_rad (n,)``, and speeds.
 
-    def towards(self, target_rad: np.ndarray, count: int) -> np.ndarray:
-        """Return the targets ``(count + 1, n)`` at even times from now to the end of the step, which is ``target_rad (n,)``."""
-        target = np.asarray(target_rad, float)
-        share = np.linspace(0, 1, count + 1)[:, None]
-        bend = (target - 2 * self._now + self._before) / 2
-        rows = self._now + share * (target - self._now) - bend * share * (1 - share)
-        self._before, self._now = self._now, target
-        rows = np.clip(rows, self._lowest, self._highest)
-        rows[-1] = target
-        return rows
+        Speeds ``(count, n)`` are those there, rad a step; of joints at their limits 0.
+        """
+        samples = np.concatenate([self._last, np.asarray(target_rad, float)[None]])
+        self._last = samples[1:]
+        left = np.arange(1 - count, 1) / count
+        rows = _polynomial(samples, left)
+        speeds = count * (_polynomial(samples, left + 0.5 / count) - _polynomial(samples, left - 0.5 / count))
+        clipped = np.clip(rows, self._lowest, self._highest)
+        return clipped, np.where(rows == clipped, speeds, 0.0)
+
+
+def _polynomial(samples: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Return the polynomial through ``samples (K, n)``, a step apart, at times ``(T,)`` in steps from the last: ``(T, n)``."""
+    factor, rows = np.ones((len(left), 1)), np.repeat(samples[-1:], len(left), axis=0)
+    for order in range(1, len(samples)):
+        factor = factor * (left[:, None] + order - 1) / order
+        rows = rows + factor * np.diff(samples, n=order, axis=0)[-1]
+    return rows
 
 
 class Arms:
@@ -59,6 +66,7 @@ class Arms:
         world.use(0)
         self._told = self._open = np.concatenate([hand.told for hand in self._hands])
         self._targets = JointTargets(joints_rad, limits[0][:joints], limits[1][:joints])
+        self._per_frame = closing.steps_per_frame  # hands are told anew so often, as in episodes
         self.feel = any(not arm.robot.has_jaws for arm in world.robots)
 
     def may_hold(self, hand: np.ndarray) -> bool:
@@ -67,14 +75,14 @@ class Arms:
 
     def towards(self, joints_rad: np.ndarray, hand: np.ndarray, count: int) -> Iterator[int]:
         """Tell joints and hands what they are to do timestep by timestep; yields the number, from 1, of each to be simulated."""
-        rows, before, dt = self._targets.towards(joints_rad, count), self._told, self._world.timestep_s
-        for number in range(1, count + 1):
-            velocities = (rows[number] - rows[number - 1]) / dt
+        before, dt = self._told, self._world.timestep_s
+        for number, (target, speed) in enumerate(zip(*self._targets.towards(joints_rad, count), strict=True), start=1):
+            velocities = speed / (count * dt)
             # as episodes do: the drives pull to where the arm is to be in the middle of the step
-            positions = by_arm(self._world, rows[number] - velocities * (dt / 2))
-            for arm, target, speeds in zip(self._world.robots, positions, by_arm(self._world, velocities), strict=True):
-                arm.set_targets(target, speeds)
-            told = before + number / count * (hand - before)
+            positions = by_arm(self._world, target - velocities * (dt / 2))
+            for arm, there, speeds in zip(self._world.robots, positions, by_arm(self._world, velocities), strict=True):
+                arm.set_targets(there, speeds)
+            told = before + min(1.0, np.ceil(number / self._per_frame) * self._per_frame / count) * (hand - before)
             for control, part in zip(self._hands, np.split(told, len(self._hands)), strict=True):
                 control.tell(part)
             yield number

@@ -22,6 +22,7 @@ WAY_M = (0.08, 0.20)
 PLACES_TRIED = 60
 MOST_INWARD = -0.5  # cosine to the way from the robot: no hand comes from behind to push things up to its own foot
 LEAST_HEIGHT_M, LEAST_WIDTH_M = 0.02, 0.03
+BASE_M, LEAST_BASE_M = 0.002, 0.025  # what is no higher over the table bears the object; narrower, and it rolls
 TIPPING = 0.8  # of its width: how high what is pushed may be, that it slides and does not fall
 HEIGHT_SHARE, HEIGHTS_M = 0.35, (0.012, 0.04)  # of the object's height: where it is pushed
 LEANS_RAD = np.radians([30.0, 15, 45, 0])  # the palm is behind the fingertips, not over the object
@@ -32,18 +33,25 @@ DOWN_M, DOWN_BACK_M = 0.10, 0.06
 BAND_M = 0.012  # to either side of the line: half of what the closed fingertips are wide
 
 
+def base_width_m(points: np.ndarray) -> float:
+    """Return the least width of what an object stands on, of its corners ``(N, 3)``: of what is round only a strip."""
+    base = points[points[:, 2] < points[:, 2].min() + BASE_M, :2]
+    angles = np.linspace(0, np.pi, 36, endpoint=False)
+    return float(np.ptp(base @ np.array([np.cos(angles), np.sin(angles)]), axis=0).min())
+
+
 class Push(Skill):
     """Push the target to a place in reach, along a way that is free."""
 
     name, predicate, has_partner = "push", "pushed_to", False
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept what is high enough for a fingertip, and broad enough not to fall over."""
-        low, high = pool.body(target.twin_id).parts.at(self.begins_in(target)[0].object_to_plane).bounds
-        wide_m = float(np.sort((high - low)[:2])[0])
-        return high[2] - low[2] >= LEAST_HEIGHT_M and wide_m >= max(
-            LEAST_WIDTH_M, HEIGHT_SHARE * TIPPING * (high[2] - low[2])
-        )
+        """Accept what is high enough for a fingertip, and stands broadly enough neither to fall over nor to roll."""
+        pose = self.begins_in(target)[0].object_to_plane
+        points = transform_points(pose, np.concatenate(pool.body(target.twin_id).body.hulls))
+        *across_m, height_m = np.ptp(points, axis=0).tolist()
+        broad = min(across_m) >= max(LEAST_WIDTH_M, HEIGHT_SHARE * TIPPING * height_m)
+        return height_m >= LEAST_HEIGHT_M and broad and base_width_m(points) >= LEAST_BASE_M
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
         """Return: pushed to the mark."""
