@@ -49,7 +49,6 @@ TARGETS = {
     "in_front_of": "box",
     "near": "mug",
     "upright": "bottle",
-    "push": "box",
     "handover": "hammer",
 }  # of skills that take anything, what shows them best; each twin is then tried once a seed
 EYE = np.array([0.45, -0.85, 0.55])  # from what is shown, in a direction that an arm at the origin does not hide
@@ -113,12 +112,12 @@ def main() -> None:
     parser.add_argument("twins", type=Path)
     parser.add_argument("--skills", default=",".join(skill_names()))
     asked = parser.parse_args()
-    shown = json.loads(RECORD.read_text()) if RECORD.exists() else {}
     for skill in asked.skills.split(","):
         episode = an_episode(asked.twins, skill)
         write_animation(
             film(episode, asked.twins), FILMS / f"{skill}.webp", rate_hz=SPEED * RATE_HZ / EVERY, quality=QUALITY
         )
+        shown = json.loads(RECORD.read_text()) if RECORD.exists() else {}
         names = [TwinSource(asked.twins).twin(each.twin_id).record.language for each in episode.objects]
         shown[skill] = {
             "episode": of_episode(episode),
