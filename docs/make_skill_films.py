@@ -2,8 +2,10 @@
 
     manitwin build --quick --text "a mug" --text "a mixing bowl" --text "a wooden spoon" --text "a hammer" \
         --text "a remote control" --text "a sponge" --text "a chef's knife" --text "a spray bottle" --text "a screwdriver" \
-        --text "a plastic bottle" --text "a tea box" --text "a large tea box" --text "a cup" --text "a plate" -o THINGS
+        --text "a plastic bottle" --text "a tea box" --text "a small tea box" --text "a cup" --text "a plate" -o THINGS
     python docs/make_skill_films.py THINGS [--skills pour,hang]
+    manitwin build --quick --text "a bowl" --text "a marker" -o TO_STIR
+    python docs/make_skill_films.py TO_STIR --skills stir
 
 Each is the first kept episode of a few attempts, shown at three times its speed, and films/films.json says of which objects
 and which motion of the arm it is.
