@@ -126,6 +126,12 @@ def test_what_is_no_place_of_twins_is_said(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_skill_that_no_pair_of_twins_suits_is_said_before_anything_is_made(bricks: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"none of \d+ twins can be used to place_in"):
+        make_episodes(bricks, tmp_path, 1, TrajectoriesConfig(skill="place_in"), executor="inline")
+    assert not list(tmp_path.glob("batches/*"))
+
+
 def test_pictures_are_drawn_afterwards_and_join_the_set(bricks: Path, tmp_path: Path) -> None:
     make_episodes(bricks, tmp_path, 2, CONFIG, executor="inline")
     config = PicturesConfig(cameras=("front", "wrist"), size_px=64)
