@@ -6,6 +6,8 @@
     python docs/make_view_pictures.py LINK SCENE_ID --scene
     manitwin view EPISODES --no-browser
     python docs/make_view_pictures.py LINK NUMBER --episode
+    manitwin review DATASET --no-browser
+    python docs/make_view_pictures.py LINK TWIN_ID --review
 
 ``LINK`` is the link of one use that the command prints.
 """
@@ -25,8 +27,8 @@ FOLDER = Path(__file__).resolve().parent
 BROWSERS = ("chromium", "chromium-browser", "google-chrome-stable", "google-chrome")
 WIDE, NARROW, SCENE = {"width": 1280, "height": 900}, {"width": 390, "height": 844}, {"width": 1280, "height": 720}
 EPISODE = {"width": 1280, "height": 965}
-MOMENT_S = 4.2
-"""Of an episode: the thing is in the hand then."""
+MOMENT_S, TRIAL_S = 4.2, 1.3
+"""Of an episode and of a trial: the thing is in the hand then, or goes up."""
 WITHOUT_GPU = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--no-sandbox"]
 
 
@@ -38,6 +40,21 @@ def shown(page: Any, address: str, size: dict[str, int], scheme: str) -> Image.I
     page.goto(address, wait_until="networkidle")
     if any(kind in address for kind in ("/twin/", "/scene/", "/episode/")):
         page.wait_for_selector("#viewer[data-ready]")
+    if "trial=" in address:
+        page.wait_for_selector(f".trial output:has-text('{TRIAL_S:.2f} s')", timeout=60_000)
+        page.wait_for_timeout(500)
+    return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+
+
+def judged(page: Any, address: str) -> Image.Image:
+    """Return what a page of a review looks like while a functional point is moved to another candidate."""
+    page.set_viewport_size(WIDE)
+    page.goto(address, wait_until="networkidle")
+    page.wait_for_selector("#viewer[data-ready]")
+    page.keyboard.press("1")  # takes up no draft of another visit
+    for key in ("y", "y", "n"):
+        page.keyboard.press(key)
+    page.wait_for_timeout(800)
     return Image.open(io.BytesIO(page.screenshot())).convert("RGB")
 
 
@@ -59,6 +76,9 @@ def main() -> None:
     parser.add_argument("link")
     parser.add_argument("id", help="of a twin, or with --scene of a scene, with --episode of an episode")
     parser.add_argument("--scene", action="store_true", help="the picture of a scene's page alone")
+    parser.add_argument(
+        "--review", action="store_true", help="the picture of a review's page alone, of a twin of its sample"
+    )
     parser.add_argument("--episode", action="store_true", help="the picture of an episode's page alone, by its number")
     given = parser.parse_args()
     address = given.link.split("/enter")[0]
@@ -70,12 +90,15 @@ def main() -> None:
         page.goto(given.link)
         if given.scene:
             pictures = {"view_scene": shown(page, f"{address}/scene/{given.id}", SCENE, "light")}
+        elif given.review:
+            pictures = {"review": judged(page, f"{address}/review/{given.id}")}
         elif given.episode:
             pictures = {"view_episode": shown(page, f"{address}/episode/{given.id}#t={MOMENT_S}", EPISODE, "light")}
         else:
             pictures = {
                 "view_gallery": shown(page, f"{address}/", WIDE, "light"),
                 "view_twin": shown(page, twin, WIDE, "light"),
+                "view_trial": shown(page, f"{twin}#grasp=2&trial={TRIAL_S}", SCENE, "light"),
                 "view_dark": shown(page, closer, WIDE, "dark"),
                 "view_narrow": beside(
                     [

@@ -214,7 +214,7 @@ WRONG_VALUES = [
     "view . --port 70000",
     "view . --sample 3",
     "view . --static out --sample 0",
-    "view . --static out --twins .",
+    "view . --trials 3",
     "review apply nothing_here",
     "review tune nothing_here",
 ]

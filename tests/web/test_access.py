@@ -9,7 +9,8 @@ import pytest
 from access_requests import Header, asked, header
 from starlette.types import Receive, Scope, Send
 
-from manitwin.web.access import HEADERS, MOST_LINKS, PERSON, Guard, Names, Tokens
+from manitwin.web.access import HEADERS, PERSON, Guard, Names
+from manitwin.web.tokens import MOST_LINKS, Tokens
 
 PORT = 8765
 HOST = ("host", f"127.0.0.1:{PORT}")

@@ -205,3 +205,27 @@ def test_plain_files_open_from_the_disk(visitor: Visitor, viewed: Viewed, tmp_pa
     ready(page)
     assert page.title() != "owned" and page.errors == []
     assert left_the_machine(page, "file://") == []
+
+
+def test_the_trial_of_a_chosen_grasp_is_played_back_and_its_moment_is_a_link(
+    inside: Visitor, served: Served, viewed: Viewed
+) -> None:
+    page = inside()
+    page.goto(f"{served.address}/twin/{viewed[1][1]}")
+    ready(page)
+    page.locator(".stage").focus()
+    page.keyboard.press("n")
+    page.keyboard.press("t")
+    page.wait_for_selector(".trial output:text-matches('slide: held')", timeout=60_000)
+    assert page.is_disabled("[data-control=placement]") and "by sapien: held" in page.inner_text(".said")
+    page.locator("[data-trial=time]").fill("1")
+    assert page.inner_text(".trial output") == "1.00 s, lift" and "trial=1.00" in page.url
+    again = page.context.new_page()
+    again.goto(page.url)
+    ready(again)
+    again.wait_for_selector(".trial output:text-is('1.00 s, lift')", timeout=60_000)
+    page.keyboard.press("Shift+T")
+    page.locator(".stage").focus()
+    page.keyboard.press("Shift+T")
+    assert page.is_enabled("[data-control=placement]") and "trial=" not in page.url
+    assert left_the_machine(page, served.address) == [] and page.errors == []

@@ -286,13 +286,30 @@ def test_plain_files_are_whole_and_the_same_again(viewed: Viewed, tmp_path: Path
         assert str(tmp_path) not in page.read_text() and str(root) not in page.read_text()
     folder = tmp_path / "out" / "twins" / mug
     said = (folder / "viewer.js").read_text()
-    assert json.loads(said.removeprefix("globalThis.manitwinTwin=").rstrip(";\n"))["twin_id"] == mug
-    model = (folder / "visual.glb.js").read_text().split('"')[1]
+    name, document = said.removeprefix("(globalThis.manitwinFiles??={})[").rstrip(";\n").split("]=", 1)
+    assert json.loads(name) == f"twins/{mug}/viewer.json" and json.loads(document)["twin_id"] == mug
+    name, model = (folder / "visual.glb.js").read_text().split('"')[1::2]
+    assert name == f"twins/{mug}/visual.glb" and "Play trial" not in (folder / "index.html").read_text()
     assert base64.b64decode(model) == (root / twin_name(mug) / "visual.glb").read_bytes()
     write_plain_files(str(root), tmp_path / "again", where="category <> 'kettle'")
     for path in (tmp_path / "out").rglob("*.*"):
         if path.is_file():
             assert path.read_bytes() == (tmp_path / "again" / path.relative_to(tmp_path / "out")).read_bytes()
+
+
+def test_trials_of_plain_files_are_those_of_the_first_grasps(viewed: Viewed, tmp_path: Path) -> None:
+    root, (_, kettle, _, _) = viewed
+    for out in ("out", "again"):
+        write_plain_files(str(root / twin_name(kettle)), tmp_path / out, trials=2)
+    folder = tmp_path / "out" / "twins" / kettle
+    scripts = (folder / "trials.js").read_text().splitlines()
+    assert len(scripts) == 2 and "Play trial" in (folder / "index.html").read_text()
+    shown = json.loads((folder / "viewer.js").read_text().split("]=", 1)[1].rstrip(";\n"))["grasps"]["panda"]["id"]
+    for script, grasp in zip(scripts, shown, strict=False):
+        name, document = script.removeprefix("(globalThis.manitwinFiles??={})[").rstrip(";").split("]=", 1)
+        assert json.loads(name) == f"twins/{kettle}/trial.json?gripper=panda&grasp={grasp}"
+        assert json.loads(document)["outcome"] == "held"
+    assert (tmp_path / "again" / "twins" / kettle / "trials.js").read_text().splitlines() == scripts
 
 
 def test_plain_files_are_of_a_sample_and_leave_out_what_is_damaged(viewed: Viewed, tmp_path: Path) -> None:
@@ -337,5 +354,7 @@ def test_the_command_writes_plain_files_and_says_so(viewed: Viewed, tmp_path: Pa
     runner = CliRunner()
     done = runner.invoke(command, ["view", str(viewed[0]), "--static", str(tmp_path / "out"), "--sample", "2"])
     assert done.exit_code == 0 and done.stdout.startswith("2 twins, "), done.output
+    done = runner.invoke(command, ["view", str(viewed[0]), "--static", str(tmp_path / "no"), "--twins", str(viewed[0])])
+    assert isinstance(done.exception, UsageError) and "there are none" in str(done.exception)
     done = runner.invoke(command, ["view", str(viewed[0]), "--sample", "2"])
     assert isinstance(done.exception, UsageError) and "--static" in str(done.exception)

@@ -171,6 +171,28 @@ def test_a_server_killed_while_saving_loses_nothing_that_it_confirmed(place: Pat
         assert [each.review.twin_id for each in stored(place)] == [before[0].review.twin_id, second]
 
 
+def test_who_reviews_goes_on_when_the_server_has_started_again(place: Path, visitor: Visitor) -> None:
+    with reviewing(place, "ada") as server:
+        page = visitor()
+        page.goto(server.links["ada"])
+        first = shown(page)
+        press(page, *"yyyyyyy")
+    with reviewing(place, "ada") as server:
+        assert page.url.startswith(server.address), "the port is the one that it had"
+        confirmed(page)
+        second = shown(page)
+        assert [each.review.twin_id for each in stored(place)] == [first] and second != first
+        unused = server.links["ada"]
+    with reviewing(place, "ada") as server:
+        other = visitor()
+        other.goto(unused)
+        assert shown(other) == second, "a link that nobody used is good still"
+    with reviewing(place, "ada", more=("--revoke",)) as server:
+        assert page.goto(f"{server.address}/review").status == 403
+    text = (place / "reviews.access.json").read_text()
+    assert "ada" in text and unused.split("token=")[1].split("&")[0] not in text
+
+
 def test_two_annotators_disagree_and_nobody_sees_what_the_other_says(place: Path, visitor: Visitor) -> None:
     with reviewing(place, "ada", "ben", more=("--overlap", "1", "--blind")) as server:
         for name, answers in (("ada", "yyyyyyy"), ("ben", "nyyyyyy")):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from manitwin.robots.load import load_robot
 from manitwin.scenes.scene import SCENE
 from manitwin.scenes.scene_files import CONFIG, read_scene, scene_files, scene_name, write_scene
 from manitwin.twin.dataset_root import twin_name
+from manitwin.web.plain_files import write_plain_files
 from manitwin.web.scene_document import DOCUMENT
 from manitwin.web.scene_folders import SceneFolders, is_scenes
 from manitwin.web.serve import pages_of
@@ -150,3 +152,33 @@ def test_one_scene_is_shown_by_itself_and_what_is_no_scene_is_told(scenes: Path,
     shutil.copytree(file.parent, moved)
     with pytest.raises(UsageError, match="which data set"):
         SceneFolders(str(moved), tmp_path / "cache")
+
+
+def test_plain_files_have_list_scenes_and_their_twins(scenes: Path, tmp_path: Path) -> None:
+    done = write_plain_files(str(scenes), tmp_path / "pages")
+    pages = sorted((tmp_path / "pages" / "scenes").glob("*/index.html"))
+    assert done.scenes == len(pages) > 1 and done.left_out == {} and done.twins >= 1
+    assert (tmp_path / "pages" / "index.html").read_text().count('href="scenes/') == len(pages)
+    for page in (*pages, tmp_path / "pages" / "index.html"):
+        for named in re.findall(r'(?:src|href)="([^"#:]+)"', page.read_text()):
+            assert (page.parent / named).is_file(), named
+    script = (pages[0].parent / "scene_view.js").read_text()
+    name, told = script.split("??={})[", 1)[1].split("]=", 1)
+    assert json.loads(name) == f"scenes/{pages[0].parent.name}/scene_view.json"
+    models = {each["model"] for each in json.loads(told.rstrip(";\n"))["objects"]}
+    assert all((tmp_path / "pages" / f"{model.removeprefix('../../')}.js").is_file() for model in models)
+    assert str(scenes) not in script
+    for path in (tmp_path / "pages").rglob("*.html"):
+        assert "All twins" not in path.read_text(), "there is no gallery"
+
+
+def test_plain_files_leave_out_a_scene_without_its_twins_and_no_page_leads_to_it(scenes: Path, tmp_path: Path) -> None:
+    folders = SceneFolders(str(scenes), tmp_path / "cache")
+    first, others = folders.scene(folders.ids[0]), [folders.scene(each) for each in folders.ids[1:]]
+    gone = {each.twin_id for each in first.objects}
+    stay = [each.scene_id for each in others if not gone & {thing.twin_id for thing in each.objects}]
+    for twin_id in gone:
+        shutil.rmtree(folders.twins.folder(twin_id))
+    done = write_plain_files(str(scenes), tmp_path / "pages")
+    assert done.scenes == len(stay) and set(done.left_out) == set(folders.ids) - set(stay)
+    assert first.scene_id not in "".join(path.read_text() for path in (tmp_path / "pages").rglob("*.html"))

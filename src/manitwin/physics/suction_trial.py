@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from manitwin.geometry.poses import inverse
+from manitwin.geometry.poses import inverse, transform
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.suction import lip_load, seal
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import HandContacts, run_phases
+from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.suction import SuctionGripper
@@ -40,13 +41,36 @@ class SuctionTrial:
 
         The cup seals on the body's ``surface``, and on its hulls where it has none.
         """
+        return [
+            run_phases(scene, object_to_hand[:3, :3], settings)
+            for scene, object_to_hand in self._scenes(body, gripper, gripper_to_object, settings)
+        ]
+
+    def record(
+        self,
+        body: RigidBody,
+        gripper: Gripper,
+        gripper_to_object: np.ndarray,
+        settings: TrialSettings,
+        joints_rad: np.ndarray | None = None,
+    ) -> TrialRecording:
+        """Try one grasp ``gripper_to_object (4, 4)`` as ``run`` does, and return its states."""
+        [(scene, object_to_hand)] = self._scenes(body, gripper, gripper_to_object[None], settings)
+        recorder = TrialRecorder()
+        result = run_phases(scene, object_to_hand[:3, :3], settings, recorder.watch(scene))
+        return recorder.recording(result, object_to_hand, scene.hand_joints())
+
+    def _scenes(
+        self, body: RigidBody, gripper: Gripper, gripper_to_object: np.ndarray, settings: TrialSettings
+    ) -> list[tuple[_Scene, np.ndarray]]:
+        """Return a scene of each grasp, and where the object begins in it ``(4, 4)``."""
         surface = RayCaster.of_hulls(body.hulls) if body.surface is None else body.surface
         cup = of_kind(gripper, SuctionGripper)
         found = seal(cup, gripper_to_object, surface)
         pressed_on = gripper_to_object.copy()
         pressed_on[:, :3, 3] += found.advance_m[:, None] * pressed_on[:, :3, 2]
         overlaps = self._collision(body.hulls).overlaps(cup, pressed_on, opening_m=cup.opening_m, clearance_m=0.0)
-        results = []
+        scenes = []
         for number, pose in enumerate(gripper_to_object):
             object_to_hand = inverse(pose)
             scene = _Scene(
@@ -59,8 +83,8 @@ class SuctionTrial:
                 lip_center_m=object_to_hand[:3, :3] @ found.center_m[number] + object_to_hand[:3, 3],
                 inward=object_to_hand[:3, :3] @ found.inward[number],
             )
-            results.append(run_phases(scene, object_to_hand[:3, :3], settings))
-        return results
+            scenes.append((scene, object_to_hand))
+        return scenes
 
     def _collision(self, hulls: tuple[np.ndarray, ...]) -> HandCollision:
         """Prepare hulls, or return what was made of this very tuple: trials often are of one object."""
@@ -88,6 +112,7 @@ class _Scene:
         self.friction = (settings.finger_friction + body.friction_static) / 2
         self.sealed, self.overlaps, self.inward = sealed, overlaps, inward
         self.rotation = object_to_hand[:3, :3]
+        self.in_object_m = body.center_of_mass_m
         self.center_m = self.rotation @ body.center_of_mass_m + object_to_hand[:3, 3]
         self.arm_m = self.center_m - lip_center_m
         self.on, self.velocity_m_s = False, np.zeros(3)
@@ -119,6 +144,14 @@ class _Scene:
     def contacts(self) -> HandContacts:
         """Return how hard the lip presses unloaded; where the gripper's body is in the object, it is there without end."""
         return HandContacts((self.settings.force_n if self.on else 0.0,), np.inf if self.overlaps else 0.0)
+
+    def object_to_hand(self) -> np.ndarray:
+        """Return the object's pose ``(4, 4)`` in the hand's frame; it does not turn."""
+        return transform(self.rotation, self.center_m - self.rotation @ self.in_object_m)
+
+    def hand_joints(self) -> np.ndarray:
+        """Return whether the vacuum holds, as 0 or 1 ``(1,)``."""
+        return np.array([float(self.on)])
 
     def object_rotation(self) -> np.ndarray:
         """Return the object's rotation in the hand's frame."""

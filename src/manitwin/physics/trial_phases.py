@@ -8,9 +8,9 @@ object is its weight and the inertial force of the path, -m a (Galilean relativi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -25,6 +25,9 @@ SLIDE_DIRECTIONS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1
 # then, one failed in the repetition, so such a grasp is not asked again: 0.62 of the steps.
 ALL_LOADED_AFTER, SURE_SHARE = 3, 0.2
 MET_M = 1e-6  # pads this close have met
+Phase = Literal["open", "close", "lift", "hold", "slide"]
+TrialWatch = Callable[[Phase, float, np.ndarray], None]
+"""Called after each advance with the phase, the time (s) and how far the hand was moved ``(3,)``, along the object's axes."""
 
 
 @dataclass(frozen=True)
@@ -67,14 +70,20 @@ class _Failed(Exception):
         self.outcome: Outcome = outcome
 
 
-def run_phases(scene: TrialScene, object_to_hand: np.ndarray, settings: TrialSettings) -> TrialResult:
+def run_phases(
+    scene: TrialScene, object_to_hand: np.ndarray, settings: TrialSettings, watch: TrialWatch | None = None
+) -> TrialResult:
     """Run the phases until one fails; ``object_to_hand (3, 3)`` turns the object's axes, along which the hand moves."""
-    return _Phases(scene, object_to_hand, settings).run()
+    return _Phases(scene, object_to_hand, settings, watch).run()
 
 
 class _Phases:
-    def __init__(self, scene: TrialScene, object_to_hand: np.ndarray, settings: TrialSettings):
-        self.scene, self.object_to_hand, self.settings = scene, object_to_hand, settings
+    def __init__(
+        self, scene: TrialScene, object_to_hand: np.ndarray, settings: TrialSettings, watch: TrialWatch | None
+    ):
+        self.scene, self.object_to_hand, self.settings, self.watch = scene, object_to_hand, settings, watch
+        self.phase: Phase = "open"
+        self.hand_m = np.zeros(3)
         self.steps = 0
         self.displacement_m = self.rotation_rad = self.penetration_m = 0.0
         self.forces_n: tuple[float, ...] = ()
@@ -103,7 +112,7 @@ class _Phases:
             raise _Failed("collides")
 
     def _close(self) -> None:
-        settings = self.settings
+        settings, self.phase = self.settings, "close"
         weightless = np.zeros((settings.steps_per_frame, 3))
         for _ in range(round(settings.close_time_s / settings.frame_s)):
             self.scene.squeeze()
@@ -112,13 +121,13 @@ class _Phases:
         self.closed_rotation = self.scene.object_rotation()
 
     def _lift(self) -> None:
-        settings = self.settings
+        settings, self.phase = self.settings, "lift"
         reference = self.scene.center_of_mass_m()
         path = np.array([0, 0, settings.lift_m])
         self._move(path, settings.lift_time_s, reference, settings.max_lift_displacement_m, "drops")
 
     def _wait_for_stable_frames(self) -> None:
-        settings = self.settings
+        settings, self.phase = self.settings, "hold"
         stable, before = 0, self.scene.center_of_mass_m()
         at_rest = self._loads(np.zeros((settings.steps_per_frame, 3)))
         for _ in range(round(settings.stable_time_s / settings.frame_s)):
@@ -132,7 +141,7 @@ class _Phases:
         raise _Failed("unstable")
 
     def _slide(self) -> None:
-        settings = self.settings
+        settings, self.phase = self.settings, "slide"
         reference = self.scene.center_of_mass_m()
         self.displacement_m = 0.0
         for number, direction in enumerate(SLIDE_DIRECTIONS):
@@ -148,9 +157,12 @@ class _Phases:
         count = round(time_s / self.settings.timestep_s)
         u = (np.arange(count) + 0.5) / count
         profile = (60 * u - 180 * u**2 + 120 * u**3) / time_s**2
+        start_m, done = self.hand_m, 0
         for loads in _chunks(
             self._loads(profile[:, None] * path_m), CHECK_EVERY_FRAMES * self.settings.steps_per_frame
         ):
+            done += len(loads)
+            self.hand_m = start_m + _share_of_path(done / count) * path_m
             self._advance(loads)
             moved = float(np.linalg.norm(self.scene.center_of_mass_m() - reference))
             self.displacement_m = max(self.displacement_m, moved)
@@ -176,8 +188,15 @@ class _Phases:
         left = self.settings.max_steps - self.steps
         self.scene.advance(loads_m_s2[:left])
         self.steps += min(left, len(loads_m_s2))
+        if self.watch is not None:
+            self.watch(self.phase, self.steps * self.settings.timestep_s, self.hand_m)
         if left < len(loads_m_s2):
             raise _Failed("unstable")
+
+
+def _share_of_path(u: float) -> float:
+    """Return the share of a quintic path that is behind at the share ``u`` of its time."""
+    return 10 * u**3 - 15 * u**4 + 6 * u**5
 
 
 def _chunks(rows: np.ndarray, size: int) -> Iterator[np.ndarray]:

@@ -12,23 +12,21 @@ Nothing here is written to a log.
 
 from __future__ import annotations
 
-import hmac
 import ipaddress
-import secrets
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs, urlsplit
 
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from manitwin.web.tokens import Tokens
 
 ENTER = "/enter"
 """The path of a link: ``/enter?token=...&next=/...``."""
 PERSON = "manitwin.person"
 """The key of the ASGI scope that says who asks."""
 LOOPBACK_NAMES = ("127.0.0.1", "localhost", "[::1]")
-MOST_LINKS = 64
-"""Links that were made and not used: the oldest are forgotten."""
 _READING = frozenset({"GET", "HEAD"})
 
 CONTENT_SECURITY_POLICY = "; ".join(
@@ -52,46 +50,6 @@ HEADERS = {
     "cross-origin-resource-policy": "same-origin",
 }
 """Of every answer. Scripts and styles come from files of this server alone; no inline text is run, whatever a caption holds."""
-
-
-@dataclass
-class Tokens:
-    """Links of one use, and the secrets of those who used one. A person is any name; nothing of it is written down."""
-
-    _links: dict[str, str] = field(default_factory=dict)
-    _secrets: dict[str, str] = field(default_factory=dict)
-
-    def link(self, person: str = "") -> str:
-        """Return the token of a new link for a person."""
-        token = secrets.token_urlsafe(32)
-        self._links[token] = person
-        while len(self._links) > MOST_LINKS:
-            del self._links[next(iter(self._links))]
-        return token
-
-    def redeem(self, token: str) -> str | None:
-        """Return the secret of a person for the token of a link, which ends with it; None for one that is not valid."""
-        found = _equal(token, self._links)
-        if found is None:
-            return None
-        person = self._links.pop(found)
-        secret = secrets.token_urlsafe(32)
-        self._secrets[secret] = person
-        return secret
-
-    def person(self, secret: str) -> str | None:
-        """Return who has this secret, or None."""
-        found = _equal(secret, self._secrets)
-        return None if found is None else self._secrets[found]
-
-
-def _equal(given: str, known: Iterable[str]) -> str | None:
-    """Return the known text that equals the given one; each comparison takes as long, however much of it is right."""
-    found = None
-    for each in known:
-        if hmac.compare_digest(given.encode(errors="replace"), each.encode()):
-            found = each
-    return found
 
 
 @dataclass(frozen=True)
@@ -194,7 +152,8 @@ class Guard:
             await _answer(send, 403, "This link was used, or is not of this server; the command has printed a new one.")
             return
         inside = onward.startswith("/") and not onward.startswith(("//", "/\\")) and onward.isprintable()
-        cookie = f"{self.cookie}={secret}; Path=/; HttpOnly; SameSite=Lax"
+        lasting = "" if self.tokens.lasting_s is None else f"; Max-Age={self.tokens.lasting_s:.0f}"
+        cookie = f"{self.cookie}={secret}; Path=/; HttpOnly; SameSite=Lax{lasting}"
         more = [("set-cookie", cookie), ("location", onward if inside and onward.isascii() else "/")]
         await _answer(send, 303, "", more)
 

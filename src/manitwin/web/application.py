@@ -12,12 +12,14 @@ from starlette.routing import Route
 from starlette.types import Receive, Scope, Send
 
 from manitwin.errors import ManiTwinError, UsageError
+from manitwin.web import trial_document
 from manitwin.web.gallery_page import gallery_page
 from manitwin.web.gallery_query import Gallery, View
 from manitwin.web.html import page, text
 from manitwin.web.links import ServerLinks
 from manitwin.web.package_files import KINDS, package_file
 from manitwin.web.served_files import ServedFile, TwinFolders, open_file
+from manitwin.web.trial_player import TrialPlayer
 from manitwin.web.twin_document import DOCUMENT, document_bytes, twin_document
 from manitwin.web.twin_page import twin_page
 
@@ -27,8 +29,14 @@ _KEPT = {"cache-control": "private, max-age=86400"}
 NOT_KEPT = {"cache-control": "no-store"}
 
 
-def application(gallery: Gallery | None, twins: TwinFolders, title: str) -> Starlette:
-    """Return the pages of a data set, or of one twin (``gallery`` None), without the guard that belongs before them."""
+def application(
+    gallery: Gallery | None, twins: TwinFolders, title: str, trials: TrialPlayer | None = None
+) -> Starlette:
+    """Return the pages of a data set, or of one twin (``gallery`` None), without the guard that belongs before them.
+
+    ``trials`` plays grasp trials, and is the caller's to close.
+    """
+    player = TrialPlayer() if trials is None else trials
 
     async def show_gallery(request: Request) -> Response:
         if gallery is None:
@@ -48,6 +56,16 @@ def application(gallery: Gallery | None, twins: TwinFolders, title: str) -> Star
             )
         )
 
+    async def give_trial(request: Request) -> Response:
+        twin_id, asked = request.path_params["twin_id"], request.query_params
+        return await answered(
+            lambda: Response(
+                player.play(twins.twin(twin_id), asked.get("gripper", ""), asked.get("grasp", "")),
+                media_type="application/json",
+                headers=NOT_KEPT,
+            )
+        )
+
     async def give_file(request: Request) -> Response:
         twin_id, name = request.path_params["twin_id"], request.path_params["name"]
         return await answered(lambda: _FileResponse(open_file(twins.folder(twin_id), name)))
@@ -57,6 +75,7 @@ def application(gallery: Gallery | None, twins: TwinFolders, title: str) -> Star
             Route("/", show_gallery),
             Route("/twin/{twin_id}", show_twin),
             Route(f"/twin/{{twin_id}}/{DOCUMENT}", give_document),
+            Route(f"/twin/{{twin_id}}/{trial_document.DOCUMENT}", give_trial),
             Route("/twin/{twin_id}/{name:path}", give_file),
             PACKAGE_FILES,
         ]

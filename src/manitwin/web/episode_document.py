@@ -17,7 +17,7 @@ from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.robots.robot import Robot
 from manitwin.web.episode_events import happenings, literals, phases, span_json
 from manitwin.web.episode_folders import EpisodeFolders
-from manitwin.web.links import ServerLinks
+from manitwin.web.links import Links
 from manitwin.web.robot_model import shown_links
 from manitwin.web.scene_document import furniture_boxes
 from manitwin.web.served_files import MODEL
@@ -35,9 +35,7 @@ _LONGEST_QUATERNION = 0.01
 _LENGTH_OF_POSE = 7
 
 
-def episode_document(
-    episode: StoredEpisode, number: int, folders: EpisodeFolders, links: ServerLinks
-) -> dict[str, Any]:
+def episode_document(episode: StoredEpisode, number: int, folders: EpisodeFolders, links: Links) -> dict[str, Any]:
     """Return the document: metres, world frame, quaternions wxyz, seconds; ``unreadable`` has a line for what cannot be shown.
 
     ``robots`` has the robot, or each of two arms. Poses are rows of position and quaternion, one for each of ``time_s``, or one
@@ -101,7 +99,7 @@ def shown_states(recording: Recording, things: int) -> np.ndarray:
 
 
 def _objects(
-    episode: StoredEpisode, folders: EpisodeFolders, links: ServerLinks, unreadable: list[str]
+    episode: StoredEpisode, folders: EpisodeFolders, links: Links, unreadable: list[str]
 ) -> tuple[list[dict[str, Any]], Callable[[str], str]]:
     """Return what is told of each object but its poses, and what gives an object's words for its name."""
     known: dict[str, tuple[str, str]] = {}
@@ -133,7 +131,7 @@ def _objects(
 
 
 def _arms(
-    robot: Robot, shown: list[list[str]], recording: Recording, states: np.ndarray, links: ServerLinks
+    robot: Robot, shown: list[list[str]], recording: Recording, states: np.ndarray, links: Links
 ) -> list[dict[str, Any]]:
     """Return the links of the robot, or of each of its two arms, whose numbers stand side by side in the arrays."""
     arms = robot.arms or (robot,)

@@ -13,7 +13,7 @@ from manitwin.episodes.attempts import OUTCOMES, Attempt, attempt_from
 from manitwin.web.attempt_rows import AttemptRow
 from manitwin.web.episode_document import DOCUMENT
 from manitwin.web.html import EPISODE_TIMELINE, EPISODE_VIEWER, STAGE, THREE, number, options, page, table, text
-from manitwin.web.links import ServerLinks
+from manitwin.web.links import Links
 
 PAGE_EPISODES = 100
 MEANINGS: Mapping[str, str] = {
@@ -88,7 +88,7 @@ def recorded_row(said: dict[str, Any], number: int) -> AttemptRow:
     )  # fmt: skip
 
 
-def list_page(shown: EpisodeList, title: str, remark: str, links: ServerLinks) -> str:
+def list_page(shown: EpisodeList, title: str, remark: str, links: Links) -> str:
     """Return a page of the list; ``remark`` is a line above it."""
     pages = "".join(
         f'<a href="{text(links.episodes(start, shown.outcome))}"{" aria-current=page" if start == shown.place else ""}>'
@@ -110,7 +110,7 @@ def list_page(shown: EpisodeList, title: str, remark: str, links: ServerLinks) -
     return page(title, body, links)
 
 
-def _counts(shown: EpisodeList, links: ServerLinks) -> str:
+def _counts(shown: EpisodeList, links: Links) -> str:
     if not shown.outcomes:
         return ""
     choices = [("", "all", sum(shown.outcomes.values())), *((each, each, n) for each, n in shown.outcomes.items())]
@@ -125,7 +125,7 @@ def _counts(shown: EpisodeList, links: ServerLinks) -> str:
     )
 
 
-def _row(row: AttemptRow | str, links: ServerLinks) -> str:
+def _row(row: AttemptRow | str, links: Links) -> str:
     if isinstance(row, str):
         return f'<tr><td colspan="7" class="error">{text(row)}</td></tr>\n'
     name = text(row.episode_id)
@@ -155,9 +155,18 @@ def _plan_failures(said: str | None) -> str:
 
 
 def episode_page(
-    said: dict[str, Any], number: int, count: int, links: ServerLinks, before: int | None, after: int | None
+    said: dict[str, Any],
+    number: int,
+    count: int,
+    links: Links,
+    before: int | None,
+    after: int | None,
+    data: Sequence[str] = (),
 ) -> str:
-    """Return the page of an episode; ``before`` and ``after`` are the numbers of its neighbours. Raises EpisodesError."""
+    """Return the page of an episode; ``before`` and ``after`` are the numbers of its neighbours. Raises EpisodesError.
+
+    ``data`` are the scripts with what a server would be asked for.
+    """
     attempt = attempt_from(said["attempt"])
     steps = "".join(
         f'<a rel="{rel}" href="{text(links.episode(other))}">{words}</a>'
@@ -174,10 +183,10 @@ def episode_page(
         f'<div class="twin">\n{_viewer(number, links)}'
         f'<main id="main">\n{_judged(attempt)}{_instructions(attempt)}{_objects(said, links)}{_facts(attempt)}</main>\n</div>\n'
     )
-    return page(title, body, links, scripts=[THREE, STAGE, EPISODE_TIMELINE, EPISODE_VIEWER])
+    return page(title, body, links, scripts=[THREE, STAGE, EPISODE_TIMELINE, EPISODE_VIEWER], data=data)
 
 
-def _viewer(number: int, links: ServerLinks) -> str:
+def _viewer(number: int, links: Links) -> str:
     layers = "".join(
         f'<label><input type="checkbox" data-layer="{name}"{" checked" if shown else ""}> {words} <kbd>{key}</kbd></label>'
         for name, key, words, shown in LAYERS
@@ -185,7 +194,7 @@ def _viewer(number: int, links: ServerLinks) -> str:
     keys = "".join(f"<div><dt>{text(key)}</dt><dd>{text(does)}</dd></div>" for key, does in KEYS)
     return (
         '<section class="viewer" id="viewer" aria-label="3D view"'
-        f' data-document="{text(links.episode(number))}/{DOCUMENT}">\n'
+        f' data-document="{text(links.episode(number, DOCUMENT))}">\n'
         '<div class="stage" tabindex="0" role="application" aria-label="3D view; the keys are listed below it">'
         '<div class="tip" hidden></div><div class="scale" aria-hidden="true"></div></div>\n'
         '<p class="said" role="status" aria-live="polite">Loading …</p>\n'
@@ -252,7 +261,7 @@ def _instructions(attempt: Attempt) -> str:
     return f'<h2>What a person would say</h2>\n<ul class="instructions">{said}</ul>\n'
 
 
-def _objects(said: dict[str, Any], links: ServerLinks) -> str:
+def _objects(said: dict[str, Any], links: Links) -> str:
     target = said["target"]
     rows = "".join(
         f'<tr><th scope="row">{text(each["name"])}{" (target)" if place == target else ""}</th>'

@@ -29,6 +29,26 @@ class Links(Protocol):
         """Return a file of a twin; the revision keeps an older one in a cache from being shown."""
         ...
 
+    def scenes(self, start: int = 0) -> str:
+        """Return the list of scenes, from one on."""
+        ...
+
+    def scene(self, scene_id: str, name: str = "") -> str:
+        """Return a scene's page, or a file of it."""
+        ...
+
+    def episodes(self, start: int = 0, outcome: str = "") -> str:
+        """Return the list of episodes, from one on, of one outcome or of all."""
+        ...
+
+    def episode(self, number: int, name: str = "") -> str:
+        """Return the page of a recorded episode, or a file of it."""
+        ...
+
+    def robot(self, name: str, arm: int = 0) -> str:
+        """Return the looks of the links of a robot, of two arms those of one."""
+        ...
+
     def asset(self, name: str) -> str:
         """Return a style or script of this package."""
         ...
@@ -52,18 +72,18 @@ class ServerLinks:
         """Return the list of scenes, from one on."""
         return f"/?from={start}" if start else "/"
 
-    def scene(self, scene_id: str) -> str:
-        """Return a scene's page."""
-        return f"/scene/{quote(scene_id, safe='')}"
+    def scene(self, scene_id: str, name: str = "") -> str:
+        """Return a scene's page, or a file of it."""
+        return f"/scene/{quote(scene_id, safe='')}{name and f'/{name}'}"
 
     def episodes(self, start: int = 0, outcome: str = "") -> str:
         """Return the list of episodes, from one on, of one outcome or of all."""
         asked = {**({"outcome": outcome} if outcome else {}), **({"from": start} if start else {})}
         return f"/?{urlencode(asked)}" if asked else "/"
 
-    def episode(self, number: int) -> str:
-        """Return the page of a recorded episode."""
-        return f"/episode/{number}"
+    def episode(self, number: int, name: str = "") -> str:
+        """Return the page of a recorded episode, or a file of it."""
+        return f"/episode/{number}{name and f'/{name}'}"
 
     def robot(self, name: str, arm: int = 0) -> str:
         """Return the looks of the links of a robot, of two arms those of one."""
@@ -97,6 +117,31 @@ class FileLinks:
         """Return a file of a twin."""
         return f"{self.up}twins/{quote(twin_id, safe='')}/{quote(name)}"
 
+    def scenes(self, start: int = 0) -> str:
+        """Return the list of scenes, from one on."""
+        return f"{self.up}{list_name(start)}"
+
+    def scene(self, scene_id: str, name: str = "") -> str:
+        """Return a scene's page, or a file of it."""
+        return f"{self.up}scenes/{quote(scene_id, safe='')}/{name or 'index.html'}"
+
+    def episodes(self, start: int = 0, outcome: str = "") -> str:
+        """Return the list of episodes, from one on; there is none of one outcome."""
+        return f"{self.up}{list_name(start)}"
+
+    def episode(self, number: int, name: str = "") -> str:
+        """Return the page of a recorded episode, or a file of it."""
+        return f"{self.up}episodes/{number}/{name or 'index.html'}"
+
+    def robot(self, name: str, arm: int = 0) -> str:
+        """Return the looks of the links of a robot, of two arms those of one."""
+        return f"{self.up}robots/{quote(name, safe='')}/links_{arm}.glb"
+
     def asset(self, name: str) -> str:
         """Return a style or script of this package."""
         return f"{self.up}static/{name}"
+
+
+def list_name(start: int) -> str:
+    """Return the file of a list from one entry on."""
+    return f"index_{start}.html" if start else "index.html"

@@ -19,13 +19,26 @@ from manitwin.web.html import (
     STAGE,
     STYLE,
     THREE,
+    TRIAL_PLAYER,
+    TWIN_SHAPES,
     VIEWER,
 )
 
 KINDS = {
     STYLE: "text/css; charset=utf-8",
     **dict.fromkeys(
-        (THREE, VIEWER, GALLERY, REVIEW, STAGE, SCENE_VIEWER, EPISODE_VIEWER, EPISODE_TIMELINE),
+        (
+            THREE,
+            VIEWER,
+            GALLERY,
+            REVIEW,
+            STAGE,
+            SCENE_VIEWER,
+            EPISODE_VIEWER,
+            EPISODE_TIMELINE,
+            TWIN_SHAPES,
+            TRIAL_PLAYER,
+        ),
         "text/javascript; charset=utf-8",
     ),
 }

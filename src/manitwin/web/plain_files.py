@@ -1,13 +1,12 @@
-"""The gallery and the pages of chosen twins as plain files: to open from a disk, put on any web host, or send to somebody."""
+"""Pages as plain files, of chosen twins, scenes or episodes: to open from a disk, put on any web host, or send to somebody."""
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -15,26 +14,32 @@ from manitwin.errors import TwinError, UsageError
 from manitwin.formats.output_folder import new_folder
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
-from manitwin.web.episode_folders import is_episodes
+from manitwin.web.episode_folders import EpisodeFolders, is_episodes
 from manitwin.web.gallery_page import plain_gallery_page
 from manitwin.web.gallery_query import Gallery, View
-from manitwin.web.html import GALLERY, STAGE, STYLE, THREE, VIEWER
+from manitwin.web.html import GALLERY, STYLE
 from manitwin.web.links import FileLinks
 from manitwin.web.package_files import LICENSE, package_file
-from manitwin.web.scene_folders import is_scenes
-from manitwin.web.served_files import CARD, MODEL, VIEWS, TwinFolders, open_file
-from manitwin.web.twin_document import document_bytes, twin_document
-from manitwin.web.twin_page import DATA_SCRIPT, MODEL_SCRIPT, twin_page
+from manitwin.web.plain_episodes import write_episodes
+from manitwin.web.plain_scenes import write_scenes
+from manitwin.web.plain_scripts import write, write_twin
+from manitwin.web.scene_folders import SceneFolders, is_scenes
+from manitwin.web.served_files import TwinFolders
+from manitwin.web.trial_player import TrialPlayer
+from manitwin.web.twin_page import SCRIPTS
 
-MOST_TWINS = 2_000
-"""Of one folder: its gallery is one page, and each twin takes a megabyte or two."""
+MOST_PAGES = 2_000
+"""Of one folder: the gallery of twins is one page, and each twin takes a megabyte or two."""
+Drawn = TypeVar("Drawn")
 
 
 @dataclass
 class PlainFiles:
-    """What was written: how many twins, bytes in all, and those that were left out with the reason, by id."""
+    """What was written: how many of each, bytes in all, and those that were left out with the reason, by id."""
 
     twins: int = 0
+    scenes: int = 0
+    episodes: int = 0
     size_bytes: int = 0
     left_out: dict[str, str] = field(default_factory=dict)
 
@@ -46,66 +51,108 @@ def write_plain_files(
     sample: int | None = None,
     seed: int = 0,
     where: str = "",
-    on_twin: Callable[[str], None] = lambda twin_id: None,
+    trials: int = 0,
+    twins: str | None = None,
+    on_page: Callable[[str], None] = lambda name: None,
 ) -> PlainFiles:
-    """Write ``out``, a new folder, with the accepted twins of a data set that satisfy ``where``, or of one twin's folder.
+    """Write ``out``, a new folder, with the pages of a place: a data set or one twin's folder, scenes, or episodes.
 
-    ``sample`` are so many of them, drawn by the seed. The same twins, sample and seed give the same bytes. An input
-    that is a photo is not written: it may hold more than the twin, such as the place where it was taken. Raises UsageError
-    where there are none, or more than ``MOST_TWINS``.
+    Of a data set the accepted twins that satisfy ``where``; of scenes and episodes with the pages of their twins, which of
+    episodes are in the data set ``twins`` where that is not the one that they were made from. ``sample`` are so many, drawn by
+    the seed. Of each gripper of a twin the trials of its first ``trials`` grasps can be played. The same input, sample and seed
+    give the same bytes. An input that is a photo is not written: it may hold more than the twin, such as the place where it was
+    taken. Raises UsageError where there are none, or more than ``MOST_PAGES``.
     """
-    if is_scenes(place) or is_episodes(place):
-        raise UsageError(f"{place}: scenes and episodes are shown by the server alone; leave out --static")
-    with TemporaryDirectory(prefix="manitwin-view-") as cache:
-        twins = TwinFolders(place, Path(cache) if "://" in place else None)
-        return _written(place, twins, out, sample, seed, where, on_twin)
+    with TemporaryDirectory(prefix="manitwin-view-") as cache, TrialPlayer() as player:
+        if where and (is_episodes(place) or is_scenes(place)):
+            raise UsageError(f"{place}: --where chooses twins of a data set, and there are none; leave it out")
+        if is_episodes(place):
+            return _of_episodes(EpisodeFolders(place, Path(cache), twins), place, out, sample, seed, on_page)
+        if twins is not None:
+            raise UsageError(f"{place}: --twins is for episodes, and there are none")
+        if is_scenes(place):
+            return _of_scenes(SceneFolders(place, Path(cache)), place, out, sample, seed, on_page)
+        folders = TwinFolders(place, Path(cache) if "://" in place else None)
+        rows, title = _rows(place, folders, sample, where)
+        chosen = chosen_of(rows, place, sample, seed, "accepted twin is chosen; give another --where")
+
+        def write_one(fresh: Path, twin_id: str) -> int:
+            return write_twin(fresh, folders.twin(twin_id), player=player, trials=trials)
+
+        return _of_twins(chosen, title, folders.only is None, out, write_one, on_page)
 
 
-def _written(
-    place: str,
-    twins: TwinFolders,
-    out: Path,
-    sample: int | None,
-    seed: int,
-    where: str,
-    on_twin: Callable[[str], None],
-) -> PlainFiles:
-    if twins.only is not None and (where or sample is not None):
-        raise UsageError(f"{place}: is one twin, of which there is nothing to choose; leave out --sample and --where")
-    if twins.only is not None:
-        rows, title = [_row(twins.only)], twins.only.record.name or twins.only.record.twin_id
-    else:
+def chosen_of(all_of_them: Sequence[Drawn], place: str, sample: int | None, seed: int, none: str) -> list[Drawn]:
+    """Return all, or ``sample`` of them drawn by the seed, in their order; raises UsageError for none and for too many."""
+    chosen = list(all_of_them)
+    if sample is not None and sample < len(chosen):
+        drawn = np.random.default_rng(seed).choice(len(chosen), sample, replace=False)
+        chosen = [chosen[i] for i in sorted(drawn)]
+    if not chosen:
+        raise UsageError(f"{place}: no {none}")
+    if len(chosen) > MOST_PAGES:
+        raise UsageError(f"{place}: {len(chosen):,} are chosen, {MOST_PAGES:,} at most; give --sample")
+    return chosen
+
+
+def _rows(place: str, twins: TwinFolders, sample: int | None, where: str) -> tuple[list[dict[str, Any]], str]:
+    """Return what the cards say of the twins, and the title of them all."""
+    if twins.only is None:
         root = DatasetRoot(place)
-        rows, title = Gallery(root).chosen(View(where=where)), Path(root.path).name or "twins"
-    rows = _sampled(rows, sample, seed)
-    if not rows:
-        raise UsageError(f"{place}: no accepted twin is chosen; give another --where")
-    if len(rows) > MOST_TWINS:
-        raise UsageError(f"{place}: {len(rows):,} twins are chosen, {MOST_TWINS:,} at most; give --sample or --where")
+        return Gallery(root).chosen(View(where=where)), Path(root.path).name or "twins"
+    if where or sample is not None:
+        raise UsageError(f"{place}: is one twin, of which there is nothing to choose; leave out --sample and --where")
+    return [_row(twins.only)], twins.only.record.name or twins.only.record.twin_id
+
+
+def _of_twins(
+    rows: list[dict[str, Any]],
+    title: str,
+    is_dataset: bool,
+    out: Path,
+    write_one: Callable[[Path, str], int],
+    on_page: Callable[[str], None],
+) -> PlainFiles:
     done = PlainFiles()
     with new_folder(out) as fresh:
         written = []
         for row in rows:
             try:
-                done.size_bytes += _write_twin(fresh, twins.twin(row["twin_id"]))
+                done.size_bytes += write_one(fresh, row["twin_id"])
                 written.append(row)
             except (TwinError, UsageError) as error:
                 done.left_out[row["twin_id"]] = str(error)
-            on_twin(row["twin_id"])
-        said = f"{len(written):,} accepted twins" + (f" of {title}" if twins.only is None else "")
+            on_page(row["twin_id"])
+        said = f"{len(written):,} accepted twins" + (f" of {title}" if is_dataset else "")
         page = plain_gallery_page(written, "accepted", title, said, FileLinks())
-        done.size_bytes += _write(fresh / "index.html", page.encode())
-        for name in (STYLE, GALLERY, THREE, STAGE, VIEWER, LICENSE):
-            done.size_bytes += _write(fresh / "static" / name, package_file(name))
+        done.size_bytes += write(fresh / "index.html", page.encode()) + _write_package_files(fresh, GALLERY, *SCRIPTS)
     done.twins = len(written)
     return done
 
 
-def _sampled(rows: list[dict[str, Any]], sample: int | None, seed: int) -> list[dict[str, Any]]:
-    if sample is None or sample >= len(rows):
-        return rows
-    chosen = np.random.default_rng(seed).choice(len(rows), sample, replace=False)
-    return [rows[i] for i in sorted(chosen)]
+def _of_scenes(
+    scenes: SceneFolders, place: str, out: Path, sample: int | None, seed: int, on_page: Callable[[str], None]
+) -> PlainFiles:
+    chosen = chosen_of(scenes.ids, place, sample, seed, "scene is there")
+    with new_folder(out) as fresh:
+        written = write_scenes(fresh, scenes, chosen, Path(place).resolve().name, on_page)
+        size = written.size_bytes + _write_package_files(fresh, *written.scripts)
+    return PlainFiles(len(written.twins), scenes=written.pages, size_bytes=size, left_out=written.left_out)
+
+
+def _of_episodes(
+    episodes: EpisodeFolders, place: str, out: Path, sample: int | None, seed: int, on_page: Callable[[str], None]
+) -> PlainFiles:
+    chosen = chosen_of(range(len(episodes)), place, sample, seed, "recorded episode is there")
+    with new_folder(out) as fresh:
+        written = write_episodes(fresh, episodes, chosen, Path(place).resolve().name, on_page)
+        size = written.size_bytes + _write_package_files(fresh, *written.scripts)
+    return PlainFiles(len(written.twins), episodes=written.pages, size_bytes=size, left_out=written.left_out)
+
+
+def _write_package_files(fresh: Path, *scripts: str) -> int:
+    names = dict.fromkeys((STYLE, *scripts, LICENSE))
+    return sum(write(fresh / "static" / name, package_file(name)) for name in names)
 
 
 def _row(twin: Twin) -> dict[str, Any]:
@@ -126,28 +173,3 @@ def _row(twin: Twin) -> dict[str, Any]:
         "verified": record.grasps.verified,
         "robustness_median": robustness.median if robustness else None,
     }
-
-
-def _write_twin(out: Path, twin: Twin) -> int:
-    """Write the page of a twin with its files, all or nothing of them; returns their bytes."""
-    document = twin_document(twin)
-    if document["unreadable"]:  # what is sent to others is whole, and names no folder of this machine
-        raise TwinError(document["unreadable"][0])
-    content = {"index.html": twin_page(twin, FileLinks("../../")).encode()}
-    content[DATA_SCRIPT] = b"globalThis.manitwinTwin=" + document_bytes(document) + b";\n"
-    model = base64.b64encode(_file(twin.folder, MODEL))
-    content[MODEL_SCRIPT] = b'globalThis.manitwinModel="' + model + b'";\n'
-    named = [name for name in sorted(twin.record.files) if name == CARD or VIEWS.fullmatch(name)]
-    content |= {name: _file(twin.folder, name) for name in named}
-    folder = out / "twins" / twin.record.twin_id
-    return sum(_write(folder / name, data) for name, data in content.items())
-
-
-def _file(folder: Path, name: str) -> bytes:
-    return b"".join(open_file(folder, name).chunks())
-
-
-def _write(path: Path, content: bytes) -> int:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(content)
-    return len(content)

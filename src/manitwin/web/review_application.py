@@ -17,6 +17,7 @@ from manitwin.dataset.review.session import ReviewSession
 from manitwin.errors import ManiTwinError, UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.twin.loaded_twin import Twin
+from manitwin.web import trial_document
 from manitwin.web.access import PERSON
 from manitwin.web.application import LINKS
 from manitwin.web.review_page import PATH, done_page, review_page
@@ -25,6 +26,7 @@ from manitwin.web.twin_document import DOCUMENT
 
 MOST_BODY_BYTES = 64 << 10
 _NOT_KEPT = {"cache-control": "no-store"}
+_SHAPES = (DOCUMENT, trial_document.DOCUMENT, "visual.glb")
 
 
 def review_application(pages: ASGIApp, twins: TwinFolders, session: ReviewSession) -> Starlette:
@@ -89,7 +91,7 @@ class _Blind:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         name = scope["path"].split("/", 3)[-1] if scope["path"].count("/") > 2 else ""
-        shown = name in (DOCUMENT, "visual.glb") or VIEWS.fullmatch(name) or scope["path"].startswith("/static/")
+        shown = name in _SHAPES or VIEWS.fullmatch(name) or scope["path"].startswith("/static/")
         if shown:
             await self._pages(scope, receive, send)
         else:

@@ -10,10 +10,10 @@ from manitwin.dataset.review.twins_seen import said_of
 from manitwin.dataset.review.verdicts import ANSWERS, DIMENSIONS, MOST_NAME_CHARACTERS, MOST_NOTE_CHARACTERS, Dimension
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import TwinRecord
-from manitwin.web.html import REVIEW, STAGE, THREE, VIEWER, number, page, text
+from manitwin.web.html import REVIEW, number, page, text
 from manitwin.web.links import Links
 from manitwin.web.twin_facts import fact_tables
-from manitwin.web.twin_page import pictures, viewer
+from manitwin.web.twin_page import SCRIPTS, pictures, viewer
 
 QUESTIONS: dict[Dimension, str] = {
     "category": "Is this what it is?",
@@ -58,7 +58,7 @@ def review_page(twin: Twin, links: Links, annotator: str, progress: Progress, dr
         f'<p class="said" id="saved" role="status" aria-live="polite"></p>\n</form>\n{_keys()}'
         f"{'' if blind else fact_tables(record)}</main>\n</div>\n{pictures(twin, links)}"
     )
-    return page(f"Review {record.twin_id}", body, links, scripts=[THREE, STAGE, VIEWER, REVIEW])
+    return page(f"Review {record.twin_id}", body, links, scripts=[*SCRIPTS, REVIEW])
 
 
 def done_page(links: Links, annotator: str, progress: Progress) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from manitwin.scenes.scene import SceneRecord
 from manitwin.web.html import SCENE_VIEWER, STAGE, THREE, number, page, table, text
-from manitwin.web.links import ServerLinks
+from manitwin.web.links import Links
 from manitwin.web.scene_document import DOCUMENT
 
 PAGE_SCENES = 100
@@ -21,7 +21,7 @@ LAYERS = (
 KEYS = (("← → ↑ ↓", "turn"), ("+ −", "nearer, farther"), ("0", "from the front again"))
 
 
-def list_page(records: Sequence[SceneRecord | str], place: int, count: int, title: str, links: ServerLinks) -> str:
+def list_page(records: Sequence[SceneRecord | str], place: int, count: int, title: str, links: Links) -> str:
     """Return a page of the list: ``records`` are those from ``place`` on of ``count``, or a line for one that cannot be read."""
     rows = "".join(_row(each, links) for each in records)
     pages = "".join(
@@ -39,7 +39,7 @@ def list_page(records: Sequence[SceneRecord | str], place: int, count: int, titl
     return page(title, body, links)
 
 
-def _row(record: SceneRecord | str, links: ServerLinks) -> str:
+def _row(record: SceneRecord | str, links: Links) -> str:
     if isinstance(record, str):
         return f'<tr><td colspan="6" class="error">{text(record)}</td></tr>\n'
     things = ", ".join(sorted(each.category for each in record.objects))
@@ -51,8 +51,13 @@ def _row(record: SceneRecord | str, links: ServerLinks) -> str:
     )
 
 
-def scene_page(record: SceneRecord, links: ServerLinks, before: str | None, after: str | None) -> str:
-    """Return the page of a scene; ``before`` and ``after`` are the ids of its neighbours in the list."""
+def scene_page(
+    record: SceneRecord, links: Links, before: str | None, after: str | None, data: Sequence[str] = ()
+) -> str:
+    """Return the page of a scene; ``before`` and ``after`` are the ids of its neighbours in the list.
+
+    ``data`` are the scripts with what a server would be asked for.
+    """
     steps = "".join(
         f'<a rel="{rel}" href="{text(links.scene(scene_id))}">{words}</a>'
         for rel, words, scene_id in (("prev", "previous", before), ("next", "next", after))
@@ -68,7 +73,7 @@ def scene_page(record: SceneRecord, links: ServerLinks, before: str | None, afte
         f'<header class="top"><nav><a href="{text(links.scenes())}">All scenes</a>{steps}</nav>'
         f'<h1>{text(record.scene_id)}</h1><p class="caption">{text(said)}</p></header>\n'
         '<div class="twin">\n<section class="viewer" id="viewer" aria-label="3D view"'
-        f' data-document="{text(links.scene(record.scene_id))}/{DOCUMENT}">\n'
+        f' data-document="{text(links.scene(record.scene_id, DOCUMENT))}">\n'
         '<div class="stage" tabindex="0" role="application" aria-label="3D view; the keys are listed below it">'
         '<div class="tip" hidden></div><div class="scale" aria-hidden="true"></div></div>\n'
         '<p class="said" role="status" aria-live="polite">Loading …</p>\n'
@@ -76,10 +81,10 @@ def scene_page(record: SceneRecord, links: ServerLinks, before: str | None, afte
         f'<details class="keys"><summary>Keys</summary><dl>{keys}</dl></details>\n</section>\n'
         f'<main id="main">\n{_objects(record, links)}{_facts(record)}</main>\n</div>\n'
     )
-    return page(record.scene_id, body, links, scripts=[THREE, STAGE, SCENE_VIEWER])
+    return page(record.scene_id, body, links, scripts=[THREE, STAGE, SCENE_VIEWER], data=data)
 
 
-def _objects(record: SceneRecord, links: ServerLinks) -> str:
+def _objects(record: SceneRecord, links: Links) -> str:
     rows = "".join(
         f'<tr><th scope="row"><a href="{text(links.twin(each.twin_id))}">{text(each.name)}</a></th>'
         f"<td>{text(each.category)}</td><td>{text(f'{each.relation} {each.supported_by or each.surface}')}</td>"

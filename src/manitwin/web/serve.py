@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import errno
+import logging
 import socket
 import tempfile
 from collections.abc import Callable, Iterator
@@ -17,7 +18,7 @@ from starlette.types import ASGIApp
 from manitwin.dataset.review.session import ReviewSession
 from manitwin.errors import UsageError
 from manitwin.twin.dataset_root import DatasetRoot
-from manitwin.web.access import ENTER, Guard, Names, Tokens
+from manitwin.web.access import ENTER, Guard, Names
 from manitwin.web.application import application
 from manitwin.web.episode_application import episode_application, no_twins
 from manitwin.web.episode_folders import EpisodeFolders, is_episodes
@@ -26,6 +27,8 @@ from manitwin.web.review_application import review_application
 from manitwin.web.scene_application import scene_application
 from manitwin.web.scene_folders import SceneFolders, is_scenes
 from manitwin.web.served_files import TwinFolders
+from manitwin.web.tokens import Tokens
+from manitwin.web.trial_player import TrialPlayer
 
 MOST_REQUESTS = 256
 """At once; more are told to come again (503)."""
@@ -62,6 +65,15 @@ def bound_socket(host: str, port: int) -> socket.socket:
     return bound
 
 
+def _is_no_end_of_waiting(record: logging.LogRecord) -> bool:
+    """Leave out what uvicorn says of answers that are cut short as the server is ended: that is what was asked for."""
+    cancelled = record.exc_info is not None and isinstance(record.exc_info[1], asyncio.CancelledError)
+    return not cancelled and not str(record.msg).startswith("Cancel %s running task(s)")
+
+
+logging.getLogger("uvicorn.error").addFilter(_is_no_end_of_waiting)
+
+
 class _Server(uvicorn.Server):
     """Leaves signals to the command, which ends it in order; uvicorn would raise them again afterwards."""
 
@@ -73,13 +85,25 @@ class _Server(uvicorn.Server):
 class PageServer:
     """A server of pages behind the guard: ``link`` makes a link of one use, ``run`` serves until ``stop`` or an interrupt.
 
-    ``on_new_link`` is told a new link when somebody came with one that was used; at most one in two seconds.
+    ``on_new_link`` is told a new link when somebody came with one that was used; at most one in two seconds. ``tokens`` are those
+    of a server before; port 0 is then its port where that is free, else any that is free.
     """
 
-    def __init__(self, app: ASGIApp, host: str, port: int, on_new_link: Callable[[str], None] | None = None):
-        self.socket = bound_socket(host, port)
+    def __init__(
+        self,
+        app: ASGIApp,
+        host: str,
+        port: int,
+        on_new_link: Callable[[str], None] | None = None,
+        tokens: Tokens | None = None,
+    ):
+        self.tokens = Tokens() if tokens is None else tokens
+        self.socket = (
+            bound_socket(host, port) if port or not self.tokens.port else self._as_before(host, self.tokens.port)
+        )
         self.host, self.port = host.strip("[]"), int(self.socket.getsockname()[1])
-        self.names, self.tokens = Names.of(host, self.port), Tokens()
+        self.names = Names.of(host, self.port)
+        self.tokens.served_at(self.port)
         self._on_new_link, self._told = on_new_link, float("-inf")
         guard = Guard(app, self.names, self.tokens, self._used)
         # no log of requests: their addresses have tokens in them
@@ -88,6 +112,13 @@ class PageServer:
             timeout_keep_alive=KEEP_ALIVE_S, timeout_graceful_shutdown=CLOSING_S, ws="none",
         )  # fmt: skip
         self._server = _Server(config)
+
+    @staticmethod
+    def _as_before(host: str, port: int) -> socket.socket:
+        try:
+            return bound_socket(host, port)
+        except UsageError:  # another program has it now
+            return bound_socket(host, 0)
 
     def address(self) -> str:
         """Return the address of the first page."""
@@ -113,7 +144,7 @@ class PageServer:
             self._on_new_link(self.link())
 
 
-def pages_of(place: str, cache: Path, twins: str | None = None) -> ASGIApp:
+def pages_of(place: str, cache: Path, twins: str | None = None, trials: TrialPlayer | None = None) -> ASGIApp:
     """Return the pages of a data set, a twin's folder, scenes, or episodes, whose twins are in the data set ``twins``.
 
     Raises UsageError where it is none of them, or has no index; EpisodesError for a file of episodes that cannot be read.
@@ -121,19 +152,21 @@ def pages_of(place: str, cache: Path, twins: str | None = None) -> ASGIApp:
     if is_episodes(place):
         episodes = EpisodeFolders(place, cache, twins)
         title = Path(place).resolve().name
-        shown = no_twins(episodes.without_twins) if episodes.twins is None else application(None, episodes.twins, title)
-        return episode_application(shown, episodes, title)
+        if episodes.twins is None:
+            return episode_application(no_twins(episodes.without_twins), episodes, title)
+        return episode_application(application(None, episodes.twins, title, trials), episodes, title)
     if twins is not None:
         raise UsageError(f"{place}: --twins is for episodes, and there are none")
     if is_scenes(place):
         scenes = SceneFolders(place, cache)
         title = Path(place).resolve().name
-        return scene_application(application(None, scenes.twins, title), scenes, title)
+        return scene_application(application(None, scenes.twins, title, trials), scenes, title)
     shown_twins = TwinFolders(place, cache if "://" in place else None)
     if shown_twins.only is not None:
-        return application(None, shown_twins, shown_twins.only.record.name or shown_twins.only.record.twin_id)
+        only = shown_twins.only.record
+        return application(None, shown_twins, only.name or only.twin_id, trials)
     root = DatasetRoot(place)
-    return application(Gallery(root), shown_twins, Path(root.path).name or "twins")
+    return application(Gallery(root), shown_twins, Path(root.path).name or "twins", trials)
 
 
 def review(
@@ -143,18 +176,20 @@ def review(
     port: int,
     on_ready: Callable[[PageServer], None],
     on_used_link: Callable[[PageServer], None],
+    tokens: Tokens,
 ) -> None:
     """Serve the pages of a review until interrupted; ``on_used_link`` is called when somebody came with a link that was used."""
     running: list[PageServer] = []
-    pages = application(None, twins := TwinFolders(place), "review")
-    app = review_application(pages, twins, session)
-    server = PageServer(app, host, port, lambda _: on_used_link(running[0]))
-    running.append(server)
-    try:
-        on_ready(server)
-        server.run()
-    finally:
-        server.socket.close()
+    with TrialPlayer() as trials:
+        pages = application(None, twins := TwinFolders(place), "review", trials)
+        app = review_application(pages, twins, session)
+        server = PageServer(app, host, port, lambda _: on_used_link(running[0]), tokens)
+        running.append(server)
+        try:
+            on_ready(server)
+            server.run()
+        finally:
+            server.socket.close()
 
 
 def serve(
@@ -166,8 +201,8 @@ def serve(
     twins: str | None = None,
 ) -> None:
     """Serve the pages that ``pages_of`` gives until interrupted; ``on_ready`` is called when it listens."""
-    with tempfile.TemporaryDirectory(prefix="manitwin-view-") as cache:
-        server = PageServer(pages_of(place, Path(cache), twins), host, port, on_new_link)
+    with tempfile.TemporaryDirectory(prefix="manitwin-view-") as cache, TrialPlayer() as trials:
+        server = PageServer(pages_of(place, Path(cache), twins, trials), host, port, on_new_link)
         try:
             on_ready(server)
             server.run()

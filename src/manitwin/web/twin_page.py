@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import TwinRecord
-from manitwin.web.html import STAGE, THREE, VIEWER, page, text
+from manitwin.web import trial_document
+from manitwin.web.html import STAGE, THREE, TRIAL_PLAYER, TWIN_SHAPES, VIEWER, options, page, text
 from manitwin.web.links import Links
 from manitwin.web.served_files import CARD, INPUTS, MODEL, VIEWS
 from manitwin.web.twin_document import DOCUMENT
@@ -24,14 +25,18 @@ LAYERS = (
 """What the 3D view can show: name, key, words, and whether it does at first."""
 KEYS = (
     ("← → ↑ ↓", "turn"), ("+ −", "nearer, farther"), ("0", "from the front again"), ("[ ]", "fewer, more grasps"),
-    ("N  Shift N", "next, previous grasp: the whole hand"), ("L", "next placement"), ("K", "colours of grasps"),
+    ("N  Shift N", "next, previous grasp: the whole hand"), ("T  Shift T", "play or pause its trial, close it"),
+    ("L", "next placement"), ("K", "colours of grasps"),
 )  # fmt: skip
-DATA_SCRIPT, MODEL_SCRIPT = "viewer.js", "visual.glb.js"
+SCRIPTS = (THREE, STAGE, TWIN_SHAPES, TRIAL_PLAYER, VIEWER)
+"""Of the 3D view of a twin, in the order in which they are run."""
+SPEEDS = (("0.1", "⅒ ×"), ("0.25", "¼ ×"), ("0.5", "½ ×"), ("1", "1 ×"), ("2", "2 ×"))
+DATA_SCRIPT, MODEL_SCRIPT, TRIALS_SCRIPT = "viewer.js", "visual.glb.js", "trials.js"
 """Of plain files: a browser reads no JSON and no GLB from a file's address, but scripts."""
 
 
-def twin_page(twin: Twin, links: Links, *, with_gallery: bool = True) -> str:
-    """Return the page of a twin, accepted or rejected."""
+def twin_page(twin: Twin, links: Links, *, with_gallery: bool = True, with_trials: bool = True) -> str:
+    """Return the page of a twin, accepted or rejected; ``with_trials``: those of its grasps can be played."""
     record = twin.record
     name = record.name or (record.language.category if record.language else None) or record.twin_id
     back = f'<nav><a href="{text(links.gallery())}">All twins</a></nav>' if with_gallery else ""
@@ -42,26 +47,26 @@ def twin_page(twin: Twin, links: Links, *, with_gallery: bool = True) -> str:
     )
     if record.status == "rejected":
         return page(name, f"{body}{_rejected(twin, links)}", links)
-    own = [] if links.live else [DATA_SCRIPT, MODEL_SCRIPT]
+    own = () if links.live else (DATA_SCRIPT, MODEL_SCRIPT, *((TRIALS_SCRIPT,) if with_trials else ()))
     body += (
-        f'<div class="twin">\n{viewer(record, links)}<main id="main">\n{_words(record)}{fact_tables(record)}'
+        f'<div class="twin">\n{viewer(record, links, with_trials=with_trials)}'
+        f'<main id="main">\n{_words(record)}{fact_tables(record)}'
         f"{_downloads(record, links)}</main>\n</div>\n{pictures(twin, links)}"
     )
-    return page(name, body, links, scripts=[THREE, STAGE, VIEWER], data=own)
+    return page(name, body, links, scripts=SCRIPTS, data=own)
 
 
-def viewer(record: TwinRecord, links: Links) -> str:
+def viewer(record: TwinRecord, links: Links, *, with_trials: bool = True) -> str:
     """Return the 3D view with its controls."""
     layers = "".join(
         f'<label><input type="checkbox" data-layer="{name}"{" checked" if shown else ""}> {words} <kbd>{key}</kbd></label>'
         for name, key, words, shown in LAYERS
     )
     keys = "".join(f"<div><dt>{text(key)}</dt><dd>{text(does)}</dd></div>" for key, does in KEYS)
+    trials = links.file(record.twin_id, trial_document.DOCUMENT, record.revision).split("?")[0]
     places = (
         f' data-document="{text(links.file(record.twin_id, DOCUMENT, record.revision))}"'
-        f' data-model="{text(links.file(record.twin_id, MODEL, record.revision))}"'
-        if links.live
-        else ""
+        f' data-model="{text(links.file(record.twin_id, MODEL, record.revision))}" data-trial="{text(trials)}"'
     )
     card = text(links.file(record.twin_id, CARD, record.revision))
     return (
@@ -78,7 +83,20 @@ def viewer(record: TwinRecord, links: Links) -> str:
         '<option value="robustness">robustness</option></select></label>'
         '<label>Pose <select data-control="placement"><option value="">object frame</option></select></label></div>\n'
         '<div class="legend" role="group" aria-label="Outcomes of grasps"></div>\n'
+        f"{_trial() if with_trials else ''}"
         f'<details class="keys"><summary>Keys</summary><dl>{keys}</dl></details>\n</section>\n'
+    )
+
+
+def _trial() -> str:
+    speeds = options(SPEEDS, "1")
+    return (
+        '<div class="trial player" role="group" aria-label="Trial of the chosen grasp">'
+        '<button type="button" data-trial="play">Play trial <kbd>T</kbd></button>'
+        '<input type="range" data-trial="time" min="0" max="0" step="any" value="0" disabled aria-label="time of the trial">'
+        f'<select data-trial="speed" disabled aria-label="speed">{speeds}</select>'
+        '<button type="button" data-trial="close" disabled>Close</button>'
+        '<output data-trial="said"></output></div>\n'
     )
 
 

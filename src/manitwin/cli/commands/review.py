@@ -14,6 +14,8 @@ from manitwin.cli.documents import Json, print_document
 if TYPE_CHECKING:
     from manitwin.web.serve import PageServer
 
+ACCESS = "reviews.access.json"
+"""Beside the reviews: who was let in before."""
 SAMPLED = 500
 """As many as the paper's annotators judged."""
 
@@ -50,7 +52,12 @@ def review(
     blind: Annotated[
         bool, typer.Option("--blind", help="Show neither who gave what is judged, nor how sure they were, nor why.")
     ] = False,
-    port: Annotated[int, typer.Option(help="The port; 0: any that is free.", min=0, max=65535)] = 0,
+    revoke: Annotated[
+        bool, typer.Option("--revoke", help="Forget all links and browsers that were let in before.")
+    ] = False,
+    port: Annotated[
+        int, typer.Option(help="The port; 0: that of the last time, or any that is free.", min=0, max=65535)
+    ] = 0,
     host: Annotated[
         str, typer.Option(help="The address to listen on; 0.0.0.0: all, for others to review.", metavar="ADDRESS")
     ] = "127.0.0.1",
@@ -67,11 +74,15 @@ def review(
     from manitwin.twin.dataset_root import DatasetRoot
     from manitwin.web.review_page import PATH
     from manitwin.web.serve import review as serve_review
+    from manitwin.web.tokens import AccessFile, Tokens
 
     names = [require_annotator(name) for name in annotator or ["me"]]
     root = DatasetRoot(dataset)
     if sample is not None:
         draw_plan(dataset, sample, seed, overlap)
+    tokens = Tokens(AccessFile(reviews_path(root).with_name(ACCESS)))
+    if revoke:
+        tokens.forget()
     with ReviewStore(reviews_path(root)) as store, interruptible() as ends_with:
         kept = store.plan()
         plan = kept if kept is not None else draw_plan(dataset, SAMPLED, seed, overlap)[0]
@@ -92,7 +103,7 @@ def review(
                 left = session.progress(name).left
                 tell_link(server.link(PATH, name), f"for {name} alone, {left} twins; until interrupted (Ctrl-C)")
 
-        serve_review(dataset, session, host, port, ready, tell)
+        serve_review(dataset, session, host, port, ready, tell, tokens)
         out_console.print(f"`manitwin review report {dataset}` says what the verdicts tell")
         out_console.print("stopped")
 

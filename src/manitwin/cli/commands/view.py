@@ -43,7 +43,10 @@ def view(
         ),
     ] = None,
     sample: Annotated[
-        int | None, typer.Option(help="Of --static: so many twins, drawn.", callback=choices.count_of("sample"))
+        int | None,
+        typer.Option(
+            help="Of --static: so many twins, scenes or episodes, drawn.", callback=choices.count_of("sample")
+        ),
     ] = None,
     seed: Annotated[
         int, typer.Option(help="Of --sample: the seed of what is drawn.", min=0, max=options.LARGEST_SEED)
@@ -51,18 +54,19 @@ def view(
     where: Annotated[
         str | None, typer.Option(help="Of --static: the twins of a condition, as of manitwin query.", metavar="SQL")
     ] = None,
+    trials: Annotated[
+        int, typer.Option(help="Of --static: so many grasps of each gripper can be played.", min=0, max=1000)
+    ] = 0,
     twins: options.Twins = None,
 ) -> None:
     """Show a gallery of a data set and a page of each twin, scenes, or episodes, in the browser; or write plain files."""
     from manitwin.errors import UsageError
 
     if static is not None:
-        if twins is not None:
-            raise UsageError("--twins is for episodes, which are not written as plain files")
-        _write(source, static, sample, seed, where or "")
+        _write(source, static, sample, seed, where or "", trials, twins)
         return
-    if sample is not None or where is not None:
-        raise UsageError("--sample and --where choose the twins of --static; the gallery has filters of its own")
+    if sample is not None or where is not None or trials:
+        raise UsageError("--sample, --where and --trials are of --static; the gallery has filters of its own")
     from manitwin.web.serve import serve
 
     def ready(server: PageServer) -> None:
@@ -90,6 +94,7 @@ def interruptible() -> Iterator[Callable[[PageServer], None]]:
     """Give a function that has the first interrupt end a server in order; a second one ends what does not stop."""
     running: list[PageServer] = []
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    watched = signal.set_wakeup_fd(-1)  # a server that waits for its last answers is not one that hangs (cli.interrupt)
 
     def interrupted(number: int, frame: object) -> None:
         signal.signal(number, before[signal.Signals(number)])
@@ -104,17 +109,23 @@ def interruptible() -> Iterator[Callable[[PageServer], None]]:
     try:
         yield ends
     finally:
+        signal.set_wakeup_fd(watched, warn_on_full_buffer=False)
         for number, handler in before.items():
             signal.signal(number, handler)
 
 
-def _write(source: str, out: Path, sample: int | None, seed: int, where: str) -> None:
+def _write(source: str, out: Path, sample: int | None, seed: int, where: str, trials: int, twins: str | None) -> None:
     from manitwin.web.plain_files import write_plain_files
 
-    done = write_plain_files(source, out, sample=sample, seed=seed, where=where)
-    for twin_id, reason in done.left_out.items():
-        err_console.print(f"{twin_id} is left out: {reason}")
-    out_console.print(f"{done.twins:,} twins, {done.size_bytes / 1e6:,.1f} MB, in {out}; open {out / 'index.html'}")
+    done = write_plain_files(source, out, sample=sample, seed=seed, where=where, trials=trials, twins=twins)
+    for name, reason in done.left_out.items():
+        err_console.print(f"{name} is left out: {reason}")
+    pages = "".join(
+        f"{count:,} {kind}, " for count, kind in ((done.scenes, "scenes"), (done.episodes, "episodes")) if count
+    )
+    out_console.print(
+        f"{pages}{done.twins:,} twins, {done.size_bytes / 1e6:,.1f} MB, in {out}; open {out / 'index.html'}"
+    )
     raise typer.Exit(3 if done.left_out else 0)
 
 

@@ -6,17 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
-from pydantic import ValidationError
 
-from manitwin.config import VerifyConfig
 from manitwin.errors import UsageError
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.models.graspers.screens import PadScreen
 from manitwin.models.graspers.surface_sampling import AntipodalGrasper
-from manitwin.pipeline.verify import trial_settings
+from manitwin.pipeline.trial_replay import settings_of_trial
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
-from manitwin.twin.grasp_summary import Trial
 from manitwin.twin.loaded_twin import Twin
 
 PROPOSALS_A_ROUND, ROUNDS = 6000, 6
@@ -62,19 +59,6 @@ def sample_grasps(twin: Twin, solid: trimesh.Trimesh, trials: int, rng: np.rando
         found.append(screen(raw).proposals)
     proposed = GraspProposals.joined(found)
     chosen = proposed.take(np.sort(rng.permutation(len(proposed))[:trials]))
-    asked = _trial_of(twin, summary.trial)
-    results = SapienTrial().run(body, gripper, chosen.gripper_to_object, trial_settings(asked, gripper))
+    settings = settings_of_trial(twin, summary.trial, gripper)
+    results = SapienTrial().run(body, gripper, chosen.gripper_to_object, settings)
     return SampledGrasps(chosen, np.array([result.outcome == "held" for result in results], bool))
-
-
-def _trial_of(twin: Twin, trial: Trial) -> VerifyConfig:
-    known = trial.model_dump()
-    try:
-        return VerifyConfig(**{name: known[name] for name in VerifyConfig.model_fields if name in known})
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise UsageError(
-            f"{twin.folder}: its grasps were tried in no way that can be repeated (grasps.trial.{where}: {first['msg']});"
-            " build it again"
-        ) from error

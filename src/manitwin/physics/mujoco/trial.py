@@ -16,7 +16,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from manitwin.geometry.poses import inverse, quaternion_wxyz
+from manitwin.geometry.poses import inverse, quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
 from manitwin.physics.mujoco.body import (
     OBJECT,
@@ -29,6 +29,7 @@ from manitwin.physics.mujoco.body import (
 )
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import HandContacts, SharedTarget, run_phases
+from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.parallel import ParallelGripper
 
@@ -66,6 +67,21 @@ class MujocoTrial:
             scene = _Scene(model, hand, object_to_hand, settings)
             results.append(run_phases(scene, object_to_hand[:3, :3], settings))
         return results
+
+    def record(
+        self,
+        body: RigidBody,
+        gripper: Gripper,
+        gripper_to_object: np.ndarray,
+        settings: TrialSettings,
+        joints_rad: np.ndarray | None = None,
+    ) -> TrialRecording:
+        """Try one grasp ``gripper_to_object (4, 4)`` as ``run`` does, and return its states."""
+        settings, hand, recorder = frozen(settings), of_kind(gripper, ParallelGripper), TrialRecorder()
+        object_to_hand = inverse(gripper_to_object)
+        scene = _Scene(_model(body, hand, settings), hand, object_to_hand, settings)
+        result = run_phases(scene, object_to_hand[:3, :3], settings, recorder.watch(scene))
+        return recorder.recording(result, object_to_hand, scene.hand_joints())
 
 
 def frozen(settings: TrialSettings) -> TrialSettings:
@@ -128,6 +144,14 @@ class _Scene:
                     push_x = towards_object * float(contact.frame[0] * wrench[0])
                     forces[side] += push_x * (-1, 1)[side]
         return HandContacts((forces[0], forces[1]), deepest)
+
+    def object_to_hand(self) -> np.ndarray:
+        """Return the object's pose ``(4, 4)`` in the hand's frame."""
+        return transform(self.object_rotation(), self.data.xpos[self.object])
+
+    def hand_joints(self) -> np.ndarray:
+        """Return the distances (m) of the +X and the -X pad from the plane x = 0."""
+        return np.array(self.data.qpos[self.joints])
 
     def object_rotation(self) -> np.ndarray:
         """Return the object's rotation in the hand's frame."""

@@ -20,6 +20,7 @@ from manitwin.physics.sapien.hand_scene import HandScene
 from manitwin.physics.sapien.shapes import COOKED, HullShapes
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import run_phases
+from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 
@@ -47,13 +48,32 @@ class ArticulatedTrial:
         ``settings.force_n`` over the gripper's own scales what its joints press with.
         """
         hand = of_kind(gripper, MultiFingerGripper)
-        if joints_rad is None:
-            raise ValueError(f"a grasp of {hand.name} needs its joints before closing and those to close to")
         with COOKED.lent([body.hulls]) as (shapes,):
             return [
                 _try_one(body, shapes, hand, pose, joints, settings)
-                for pose, joints in zip(gripper_to_object, joints_rad, strict=True)
+                for pose, joints in zip(gripper_to_object, _required(joints_rad, hand), strict=True)
             ]
+
+    def record(
+        self,
+        body: RigidBody,
+        gripper: Gripper,
+        gripper_to_object: np.ndarray,
+        settings: TrialSettings,
+        joints_rad: np.ndarray | None = None,
+    ) -> TrialRecording:
+        """Try one grasp ``gripper_to_object (4, 4)`` with ``joints_rad (2, J)`` as ``run`` does, and return its states."""
+        hand, recorder = of_kind(gripper, MultiFingerGripper), TrialRecorder()
+        joints = _required(joints_rad, hand)
+        with COOKED.lent([body.hulls]) as (shapes,):
+            result = _try_one(body, shapes, hand, gripper_to_object, joints, settings, recorder)
+        return recorder.recording(result, inverse(gripper_to_object), joints[0])
+
+
+def _required(joints_rad: np.ndarray | None, hand: MultiFingerGripper) -> np.ndarray:
+    if joints_rad is None:
+        raise ValueError(f"a grasp of {hand.name} needs its joints before closing and those to close to")
+    return joints_rad
 
 
 def _try_one(
@@ -63,12 +83,14 @@ def _try_one(
     gripper_to_object: np.ndarray,
     joints_rad: np.ndarray,
     settings: TrialSettings,
+    recorder: TrialRecorder | None = None,
 ) -> TrialResult:
     object_to_hand = inverse(gripper_to_object)
     scene = HandScene(
         body, shapes, object_to_hand, settings, lambda scene: FingeredHand(scene, hand, joints_rad, settings)
     )
-    return run_phases(scene, object_to_hand[:3, :3], settings)
+    watch = None if recorder is None else recorder.watch(scene)
+    return run_phases(scene, object_to_hand[:3, :3], settings, watch)
 
 
 class FingerClosing:
@@ -144,11 +166,16 @@ class FingeredHand:
             armature=drive.armature_kg_m2,
         )
         order = [gripper.joints.index(joint.name) for joint in self._joints]
+        self._place_of = np.argsort(order)
         start, goal = joints_rad[:, order]
         self._closing = FingerClosing(gripper, start, goal, order, strength=strength, frame_s=settings.frame_s)
         self.articulation.set_qpos(start.astype(np.float32))
         self._drive_to(start)
         self._owner = {link.entity.per_scene_id: finger_of[name] for name, link in self._links.items()}
+
+    def joints(self) -> np.ndarray:
+        """Return its joints (rad), in the order of the gripper's file."""
+        return np.asarray(self.articulation.get_qpos(), float)[self._place_of]
 
     def squeeze(self) -> None:
         """Move on the targets of all fingers that do not press yet."""

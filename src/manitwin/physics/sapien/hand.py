@@ -84,6 +84,11 @@ class FixedHand:
             )
             component.attach(shape)
 
+    def joints(self) -> np.ndarray:
+        """Return the distances (m) of the +X and the -X pad from the plane x = 0."""
+        plus, minus = self.fingers
+        return np.array([plus.entity_pose.p[0], -minus.entity_pose.p[0]], float)
+
     def squeeze(self) -> None:
         """Move the fingers' shared target on by one frame."""
         plus, minus = self.fingers

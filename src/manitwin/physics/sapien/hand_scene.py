@@ -31,6 +31,10 @@ LOAD_RATE_PER_S = 0.01  # drag of the load's drive per mass: 1e-4 of the weight 
 class SapienHand(Protocol):
     """A hand in a scene, which stays where it is."""
 
+    def joints(self) -> np.ndarray:
+        """Return its state ``(J,)``."""
+        ...
+
     def squeeze(self) -> None:
         """Close by one frame, until it presses as hard as it should."""
         ...
@@ -106,9 +110,17 @@ class HandScene:
         pose = self._look()
         return pose[:3, :3] @ self.in_object_m + pose[:3, 3]
 
+    def object_to_hand(self) -> np.ndarray:
+        """Return the object's pose ``(4, 4)`` in the hand's frame."""
+        return np.asarray(self.object.entity_pose.to_transformation_matrix(), float)
+
+    def hand_joints(self) -> np.ndarray:
+        """Return the hand's state ``(J,)``."""
+        return self.hand.joints()
+
     def _look(self) -> np.ndarray:
         """Return the object's pose ``(4, 4)`` in the hand's frame, and keep it in ``looks``."""
-        pose = self.object.entity_pose.to_transformation_matrix().astype(float)
+        pose = self.object_to_hand()
         self.looks.append(pose)
         return pose
 

@@ -11,6 +11,7 @@ from manitwin.physics.sapien.hand_scene import HandScene
 from manitwin.physics.sapien.shapes import COOKED, HullShapes
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import run_phases
+from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.hand_clearance import HandReach
 from manitwin.robots.grippers.parallel import ParallelGripper
@@ -39,6 +40,21 @@ class SapienTrial:
         with COOKED.lent([body.hulls]) as (shapes,):
             return [_try_one(body, shapes, reach, hand, inverse(pose), settings) for pose in gripper_to_object]
 
+    def record(
+        self,
+        body: RigidBody,
+        gripper: Gripper,
+        gripper_to_object: np.ndarray,
+        settings: TrialSettings,
+        joints_rad: np.ndarray | None = None,
+    ) -> TrialRecording:
+        """Try one grasp ``gripper_to_object (4, 4)`` as ``run`` does, and return its states."""
+        hand, reach, recorder = of_kind(gripper, ParallelGripper), HandReach(body.hulls), TrialRecorder()
+        object_to_hand = inverse(gripper_to_object)
+        with COOKED.lent([body.hulls]) as (shapes,):
+            result = _try_one(body, shapes, reach, hand, object_to_hand, settings, recorder)
+        return recorder.recording(result, object_to_hand, np.full(2, hand.opening_m / 2))
+
 
 def _try_one(
     body: RigidBody,
@@ -47,6 +63,7 @@ def _try_one(
     gripper: ParallelGripper,
     object_to_hand: np.ndarray,
     settings: TrialSettings,
+    recorder: TrialRecorder | None = None,
 ) -> TrialResult:
     """Try a grasp on the hulls that the hand can reach; where the object turned others towards it, on all."""
     gaps = reach.gaps_m(gripper, object_to_hand[None])[0]
@@ -58,7 +75,8 @@ def _try_one(
         """Return what became of the object with some of its shapes, and the poses at which it was looked at."""
         chosen = [shape for shape, is_in in zip(shapes, some, strict=True) if is_in]
         scene = HandScene(body, chosen, object_to_hand, settings, lambda scene: FixedHand(scene, gripper, settings))
-        return run_phases(scene, object_to_hand[:3, :3], settings), np.array(scene.looks)
+        watch = None if recorder is None else recorder.watch(scene)
+        return run_phases(scene, object_to_hand[:3, :3], settings, watch), np.array(scene.looks)
 
     result, looks = simulate(near)
     if near.all() or _stayed_out(reach, gaps, gripper, looks):

@@ -1,7 +1,15 @@
 // What 3D views share: the renderer and its camera, turned by mouse and keys, and names on hover. Metres, +Z up, quaternions wxyz.
 // Texts are only ever set as textContent.
 "use strict";
+// what a server is asked for, or, of plain files, what scripts have set by its name: browsers read nothing else from a disk
 globalThis.manitwinGiven = async (address, how) => {
+  const files = globalThis.manitwinFiles;
+  if (files) {
+    const name = address.replace(/^(\.\.\/)+/, "");
+    if (!Object.hasOwn(files, name)) throw new Error("it is not among these files");
+    const found = files[name];
+    return how === "json" ? found : Uint8Array.from(atob(found), (each) => each.charCodeAt(0)).buffer;
+  }
   const answer = await fetch(address);
   if (answer.ok) return answer[how]();
   const told = new DOMParser().parseFromString(await answer.text(), "text/html").querySelector("[role=alert]");
@@ -23,12 +31,16 @@ globalThis.manitwinStage = (viewer, near = 0.01, far = 100) => {
   const { THREE, GLTFLoader, OrbitControls } = globalThis.threeBundle || {};
   let renderer;
   try {
-    renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
+    // of its size from the beginning: to change it takes as long as to make it, where there is no GPU
+    const canvas = document.createElement("canvas");
+    canvas.width = stage.clientWidth || 300;
+    canvas.height = stage.clientHeight || 150;
+    renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
   } catch (error) {
     fail("This browser cannot draw in 3D (WebGL is off or missing): all else is here.");
     return null;
   }
-  renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+  if (Math.min(devicePixelRatio, 2) !== 1) renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
   stage.prepend(renderer.domElement);
   const scene = new THREE.Scene();
   const camera = new THREE.PerspectiveCamera(35, 1, near, far);
@@ -71,7 +83,8 @@ globalThis.manitwinStage = (viewer, near = 0.01, far = 100) => {
   function resize() {
     const { clientWidth, clientHeight } = stage;
     if (!clientWidth || !clientHeight) return;
-    renderer.setSize(clientWidth, clientHeight, false);
+    const now = renderer.getSize(new THREE.Vector2());
+    if (now.x !== clientWidth || now.y !== clientHeight) renderer.setSize(clientWidth, clientHeight, false);
     renderer.domElement.style.width = `${clientWidth}px`;
     renderer.domElement.style.height = `${clientHeight}px`;
     camera.aspect = clientWidth / clientHeight;
@@ -165,6 +178,8 @@ globalThis.manitwinStage = (viewer, near = 0.01, far = 100) => {
   return {
     THREE, scene, stage, problems, report, fail, quaternion, vector, draw, listen, kept, parsed,
     remember: () => remember(),
+    look,
+    camera: () => [...camera.position.toArray(), ...orbit.target.toArray()],
     setHome: (numbers) => (home = numbers),
   };
 };

@@ -9,12 +9,10 @@
     held: 0x228833, slips: 0xccbb44, drops: 0xee6677, misses: 0xaa3377, collides: 0x4477aa, unstable: 0x66ccee,
     penetrates: 0x994455, unreachable: 0xbbbbbb,
   }; // Tol's bright scheme
-  const POINTS = { candidate: [0x7c858f, 0.009], functional: [0xd62728, 0.013], grasp: [0x1f77b4, 0.013] };
   // asked for at once: the server works while the browser sets up WebGL
-  const plain = globalThis.manitwinTwin;
-  const given = (name, how) => globalThis.manitwinGiven(viewer.dataset[name], how);
-  const document_ = plain ? Promise.resolve(plain) : given("document", "json");
-  const model = plain ? Promise.resolve().then(() => decoded(globalThis.manitwinModel)) : given("model", "arrayBuffer");
+  const given = (name, how, asked = "") => globalThis.manitwinGiven(viewer.dataset[name] + asked, how);
+  const document_ = given("document", "json");
+  const model = given("model", "arrayBuffer");
   for (const each of [document_, model]) each.catch(() => {}); // told below
 
   const view = globalThis.manitwinStage(viewer, 0.005, 50);
@@ -27,6 +25,7 @@
     object.add((layers[name] = new THREE.Group()));
   }
   scene.add((layers.cube = new THREE.Group()));
+  const shapes = globalThis.manitwinShapes(view, layers, object);
 
   let twin;
   let forks = null; // the one instanced mesh of a gripper's grasps
@@ -36,67 +35,7 @@
 
   const solid = (color, more) => new THREE.MeshStandardMaterial({ color, roughness: 0.7, ...more });
 
-  // ---- shapes
-  function addWireframe() {
-    if (layers.wireframe.children.length) return;
-    const lines = new THREE.MeshBasicMaterial({ color: 0x5577aa, wireframe: true, transparent: true, opacity: 0.5 });
-    layers.mesh.updateWorldMatrix(true, true);
-    const inverse = object.matrixWorld.clone().invert();
-    layers.mesh.traverse((each) => {
-      if (!each.isMesh) return;
-      const copy = new THREE.Mesh(each.geometry, lines);
-      copy.applyMatrix4(inverse.clone().multiply(each.matrixWorld));
-      layers.wireframe.add(copy);
-    });
-  }
-  function addHulls() {
-    twin.hulls.forEach((hull, place) => {
-      const shape = new THREE.BufferGeometry();
-      shape.setAttribute("position", new THREE.Float32BufferAttribute(hull.vertices, 3));
-      shape.setIndex(hull.faces);
-      const color = new THREE.Color().setHSL((place * 0.381966) % 1, 0.55, 0.55);
-      layers.hulls.add(new THREE.Mesh(shape, solid(color, { flatShading: true, transparent: true, opacity: 0.6, depthWrite: false })));
-    });
-  }
-  function addPoints(size) {
-    for (const [kind, [color, share]] of Object.entries(POINTS)) {
-      const points = twin.points.filter((point) => point.kind === kind);
-      if (!points.length) continue;
-      const radius = share * size;
-      const mesh = new THREE.InstancedMesh(new THREE.SphereGeometry(radius, 14, 10), solid(color), points.length);
-      points.forEach((point, place) => mesh.setMatrixAt(place, new THREE.Matrix4().setPosition(vector(point.position_m))));
-      mesh.userData.label = (place) => points[place].label;
-      mesh.userData.pick = (place) => points[place].id;
-      layers[kind].add(mesh);
-      for (const { frame } of points.filter((point) => point.frame)) {
-        const axes = new THREE.AxesHelper(0.12 * size);
-        axes.position.copy(vector(frame.position_m));
-        axes.quaternion.copy(quaternion(frame.quaternion_wxyz));
-        layers[kind].add(axes);
-      }
-    }
-    const mass = new THREE.Mesh(new THREE.SphereGeometry(0.014 * size, 16, 12), solid(0xff9900, { depthTest: false, transparent: true }));
-    mass.position.copy(vector(twin.center_of_mass_m));
-    mass.renderOrder = 2;
-    mass.userData.label = () => "centre of mass";
-    layers.mass.add(mass);
-  }
-  function addScale(size) {
-    const box = new THREE.BoxGeometry(0.1, 0.1, 0.1);
-    const cube = new THREE.Mesh(box, solid(0x8d959e, { transparent: true, opacity: 0.25, depthWrite: false }));
-    cube.add(new THREE.LineSegments(new THREE.EdgesGeometry(box), new THREE.LineBasicMaterial({ color: 0x8d959e })));
-    const beside = Math.max(twin.extents_m[0], twin.extents_m[1]) / 2 + 0.07;
-    cube.position.set(0.8 * beside, 0.8 * beside, 0.05); // behind, seen from the front
-    cube.userData.label = () => "10 cm cube";
-    layers.cube.add(cube);
-    const cells = Math.max(4, Math.ceil(size / 0.1) * 2 + 2);
-    const grid = new THREE.GridHelper(cells * 0.1, cells, 0x8d959e, 0x8d959e);
-    grid.rotation.x = Math.PI / 2;
-    grid.material.transparent = true;
-    grid.material.opacity = 0.35;
-    scene.add(grid);
-    viewer.querySelector(".scale").textContent = "grid: 10 cm";
-  }
+  // ---- grasps
   function boxMatrix(box, width, pose) {
     const center = vector(box.center).setX(box.center[0] + box.shift * width);
     const half = vector(box.half).setX(box.half[0] + box.grow * width);
@@ -145,7 +84,9 @@
     shown.forEach((place, at) => {
       for (let part = 0; part < fork.length; part += 1) forks.setColorAt(at * fork.length + part, graspColor(columns, place));
     });
-    forks.userData.label = (instance) => graspLabel(columns, shown[Math.floor(instance / fork.length)]);
+    const told = (instance) => shown[Math.floor(instance / fork.length)];
+    forks.userData.label = (instance) => graspLabel(columns, told(instance));
+    forks.userData.pick = (instance) => columns.id[told(instance)];
     layers.grasps.add(forks);
     if (chosen >= 0 && chosen < columns.id.length) {
       const whole = boxes(hand.length ? hand : fork, [chosen], columns, solid(graspColor(columns, chosen), { transparent: true, opacity: 0.55 }));
@@ -198,17 +139,50 @@
   }
   function showLayers() {
     for (const name of Object.keys(layers)) layers[name].visible = layerBox(name).checked;
-    if (layerBox("wireframe").checked) addWireframe();
+    if (trial && trial.isOpen()) layers.grasps.visible = false; // the hand is the one that moves
+    if (layerBox("wireframe").checked) shapes.addWireframe();
     draw();
   }
   function choose(step) {
     const columns = twin.grasps[control("gripper").value];
     if (!columns || !shown.length) return;
     const at = shown.indexOf(chosen);
-    chosen = shown[at < 0 ? (step > 0 ? 0 : shown.length - 1) : (at + step + shown.length) % shown.length];
-    report(graspLabel(columns, chosen));
-    drawGrasps();
+    take(shown[at < 0 ? (step > 0 ? 0 : shown.length - 1) : (at + step + shown.length) % shown.length]);
   }
+  function take(place) {
+    chosen = place;
+    report(graspLabel(twin.grasps[control("gripper").value], chosen));
+    drawGrasps();
+    if (trial && trial.isOpen()) trial.open(grasp());
+    view.remember();
+  }
+  function grasp() {
+    const gripper = control("gripper").value;
+    return { gripper, id: twin.grasps[gripper].id[chosen] };
+  }
+
+  // ---- the trial of the chosen grasp
+  const trial = globalThis.manitwinTrial(viewer, view, object, {
+    chosen: () => {
+      if (chosen < 0) choose(1);
+      return chosen < 0 ? null : grasp();
+    },
+    document: ({ gripper, id }) => given("trial", "json", `?${new URLSearchParams({ gripper, grasp: id })}`),
+    color: (outcome) => COLORS[outcome] ?? 0x888888,
+    frame: (told) => {
+      const size = Math.hypot(...twin.extents_m);
+      const rises = told.hand.length > 7 ? Math.max(...told.hand.filter((_, at) => at % 7 === 2)) - told.hand[2] : 0;
+      const far = 2.4 * (size + rises) + 0.25;
+      const middle = (twin.extents_m[2] + rises) / 2;
+      return [0.5 * far, -0.75 * far, middle + 0.3 * far, 0, 0, middle];
+    },
+    opened: (is) => {
+      control("placement").disabled = is;
+      if (!is) place();
+      showLayers();
+    },
+    remember: () => view.remember(),
+  });
   function step(name, by) {
     const field = control(name);
     if (name === "count") field.value = Math.max(0, Number(field.value) + by);
@@ -217,7 +191,8 @@
   }
   const KEYS = {
     "[": () => step("count", -5), "]": () => step("count", 5), n: () => choose(1), N: () => choose(-1),
-    l: () => step("placement", 1), k: () => step("color", 1),
+    l: () => control("placement").disabled || step("placement", 1), k: () => step("color", 1),
+    t: () => trial && trial.toggle(), T: () => trial && trial.close(),
   };
   for (const box of viewer.querySelectorAll("[data-layer]")) {
     KEYS[box.parentElement.querySelector("kbd").textContent.toLowerCase()] = () => {
@@ -230,11 +205,17 @@
     viewer.addEventListener("input", (event) => {
       const name = event.target.dataset.control;
       if (name === "gripper") {
+        if (trial) trial.close();
         chosen = -1;
         fillGripper();
       } else if (name === "placement") place();
       else if (name) drawGrasps();
       if (name) view.remember();
+    });
+    document.addEventListener("twin:picked", ({ detail }) => {
+      const columns = twin.grasps[control("gripper").value];
+      const place = columns ? columns.id.indexOf(detail) : -1;
+      if (place >= 0) take(place);
     });
     // the mesh has no name of its own, and its many triangles are not asked
     view.listen(KEYS, () => Object.entries(layers).flatMap(([name, group]) => (name === "mesh" || name === "wireframe" ? [] : group.children)));
@@ -247,6 +228,7 @@
     for (const name of ["gripper", "count", "color", "placement"]) state.set(name, control(name).value);
     if (hidden.size) state.set("without", [...hidden].join(" "));
     if (chosen >= 0) state.set("grasp", chosen);
+    if (trial && trial.isOpen()) state.set("trial", trial.time().toFixed(2));
     return state;
   }
   function recall(state) {
@@ -261,15 +243,12 @@
     fillGripper(state.has("count") ? Number(state.get("count")) || 0 : undefined);
     place();
     showLayers();
+    const at = Number.parseFloat(state.get("trial") ?? "");
+    const columns = twin.grasps[control("gripper").value];
+    if (trial && Number.isFinite(at) && columns && columns.id[chosen] !== undefined) trial.open(grasp(), at);
   }
 
   // ---- loading
-  function decoded(base64) {
-    const text = atob(base64);
-    const bytes = new Uint8Array(text.length);
-    for (let at = 0; at < text.length; at += 1) bytes[at] = text.charCodeAt(at);
-    return bytes.buffer;
-  }
   async function begin() {
     try {
       twin = await document_;
@@ -282,9 +261,9 @@
     const far = 2.4 * Math.hypot(...twin.extents_m) + 0.12;
     view.setHome([0.62 * far, -0.68 * far, height + 0.45 * far, 0, 0, height]);
     twin.unreadable.forEach(fail);
-    addHulls();
-    addPoints(size);
-    addScale(size);
+    shapes.addHulls(twin);
+    shapes.addPoints(twin, size);
+    shapes.addScale(twin, size);
     fillControls();
     view.kept(recall, remembered);
     listen();
@@ -304,7 +283,7 @@
     showLayers();
     requestAnimationFrame(() => requestAnimationFrame(() => {
       viewer.dataset.ready = String(Math.round(performance.now()));
-      if (!view.problems.length) report("Drag to turn, scroll for nearer; point at anything for its name.");
+      if (!view.problems.length && chosen < 0) report("Drag to turn, scroll for nearer; point at anything for its name.");
     }));
   }
   begin();

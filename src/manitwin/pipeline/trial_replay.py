@@ -1,0 +1,125 @@
+"""Try a twin's grasp again as it was tried when the twin was made, and keep what could be seen of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from importlib import import_module
+from typing import cast
+
+import numpy as np
+import trimesh
+from pydantic import ValidationError
+
+from manitwin.config import VerifyConfig
+from manitwin.errors import UsageError
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
+from manitwin.geometry.ray_caster import RayCaster
+from manitwin.physics.trial import TrialSettings
+from manitwin.physics.trial_recording import RecordingTrial, TrialRecording
+from manitwin.pipeline.verify import trial_settings
+from manitwin.robots.grippers.gripper import Gripper, load_gripper, shipped_grippers
+from manitwin.twin.grasp_summary import GraspSummary, Trial
+from manitwin.twin.grasp_table import JOINTS
+from manitwin.twin.loaded_twin import Twin
+
+ENGINES = {
+    ("parallel", "sapien"): "manitwin.physics.sapien.trial:SapienTrial",
+    ("parallel", "mujoco"): "manitwin.physics.mujoco.trial:MujocoTrial",
+    ("suction", "statics"): "manitwin.physics.suction_trial:SuctionTrial",
+    ("multi_finger", "sapien"): "manitwin.physics.sapien.fingers:ArticulatedTrial",
+}
+"""By kind of gripper and engine; imported where one is needed."""
+
+
+@dataclass(frozen=True)
+class ReplayedTrial:
+    """A grasp that was tried again: how (``gripper_to_object (4, 4)``), by what, and what the twin says of it."""
+
+    recording: TrialRecording
+    gripper: Gripper
+    gripper_to_object: np.ndarray
+    engine: str
+    recorded_outcome: str
+
+
+def replay_trial(twin: Twin, gripper_name: str, grasp_id: str) -> ReplayedTrial:
+    """Try one grasp of a twin again with the settings, mass and friction of its record.
+
+    Hulls and poses are those of the files, rounded, so that what was on the edge may end otherwise. Raises UsageError where
+    there is no such grasp, or its gripper or engine is none that comes with the package.
+    """
+    summary, gripper = summary_of(twin, gripper_name), known_gripper(twin, gripper_name)
+    where = ENGINES.get((gripper.kind, summary.trial.engine))
+    if where is None:
+        raise UsageError(
+            f"trials of the engine {summary.trial.engine} with a {gripper.kind} gripper cannot be recorded"
+        )
+    pose, joints_rad, outcome = _grasp(twin, gripper_name, grasp_id)
+    body = twin.rigid_body()
+    if gripper.kind == "suction":  # a cup feels what hulls smooth over
+        body = replace(body, surface=_surface(twin))
+    module, name = where.split(":")
+    trial = cast(RecordingTrial, getattr(import_module(module), name)())
+    settings = settings_of_trial(twin, summary.trial, gripper)
+    recording = trial.record(body, gripper, pose, settings, joints_rad)
+    return ReplayedTrial(recording, gripper, pose, summary.trial.engine, outcome)
+
+
+def summary_of(twin: Twin, gripper_name: str) -> GraspSummary:
+    """Return what a twin's record tells of the grasps of a gripper; raises UsageError where it tells nothing."""
+    first = twin.record.grasps
+    if first is not None and first.gripper == gripper_name:
+        return first
+    other = first.other_grippers.get(gripper_name) if first is not None else None
+    if other is None or other.summary is None:
+        raise UsageError(f"{twin.record.twin_id}: has no grasps of a gripper of this name")
+    return other.summary
+
+
+def known_gripper(twin: Twin, gripper_name: str) -> Gripper:
+    """Return a gripper that comes with the package and is the one of the twin's record; raises UsageError for another."""
+    if gripper_name not in shipped_grippers():
+        raise UsageError(
+            "the gripper does not come with the package, and a twin has only its name: no trial can be played"
+        )
+    gripper = load_gripper(gripper_name)
+    if gripper.sha256 != summary_of(twin, gripper_name).gripper_sha256:
+        raise UsageError(f"the {gripper_name} of this package is another than that of the trial; build the twin again")
+    return gripper
+
+
+def settings_of_trial(twin: Twin, trial: Trial, gripper: Gripper) -> TrialSettings:
+    """Return the numbers of the trial that a record tells; raises UsageError where they are none that can be run."""
+    known = trial.model_dump()
+    try:
+        asked = VerifyConfig(**{name: known[name] for name in VerifyConfig.model_fields if name in known})
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise UsageError(
+            f"{twin.folder}: its grasps were tried in no way that can be repeated (grasps.trial.{where}: {first['msg']});"
+            " build it again"
+        ) from error
+    return trial_settings(asked, gripper)
+
+
+def _surface(twin: Twin) -> RayCaster:
+    joined = trimesh.util.concatenate(twin.visual)
+    assert isinstance(joined, trimesh.Trimesh)
+    return RayCaster(joined)
+
+
+def _grasp(twin: Twin, gripper_name: str, grasp_id: str) -> tuple[np.ndarray, np.ndarray | None, str]:
+    """Return the pose of a grasp ``(4, 4)``, the joints ``(2, J)`` of a hand that has more of them, and the outcome."""
+    table = twin.grasp_table()
+    names = zip(table["gripper"].to_pylist(), table["grasp_id"].to_pylist(), strict=True)
+    row = next((place for place, name in enumerate(names) if name == (gripper_name, grasp_id)), None)
+    if row is None:
+        raise UsageError(f"{twin.record.twin_id}: has no grasp of this name")
+    found = table.slice(row, 1).to_pylist()[0]
+    rotation = rotation_from_quaternion_wxyz(np.array([found["quaternion_wxyz"]], float))[0]
+    pose = transform(rotation, np.array(found["position_m"], float))
+    if not np.isfinite(pose).all():
+        raise UsageError(f"{twin.record.twin_id}: the grasp's pose is no finite numbers; build the twin again")
+    joints = [found[name] for name in JOINTS]
+    return pose, None if any(not each for each in joints) else np.array(joints, float), found["outcome"]

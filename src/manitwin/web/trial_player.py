@@ -1,0 +1,78 @@
+"""Grasp trials for pages, tried in a process of their own: what physics makes of a broken twin ends that process alone."""
+
+from __future__ import annotations
+
+import multiprocessing
+import threading
+from collections import OrderedDict
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from types import TracebackType
+
+from manitwin.errors import TwinError
+from manitwin.twin.loaded_twin import Twin
+from manitwin.web.trial_document import trial_bytes
+
+MOST_KEPT = 64
+"""Documents of trials that were played, which are kept for the next look; one has some 100 kB."""
+LONGEST_S = 60.0
+"""A trial takes a few tenths of a second, the start of the process some seconds; what takes this long is ended."""
+
+
+class TrialPlayer:
+    """Plays one trial at a time. The process starts with the first, and ends with ``close`` or the ``with`` block."""
+
+    def __init__(self) -> None:
+        self._pool: ProcessPoolExecutor | None = None
+        self._lock = threading.Lock()
+        self._closed = False
+        self._kept: OrderedDict[tuple[str, str, str, str], bytes] = OrderedDict()
+
+    def play(self, twin: Twin, gripper: str, grasp_id: str) -> bytes:
+        """Return the document of a trial as JSON; raises UsageError for a grasp that is not there or cannot be tried again.
+
+        TwinError where the process ends, or takes too long.
+        """
+        key = (twin.record.twin_id, twin.record.revision, gripper, grasp_id)
+        with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                return self._kept[key]
+            if self._closed:
+                raise TwinError("the server ends")
+            if self._pool is None:
+                self._pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
+            try:
+                document = self._pool.submit(trial_bytes, str(twin.folder), gripper, grasp_id).result(LONGEST_S)
+            except BrokenProcessPool as error:
+                self._end()
+                raise TwinError("the trial ended its process; all else of the twin is here") from error
+            except TimeoutError as error:
+                self._end()
+                raise TwinError(f"the trial took more than {LONGEST_S:.0f} s and was ended") from error
+            self._kept[key] = document
+            while len(self._kept) > MOST_KEPT:
+                self._kept.popitem(last=False)
+            return document
+
+    def close(self) -> None:
+        """End the process, and with it a trial that is under way."""
+        self._closed = True
+        self._end()
+
+    def _end(self) -> None:
+        pool, self._pool = self._pool, None
+        if pool is None:
+            return
+        running = list((pool._processes or {}).values())  # one that hangs must not keep the server from its end
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in running:
+            process.kill()
+
+    def __enter__(self) -> TrialPlayer:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()

@@ -1,0 +1,71 @@
+"""A twin's grasp that is tried again: as its record says, or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pyarrow.parquet as pq
+import pytest
+
+from grasped_twins import write_brick
+from manitwin.errors import UsageError
+from manitwin.pipeline.trial_replay import replay_trial
+from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.loaded_twin import Twin
+from manitwin.twin.store import RECORD, seal
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return tmp_path / twin_name(write_brick(tmp_path, 0))
+
+
+def change(folder: Path, how: Callable[[dict[str, Any]], None]) -> None:
+    record = json.loads((folder / RECORD).read_bytes())
+    how(record)
+    del record["revision"], record["files"]
+    seal(folder, record)
+
+
+def test_a_grasp_that_held_holds_again_with_what_the_record_says(folder: Path) -> None:
+    replayed = replay_trial(Twin(folder), "panda", "panda-0000")
+    assert replayed.recording.result.outcome == replayed.recorded_outcome == "held" and replayed.engine == "sapien"
+    first = pq.read_table(folder / "grasps.parquet")["position_m"][0].as_py()
+    assert replayed.gripper_to_object[:3, 3].tolist() == pytest.approx(first)
+
+    change(folder, lambda record: record["physical"]["mass_kg"].update(value=30.0, high=40.0))
+    heavy = replay_trial(Twin(folder), "panda", "panda-0000")
+    assert (heavy.recording.result.outcome, heavy.recorded_outcome) == ("drops", "held")
+
+
+@pytest.mark.parametrize(
+    ("gripper", "grasp", "said"),
+    [
+        ("panda", "panda-9999", "no grasp of this name"),
+        ("wsg50_110", "panda-0000", "no grasps of a gripper of this name"),
+        ("../panda.toml", "panda-0000", "no grasps of a gripper of this name"),
+    ],
+)
+def test_what_is_not_there_is_said(folder: Path, gripper: str, grasp: str, said: str) -> None:
+    with pytest.raises(UsageError, match=said):
+        replay_trial(Twin(folder), gripper, grasp)
+
+
+@pytest.mark.parametrize(
+    ("how", "said"),
+    [
+        (lambda grasps: grasps.update(gripper_sha256="0" * 64), "another than that of the trial"),
+        (lambda grasps: grasps.update(gripper="mine"), "does not come with the package"),
+        (lambda grasps: grasps["trial"].update(engine="other"), "engine other"),
+        (lambda grasps: grasps["trial"].update(timestep_s=-1.0), r"grasps\.trial\.timestep_s"),
+    ],
+)
+def test_a_trial_that_cannot_be_repeated_is_said(
+    folder: Path, how: Callable[[dict[str, Any]], None], said: str
+) -> None:
+    change(folder, lambda record: how(record["grasps"]))
+    with pytest.raises(UsageError, match=said):
+        replay_trial(Twin(folder), Twin(folder).record.grasps.gripper, "panda-0000")  # type: ignore[union-attr]
