@@ -123,7 +123,7 @@ class Folders:
             (page / "LABELS.csv").write_text(
                 f"twin_id,category,plausible_mass_low_kg,plausible_mass_high_kg\n{record},mug,0.1,1\n"
             )
-        if "--clip CLIP" in said:
+        if "--clip CLIP" in said or "clip:CLIP" in said:
             write_tiny_clip(page / "CLIP")
         if "verdicts.csv" in said:
             ids = [record.name for record in sorted(self.dataset.glob("twins/*/*"))]

@@ -47,7 +47,7 @@ def review_page(twin: Twin, links: Links, annotator: str, progress: Progress, dr
     fields = "".join(_dimension(record, place, dimension) for place, dimension in enumerate(DIMENSIONS, 1))
     body = (
         f"{_head(annotator, progress)}"
-        f'<div class="twin">\n{viewer(record, links)}<main id="main">\n'
+        f'<div class="twin">\n{viewer(record, links, hidden=("grasps",))}<main id="main">\n'
         f'<form id="review" data-twin="{text(record.twin_id)}" data-revision="{text(record.revision)}"'
         f' data-path="{PATH}" data-draft="{text(json.dumps(draft)) if draft else ""}" autocomplete="off">\n{_strip()}{fields}'
         f'<label class="note"><span>Note <kbd data-key="note"></kbd></span>'
@@ -74,9 +74,15 @@ def done_page(links: Links, annotator: str, progress: Progress) -> str:
 
 def _head(annotator: str, progress: Progress) -> str:
     total = progress.reviewed + progress.left
+    speed = ""
+    if progress.median_s is not None:
+        left_min = progress.median_s * progress.left / 60
+        speed = f", {progress.median_s:.0f} s each (median)" + (
+            f", about {left_min:.0f} min to go" if left_min >= 1 else ""
+        )
     return (
         f'<header class="top"><h1>Review</h1><p class="caption" id="progress">{text(annotator)}: {progress.reviewed} reviewed,'
-        f' {progress.left} left <progress value="{progress.reviewed}" max="{max(total, 1)}"></progress></p></header>\n'
+        f' {progress.left} left{speed} <progress value="{progress.reviewed}" max="{max(total, 1)}"></progress></p></header>\n'
     )
 
 

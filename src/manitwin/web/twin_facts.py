@@ -113,17 +113,33 @@ def _grasps(grasps: GraspSummary) -> str:
 def _points(record: TwinRecord) -> str:
     if record.points is None:
         return ""
+    stage = record.provenance.stages.get("points")
+    chosen_by = (stage.model or stage.backend) if stage else None
     rows: list[tuple[Any, ...]] = [
-        (each.label, "functional", each.description, f"{each.confidence:.2f}", each.rationale)
+        (
+            each.label,
+            "functional",
+            each.description,
+            f"{each.confidence:.2f}",
+            each.rationale,
+            each.source or chosen_by,
+        )
         for each in record.points.functional
     ]
     for each in record.points.grasp:
         held = "" if each.verified is None else f"{each.verified} verified grasps; "
         kind = each.type.replace("_", " ")
         rows.append(
-            (each.label or kind, f"grasp, {kind}", each.scenario, f"{each.confidence:.2f}", held + each.rationale)
+            (
+                each.label or kind,
+                f"grasp, {kind}",
+                each.scenario,
+                f"{each.confidence:.2f}",
+                held + each.rationale,
+                each.source or chosen_by,
+            )
         )
-    return table("Points", ("point", "kind", "what for", "confidence", "why"), rows)
+    return table("Points", ("point", "kind", "what for", "confidence", "why", "source"), rows)
 
 
 def _placements(record: TwinRecord) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.record import TwinRecord
 from manitwin.web import trial_document
@@ -21,6 +23,7 @@ LAYERS = (
     ("grasps", "G", "Grasps", True),
     ("mass", "O", "Centre of mass", False),
     ("cube", "B", "10 cm cube", True),
+    ("gripper", "R", "Gripper beside it", False),
 )
 """What the 3D view can show: name, key, words, and whether it does at first."""
 KEYS = (
@@ -56,10 +59,11 @@ def twin_page(twin: Twin, links: Links, *, with_gallery: bool = True, with_trial
     return page(name, body, links, scripts=SCRIPTS, data=own)
 
 
-def viewer(record: TwinRecord, links: Links, *, with_trials: bool = True) -> str:
-    """Return the 3D view with its controls."""
+def viewer(record: TwinRecord, links: Links, *, with_trials: bool = True, hidden: Collection[str] = ()) -> str:
+    """Return the 3D view with its controls; ``hidden`` are layers that are not shown at first."""
     layers = "".join(
-        f'<label><input type="checkbox" data-layer="{name}"{" checked" if shown else ""}> {words} <kbd>{key}</kbd></label>'
+        f'<label><input type="checkbox" data-layer="{name}"{" checked" if shown and name not in hidden else ""}>'
+        f" {words} <kbd>{key}</kbd></label>"
         for name, key, words, shown in LAYERS
     )
     keys = "".join(f"<div><dt>{text(key)}</dt><dd>{text(does)}</dd></div>" for key, does in KEYS)

@@ -7,7 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from manitwin.cli.main import app
+from manitwin.config import ServicesConfig
 from manitwin.dataset.index.rebuild import rebuild
 from manitwin.dataset.search import twin_looks as drawing
 from manitwin.dataset.search.search import search_picture, search_words, text_vectors
@@ -15,12 +18,14 @@ from manitwin.dataset.search.stored import FOLDER, Stored, VectorStore
 from manitwin.dataset.search.twin_looks import SPACE, twin_looks
 from manitwin.dataset.search.words import described, rank_by_words, words
 from manitwin.errors import UsageError
+from manitwin.models.embedders.texts import text_embedder
 from manitwin.render.cameras import framing_camera
 from manitwin.render.renderer import shared_renderer
 from manitwin.twin.dataset_root import DatasetRoot, twin_name
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import RECORD, seal
 from scene_twins import can, slab, write_thing
+from tiny_clip import write_tiny_clip
 
 
 @pytest.fixture(scope="module")
@@ -100,6 +105,22 @@ def test_a_model_of_embeddings_is_asked_once_for_each_text(root: DatasetRoot) ->
     ]
     text_vectors(root, rows, model)  # type: ignore[arg-type]
     assert model.asked[-1] == "can: new"
+
+
+def test_a_clips_folder_ranks_without_any_server(root: DatasetRoot, tmp_path: Path) -> None:
+    write_tiny_clip(tmp_path / "clip")
+    done = CliRunner().invoke(
+        app, ["search", root.url, "mug", "--embedder", f"clip:{tmp_path / 'clip'}", "--json"], catch_exceptions=False
+    )
+    hits = json.loads(done.stdout)["hits"]
+    assert len(hits) == 3 and {hit["matched"] is None for hit in hits} == {True}, (
+        "no twin has the word, all have vectors"
+    )
+    model = text_embedder(f"clip:{tmp_path / 'clip'}", ServicesConfig())
+    asked = model.embed(["mug"])[0]
+    texts = {hit["twin_id"]: f"{hit['category']}: {hit['caption']}" for hit in hits}
+    likeness = [float(model.embed([texts[hit["twin_id"]]])[0] @ asked) for hit in hits]
+    assert likeness == sorted(likeness, reverse=True)
 
 
 def test_a_picture_finds_its_twin_and_looks_are_made_once(root: DatasetRoot, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -32,7 +32,8 @@ def search(
     embedder: Annotated[
         str | None,
         typer.Option(
-            help="Rank words also by a model of embeddings: openai:MODEL, or openai:MODEL@URL.", metavar="SPEC"
+            help="Rank words also by a model of embeddings: clip:FOLDER, openai:MODEL, or openai:MODEL@URL.",
+            metavar="SPEC",
         ),
     ] = None,
     limit: Annotated[int, typer.Option(help="Print at most so many twins.", callback=choices.count_of("--limit"))] = 10,

@@ -38,10 +38,11 @@ class Said(BaseModel):
 
 @dataclass(frozen=True)
 class Progress:
-    """An annotator's progress: reviews of the sample that stand, and twins left of their share, then of others'."""
+    """An annotator's progress: reviews of the sample that stand, twins left of their share, and the median time of a review."""
 
     reviewed: int
     left: int
+    median_s: float | None = None
 
 
 class ReviewSession:
@@ -67,7 +68,7 @@ class ReviewSession:
         """Return an annotator's progress."""
         now, judged = self._revisions(), self.store.judged()
         done = sum(annotator in judged.get(twin_id, {}).get(now.get(twin_id, ""), ()) for twin_id in self.plan.twins)
-        return Progress(done, len(self._queue(annotator, share_of)))
+        return Progress(done, len(self._queue(annotator, share_of)), self.store.median_seconds(annotator))
 
     def confirm(self, annotator: str, record: TwinRecord, body: Mapping[str, Any]) -> None:
         """Keep a review; raises UsageError for what is none, or is of a twin that was built anew since it was shown."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
+import statistics
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -142,6 +143,14 @@ class ReviewStore:
             f"{_LIVE} AND twin_id = ? AND annotator = ? ORDER BY number DESC LIMIT 1", (twin_id, annotator)
         )
         return found[0] if found else None
+
+    def median_seconds(self, annotator: str) -> float | None:
+        """Return the median time that an annotator's reviews that stand took; None: none says how long."""
+        rows = self._select(
+            f"SELECT json_extract(body, '$.seconds') FROM events WHERE {_LIVE} AND annotator = ?", (annotator,)
+        )
+        told = [float(seconds) for (seconds,) in rows if isinstance(seconds, int | float)]
+        return statistics.median(told) if told else None
 
     def undone(self) -> dict[str, int]:
         """Return how many reviews each annotator has taken back."""

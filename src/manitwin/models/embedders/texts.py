@@ -1,16 +1,18 @@
-"""Texts as vectors by a model behind the embeddings API that OpenAI, vLLM, Ollama, llama.cpp and others serve."""
+"""Texts as vectors: by a model behind the embeddings API that OpenAI, vLLM, Ollama and others serve, or by a CLIP's files."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 import numpy as np
 
 from manitwin.config import ServicesConfig
 from manitwin.errors import ConfigError
+from manitwin.models.embedders.clip import TEXT, ClipFolder
 from manitwin.models.services.http import HttpService
 from manitwin.models.services.keys import bearer, key_from_environment, split_url
 from manitwin.models.vlm.chat_from_spec import KEY_OF_HOST, KEY_OF_OTHERS
@@ -20,7 +22,20 @@ BATCH = 64
 MOST_NUMBERS = 65536
 
 
-class TextEmbedder:
+class TextEmbedder(Protocol):
+    """A model that embeds texts."""
+
+    @property
+    def identity(self) -> str:
+        """What decides the vectors."""
+        ...
+
+    def embed(self, texts: Sequence[str]) -> np.ndarray:
+        """Return the unit vectors ``(N, D) float32`` of texts, in their order."""
+        ...
+
+
+class ServedTexts:
     """Embed texts by one model at one server (https://platform.openai.com/docs/api-reference/embeddings/create).
 
     Raises what ``HttpService`` does, and BadReply for an answer that is no finite vector for each text, all of one length.
@@ -65,15 +80,38 @@ class TextEmbedder:
         return [found[place] for place in range(count)]
 
 
+class ClipTexts:
+    """Embed texts by the text network of a CLIP's folder (``ClipFolder``), on this machine."""
+
+    def __init__(self, folder: Path):
+        """Look for its files; raises UsageError where they are not there."""
+        self._clip = ClipFolder(folder)
+
+    @property
+    def identity(self) -> str:
+        """What decides the vectors: the network and its vocabulary."""
+        digests = self._clip.sha256
+        return f"clip {' '.join(digests[name] for name in (TEXT, 'vocab.json', 'merges.txt'))}"
+
+    def embed(self, texts: Sequence[str]) -> np.ndarray:
+        """Return the unit vectors ``(N, D) float32`` of texts, in their order."""
+        return self._clip.texts(texts).astype(np.float32) if len(texts) else np.empty((0, 0), np.float32)
+
+
 def text_embedder(spec: str, services: ServicesConfig) -> TextEmbedder:
-    """Return the embedder of ``openai:MODEL`` or ``openai:MODEL@URL``; raises ConfigError without a model or a key."""
+    """Return the embedder of ``openai:MODEL``, ``openai:MODEL@URL`` or ``clip:FOLDER``.
+
+    Raises ConfigError without a model or a key, UsageError for a folder without a CLIP's files.
+    """
     name, _, argument = spec.partition(":")
+    if name == "clip" and argument:
+        return ClipTexts(Path(argument))
     model, url = split_url(argument)
     if name != "openai" or not model:
         raise ConfigError(
-            f"{spec!r} names no embedding model; give openai:MODEL, or openai:MODEL@URL for a server of your own"
+            f"{spec!r} names no embedding model; give clip:FOLDER, openai:MODEL, or openai:MODEL@URL for a server of your own"
         )
     url = url or OPENAI_URL
     key_name = KEY_OF_HOST.get(urlsplit(url).hostname or "", KEY_OF_OTHERS)
     key = key_from_environment((key_name,), url, spec, own_server=key_name == KEY_OF_OTHERS)
-    return TextEmbedder(model, url, key, services)
+    return ServedTexts(model, url, key, services)

@@ -73,7 +73,9 @@
   function go(place) {
     at = Math.max(0, Math.min(sets.length - 1, place));
     sets.forEach((set, each) => set.classList.toggle("current", each === at));
-    if (sets[at]) sets[at].scrollIntoView({ block: "nearest" });
+    if (!sets[at]) return;
+    sets[at].scrollIntoView({ block: "nearest" });
+    if (sets[at].dataset.dimension === "simulation") showLayer("grasps"); // before, they would hide what is judged
   }
   function showFixes() {
     for (const set of sets) {
@@ -81,8 +83,8 @@
       if (fix) fix.hidden = answer(set) !== "no";
     }
   }
-  function showCandidates() {
-    const layer = document.querySelector("[data-layer=candidate]");
+  function showLayer(name) {
+    const layer = document.querySelector(`[data-layer=${name}]`);
     if (!layer || layer.checked) return;
     layer.checked = true;
     layer.dispatchEvent(new Event("change", { bubbles: true }));
@@ -93,7 +95,7 @@
     showFixes();
     keep();
     if (value !== "no") go(at + 1);
-    else if (sets[at].querySelector("[data-point]")) showCandidates();
+    else if (sets[at].querySelector("[data-point]")) showLayer("candidate");
   }
   function content() {
     const answers = {};

@@ -24,7 +24,7 @@
   for (const name of ["mesh", "wireframe", "hulls", "candidate", "functional", "grasp", "grasps", "mass"]) {
     object.add((layers[name] = new THREE.Group()));
   }
-  scene.add((layers.cube = new THREE.Group()));
+  scene.add((layers.cube = new THREE.Group()), (layers.gripper = new THREE.Group()));
   const shapes = globalThis.manitwinShapes(view, layers, object);
 
   let twin;
@@ -67,6 +67,21 @@
     if (columns.width_m[place] !== null) parts.push(`${Math.round(1000 * columns.width_m[place])} mm wide`);
     if (columns.retired[place]) parts.push("retired");
     return parts.join(", ");
+  }
+  // the open hand, fingertips on the ground, on the other side than the cube
+  function standGripper() {
+    layers.gripper.clear();
+    const name = control("gripper").value;
+    if (!name || !twin.grippers[name].hand.length) return;
+    const widest = Math.max(...twin.grasps[name].width_m.filter((width) => width !== null), 0.04);
+    const columns = { position_m: [0, 0, 0], quaternion_wxyz: [0, 1, 0, 0], width_m: [widest] };
+    const hand = boxes(twin.grippers[name].hand, [0], columns, solid(0x8d959e, { transparent: true, opacity: 0.6 }));
+    hand.computeBoundingBox();
+    const { min, max } = hand.boundingBox;
+    const beside = (twin.extents_m[0] + max.x - min.x) / 2 + 0.05;
+    hand.position.set(-beside, 0, -min.z);
+    hand.userData.label = () => `${name}, open as wide as its widest grasp`;
+    layers.gripper.add(hand);
   }
   function drawGrasps() {
     for (const child of [...layers.grasps.children]) {
@@ -126,6 +141,7 @@
       label.append(box, mark, ` ${outcome} ${columns.outcome.filter((each) => each === outcome).length}`);
       legend.append(label);
     }
+    standGripper();
     drawGrasps();
   }
   function place() {
