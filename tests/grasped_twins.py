@@ -17,6 +17,7 @@ from manitwin.twin.grasp_table import JOINTS, SCHEMA
 from manitwin.twin.store import RECORD, seal
 from rigid_boxes import FROM_ABOVE, PANDA, above
 from scene_twins import Thing, slab, write_thing
+from twin_folders import tried_as_built
 
 WIDTH_M, HEIGHT_M = 0.04, 0.1
 TIPS_M = [[0.0, y, z] for y in (-0.01, 0.0, 0.01) for z in (0.07, 0.08)]
@@ -81,7 +82,8 @@ def write_held(
         columns[column] = [None if each is None else each[place].tolist() for each in joints[: len(poses)]]
     pq.write_table(pa.table(columns, schema=SCHEMA), folder / "grasps.parquet")
     record = json.loads((folder / RECORD).read_bytes())
-    record["grasps"]["gripper"] = gripper
+    told = {"gripper": gripper, "gripper_sha256": load_gripper(gripper).sha256, "trial": tried_as_built()}
+    record["grasps"] |= told
     del record["revision"], record["files"]
     seal(folder, record)
     return identity

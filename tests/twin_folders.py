@@ -126,8 +126,7 @@ def _sections(category: str, mass_kg: float, mesh: trimesh.Trimesh, grasps: int)
                 ],
             },
             "grasps": {
-                "gripper": "panda", "gripper_sha256": load_gripper("panda").sha256, "trial": tried_as_built(),
-                "proposed": 50, "simulated": grasps - 2, "verified": 3, "success_rate": 0.5,
+                "gripper": "panda", "proposed": 50, "simulated": grasps - 2, "verified": 3, "success_rate": 0.5,
                 "unfiltered_simulated": 1, "unfiltered_success_rate": 1.0, "failures": {"slips": 3},
                 "approach_octants": 4,
                 "second_opinion": {

@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from manitwin.dataset.affordances.blind import blind_parts
 from manitwin.dataset.affordances.maps import SurfaceMaps
 from manitwin.dataset.report_page import Picture, Section, Table, page
 from manitwin.formats.image_file import png_of
@@ -50,6 +51,47 @@ def _dots(maps: SurfaceMaps, colors: np.ndarray) -> np.ndarray:
     return canvas
 
 
+def _blind(rows: Sequence[Mapping[str, Any]]) -> list[Table]:
+    """Return what is right without a look at the shape, as medians by kind of map, and of parts."""
+    of_kind: dict[str, list[list[float | None]]] = {}
+    for row in rows:
+        for name, scores in row["blind"].items():
+            of_kind.setdefault(name.partition(":")[0], []).append(scores)
+    if not of_kind:
+        return []
+    halves = [row["agreement"] for row in rows if row["agreement"] is not None]
+    told = {"grasp": [_median(values) for values in zip(*halves, strict=True)]} if halves else {}
+    heads = (
+        "map",
+        "SIM, one value everywhere",
+        "SIM, nearer the middle",
+        "AUC, nearer the middle",
+        "SIM of halves",
+        "AUC of halves",
+    )
+    lines = [
+        (kind, *(_median(values) for values in zip(*scores, strict=True)), *told.get(kind, (None, None)))
+        for kind, scores in sorted(of_kind.items())
+    ]
+    share, twins = blind_parts(rows)
+    remark = (
+        f" Of parts, {share:.0%} of the points are right where all are of the largest part of the category's other twins"
+        f" ({twins:,} twins)."
+        if share is not None
+        else ""
+    )
+    caption = (
+        "Blind baseline, medians: maps that know no shape, which a model has to pass, beside how far two halves of the contacts"
+        f" agree. One value everywhere has an AUC of one half.{remark}"
+    )
+    return [Table(caption, heads, lines)]
+
+
+def _median(values: Sequence[float | None]) -> float | None:
+    found = [value for value in values if value is not None]
+    return round(float(np.median(found)), 3) if found else None
+
+
 def affordances_page(
     rows: Sequence[Mapping[str, Any]], left_out: Mapping[str, str], samples: Sequence[Picture], with_parts: int
 ) -> bytes:
@@ -66,6 +108,7 @@ def affordances_page(
         Table("Maps by kind.", ("map", "maps"), sorted(kinds.items())),
         Table("Twins by category.", ("category", "twins"), sorted(categories.items())),
     ]
+    tables += _blind(rows)
     if left_out:
         tables.append(Table("Left out.", ("twin", "reason"), sorted(left_out.items())))
     return page("Affordances and parts", lead, [Section("Samples", samples), Section("Balance", tables)])

@@ -8,11 +8,13 @@ import json
 import re
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
+from manitwin.dataset.affordances.blind import blind_maps, part_shares
 from manitwin.dataset.affordances.maps import SurfaceMaps, has_parts, surface_maps
 from manitwin.dataset.affordances.partnext import PartNextFolder
 from manitwin.dataset.affordances.report import affordances_page, sample_picture
@@ -182,6 +184,11 @@ def _row(maps: SurfaceMaps) -> dict[str, object]:
         "tried": maps.tried,
         "held": maps.held,
         "agreement": None if maps.agreement is None else [round(value, 4) for value in maps.agreement],
+        "blind": {
+            name: [round(value, 4) if isfinite(value) else None for value in astuple(scores)]
+            for name, scores in blind_maps(maps).items()
+        },
+        "part_shares": {name: round(share, 4) for name, share in part_shares(maps).items()},
     }
 
 
