@@ -98,7 +98,7 @@ def main() -> None:
             pictures = {
                 "view_gallery": shown(page, f"{address}/", WIDE, "light"),
                 "view_twin": shown(page, twin, WIDE, "light"),
-                "view_trial": shown(page, f"{twin}#grasp=2&trial={TRIAL_S}", SCENE, "light"),
+                "view_trial": shown(page, f"{twin}#grasp=2&trial={TRIAL_S}", WIDE, "light"),
                 "view_dark": shown(page, closer, WIDE, "dark"),
                 "view_narrow": beside(
                     [

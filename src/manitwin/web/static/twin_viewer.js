@@ -188,7 +188,7 @@
     frame: (told) => {
       const size = Math.hypot(...twin.extents_m);
       const rises = told.hand.length > 7 ? Math.max(...told.hand.filter((_, at) => at % 7 === 2)) - told.hand[2] : 0;
-      const far = 2.4 * (size + rises) + 0.25;
+      const far = 1.8 * (size + rises) + 0.2;
       const middle = (twin.extents_m[2] + rises) / 2;
       return [0.5 * far, -0.75 * far, middle + 0.3 * far, 0, 0, middle];
     },
@@ -299,7 +299,10 @@
     showLayers();
     requestAnimationFrame(() => requestAnimationFrame(() => {
       viewer.dataset.ready = String(Math.round(performance.now()));
-      if (!view.problems.length && chosen < 0) report("Drag to turn, scroll for nearer; point at anything for its name.");
+      if (view.problems.length || (trial && trial.isOpen())) return;
+      const columns = twin.grasps[control("gripper").value];
+      if (columns && columns.id[chosen] !== undefined) report(graspLabel(columns, chosen));
+      else report("Drag to turn, scroll for nearer; point at anything for its name.");
     }));
   }
   begin();
