@@ -33,7 +33,8 @@ def list_page(records: Sequence[SceneRecord | str], place: int, count: int, titl
     head = "".join(f'<th scope="col">{name}</th>' for name in heads)
     body = (
         f'<header class="top"><h1>{text(title)}</h1><p class="caption">{count:,} scenes</p></header>\n'
-        f'<main id="main"><div class="scroll"><table class="scenes"><thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n'
+        f'<main id="main"><div class="scroll"><table class="scenes"><thead><tr>{head}</tr></thead>\n'
+        f"<tbody>\n{rows}</tbody></table></div>\n"
         f"{f'<nav class=pages aria-label=Pages>{pages}</nav>' if count > PAGE_SCENES else ''}</main>\n"
     )
     return page(title, body, links)
