@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from access_requests import asked
 
@@ -84,3 +87,20 @@ def test_a_process_that_ends_or_hangs_costs_its_trial_and_nothing_else(
         with pytest.raises(UsageError):
             monkeypatch.undo()
             player.play(twin, "panda", "no")
+
+
+def test_an_altered_twin_is_said_and_ends_no_process(viewed: Viewed, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(viewed[0] / twin_name(viewed[1][1]), tmp_path / "twin"))
+    (folder / "collision" / "hull_00.obj").rename(tmp_path / "hull.obj")
+    (folder / "collision" / "hull_00.obj").write_text("v nonsense\n")
+    with TrialPlayer() as player:
+        with pytest.raises(TwinError, match="no hull that can be read"):
+            player.play(Twin(folder), "panda", "panda-0000")
+        (tmp_path / "hull.obj").replace(folder / "collision" / "hull_00.obj")
+        table = pq.read_table(folder / "grasps.parquet")
+        place = table.schema.get_field_index("quaternion_wxyz")
+        flat = pa.array([[0.0] * 4] * len(table), table.schema.field(place).type)
+        pq.write_table(table.set_column(place, table.schema.field(place), flat), folder / "grasps.parquet")
+        with pytest.raises(TwinError, match=r"cannot be run \(ValueError"):
+            player.play(Twin(folder), "panda", "panda-0000")
+        assert len(player._pool._processes) == 1  # type: ignore[union-attr]

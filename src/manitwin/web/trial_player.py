@@ -7,9 +7,11 @@ import threading
 from collections import OrderedDict
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
 from types import TracebackType
 
-from manitwin.errors import TwinError
+from manitwin.errors import ManiTwinError, TwinError, UsageError
+from manitwin.formats.printable import printable_line
 from manitwin.twin.loaded_twin import Twin
 from manitwin.web.trial_document import trial_bytes
 
@@ -17,6 +19,24 @@ MOST_KEPT = 64
 """Documents of trials that were played, which are kept for the next look; one has some 100 kB."""
 LONGEST_S = 60.0
 """A trial takes a few tenths of a second, the start of the process some seconds; what takes this long is ended."""
+
+
+@dataclass(frozen=True)
+class _Refused:
+    """An error of the other process, in words: not every error can be sent from one to another."""
+
+    why: str
+    usage: bool
+
+
+def _tried(folder: str, gripper: str, grasp_id: str) -> bytes | _Refused:
+    try:
+        return trial_bytes(folder, gripper, grasp_id)
+    except ManiTwinError as error:
+        return _Refused(str(error), isinstance(error, UsageError))
+    except Exception as error:  # an altered twin: numbers that no engine takes, joints that the hand has not
+        cause = printable_line(f"{type(error).__name__}: {error}", max_characters=200)
+        return _Refused(f"{folder}: the trial cannot be run ({cause}); build the twin again", usage=False)
 
 
 class TrialPlayer:
@@ -43,14 +63,16 @@ class TrialPlayer:
             if self._pool is None:
                 self._pool = ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn"))
             try:
-                document = self._pool.submit(trial_bytes, str(twin.folder), gripper, grasp_id).result(LONGEST_S)
+                answer = self._pool.submit(_tried, str(twin.folder), gripper, grasp_id).result(LONGEST_S)
             except BrokenProcessPool as error:
                 self._end()
                 raise TwinError("the trial ended its process; all else of the twin is here") from error
             except TimeoutError as error:
                 self._end()
                 raise TwinError(f"the trial took more than {LONGEST_S:.0f} s and was ended") from error
-            self._kept[key] = document
+            if isinstance(answer, _Refused):
+                raise UsageError(answer.why) if answer.usage else TwinError(answer.why)
+            self._kept[key] = document = answer
             while len(self._kept) > MOST_KEPT:
                 self._kept.popitem(last=False)
             return document
