@@ -14,6 +14,7 @@ from PIL import Image
 from conftest import serving
 from drawn_episodes import GRASPED, RELEASED, STEPS, attempt, stored, write_run
 from drawn_scenes import write_scenes
+from manitwin.web.plain_files import write_plain_files
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser]
 
@@ -104,3 +105,17 @@ def test_words_of_an_episode_run_nothing(visitor: Callable[..., Any], run: Path)
         assert page.get_by_role("cell", name="in(object_00, object_01): on_the_rim").count() == 1
         assert page.errors == []
         assert all(each.startswith(server.address) for each in page.requests if not each.startswith(("blob:", "data:")))
+
+
+def test_plain_files_of_episodes_play_from_the_disk(visitor: Callable[..., Any], run: Path, tmp_path: Path) -> None:
+    write_plain_files(str(run), tmp_path / "out")
+    page = visitor()
+    page.goto((tmp_path / "out" / "index.html").as_uri())
+    page.get_by_role("link", name="episode-00000000").click()
+    page.wait_for_selector("#viewer[data-ready]", timeout=60_000)
+    stage = page.locator(".stage")
+    first = pixels(stage)
+    stage.press("End")
+    assert "1.20 / 1.20 s" in page.inner_text("output") and changed(first, pixels(stage)) > 200
+    assert "Drag to turn" in page.inner_text(".said") and page.title().count("img") == 0
+    assert page.errors == [] and not [url for url in page.requests if not url.startswith(("file://", "blob:", "data:"))]

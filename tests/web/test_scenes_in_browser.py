@@ -14,6 +14,7 @@ from PIL import Image
 from conftest import serving
 from drawn_scenes import write_scenes
 from manitwin.scenes.scene_files import scene_files
+from manitwin.web.plain_files import write_plain_files
 
 pytestmark = [pytest.mark.slow, pytest.mark.browser]
 
@@ -52,3 +53,16 @@ def test_a_scene_is_turned_pointed_at_and_handed_on(visitor: Callable[..., Any],
         stage.press("ArrowLeft")
         assert np.abs(pixels(stage) - before).mean() > 2.0
         assert page.errors == []
+
+
+def test_plain_files_of_scenes_open_from_the_disk_with_their_twins(visitor: Callable[..., Any], tmp_path: Path) -> None:
+    write_plain_files(str(write_scenes(tmp_path)), tmp_path / "out")
+    page = visitor()
+    page.goto((tmp_path / "out" / "index.html").as_uri())
+    page.locator("tbody a").first.click()
+    page.wait_for_selector("#viewer[data-ready]", timeout=60_000)
+    assert "Drag to turn" in page.inner_text(".said") and pixels(page.locator(".stage")).std() > 5
+    page.locator("main tbody a").first.click()
+    page.wait_for_selector("#viewer[data-ready]", timeout=60_000)
+    assert "Drag to turn" in page.inner_text(".said") and page.locator(".trial").count() == 0
+    assert page.errors == [] and not [url for url in page.requests if not url.startswith(("file://", "blob:", "data:"))]

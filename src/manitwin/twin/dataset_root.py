@@ -6,6 +6,7 @@ DATASET/
   twins/<2 hex>/<twin_id>/    finished twins, accepted and rejected
   index/                      Parquet tables
   reviews.sqlite              what people have said of twins
+  reviews.access.json         who of them was let in before: digests of links and cookies
   amendments/<2 hex>/<twin_id>.json   what they have put right
   .work/<twin_id>/<stage>/<key>/   results of stages
 """
