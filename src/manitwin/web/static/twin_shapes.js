@@ -1,4 +1,4 @@
-// The shapes of a twin beside its mesh and grasps: wireframe, hulls, points with their frames, and things of known size beside it.
+// The shapes of a twin beside its mesh: wireframe, hulls, points with their frames, grippers, and things of known size beside it.
 // Metres, the object frame; texts are only ever set as textContent.
 "use strict";
 globalThis.manitwinShapes = (view, layers, object) => {
@@ -65,5 +65,26 @@ globalThis.manitwinShapes = (view, layers, object) => {
     scene.add(grid);
     view.stage.querySelector(".scale").textContent = "grid: 10 cm";
   }
-  return { addWireframe, addHulls, addPoints, addScale };
+  // boxes of grippers at grasps, as one instanced mesh
+  function boxMatrix(box, width, pose) {
+    const center = vector(box.center).setX(box.center[0] + box.shift * width);
+    const half = vector(box.half).setX(box.half[0] + box.grow * width);
+    return new THREE.Matrix4().compose(center, quaternion(box.quaternion), half.multiplyScalar(2)).premultiply(pose);
+  }
+  function pose(columns, place) {
+    const q = columns.quaternion_wxyz.slice(4 * place, 4 * place + 4);
+    return new THREE.Matrix4().compose(vector(columns.position_m, 3 * place), quaternion(q), new THREE.Vector3(1, 1, 1));
+  }
+  function boxes(list, places, columns, material) {
+    const mesh = new THREE.InstancedMesh(new THREE.BoxGeometry(1, 1, 1), material, Math.max(1, list.length * places.length));
+    mesh.count = list.length * places.length;
+    places.forEach((place, at) => {
+      const gripperToObject = pose(columns, place);
+      list.forEach((box, part) =>
+        mesh.setMatrixAt(at * list.length + part, boxMatrix(box, columns.width_m[place] || 0, gripperToObject)));
+    });
+    mesh.frustumCulled = false;
+    return mesh;
+  }
+  return { addWireframe, addHulls, addPoints, addScale, boxes };
 };

@@ -36,26 +36,6 @@
   const solid = (color, more) => new THREE.MeshStandardMaterial({ color, roughness: 0.7, ...more });
 
   // ---- grasps
-  function boxMatrix(box, width, pose) {
-    const center = vector(box.center).setX(box.center[0] + box.shift * width);
-    const half = vector(box.half).setX(box.half[0] + box.grow * width);
-    return new THREE.Matrix4().compose(center, quaternion(box.quaternion), half.multiplyScalar(2)).premultiply(pose);
-  }
-  function pose(columns, place) {
-    const q = columns.quaternion_wxyz.slice(4 * place, 4 * place + 4);
-    return new THREE.Matrix4().compose(vector(columns.position_m, 3 * place), quaternion(q), new THREE.Vector3(1, 1, 1));
-  }
-  function boxes(list, places, columns, material) {
-    const mesh = new THREE.InstancedMesh(new THREE.BoxGeometry(1, 1, 1), material, Math.max(1, list.length * places.length));
-    mesh.count = list.length * places.length;
-    places.forEach((place, at) => {
-      const gripperToObject = pose(columns, place);
-      list.forEach((box, part) =>
-        mesh.setMatrixAt(at * list.length + part, boxMatrix(box, columns.width_m[place] || 0, gripperToObject)));
-    });
-    mesh.frustumCulled = false;
-    return mesh;
-  }
   function graspColor(columns, place) {
     if (control("color").value === "outcome") return new THREE.Color(COLORS[columns.outcome[place]] ?? 0x888888);
     const share = columns.robustness[place];
@@ -75,7 +55,7 @@
     if (!name || !twin.grippers[name].hand.length) return;
     const widest = Math.max(...twin.grasps[name].width_m.filter((width) => width !== null), 0.04);
     const columns = { position_m: [0, 0, 0], quaternion_wxyz: [0, 1, 0, 0], width_m: [widest] };
-    const hand = boxes(twin.grippers[name].hand, [0], columns, solid(0x8d959e, { transparent: true, opacity: 0.6 }));
+    const hand = shapes.boxes(twin.grippers[name].hand, [0], columns, solid(0x8d959e, { transparent: true, opacity: 0.6 }));
     hand.computeBoundingBox();
     const { min, max } = hand.boundingBox;
     const beside = (twin.extents_m[0] + max.x - min.x) / 2 + 0.05;
@@ -95,7 +75,7 @@
     const { fork, hand } = twin.grippers[control("gripper").value];
     const open = columns.id.map((_, place) => place).filter((place) => !hidden.has(columns.outcome[place]));
     shown = open.slice(0, Number(control("count").value));
-    forks = boxes(fork, shown, columns, solid(0xffffff));
+    forks = shapes.boxes(fork, shown, columns, solid(0xffffff));
     shown.forEach((place, at) => {
       for (let part = 0; part < fork.length; part += 1) forks.setColorAt(at * fork.length + part, graspColor(columns, place));
     });
@@ -104,7 +84,7 @@
     forks.userData.pick = (instance) => columns.id[told(instance)];
     layers.grasps.add(forks);
     if (chosen >= 0 && chosen < columns.id.length) {
-      const whole = boxes(hand.length ? hand : fork, [chosen], columns, solid(graspColor(columns, chosen), { transparent: true, opacity: 0.55 }));
+      const whole = shapes.boxes(hand.length ? hand : fork, [chosen], columns, solid(graspColor(columns, chosen), { transparent: true, opacity: 0.55 }));
       whole.userData.label = () => graspLabel(columns, chosen);
       layers.grasps.add(whole);
     }
