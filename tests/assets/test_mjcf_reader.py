@@ -255,3 +255,119 @@ def test_shapes_of_one_group_are_seen_alike_and_a_computed_inertia_is_not_judged
     )
     pendulum = mjcf(tmp_path, f"<body><joint/>{bob}</body>")
     assert "INE005" not in {finding.code for finding in audit_path(pendulum, RULES).findings}
+
+
+def test_attached_models_are_read_where_mujoco_puts_them(tmp_path: Path) -> None:
+    (tmp_path / "parts" / "meshes").mkdir(parents=True)
+    wedge().export(tmp_path / "parts" / "meshes" / "wedge.stl")
+    (tmp_path / "parts" / "handle.xml").write_text(
+        '<mujoco model="handle"><compiler meshdir="meshes" angle="radian"/>'
+        '<asset><mesh file="wedge.stl" scale=".01 .01 .01"/></asset>'
+        '<worldbody><body name="grip" euler="0.5 0 0"><geom type="mesh" mesh="wedge" density="300"/></body></worldbody></mujoco>'
+    )
+    before = '<asset><model name="handle" file="parts/handle.xml"/></asset>'
+    attach = '<frame pos="0 0 0.2" euler="0 90 0"><attach model="handle" body="grip" prefix="left_"/></frame>'
+    path = mjcf(
+        tmp_path, f'<body name="door"><freejoint/><geom type="box" size=".1 .2 .3" mass="2"/>{attach}</body>', before
+    )
+    asset = read_asset(path)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert asset.inertial.mass_kg == pytest.approx(model.body_subtreemass[1])
+    assert np.allclose(asset.inertial.center_of_mass_m, data.subtree_com[1], atol=1e-9)
+    in_world = model.mesh_vert @ data.geom_xmat[1].reshape(3, 3).T + data.geom_xpos[1]
+    assert np.allclose(asset.collision[1].vertices.min(0), in_world.min(0), atol=1e-6)
+    assert tmp_path / "parts" / "handle.xml" in asset.files
+
+
+def test_replicated_and_own_attachments_are_written_out(tmp_path: Path) -> None:
+    (tmp_path / "peg.xml").write_text(
+        '<mujoco model="peg"><worldbody><body name="peg"><freejoint/><geom size=".02"/></body></worldbody></mujoco>'
+    )
+    before = '<asset><model file="peg.xml"/></asset>'
+    row = '<replicate count="3" offset=".1 0 0"><attach model="peg" body="peg" prefix="a_"/></replicate>'
+    assert any("2 more bodies" in r or "a_peg" in r for r in read_asset(mjcf(tmp_path, row, before)).remarks)
+    part = '<frame name="part"><geom name="g" size=".1"/></frame>'
+    again = '<frame pos="1 0 0"><attach frame="part" prefix="again_"/></frame>'
+    assert len(read_asset(mjcf(tmp_path, f'<body name="x">{part}{again}</body>')).collision) == 2
+
+
+@pytest.mark.parametrize(
+    ("child", "cause"),
+    [
+        (None, "is not there"),
+        ('<mujoco><asset><model name="o" file="object.xml"/></asset><worldbody/></mujoco>', "attaches itself"),
+        ("<robot/>", "not <mujoco>"),
+        ('<mujoco><worldbody><body name="other"/></worldbody></mujoco>', "could not find"),
+    ],
+)
+def test_what_cannot_be_attached_is_said(tmp_path: Path, child: str | None, cause: str) -> None:
+    if child is not None:
+        (tmp_path / "child.xml").write_text(child)
+    before = '<asset><model name="c" file="child.xml"/></asset>'
+    path = mjcf(tmp_path, '<body><geom size=".1"/><attach model="c" body="peg" prefix="a_"/></body>', before)
+    with pytest.raises(AssetError, match=cause):
+        read_asset(path)
+
+
+def test_attachments_that_multiply_are_refused_before_they_are_written_out(tmp_path: Path) -> None:
+    for number in range(8):
+        inner = "<geom size='1'/>" if number == 0 else (
+            "".join(f'<attach model="m" prefix="{i}_"/>' for i in range(10))
+        )  # fmt: skip
+        asset = "" if number == 0 else f'<asset><model name="m" file="m{number - 1}.xml"/></asset>'
+        (tmp_path / f"m{number}.xml").write_text(f"<mujoco>{asset}<worldbody><body>{inner}</body></worldbody></mujoco>")
+    with pytest.raises(AssetError, match="elements"):
+        read_asset(tmp_path / "m7.xml")
+
+
+def test_a_mesh_of_points_alone_is_their_hull_with_mujocos_mass(tmp_path: Path) -> None:
+    points = np.random.default_rng(2).normal(size=(40, 3)) * [0.02, 0.03, 0.05]
+    (tmp_path / "cloud.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in points))
+    path = mjcf(
+        tmp_path,
+        '<body><freejoint/><geom type="mesh" mesh="cloud" density="700"/></body>',
+        '<asset><mesh file="cloud.obj"/></asset>',
+    )
+    asset = read_asset(path)
+    model = mujoco.MjModel.from_xml_path(str(path))
+    assert asset.inertial.mass_kg == pytest.approx(model.body_mass[1], rel=1e-6)
+    assert trimesh.Trimesh(asset.collision[0].vertices, asset.collision[0].faces).is_watertight
+    assert any("40 points" in remark for remark in asset.remarks)
+    (tmp_path / "cloud.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n")
+    with pytest.raises(AssetError, match="no volume"):
+        read_asset(path)
+
+
+def test_soft_bodies_alone_are_their_shape_at_rest_and_not_judged_as_rigid(tmp_path: Path) -> None:
+    flex = (
+        '<flexcomp name="sponge" type="grid" count="4 4 4" spacing=".02 .02 .02" dim="3" dof="radial" radius=".001" mass="1">'
+        '<edge equality="true"/></flexcomp>'
+    )
+    path = mjcf(tmp_path, f'<body name="held" pos="0 0 1"><freejoint/>{flex}</body>')
+    asset = read_asset(path)
+    assert asset.soft and asset.name == "sponge" and not asset.collision
+    assert np.allclose(np.ptp(asset.visual[0].vertices, axis=0), 0.06, atol=1e-6)
+    found = {finding.code for finding in audit_path(path, RULES).findings}
+    assert not found & {"COL001", "MAS001", "INE001", "FRI001"}
+    wedge().export(tmp_path / "cloth.obj")
+    cloth = '<flexcomp name="cloth" type="mesh" file="cloth.obj" dim="2" scale=".01 .01 .01" radius=".001"/>'
+    seen = read_asset(mjcf(tmp_path, cloth)).visual[0].vertices
+    assert np.allclose(seen.min(0), wedge().vertices.min(0) / 100, atol=1e-6)
+
+
+def test_a_height_field_alone_is_its_surface(tmp_path: Path) -> None:
+    heights = np.zeros((3, 4), np.uint8)
+    heights[0, 3] = 255  # the upper right corner of the picture: +x, +y
+    Image.fromarray(heights).save(tmp_path / "hill.png")
+    before = '<asset><hfield name="hill" file="hill.png" size="2 1 .5 .1"/></asset>'
+    asset = read_asset(mjcf(tmp_path, '<geom type="hfield" hfield="hill"/>', before))
+    assert asset.static
+    top = asset.visual[0].vertices[asset.visual[0].vertices[:, 2].argmax()]
+    assert np.allclose(top, [2, 1, 0.5])
+
+
+def test_lights_with_pictures_do_not_matter(tmp_path: Path) -> None:
+    light = '<light type="image" texture="sky"/>'
+    assert read_asset(mjcf(tmp_path, f'{light}<body><geom size=".1"/></body>')).collision

@@ -97,7 +97,8 @@ class Asset:
     where it declares none. ``missing_files`` are named and not there; ``remarks`` are what the reader had to note, one line each.
     ``rests`` are declared resting poses, asset to plane ``(4, 4)``. ``static``: it is said to stand fast, as buildings do, and is
     no object that moves. ``partial``: other bodies of the file, such as a robot's links, were left out; its name is of
-    them all.
+    them all. ``soft``: it deforms; what is
+    asked of rigid bodies is not asked of it.
     """
 
     format: Format
@@ -116,6 +117,7 @@ class Asset:
     rests: tuple[np.ndarray, ...] = ()
     static: bool = False
     partial: bool = False
+    soft: bool = False
     license: str | None = None
     attribution: str | None = None
     files: tuple[Path, ...] = ()

@@ -108,11 +108,17 @@ class AssetFiles:
         if self.own is not None and not file.is_relative_to(self.own.resolve()):
             self.remark(f"files were read from above its own folder, below the root {self.root.resolve().name!r}")
 
-    def mesh(self, path: Path) -> MeshFile:
-        """Read a mesh that ``find`` returned; raises AssetError naming it where it cannot be read, or the asset is too large."""
+    def mesh(self, path: Path, *, hull_of_points: bool = False) -> MeshFile:
+        """Read a mesh that ``find`` returned, ``hull_of_points`` as ``read_mesh`` has it.
+
+        Raises AssetError naming it where it cannot be read, or the asset is too large.
+        """
         if path not in self._meshes:
             try:
-                mesh = read_mesh(path, limits=MESH_LIMITS, root=self.root, texture_folders=self._texture_folders(path))
+                folders = self._texture_folders(path)
+                mesh = read_mesh(
+                    path, limits=MESH_LIMITS, root=self.root, texture_folders=folders, hull_of_points=hull_of_points
+                )
             except InputError as error:
                 raise AssetError(error.detail) from error
             self.used.update(mesh.files)

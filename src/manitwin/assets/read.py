@@ -24,6 +24,9 @@ _SHAPES = (b"<geom", b"<visual", b"<collision", b"<include", b"<replicate", b"<c
 """What shapes are, or come from, in MJCF, URDF and SDF."""
 _WORLD_BODY = re.compile(rb"<worldbody[\s>].*?</worldbody>", re.DOTALL)
 _ENDS = (b"</mujoco>", b"</robot>", b"</sdf>")
+_PRIM = re.compile(rb"^\s*def\b", re.MULTILINE)
+_COMPOSED = (b"references", b"payload")
+"""What brings prims of other layers into one without any."""
 _MARKS = re.compile(rb"<extra_info[\s/>]|<custom_data[\s/>]")
 _ROBOTWIN_DATA = re.compile(r"model_data\d*\.json")
 
@@ -125,12 +128,15 @@ def _xml_format(file: Path) -> Format | None:
 
 def _is_fragment(file: Path) -> bool:
     """Tell whether an XML description holds no shape, and is there for others to include: it is no asset by itself."""
-    if file.suffix.lower() not in (".urdf", ".xml", ".mjcf", ".sdf"):
+    suffix = file.suffix.lower()
+    if suffix not in (".urdf", ".xml", ".mjcf", ".sdf", ".usda"):
         return False
     with open_regular(file, AssetError) as stream:
         content = stream.read(_FRAGMENT_BYTES)
     if len(content) == _FRAGMENT_BYTES:
         return False
+    if suffix == ".usda":
+        return _PRIM.search(content) is None and not any(word in content for word in _COMPOSED) and b"class " in content
     content = _without_comments(content)
     if content.rstrip().endswith(b"</mujoco>") and b"<include" not in content:
         content = b"".join(_WORLD_BODY.findall(content)) + b"</mujoco>"  # defaults name shapes, and make none

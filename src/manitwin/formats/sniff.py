@@ -136,12 +136,12 @@ def msh_bytes(head: bytes) -> int | None:
     """Return how many bytes a file of MuJoCo's binary meshes with this head has to have, None where it is the head of none.
 
     It begins with four 32-bit integers: positions, normals and texture coordinates, each of the latter two one a position or
-    none, and triangles. Source: the XML reference of MuJoCo, ``mesh``, "MSH file format".
+    none, and triangles, of which there may be none. Source: the XML reference of MuJoCo, ``mesh``, "MSH file format".
     """
     if len(head) < MSH_HEADER_BYTES:
         return None
     vertices, normals, coordinates, faces = struct.unpack_from("<4i", head)
-    if vertices < 3 or faces < 1 or normals not in (0, vertices) or coordinates not in (0, vertices):
+    if vertices < 3 or faces < 0 or normals not in (0, vertices) or coordinates not in (0, vertices):
         return None
     return MSH_HEADER_BYTES + 4 * (3 * vertices + 3 * normals + 2 * coordinates + 3 * faces)
 

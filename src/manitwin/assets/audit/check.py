@@ -24,6 +24,8 @@ OF_THE_WHOLE_SHAPE = (
 """Rules that measure the shape: where a mesh of it is not there (FIL002 says so), what is left says nothing of it."""
 OF_WHAT_MOVES = ("MAS", "INE", "COM", "COL001", "FRI001", "SCL001", "RUN")
 """Rules that are not held against what stands fast: no engine asks it for a mass."""
+OF_RIGID_BODIES = (*OF_WHAT_MOVES, "COL", "FRI", "PLC003")
+"""Rules that are not held against what is soft."""
 
 
 def audit_asset(
@@ -42,6 +44,8 @@ def audit_asset(
         rules = [rule for rule in rules if rule.code in broken]
     elif any(Path(name).suffix.lower() in MESHES for name in asset.missing_files):
         rules = [rule for rule in rules if not rule.code.startswith(OF_THE_WHOLE_SHAPE)]
+    if asset.soft:
+        rules = [rule for rule in rules if not rule.code.startswith(OF_RIGID_BODIES)]
     if asset.static:
         rules = [rule for rule in rules if not rule.code.startswith(OF_WHAT_MOVES)]
     return [_finding(rule, asset.path, complaint) for rule in rules for complaint in measured.complaints(rule.check)]

@@ -13,11 +13,13 @@ from manitwin.errors import AssetError
 from manitwin.formats.xml_file import MAX_NUMBER
 
 _SECTIONS = frozenset({"compiler", "default", "asset", "worldbody"})
-_ASSETS = frozenset({"mesh", "material", "texture"})
-_NOT_READ = ("attach", "model")  # of other files
-_SOFT = ("composite", "flexcomp")
+_ASSETS = frozenset({"mesh", "material", "texture", "hfield", "model"})
+_UNSEEN = ("light", "camera")
+_COMPOSITE, _FLEX = "composite", "flexcomp"
 _CODE = "plugin"
-_WORDS = frozenset({"name", "file", "mesh", "material", "texture", "class", "childclass", "model", "user"})
+_WORDS = frozenset(
+    {"name", "file", "mesh", "material", "texture", "class", "childclass", "model", "user", "prefix", "body", "frame"}
+)
 _OF_SHAPE_AND_MASS = frozenset(
     {"pos", "size", "scale", "fromto", "vertex", "refpos", "mass", "density", "diaginertia", "fullinertia", "friction"}
 )
@@ -25,20 +27,24 @@ _OF_SHAPE_AND_MASS = frozenset(
 _MAX_ELEMENTS = 100_000
 
 
-def keep_rigid_objects(file: Path, root: etree._Element, files: AssetFiles) -> None:
-    """Take everything out of a parsed MJCF that is no part of a rigid object; raises AssetError for what is not read.
+def keep_rigid_objects(
+    file: Path, root: etree._Element, files: AssetFiles, sizes: dict[str, float], *, keep_soft: bool = False
+) -> bool:
+    """Take everything out of a parsed MJCF that is no part of a rigid object; return whether there were soft bodies.
 
-    Composites and flexes are soft, plug-ins are code, and neither is read; ``replicate`` stays, which MuJoCo writes out.
+    Composites and flexes (those only without ``keep_soft``) are soft, plug-ins are code, and neither is read; ``replicate`` and
+    ``attach`` stay, which MuJoCo writes out. ``sizes``: how many elements the models have that it attaches. Raises AssetError
+    for what is too large, or has numbers that no object can have.
     """
-    if _written_out(root) > _MAX_ELEMENTS:
+    if written_out(root, sizes) > _MAX_ELEMENTS:
         raise AssetError(f"{file.name}: more than {_MAX_ELEMENTS} elements; it is no single object")
-    for tag in _NOT_READ:
-        if root.find(f".//{tag}") is not None:
-            raise AssetError(f"{file.name}: it uses <{tag}>, which is not read; write it out as bodies and geoms")
-    for tag in _SOFT:
+    soft = root.find(f".//{_FLEX}") is not None
+    for tag in (_COMPOSITE,) if keep_soft else (_COMPOSITE, _FLEX):
         for element in list(root.iter(tag)):
             element.getparent().remove(element)
             files.remark(f"<{tag}> is no rigid body and was left out")
+    for element in list(root.iter(*_UNSEEN)):
+        element.getparent().remove(element)
     for section in list(root):
         if section.tag not in _SECTIONS:
             root.remove(section)
@@ -50,10 +56,14 @@ def keep_rigid_objects(file: Path, root: etree._Element, files: AssetFiles) -> N
         _check_numbers(file, element)
     _leave_out_repeated(root, files)
     _leave_out_unknown_materials(root, files)
+    return soft
 
 
-def _written_out(element: etree._Element) -> float:
-    """Return how many elements there are once every <replicate> is written out."""
+def written_out(element: etree._Element, sizes: dict[str, float]) -> float:
+    """Return how many elements there are once every <replicate> and <attach> is written out, by ``sizes`` of models.
+
+    What a document attaches of itself is at most all of it so far.
+    """
     count = 0.0
     weights: dict[etree._Element, float] = {}
     for each in element.iter(etree.Element):
@@ -63,6 +73,8 @@ def _written_out(element: etree._Element) -> float:
                 weight *= max(1.0, float(each.get("count", "1")))
         weights[each] = weight
         count += weight
+        if each.tag == "attach":
+            count += weight * (count if each.get("model") is None else sizes.get(each.get("model"), 0.0))
     return count
 
 

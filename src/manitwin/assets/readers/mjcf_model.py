@@ -1,4 +1,4 @@
-"""An MJCF file brought to what describes objects: includes put in, everything else taken out, nothing opened by MuJoCo."""
+"""An MJCF file after MuJoCo's compiler, with the meshes, textures and height fields that are read here and handed to it."""
 
 from __future__ import annotations
 
@@ -9,77 +9,20 @@ from typing import Any
 import mujoco
 import numpy as np
 import trimesh
-from lxml import etree  # type: ignore[import-untyped]
 from PIL import Image
 
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles, joined
-from manitwin.assets.readers.mjcf_contents import keep_rigid_objects
+from manitwin.assets.readers.mjcf_document import MjcfSource
 from manitwin.errors import AssetError
-from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import bake_transform, decode_texture
-from manitwin.formats.xml_file import MAX_XML_BYTES, comments_before, read_xml, xml_text
+from manitwin.formats.xml_file import xml_text
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
-_MAX_INCLUDES = 32
-_HEAD_BYTES = 1 << 16
 _LEAST_MASS_KG, _LEAST_INERTIA_KG_M2 = 1e-9, 1e-12
+_LEAST_ROWS = 2
 NO_OBJECTS = "planes and height fields were left out: they are no objects"
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
-
-
-@dataclass(frozen=True)
-class MjcfSource:
-    """The XML that MuJoCo is given, and what was taken from it.
-
-    ``texts`` are the comments at its head, and those of <custom> as ``name: data``.
-    """
-
-    file: Path
-    root: etree._Element
-    texts: tuple[str, ...]
-
-    def writes(self, attributes: tuple[str, ...]) -> bool:
-        """Tell whether a geom, or a default for geoms, writes one of these attributes."""
-        return any(geom.get(name) is not None for geom in self.root.iter("geom") for name in attributes)
-
-
-def open_mjcf(file: Path, files: AssetFiles) -> MjcfSource:
-    """Parse an MJCF file and put its includes in; raises AssetError for what is broken or not read."""
-    root = read_xml(file, "mujoco")
-    comments = comments_before(root)
-    _put_in_includes(file, root, file, files, {file.resolve()})
-    texts = (*comments, *(f"{t.get('name')}: {t.get('data')}" for t in root.iterfind("custom/text")))
-    keep_rigid_objects(file, root, files)
-    return MjcfSource(file, root, texts)
-
-
-def _put_in_includes(
-    main: Path, root: etree._Element, file: Path, files: AssetFiles, done: set[Path], depth: int = 0
-) -> None:
-    """Replace <include> by the children of the included root, as MuJoCo does; each file once.
-
-    A file is looked up from the main file's folder, and then from that of the ``file`` which includes it.
-    """
-    while (include := root.find(".//include")) is not None:
-        name = (include.get("file") or "").replace("\\", "/")
-        found = files.find(name, [main.parent / name, file.parent / name])
-        if found is None:
-            raise AssetError(
-                f"{file.name}: the file {name[:80]!r} that it includes is not there, or above the root"
-                f" {files.root.name!r}; give the folder that holds all of it"
-            )
-        if found in done or len(done) > _MAX_INCLUDES or depth > _MAX_INCLUDES:
-            raise AssetError(f"{file.name}: includes {name[:80]!r} twice, or too many files")
-        done.add(found)
-        head = read_bytes(found, MAX_XML_BYTES, AssetError)[:_HEAD_BYTES]
-        tag = "mujocoinclude" if b"<mujocoinclude" in head else "mujoco"
-        included = read_xml(found, tag)
-        _put_in_includes(main, included, found, files, done, depth + 1)
-        parent, position = include.getparent(), include.getparent().index(include)
-        parent.remove(include)
-        for offset, child in enumerate(list(included)):
-            parent.insert(position + offset, child)
 
 
 @dataclass(frozen=True)
@@ -102,16 +45,14 @@ def compiled(source: MjcfSource, files: AssetFiles) -> CompiledMjcf:
     """
     name = source.file.name
     try:
-        spec = mujoco.MjSpec.from_string(xml_text(source.root))
+        spec = mujoco.MjSpec.from_string(xml_text(source.root), include=source.model_texts())
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         raise AssetError(f"{name}: MuJoCo cannot read it: {_line(error)}") from error
     spec.compiler.fusestatic = False  # both would take away bodies and geoms that the file has
     spec.compiler.discardvisual = False
     meshes = _take_meshes(source, spec, files)
     textures = _take_textures(source, spec, files)
-    for geom in [geom for geom in spec.geoms if geom.type == mujoco.mjtGeom.mjGEOM_HFIELD]:  # their data is not read
-        spec.delete(geom)
-        files.remark(NO_OBJECTS)
+    _take_height_fields(source, spec, files)
     try:
         try:
             model = spec.compile()
@@ -134,12 +75,11 @@ def _take_meshes(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str, 
     for mesh in list(spec.meshes):
         if not mesh.file:
             continue  # written out in the file itself
-        mesh.name = mesh.name or Path(mesh.file).stem
-        path = _find(source, spec.meshdir, mesh.file, spec, files)
+        path = _find(source, mesh.file, files)
         if path is None:
             absent.append(mesh)
             continue
-        parts = files.mesh(path).parts
+        parts = files.mesh(path, hull_of_points=True).parts
         vertices, faces = joined(parts)
         mesh.uservert, mesh.userface = vertices.reshape(-1), faces.reshape(-1).astype(np.int32)
         mesh.file = ""
@@ -164,14 +104,9 @@ def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str
     for texture in spec.textures:
         if not texture.file:
             continue
-        path = _find(source, spec.texturedir, texture.file, spec, files)
-        if path is not None and path.stat().st_size <= MESH_LIMITS.max_bytes:
-            notes = MeshSource(path, MESH_LIMITS)
-            image = decode_texture(notes.data(), path.name, notes)
-            for sentence in notes.findings:
-                files.remark(sentence)
-            if image is not None:
-                images[texture.name or Path(texture.file).stem] = image
+        image = _image(_find(source, texture.file, files), files)
+        if image is not None:
+            images[texture.name or Path(source.places[texture.file][0]).stem] = image
     by_material = {}
     for material in spec.materials:
         names = list(material.textures)
@@ -185,11 +120,40 @@ def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str
     return by_material
 
 
-def _find(source: MjcfSource, folder: str, name: str, spec: Any, files: AssetFiles) -> Path | None:
-    plain = name.replace("\\", "/")
-    if spec.strippath:
-        plain = plain.rsplit("/", 1)[-1]
-    return files.find(plain, [source.file.parent / folder / plain])
+def _take_height_fields(source: MjcfSource, spec: Any, files: AssetFiles) -> None:
+    """Read the pictures of height fields and hand their heights to the spec; those without are left out with their geoms."""
+    for field in list(spec.hfields):
+        heights = None
+        if field.file:
+            image = _image(_find(source, field.file, files), files)
+            heights = None if image is None else np.asarray(image.convert("L"), float)[::-1]  # from the lowest row up
+            field.file = ""
+        elif len(field.userdata) == field.nrow * field.ncol:
+            heights = np.asarray(field.userdata, float).reshape(field.nrow, field.ncol)
+        if heights is not None and min(heights.shape) >= _LEAST_ROWS:
+            files.count(2 * heights.size)
+            field.nrow, field.ncol = heights.shape
+            field.userdata = heights.reshape(-1).tolist()
+            continue
+        for geom in [geom for geom in spec.geoms if geom.hfieldname == field.name]:
+            spec.delete(geom)
+        spec.delete(field)
+        files.remark(NO_OBJECTS)
+
+
+def _image(path: Path | None, files: AssetFiles) -> Image.Image | None:
+    if path is None or path.stat().st_size > MESH_LIMITS.max_bytes:
+        return None
+    notes = MeshSource(path, MESH_LIMITS)
+    image = decode_texture(notes.data(), path.name, notes)
+    for sentence in notes.findings:
+        files.remark(sentence)
+    return image
+
+
+def _find(source: MjcfSource, key: str, files: AssetFiles) -> Path | None:
+    name, place = source.places[key]
+    return files.find(name, [place])
 
 
 def _line(error: Exception) -> str:

@@ -7,10 +7,12 @@ import struct
 import numpy as np
 import trimesh
 
+from manitwin.formats.meshes.point_hull import hull_part
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.formats.sniff import MSH_HEADER_BYTES, msh_bytes
 
+_GREY = (0.8, 0.8, 0.8)
 _REMEDY = "download it again, or export it as OBJ"
 
 
@@ -24,15 +26,19 @@ def read_msh(source: MeshSource) -> list[trimesh.Trimesh]:
     source.check_vertices(vertices)
     numbers = np.frombuffer(data, "<f4", 3 * (vertices + normals) + 2 * coordinates, MSH_HEADER_BYTES)
     indices = np.frombuffer(data, "<i4", 3 * faces, MSH_HEADER_BYTES + numbers.nbytes).reshape(-1, 3)
-    if indices.min() < 0 or indices.max() >= vertices:
+    if not faces and not source.hull_of_points:
+        raise source.refused("no_faces", f"{vertices} vertices and no faces", "give it triangles")
+    if faces and (indices.min() < 0 or indices.max() >= vertices):
         raise source.unreadable("a face names a vertex that is not there", _REMEDY)
     with np.errstate(invalid="ignore"):  # signalling NaNs, which the checks of every mesh find
         positions, directions, uv = np.split(numbers.astype(np.float64), [3 * vertices, 3 * (vertices + normals)])
+    if not faces:
+        return [hull_part(positions.reshape(-1, 3), source, _GREY)]
     return [
         make_part(
             positions.reshape(-1, 3),
             indices,
-            material=pbr_material(base_color=(0.8, 0.8, 0.8)),
+            material=pbr_material(base_color=_GREY),
             name="mesh",
             uv=_from_upper_left(uv.reshape(-1, 2)) if coordinates else None,
             normals=directions.reshape(-1, 3) if normals else None,

@@ -12,6 +12,7 @@ import trimesh
 from PIL import Image
 from trimesh.visual.material import PBRMaterial
 
+from manitwin.formats.meshes.point_hull import hull_part
 from manitwin.formats.meshes.source import MeshSource
 from manitwin.formats.meshes.textures import color_by_corner, decode_texture, make_part, material_of, pbr_material
 from manitwin.formats.meshes.triangles import triangle_fans
@@ -75,6 +76,8 @@ def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
         if colors is not None and material_of(part).baseColorTexture is None:
             part = color_by_corner(part, colors[corners[:, 0]][part.faces], source)
         parts.append(part)
+    if not parts and source.hull_of_points:
+        return [hull_part(positions, source, DEFAULT_COLOR)]
     if not parts and len(positions):
         raise source.refused(
             "no_faces", f"{len(positions)} vertices and no faces", "export the surface, not a point cloud"

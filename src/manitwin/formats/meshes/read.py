@@ -54,16 +54,24 @@ class MeshFile:
 
 
 def read_mesh(
-    path: Path, *, limits: MeshLimits | None = None, root: Path | None = None, texture_folders: tuple[Path, ...] = ()
+    path: Path,
+    *,
+    limits: MeshLimits | None = None,
+    root: Path | None = None,
+    texture_folders: tuple[Path, ...] = (),
+    hull_of_points: bool = False,
 ) -> MeshFile:
     """Read a mesh file, by content and not by name; files that it names are only read from its own folder, or ``root``.
 
     ``texture_folders``: where pictures are looked up by their name alone, if they are not where the mesh says.
+    ``hull_of_points``: an OBJ or MSH file of points alone is their convex hull, as MuJoCo has it.
 
     Raises InputError: ``unreadable``, ``too_large``, ``empty``, ``wrong_type``, ``animated``, ``no_faces``, ``not_finite``.
     """
     sniffed = sniff(path)
-    source = MeshSource(path, limits or MeshLimits(), root=root, texture_folders=texture_folders)
+    source = MeshSource(
+        path, limits or MeshLimits(), root=root, texture_folders=texture_folders, hull_of_points=hull_of_points
+    )
     if sniffed.kind != "mesh":
         raise source.refused("wrong_type", f"holds an image ({sniffed.format}), not a mesh", "give it as an image")
     if path.suffix.lower() not in _SUFFIXES[sniffed.format]:

@@ -65,8 +65,10 @@ class MeshSource:
 
     Names are looked up from the file's own folder, below it or below ``root`` and nowhere else: absolute paths, links that
     lead out and remote addresses are never followed, and only regular files are opened. What is not there is looked for in
-    ``texture_folders`` by its name alone. ``findings`` collects plain sentences about what was left out or assumed,
-    ``textures`` what was decoded, by its bytes' digest.
+    ``texture_folders`` by its name alone. ``hull_of_points``: vertices without faces are their convex hull.
+
+    ``findings`` collects plain sentences about what was left out or assumed, ``textures`` what was decoded, by its bytes'
+    digest.
     """
 
     path: Path
@@ -76,6 +78,7 @@ class MeshSource:
     textures: dict[str, Image.Image | None] = field(default_factory=dict)
     root: Path | None = None
     texture_folders: tuple[Path, ...] = ()
+    hull_of_points: bool = False
     _texture_pixels: int = 0
     _contents: dict[Path, bytes] = field(default_factory=dict)
 

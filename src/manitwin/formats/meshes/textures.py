@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import trimesh
-from PIL import Image
+from PIL import Image, UnidentifiedImageError
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
@@ -57,6 +57,9 @@ def _decoded(data: Buffer, name: str, source: MeshSource) -> Image.Image | None:
             image.load()
     except (InputError, MemoryError):
         raise
+    except UnidentifiedImageError:  # whose words name an address in memory
+        source.find(f"texture {name!r} is no picture that is read, and was left out")
+        return None
     except Exception as error:  # a decoder may raise anything on damaged bytes
         source.find(f"texture {name!r} cannot be decoded and was left out ({' '.join(str(error).split())[:100]})")
         return None

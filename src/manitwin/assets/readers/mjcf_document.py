@@ -1,0 +1,148 @@
+"""The XML of an MJCF file with all that it is composed of: includes put in, attached models beside it, files by keys.
+
+MuJoCo is given texts alone and opens nothing: a mesh, texture or height field is named by a key that stands for its place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lxml import etree  # type: ignore[import-untyped]
+
+from manitwin.assets.asset_files import AssetFiles
+from manitwin.assets.readers.mjcf_contents import keep_rigid_objects, written_out
+from manitwin.errors import AssetError
+from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.xml_file import MAX_XML_BYTES, comments_before, read_xml, xml_text
+
+_MAX_INCLUDES, _MAX_DEPTH = 32, 8
+_HEAD_BYTES = 1 << 16
+UNNAMED = "MuJoCo Model"
+"""What MuJoCo calls a model without a name."""
+
+
+@dataclass
+class MjcfSource:
+    """The XML that MuJoCo is given, and what was taken from it.
+
+    ``texts`` are the comments at its head, and those of <custom> as ``name: data``. ``models`` are the XMLs that it attaches by
+    the names that it has for them, ``places`` by their keys the name that the file writes for a mesh, texture or height field
+    and where it should be. ``soft``: bodies that are not rigid were left out.
+    """
+
+    file: Path
+    root: etree._Element
+    texts: tuple[str, ...] = ()
+    models: dict[str, etree._Element] = field(default_factory=dict)
+    places: dict[str, tuple[str, Path]] = field(default_factory=dict)
+    soft: bool = False
+
+    def writes(self, attributes: tuple[str, ...]) -> bool:
+        """Tell whether a geom, or a default for geoms, writes one of these attributes."""
+        geoms = [geom for root in (self.root, *self.models.values()) for geom in root.iter("geom")]
+        return any(geom.get(name) is not None for geom in geoms for name in attributes)
+
+    def model_texts(self) -> dict[str, bytes]:
+        """Return the attached XMLs as texts."""
+        return {name: xml_text(root).encode() for name, root in self.models.items()}
+
+
+def open_mjcf(file: Path, files: AssetFiles, *, keep_soft: bool = False) -> MjcfSource:
+    """Parse an MJCF file with what it includes and attaches; raises AssetError for what is broken or not read.
+
+    ``keep_soft``: bodies that are not rigid stay.
+    """
+    source = MjcfSource(file, etree.Element("mujoco"))
+    source.root = _Composition(source, files, keep_soft).document(file, (file.resolve(),))
+    return source
+
+
+class _Composition:
+    """Reads the documents of one MJCF file, each that it attaches once."""
+
+    def __init__(self, source: MjcfSource, files: AssetFiles, keep_soft: bool):
+        self._source, self._files, self._keep_soft = source, files, keep_soft
+        self._keys: dict[Path, str] = {}
+        self._sizes: dict[str, float] = {}
+
+    def document(self, file: Path, above: tuple[Path, ...]) -> etree._Element:
+        """Return the root of one document, its models read and its files named by keys."""
+        root = read_xml(file, "mujoco")
+        comments = comments_before(root)
+        self._put_in_includes(file, root, file, {file.resolve()})
+        texts = (*comments, *(f"{t.get('name')}: {t.get('data')}" for t in root.iterfind("custom/text")))
+        self._source.texts += texts if len(above) == 1 else ()
+        sizes = self._take_models(file, root, above)
+        self._source.soft |= keep_rigid_objects(file, root, self._files, sizes, keep_soft=self._keep_soft)
+        self._name_files(file, root)
+        self._sizes[str(file.resolve())] = written_out(root, sizes)
+        return root
+
+    def _put_in_includes(self, main: Path, root: etree._Element, file: Path, done: set[Path], depth: int = 0) -> None:
+        """Replace <include> by the children of the included root, as MuJoCo does; each file once.
+
+        A file is looked up from the main file's folder, and then from that of the ``file`` which includes it.
+        """
+        while (include := root.find(".//include")) is not None:
+            name = (include.get("file") or "").replace("\\", "/")
+            found = self._found(file, name, [main.parent / name, file.parent / name], "includes")
+            if found in done or len(done) > _MAX_INCLUDES or depth > _MAX_INCLUDES:
+                raise AssetError(f"{file.name}: includes {name[:80]!r} twice, or too many files")
+            done.add(found)
+            head = read_bytes(found, MAX_XML_BYTES, AssetError)[:_HEAD_BYTES]
+            tag = "mujocoinclude" if b"<mujocoinclude" in head else "mujoco"
+            included = read_xml(found, tag)
+            self._put_in_includes(main, included, found, done, depth + 1)
+            parent, position = include.getparent(), include.getparent().index(include)
+            parent.remove(include)
+            for offset, child in enumerate(list(included)):
+                parent.insert(position + offset, child)
+
+    def _take_models(self, file: Path, root: etree._Element, above: tuple[Path, ...]) -> dict[str, float]:
+        """Read the models that a document attaches; return how many elements each has, by its name."""
+        sizes = {}
+        for model in root.xpath("asset/model"):
+            name = (model.get("file") or "").replace("\\", "/")
+            found = self._found(file, name, [file.parent / name], "attaches")
+            if found in above or len(above) > _MAX_DEPTH:
+                raise AssetError(
+                    f"{file.name}: the model {name[:80]!r} attaches itself, or models are attached too deep"
+                )
+            key = self._keys.setdefault(found, f"model_{len(self._keys)}.xml")
+            if key not in self._source.models:
+                self._source.models[key] = self.document(found, (*above, found))
+            model.set("file", key)
+            child = self._source.models[key]
+            sizes[model.get("name") or child.get("model") or UNNAMED] = self._sizes[str(found)]
+        return sizes
+
+    def _found(self, file: Path, name: str, places: list[Path], verb: str) -> Path:
+        found = self._files.find(name, places)
+        if found is None:
+            raise AssetError(
+                f"{file.name}: the file {name[:80]!r} that it {verb} is not there, or above the root"
+                f" {self._files.root.name!r}; give the folder that holds all of it"
+            )
+        return found
+
+    def _name_files(self, file: Path, root: etree._Element) -> None:
+        """Give each file that a document names a key, and an unnamed mesh the name that MuJoCo gives it."""
+        folders = {"mesh": "", "hfield": "", "texture": ""}
+        strip = False
+        for compiler in root.iterfind("compiler"):
+            strip = compiler.get("strippath", str(strip)).lower() == "true"
+            for kind, own in (("mesh", "meshdir"), ("hfield", "meshdir"), ("texture", "texturedir")):
+                written = compiler.attrib.get(own, compiler.get("assetdir"))
+                folders[kind] = folders[kind] if written is None else written.replace("\\", "/")
+        for entry in [*root.xpath("asset/*[@file]"), *root.iterfind(".//flexcomp[@file]")]:
+            kind = "mesh" if entry.tag == "flexcomp" else entry.tag
+            if kind not in folders:
+                continue
+            name = entry.get("file").replace("\\", "/")
+            plain = name.rpartition("/")[2] if strip else name
+            key = f"{len(self._source.places)}.file"
+            self._source.places[key] = (plain, file.parent / folders[kind] / plain)
+            if entry.tag == "mesh" and not entry.get("name"):
+                entry.set("name", Path(plain).stem)
+            entry.set("file", key)

@@ -1,0 +1,184 @@
+"""The geoms of bodies of a compiled MJCF file as visual parts and collision shapes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+import trimesh
+from trimesh.visual.material import PBRMaterial
+
+from manitwin.assets import primitives
+from manitwin.assets.asset import CollisionShape
+from manitwin.assets.asset_files import AssetFiles, joined
+from manitwin.assets.readers.mjcf_model import NO_OBJECTS, CompiledMjcf
+from manitwin.formats.meshes.textures import (
+    bake_transform,
+    make_part,
+    material_of,
+    normals_of,
+    pbr_material,
+    srgb_to_linear,
+    uv_of,
+)
+from manitwin.geometry.poses import inverse, rotation_from_quaternion_wxyz, transform
+
+SHOWN_GROUPS = 3
+"""MuJoCo's viewer shows groups 0 to 2 (mjvOption.geomgroup)."""
+_KINDS = mujoco.mjtGeom
+_SHEET_M, _UNBOUNDED_M = 1e-3, 1.0  # how thick a plane is shown, and how wide one without an end
+_GROUND_KINDS = (int(_KINDS.mjGEOM_PLANE), int(_KINDS.mjGEOM_HFIELD))
+_MESH_KINDS = (int(_KINDS.mjGEOM_MESH), int(_KINDS.mjGEOM_SDF))
+
+
+def is_solid(model: Any, body: int) -> bool:
+    """Tell whether a body has a shape that is seen or collides, and is no plane and no height field."""
+    start, count = int(model.body_geomadr[body]), int(model.body_geomnum[body])
+    solid = [geom for geom in range(start, start + count) if int(model.geom_type[geom]) not in _GROUND_KINDS]
+    return any(model.geom_group[g] < SHOWN_GROUPS or collides(model, g) for g in solid)
+
+
+def collides(model: Any, geom: int) -> bool:
+    """Tell whether a geom collides with any other."""
+    return bool(model.geom_contype[geom] or model.geom_conaffinity[geom])
+
+
+class BodyShapes:
+    """Reads the geoms of one compiled file; ``planes``: with height fields as sheets, of what has no other shape."""
+
+    def __init__(self, compiled: CompiledMjcf, files: AssetFiles, *, planes: bool = False):
+        self._compiled, self._model, self._files, self._planes = compiled, compiled.model, files, planes
+
+    def of(
+        self, bodies: list[tuple[int, np.ndarray]]
+    ) -> tuple[tuple[trimesh.Trimesh, ...], tuple[CollisionShape, ...]]:
+        """Return the visual parts and the collision shapes of bodies with their poses.
+
+        A geom collides where contype or conaffinity is not zero. Visual are the others in a group that the viewer shows, with
+        the colliding ones of the same groups; where there are none, the colliding ones in such a group.
+        """
+        colliding = set(self.colliding(bodies))
+        visual: dict[bool, list[trimesh.Trimesh]] = {True: [], False: []}
+        collision = []
+        groups = {int(self._model.geom_group[geom]) for geom, _ in self._geoms(bodies) if geom not in colliding}
+        for geom, body_to_asset in self._geoms(bodies):
+            parts = self._parts(geom, body_to_asset)
+            if geom in colliding and parts:
+                vertices, faces = joined(parts)
+                name = self._model.geom(geom).name or f"geom_{geom:02d}"
+                primitive = int(self._model.geom_type[geom]) not in _MESH_KINDS
+                collision.append(CollisionShape(name, vertices, faces, True, primitive=primitive))
+            if self._model.geom_group[geom] < SHOWN_GROUPS:
+                visual[geom in colliding and int(self._model.geom_group[geom]) not in groups] += parts
+        return tuple(visual[False] or visual[True]), tuple(collision)
+
+    def colliding(self, bodies: list[tuple[int, np.ndarray]]) -> list[int]:
+        """Return the geoms of bodies that collide."""
+        model = self._model
+        return [g for g, _ in self._geoms(bodies) if collides(model, g)]
+
+    def _geoms(self, bodies: list[tuple[int, np.ndarray]]) -> list[tuple[int, np.ndarray]]:
+        starts, counts = self._model.body_geomadr, self._model.body_geomnum
+        return [(int(starts[body]) + i, pose) for body, pose in bodies for i in range(int(counts[body]))]
+
+    def _parts(self, geom: int, body_to_asset: np.ndarray) -> list[trimesh.Trimesh]:
+        model = self._model
+        pose = body_to_asset @ transform(rotation_from_quaternion_wxyz(model.geom_quat[geom]), model.geom_pos[geom])
+        material = self._material(geom)
+        if int(model.geom_type[geom]) in _MESH_KINDS:
+            return self._mesh(geom, pose, material)
+        kind, size = int(model.geom_type[geom]), np.array(model.geom_size[geom])
+        if self._planes and kind == int(_KINDS.mjGEOM_PLANE):
+            solid: trimesh.Trimesh | None = _sheet(size)
+        elif self._planes and kind == int(_KINDS.mjGEOM_HFIELD):
+            solid = _terrain(model, int(model.geom_dataid[geom]))
+        else:
+            solid = _primitive(kind, size)
+        if solid is None:
+            self._files.remark(NO_OBJECTS)
+            return []
+        self._files.count(len(solid.faces))
+        name = model.geom(geom).name or f"geom_{geom:02d}"
+        return [bake_transform(make_part(solid.vertices, solid.faces, material=material, name=name), pose)]
+
+    def _mesh(self, geom: int, pose: np.ndarray, material: PBRMaterial) -> list[trimesh.Trimesh]:
+        model, mesh = self._model, int(self._model.geom_dataid[geom])
+        parts = self._compiled.meshes.get(model.mesh(mesh).name)
+        if parts is None:  # written out in the file: as MuJoCo has it, in the frame of its inertia
+            vertices, faces = _written_out(model, mesh)
+            self._files.count(len(faces))
+            return [bake_transform(make_part(vertices, faces, material=material, name=model.mesh(mesh).name), pose)]
+        self._files.count(sum(len(part.faces) for part in parts))
+        inertia_to_mesh = transform(rotation_from_quaternion_wxyz(model.mesh_quat[mesh]), model.mesh_pos[mesh])
+        to_asset = pose @ inverse(inertia_to_mesh)
+        return [bake_transform(_dressed(part, material), to_asset) for part in parts]
+
+    def _material(self, geom: int) -> PBRMaterial:
+        model, index = self._model, int(self._model.geom_matid[geom])
+        rgba = np.array(model.geom_rgba[geom] if index < 0 else model.mat_rgba[index], float)
+        name = None if index < 0 else model.mat(index).name
+        alpha = float(np.clip(rgba[3], 0, 1))
+        return pbr_material(
+            name,
+            base_color=(*srgb_to_linear(np.clip(rgba[:3], 0, 1)), alpha),
+            base_color_texture=None if name is None else self._compiled.textures.get(name),
+            alpha_mode="BLEND" if alpha < 1 else None,
+        )
+
+
+def _dressed(part: trimesh.Trimesh, material: PBRMaterial) -> trimesh.Trimesh:
+    """Return the part with the material of the MJCF file, unless only the mesh file has a picture."""
+    own = material_of(part)
+    if own.baseColorTexture is not None and material.baseColorTexture is None:
+        return part
+    return make_part(
+        part.vertices,
+        part.faces,
+        material=material,
+        name=part.metadata["name"],
+        uv=uv_of(part),
+        normals=normals_of(part),
+    )
+
+
+def _written_out(model: Any, mesh: int) -> tuple[np.ndarray, np.ndarray]:
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    return np.array(model.mesh_vert[first : first + count], float), np.array(model.mesh_face[face : face + faces], int)
+
+
+def _sheet(size: np.ndarray) -> trimesh.Trimesh:
+    """Return a plane as a sheet under it: half lengths, of which 0 has no end (MJCF reference, geom type)."""
+    sides = [2 * float(half) if half > 0 else _UNBOUNDED_M for half in size[:2]]
+    sheet = trimesh.creation.box((*sides, _SHEET_M))
+    sheet.apply_translation((0, 0, -_SHEET_M / 2))
+    return sheet
+
+
+def _terrain(model: Any, field: int) -> trimesh.Trimesh:
+    """Return a height field's surface: rows along y from -size[1], columns along x, heights by size[2] (MJCF, hfield)."""
+    rows, columns, first = (int(a[field]) for a in (model.hfield_nrow, model.hfield_ncol, model.hfield_adr))
+    half_x, half_y, height, _ = (float(size) for size in model.hfield_size[field])
+    x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
+    z = height * np.asarray(model.hfield_data[first : first + rows * columns], float)
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).reshape(-1)
+    lower = np.column_stack([corner, corner + 1, corner + columns + 1])
+    upper = np.column_stack([corner, corner + columns + 1, corner + columns])
+    vertices = np.column_stack([x.reshape(-1), y.reshape(-1), z])
+    return trimesh.Trimesh(vertices, np.concatenate([lower, upper]), process=False)
+
+
+def _primitive(kind: int, size: np.ndarray) -> trimesh.Trimesh | None:
+    """Return a geom's mesh: sizes are half lengths (MJCF reference, geom size)."""
+    if kind == int(_KINDS.mjGEOM_BOX):
+        return trimesh.creation.box(2 * size)
+    if kind == int(_KINDS.mjGEOM_SPHERE):
+        return primitives.sphere(float(size[0]))
+    if kind == int(_KINDS.mjGEOM_CYLINDER):
+        return primitives.cylinder(float(size[0]), 2 * float(size[1]))
+    if kind == int(_KINDS.mjGEOM_CAPSULE):
+        return primitives.capsule(float(size[0]), 2 * float(size[1]))
+    if kind == int(_KINDS.mjGEOM_ELLIPSOID):
+        return primitives.ellipsoid(size)
+    return None

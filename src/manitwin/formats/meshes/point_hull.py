@@ -1,0 +1,37 @@
+"""The convex hull of a mesh file that holds points alone, for formats and engines in which that is what they mean."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from scipy.spatial import QhullError
+
+from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.textures import make_part, pbr_material
+
+_FLAT = 1e-9
+"""Of the least and the largest extent of points that lie in a plane, as far as numbers can tell."""
+
+
+def hull_part(points: np.ndarray, source: MeshSource, color: tuple[float, float, float]) -> trimesh.Trimesh:
+    """Return the hull of points ``(N, 3)`` as a part in one colour, with a finding that says so.
+
+    Raises InputError ``no_faces`` where they span no volume. Source: the XML reference of MuJoCo, ``mesh``.
+    """
+    points = np.asarray(points, float)
+    flat = source.refused(
+        "no_faces",
+        f"{len(points)} vertices, no faces, and no volume between them",
+        "export the surface, not a point cloud",
+    )
+    if len(points) < 4 or not np.isfinite(points).all():
+        raise flat
+    spans = np.linalg.svd(points - points.mean(0), compute_uv=False)
+    if spans[2] <= _FLAT * spans[0]:
+        raise flat
+    try:
+        hull = trimesh.convex.convex_hull(points)
+    except QhullError as error:
+        raise flat from error
+    source.find(f"it holds {len(points)} points and no faces: their convex hull was read")
+    return make_part(hull.vertices, hull.faces, material=pbr_material(None, base_color=color), name="mesh")
