@@ -371,3 +371,24 @@ def test_a_height_field_alone_is_its_surface(tmp_path: Path) -> None:
 def test_lights_with_pictures_do_not_matter(tmp_path: Path) -> None:
     light = '<light type="image" texture="sky"/>'
     assert read_asset(mjcf(tmp_path, f'{light}<body><geom size=".1"/></body>')).collision
+
+
+def test_soft_strings_are_rods_and_files_of_gmsh_are_read(tmp_path: Path) -> None:
+    string = (
+        '<flexcomp name="rope" type="grid" count="5 1 1" spacing=".1 1 1" dim="1" radius=".004" mass="1">'
+        '<edge equality="true"/></flexcomp>'
+    )
+    rope = read_asset(mjcf(tmp_path, f'<body name="b">{string}</body>')).visual[0]
+    assert np.allclose(np.ptp(rope.vertices, axis=0), [0.4, 0.008, 0.008], atol=1.5e-3)
+    nodes = "1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1"
+    (tmp_path / "tetra.msh").write_text(
+        f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n{nodes}\n$EndNodes\n"
+        "$Elements\n1\n1 4 2 0 1 1 2 3 4\n$EndElements\n"
+    )
+    tetra = '<flexcomp name="t" type="gmsh" file="tetra.msh" dim="3" scale=".1 .1 .1" radius=".001"/>'
+    asset = read_asset(mjcf(tmp_path, f'<body name="b">{tetra}</body>'))
+    assert asset.soft and len(asset.visual[0].faces) == 4
+    assert np.allclose(np.ptp(asset.visual[0].vertices, axis=0), 0.1)
+    (tmp_path / "tetra.msh").write_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n")
+    with pytest.raises(AssetError, match="MuJoCo cannot read"):
+        read_asset(mjcf(tmp_path, f'<body name="b">{tetra}</body>'))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,12 +17,17 @@ from manitwin.config import PhysicalConfig
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply, Rejected
 from manitwin.formats.glb import read_glb, write_glb
+from manitwin.geometry.mass_properties import solid_mass_properties
+from manitwin.geometry.poses import GLTF_TO_OBJECT
+from manitwin.models.annotators.given import KeepsGiven
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
 from manitwin.models.annotators.rules import RulesAnnotator
+from manitwin.pipeline.annotated_mass import annotated_mass
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.object_state import load_solid
 from manitwin.pipeline.physical import PhysicalStage
+from manitwin.twin.import_record import ImportRecord
 from manitwin.twin.record import Physical
 from manitwin.twin.record_values import Estimate
 
@@ -230,3 +237,78 @@ def test_a_bottle_says_how_far_its_center_goes_between_empty_and_full(tmp_path: 
 def test_no_fill_states_where_nothing_is_known_of_them(name: str, annotator: RulesAnnotator, tmp_path: Path) -> None:
     mesh = bottle() if name == "water bottle" else cylinder(0.007, 0.05) if name == "battery" else cup(0.04, 0.1, 0.003)
     assert run(mesh, tmp_path, name, annotator=annotator).filling is None
+
+
+def annotated(mesh: trimesh.Trimesh, folder: Path, **fields: object) -> Path:
+    """Write what another tool says of a mesh whose mass is 0.2 kg; return the import.json."""
+    record = ImportRecord(
+        format="urdf", file="x.urdf", name="block", category=None, license=None, attribution=None,
+        asset_to_object=np.eye(4).tolist(), mass_kg=0.2, friction_static=None, friction_dynamic=None, restitution=None,
+        material=None, captions=[], functional_points=[], grasp_points=[], grasps=[], rests=[], missing=[], remarks=[],
+        **{"center_of_mass_m": None, "inertia_kg_m2": None, **fields},
+    )  # fmt: skip
+    path = folder / "import.json"
+    path.write_text(record.model_dump_json())
+    return path
+
+
+def run_annotated(mesh: trimesh.Trimesh, folder: Path, given: Path, mass: Estimate | None = None) -> dict[str, Any]:
+    (folder / "views").mkdir(exist_ok=True)
+    (folder / "canonical.glb").write_bytes(write_glb([visual(mesh, baseColorFactor=[200, 10, 10, 255])]))
+    np.savez(folder / "canonical.npz", vertices=mesh.vertices, faces=mesh.faces)
+    paths = {key: folder / key for key in ("canonical.glb", "canonical.npz", "views/")}
+    geometry = {"metric": True, "input_to_object": GLTF_TO_OBJECT.tolist()}
+    draft = Draft("id", Item(file=None, name=None, given=str(given)), 0, {"geometry": geometry, "cameras": []}, paths)
+    annotator = KeepsGiven(Says(mass_kg=mass or said(0.2)))
+    fields: dict[str, Any] = PhysicalStage(PhysicalConfig(), annotator).run(draft, folder)
+    return fields
+
+
+def test_an_annotated_center_and_inertia_are_kept(tmp_path: Path) -> None:
+    mesh = cylinder(0.03, 0.1)
+    inertia = np.array([[2e-4, 1e-5, 0], [1e-5, 2.2e-4, 0], [0, 0, 1.1e-4]])
+    given = annotated(mesh, tmp_path, center_of_mass_m=[0.002, 0.0, 0.03], inertia_kg_m2=inertia.tolist())
+    fields = run_annotated(mesh, tmp_path, given)
+    physical = Physical(**fields["physical"])
+    assert physical.mass_distribution == "annotated" and physical.center_of_mass_uncertainty_m == 0
+    assert physical.center_of_mass_m == pytest.approx([0.002, 0.0, 0.03])
+    assert np.allclose(physical.inertia_kg_m2, inertia, rtol=1e-9)
+    assert not [finding for finding in fields["physical_findings"] if "moments" in finding]
+
+
+def test_an_inertia_far_from_the_shape_is_a_finding(tmp_path: Path) -> None:
+    mesh = cylinder(0.03, 0.1)
+    given = annotated(mesh, tmp_path, inertia_kg_m2=np.diag([0.2, 0.2, 0.2]).tolist())
+    fields = run_annotated(mesh, tmp_path, given)
+    assert any("principal moments 0.2, 0.2, 0.2" in finding for finding in fields["physical_findings"])
+
+
+@pytest.mark.parametrize(
+    ("fields", "cause"),
+    [
+        ({"inertia_kg_m2": np.diag([1e-4, 1e-4, 3e-4]).tolist()}, "that of no body"),
+        ({"inertia_kg_m2": np.diag([-1e-4, 1e-4, 1e-4]).tolist()}, "that of no body"),
+        ({"inertia_kg_m2": [[1e-4, 5e-5, 0], [0, 1e-4, 0], [0, 0, 1e-4]]}, "that of no body"),
+        ({"center_of_mass_m": [0.0, 0.05, 0.05]}, "20 mm outside"),
+    ],
+)
+def test_what_no_body_has_rejects_an_import(tmp_path: Path, fields: dict[str, object], cause: str) -> None:
+    mesh = cylinder(0.03, 0.1)
+    with pytest.raises(Rejected, match=cause) as raised:
+        run_annotated(mesh, tmp_path, annotated(mesh, tmp_path, **fields))
+    assert raised.value.reason == "implausible_mass"
+
+
+def test_annotated_mass_properties_scale_with_size_and_mass() -> None:
+    solid = cylinder(0.06, 0.2)
+    record = ImportRecord.model_validate_json(annotated_text(inertia_kg_m2=np.diag([2e-4, 2e-4, 1e-4]).tolist()))
+    computed = solid_mass_properties(solid, 0.4)
+    kept = annotated_mass(record, solid, mass_kg=0.4, scale=2.0, computed=computed)
+    assert kept is not None
+    assert np.allclose(kept.center_of_mass_m, [0, 0, 0.08])  # twice 0.04 m
+    assert np.allclose(np.diag(kept.inertia_kg_m2), [1.6e-3, 1.6e-3, 8e-4])  # 2^2 times the double mass
+
+
+def annotated_text(**fields: object) -> str:
+    with tempfile.TemporaryDirectory() as folder:
+        return annotated(cylinder(0.03, 0.1), Path(folder), center_of_mass_m=[0, 0, 0.04], **fields).read_text()

@@ -17,11 +17,13 @@ from manitwin.geometry.boxes import oriented_bounding_box, upright_extents
 from manitwin.geometry.mass_properties import MassProperties, shell_mass_properties, solid_mass_properties
 from manitwin.models.annotators.priors import Interval, Prior, lookup
 from manitwin.models.annotators.protocol import Annotator, PhysicalEstimates, Subject
+from manitwin.pipeline.annotated_mass import annotated_mass, moments_apart
 from manitwin.pipeline.fill_states import filling_of
 from manitwin.pipeline.human_corrections import corrected_estimates, is_human
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.mass_by_parts import mass_by_parts
 from manitwin.pipeline.object_state import findings_of, object_name, read_subject
+from manitwin.twin.import_record import FITTED
 from manitwin.twin.record import OrientedBox, Physical
 from manitwin.twin.record_values import Estimate
 
@@ -57,10 +59,10 @@ class PhysicalStage:
         """Write ``visual.glb`` and ``solid.npz`` in true metres; return ``physical``, what speaks against it, and ``size``.
 
         ``size`` is the Estimate that gave the scale, of the longest extent in metres; None where the mesh had it. ``called`` is
-        what an annotator that looks took the object for.
+        what an annotator that looks took the object for. An annotated centre of mass and inertia are kept.
 
-        Raises Rejected where size, mass or density are beyond what a thing of this name has, BadReply where the
-        annotator gives neither mass nor density.
+        Raises Rejected where size, mass or density are beyond what a thing of this name has, or an annotated centre or inertia
+        is that of no body; BadReply where the annotator gives neither mass nor density.
         """
         metric = bool(draft.field("geometry")["metric"])
         subject = read_subject(draft, solid="canonical.npz", visual="canonical.glb", metric=metric)
@@ -82,6 +84,13 @@ class PhysicalStage:
             off_m = float(np.linalg.norm(by_parts.center_of_mass_m - properties.center_of_mass_m))
             uncertainty = 0.0 if _known_mass(subject) is not None else max(uncertainty, OF_OTHER_MATTER * off_m)
             properties = by_parts
+        annotated = self._annotated(subject, solid, mass.value, scale, properties)
+        findings = findings_of(estimates)
+        if annotated is not None and subject.given is not None:
+            wall_m = estimates.wall_thickness_m or NOMINAL_WALL_M
+            findings = [*(findings or ()), *moments_apart(annotated, solid, mass.value, wall_m, subject.given.source)]
+            uncertainty = uncertainty if subject.given.center_of_mass_m is None else 0.0
+            properties = annotated
         corners = np.array([part.bounds for part in parts])
         physical = Physical(
             extents_m=(corners[:, 1].max(0) - corners[:, 0].min(0)).tolist(),
@@ -96,7 +105,7 @@ class PhysicalStage:
             center_of_mass_m=properties.center_of_mass_m.tolist(),
             center_of_mass_uncertainty_m=uncertainty,
             inertia_kg_m2=properties.inertia_kg_m2.tolist(),
-            mass_distribution=_distribution(estimates, by_parts),
+            mass_distribution=_distribution(estimates, by_parts) if annotated is None else "annotated",
             filling=None
             if estimates.wall_thickness_m is not None
             else filling_of(solid, mass, properties, uncertainty, _prior_of(draft, estimates), NOMINAL_WALL_M),
@@ -105,10 +114,18 @@ class PhysicalStage:
         said = None if given is None or (metric and not is_human(given.source)) else given.model_dump()
         return {
             "physical": physical.model_dump(),
-            "physical_findings": findings_of(estimates),
+            "physical_findings": findings,
             "size": said,
             "called": estimates.called,
         }
+
+    def _annotated(
+        self, subject: Subject, solid: trimesh.Trimesh, mass_kg: float, scale: float, computed: MassProperties
+    ) -> MassProperties | None:
+        given = subject.given
+        if given is None or given.made_of_parts or given.format == FITTED:
+            return None
+        return annotated_mass(given, solid, mass_kg, scale, computed)
 
     def _of_parts(
         self, draft: Draft[Item], solid: trimesh.Trimesh, mass_kg: float, estimates: PhysicalEstimates

@@ -168,7 +168,7 @@ class Physical(Record):
     center_of_mass_m: Vector3
     center_of_mass_uncertainty_m: Finite
     inertia_kg_m2: Matrix3
-    mass_distribution: Literal["solid", "shell", "parts"]
+    mass_distribution: Literal["solid", "shell", "parts", "annotated"]
     filling: Filling | None = None
 
     @model_validator(mode="after")

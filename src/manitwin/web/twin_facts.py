@@ -55,6 +55,8 @@ def _physical(physical: Physical, stages: Any) -> str:
     weighed = f"computed: a {physical.mass_distribution} of even density"
     if physical.mass_distribution == "parts":
         weighed = "computed: parts of different density"
+    if physical.mass_distribution == "annotated":
+        weighed = "as the imported asset gives it"
     moments = [number(physical.inertia_kg_m2[i][i]) for i in range(3)]
     products = [number(physical.inertia_kg_m2[i][j]) for i, j in ((0, 1), (0, 2), (1, 2))]
     scaled = f", scaled by {number(physical.scale_applied)}" if physical.scale_applied != 1 else ""

@@ -28,7 +28,8 @@ class MjcfSource:
 
     ``texts`` are the comments at its head, and those of <custom> as ``name: data``. ``models`` are the XMLs that it attaches by
     the names that it has for them, ``places`` by their keys the name that the file writes for a mesh, texture or height field
-    and where it should be. ``soft``: bodies that are not rigid were left out.
+    and where it should be. ``soft``: bodies that are not rigid were left out, or are
+    read with ``soft_files`` by the names that the XML has for them.
     """
 
     file: Path
@@ -37,6 +38,7 @@ class MjcfSource:
     models: dict[str, etree._Element] = field(default_factory=dict)
     places: dict[str, tuple[str, Path]] = field(default_factory=dict)
     soft: bool = False
+    soft_files: dict[str, bytes] = field(default_factory=dict)
 
     def writes(self, attributes: tuple[str, ...]) -> bool:
         """Tell whether a geom, or a default for geoms, writes one of these attributes."""
@@ -44,8 +46,8 @@ class MjcfSource:
         return any(geom.get(name) is not None for geom in geoms for name in attributes)
 
     def model_texts(self) -> dict[str, bytes]:
-        """Return the attached XMLs as texts."""
-        return {name: xml_text(root).encode() for name, root in self.models.items()}
+        """Return the attached XMLs as texts, and the files of soft bodies."""
+        return {name: xml_text(root).encode() for name, root in self.models.items()} | self.soft_files
 
 
 def open_mjcf(file: Path, files: AssetFiles, *, keep_soft: bool = False) -> MjcfSource:
@@ -127,7 +129,7 @@ class _Composition:
         return found
 
     def _name_files(self, file: Path, root: etree._Element) -> None:
-        """Give each file that a document names a key, and an unnamed mesh the name that MuJoCo gives it."""
+        """Give each file that a document names a key, and an unnamed mesh or height field the name that MuJoCo gives it."""
         folders = {"mesh": "", "hfield": "", "texture": ""}
         strip = False
         for compiler in root.iterfind("compiler"):
@@ -143,6 +145,6 @@ class _Composition:
             plain = name.rpartition("/")[2] if strip else name
             key = f"{len(self._source.places)}.file"
             self._source.places[key] = (plain, file.parent / folders[kind] / plain)
-            if entry.tag == "mesh" and not entry.get("name"):
+            if entry.tag in ("mesh", "hfield") and not entry.get("name"):
                 entry.set("name", Path(plain).stem)
             entry.set("file", key)

@@ -11,10 +11,14 @@ from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset_files import AssetFiles, joined
 from manitwin.assets.readers.mjcf_document import MjcfSource
+from manitwin.errors import AssetError
+from manitwin.formats.bounded_file import read_bytes
 from manitwin.formats.meshes.textures import make_part, pbr_material, srgb_to_linear
 
 _MAX_FILE_FACES = 20_000
 """Of a flex from a file: it goes to MuJoCo as text."""
+_MAX_GMSH_BYTES = 16 << 20
+_THINNEST_M, _ROD_SIDES = 1e-4, 6
 _OF_MOTION = ("dof", "mass", "inertiabox", "origin")
 """Attributes of a flex that say how it moves, or how its inside is divided."""
 
@@ -22,7 +26,7 @@ _OF_MOTION = ("dof", "mass", "inertiabox", "origin")
 def as_shapes_at_rest(source: MjcfSource, files: AssetFiles) -> None:
     """Write the flexes of a document so that MuJoCo makes their shapes of numbers alone, fixed to the bodies that hold them.
 
-    Those from files of tetrahedra are left out with a remark.
+    A file of Gmsh goes to MuJoCo as its bytes, one of triangles as numbers.
     """
     for root in (source.root, *source.models.values()):
         for flex in list(root.iter("flexcomp")):
@@ -37,12 +41,14 @@ def as_shapes_at_rest(source: MjcfSource, files: AssetFiles) -> None:
 
 def _take_file(flex: etree._Element, source: MjcfSource, files: AssetFiles) -> bool:
     name, place = source.places[flex.attrib.pop("file")]
-    if flex.get("type") != "mesh":
-        files.remark("a soft body from a file of tetrahedra was left out: that format is not read")
-        return False
     path = files.find(name, [place])
     if path is None:
         return False
+    if flex.get("type") == "gmsh":
+        key = f"flex_{len(source.soft_files)}.msh"
+        source.soft_files[key] = read_bytes(path, _MAX_GMSH_BYTES, AssetError)
+        flex.set("file", key)
+        return True
     vertices, faces = joined(files.mesh(path, hull_of_points=True).parts)
     if len(faces) > _MAX_FILE_FACES:
         files.remark(f"a soft body of {len(faces)} triangles was left out: it is more than is read")
@@ -55,7 +61,7 @@ def _take_file(flex: etree._Element, source: MjcfSource, files: AssetFiles) -> b
 
 
 def soft_parts(model: Any) -> list[trimesh.Trimesh]:
-    """Return the surfaces of a compiled model's flexes in the world's axes, each in its colour; strings have none."""
+    """Return the surfaces of a compiled model's flexes in the world's axes, each in its colour; strings as rods."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
@@ -63,22 +69,29 @@ def soft_parts(model: Any) -> list[trimesh.Trimesh]:
     parts = []
     for flex in range(model.nflex):
         first, count = int(model.flex_vertadr[flex]), int(model.flex_vertnum[flex])
-        faces = _faces(model, flex)
-        if not len(faces):
-            continue
+        points = np.array(data.flexvert_xpos[first : first + count], float)
+        if int(model.flex_dim[flex]) == 1:
+            points, faces = _string(model, flex, points)
+        else:
+            faces = _faces(model, flex)
         red, green, blue = srgb_to_linear(np.clip(np.array(model.flex_rgba[flex][:3], float), 0, 1))
         material = pbr_material(None, base_color=(red, green, blue))
         name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_FLEX, flex) or f"flex_{flex:02d}"
-        parts.append(
-            make_part(np.array(data.flexvert_xpos[first : first + count]), faces, material=material, name=name)
-        )
+        parts.append(make_part(points, faces, material=material, name=name))
     return parts
+
+
+def _string(model: Any, flex: int, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices and faces of a rod along each piece of a string, as thick as the string."""
+    start, count = int(model.flex_elemdataadr[flex]), 2 * int(model.flex_elemnum[flex])
+    pieces = points[np.array(model.flex_elem[start : start + count], int).reshape(-1, 2)]
+    radius_m = max(float(model.flex_radius[flex]), _THINNEST_M)
+    long = pieces[np.linalg.norm(pieces[:, 1] - pieces[:, 0], axis=1) > 0]
+    return joined([trimesh.creation.cylinder(radius_m, segment=piece, sections=_ROD_SIDES) for piece in long])
 
 
 def _faces(model: Any, flex: int) -> np.ndarray:
     """Return the triangles ``(F, 3)`` of a flex: its elements where it is a sheet, the shell of one that is filled."""
-    if int(model.flex_dim[flex]) == 1:
-        return np.empty((0, 3), int)
     if int(model.flex_dim[flex]) == 2:
         start, count = int(model.flex_elemdataadr[flex]), 3 * int(model.flex_elemnum[flex])
         return np.array(model.flex_elem[start : start + count], int).reshape(-1, 3)
