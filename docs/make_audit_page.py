@@ -37,7 +37,7 @@ status: 0 no errors, 1 errors, 2 wrong use.
 - What an asset names (meshes, textures, includes) is read from beside it and from above it up to its **root**: the folder that
   you gave; of a single file the repository (`.git`) that it lies in, or its package or model (`package.xml`, `model.config`), or
   its own folder. FIL007 notes what was read from above. Descriptions without a shape, which others include, are no assets.
-- What most assets of a folder have in common (LIC001, LIC002) is said once, with the count; JSON and SARIF have each.
+- What most assets of a folder have in common (LIC001, LIC002, FRI001) is said once, with the count; JSON and SARIF have each.
 - One cause is one finding: of an object in millimetres the size is wrong, and its mass, inertia and grasps are not held
   against it; of one that lacks a mesh the file is missing, and what is left of its shape is not judged.
 - What stands fast (`<static>` in SDF; in MJCF shapes of the world, and bodies without a joint beside others that have one) is

@@ -9,10 +9,12 @@ from typing import Any
 import pytest
 
 from manitwin.engine.stage import Draft
-from manitwin.pipeline.assembly import NAME_HINT, name_would_help
+from manitwin.errors import Rejected
+from manitwin.pipeline.assembly import NAME_HINT, _rejection, name_would_help
 from manitwin.pipeline.item import Item
 from manitwin.pipeline.quality import OF_ANYTHING, SIZE_UNSAID, unsaid_size_words
 from manitwin.pipeline.recipe import ending_of
+from manitwin.pipeline.suspicious_size import CHECK_SCALE
 from manitwin.twin.dataset_root import twin_name
 from manitwin.twin.record import REJECTION_REASONS, TwinRecord
 from manitwin.twin.store import RECORD, parse_record
@@ -98,3 +100,31 @@ def test_a_size_from_a_prior_is_told_as_nobodys_statement(source: str, of: str) 
 def test_a_size_that_a_mesh_or_a_model_says_is_no_guess(said: dict[str, Any] | None) -> None:
     draft = Draft(item_id="0" * 16, payload=Item(file=None, text="x"), seed=0, fields={"size": said})
     assert unsaid_size_words(draft) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "longest_m", "said"),
+    [
+        (
+            "mug",
+            0.013,
+            "it is 13 mm long, but nearly every mug has 80 mm to 160 mm (centimetres taken for millimetres?)",
+        ),
+        (None, 0.013, "it is 13 mm long, but things of a hand's size have 20 mm to 600 mm (centimetres taken for"),
+        ("mug", 100.0, "it is 100 m long, but nearly every mug has 80 mm to 160 mm (millimetres taken for metres?)"),
+        ("mug", 0.1, None),
+        (None, 0.1, None),
+    ],
+)
+def test_a_suspicious_scale_is_named_first(name: str | None, longest_m: float, said: str | None) -> None:
+    physical = {"extents_m": [longest_m / 2, longest_m, longest_m / 3]}
+    fields = {"size": None, "geometry": {"metric": True}, "physical": physical}
+    draft = Draft(item_id="0" * 16, payload=Item(file=None, name=name), seed=0, fields=fields)
+    told = _rejection(Rejected("none_held", "none of 12 simulated grasps held: 12 drops"), "verify", draft)
+    if said is None:
+        assert told.detail == "none of 12 simulated grasps held: 12 drops"
+    else:
+        assert told.detail.startswith(said)
+        assert told.detail.endswith(f"{CHECK_SCALE}; none of 12 simulated grasps held: 12 drops")
+    other = _rejection(Rejected("no_stable_pose", "so"), "placement", draft)
+    assert other.detail == "so"

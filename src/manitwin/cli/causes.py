@@ -49,6 +49,7 @@ NAME_IT = (
     "say what it is (--name mug, or a column name), for a mesh also its unit (--units m, cm or mm, or a column units)"
 )
 """The remedy where only the usual size of anything made it too wide or too thin."""
+SCALE_IT = "say the unit (--units m, cm or mm, or a column units), or scale the file"
 MEASURE_IT = (
     "give a mesh of its true size (--units m, cm or mm, or a column units), or say more closely what it is (--name)"
 )
@@ -138,9 +139,12 @@ def _cause(first: Unaccepted, count: int) -> Cause:
 
 
 def _of_unsaid_size(message: str) -> str | None:
-    """Return the remedy of a rejection that a merely usual size may have decided, None where somebody has said the size."""
+    """Return the remedy of a rejection that a merely usual or an unlikely size may have decided, None where the size is sound."""
     from manitwin.pipeline.quality import OF_ANYTHING, SIZE_UNSAID
+    from manitwin.pipeline.suspicious_size import CHECK_SCALE
 
+    if CHECK_SCALE in message:
+        return SCALE_IT
     if SIZE_UNSAID not in message:
         return None
     return NAME_IT if OF_ANYTHING in message else MEASURE_IT

@@ -31,6 +31,7 @@ from manitwin.pipeline.quality import (
     size_checks,
     unsaid_size_words,
 )
+from manitwin.pipeline.suspicious_size import suspicious_size_words
 from manitwin.twin.part_records import FACE_PARTS
 from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
 from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
@@ -137,7 +138,7 @@ def _write_source(draft: Draft[Item], kind: str, folder: Path) -> dict[str, Any]
 
 
 def _rejection(rejected: Rejected, stage: str | None, draft: Draft[Item]) -> Rejection:
-    """Return the reason with its stage; where it may be the fault of a size that nobody knows, with that."""
+    """Return the reason with its stage; where it may be the fault of a size that nobody knows or has, with that."""
     named = rejected.stage or stage or ""
     if rejected.reason not in REJECTION_REASONS.get(named, frozenset()):
         named = next((s for s, reasons in REJECTION_REASONS.items() if rejected.reason in reasons), named)
@@ -145,6 +146,9 @@ def _rejection(rejected: Rejected, stage: str | None, draft: Draft[Item]) -> Rej
     unsaid = unsaid_size_words(draft)
     if rejected.reason in OF_SIZE and unsaid is not None:
         detail += f", but {unsaid}"
+    suspicious = suspicious_size_words(draft) if rejected.reason in OF_SIZE else None
+    if suspicious is not None:
+        detail = f"{suspicious}; {detail}"
     return Rejection(stage=named, reason=rejected.reason, detail=detail)
 
 

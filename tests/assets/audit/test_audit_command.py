@@ -241,6 +241,18 @@ def test_what_most_assets_have_in_common_is_said_once_with_its_count(tmp_path: P
     assert "  LIC001 warning  no licence is stated" in alone.stdout
 
 
+def test_friction_that_no_asset_of_a_set_declares_is_said_once(tmp_path: Path) -> None:
+    for name in ("one", "two", "three"):
+        write_urdf(tmp_path / name)
+        file = next((tmp_path / name).glob("*.urdf"))
+        file.write_text(re.sub(r"<contact>.*?</contact>", "", file.read_text(), flags=re.DOTALL))
+    done = CliRunner().invoke(app, ["audit", str(tmp_path), "--select", "FRI001"])
+    assert done.stdout.count("no friction is declared") == 1
+    assert "FRI001 warning  3 of 3 assets: no friction" in done.stdout
+    by_asset = json.loads(CliRunner().invoke(app, ["audit", str(tmp_path), "--format", "json"]).stdout)["assets"]
+    assert all("FRI001" in {found["code"] for found in each["findings"]} for each in by_asset)
+
+
 def test_a_baseline_leaves_out_what_was_known_and_nothing_else(tmp_path: Path, command: Callable[..., Result]) -> None:
     write_urdf(tmp_path / "assets/one", inertial=PLACEHOLDER)
     file = tmp_path / "baseline.json"

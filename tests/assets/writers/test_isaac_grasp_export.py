@@ -46,7 +46,8 @@ def test_poses_are_those_of_the_pandas_hand(make: Any) -> None:
 def test_header_has_what_grasp_sim_asks_for() -> None:
     content = loaded(brick())
     assert content["format"] == "isaac_grasp"
-    assert content["format_version"] == "1.0" and isinstance(content["format_version"], str)
+    assert content["format_version"] == 1.0 and isinstance(content["format_version"], float)  # as Isaac Sim has it
+    assert content["object_frame_link"] == f"/World/{brick().name}"
     assert content["object_file"] in isaac_grasp.export(brick()).files
     assert content["object_scale"] == 1.0
     assert content["gripper_file"] == "bots/franka_panda.usd"

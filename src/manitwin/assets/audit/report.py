@@ -32,7 +32,7 @@ MANY = 20
 """From so many assets on what they amount to is said as well."""
 _SEVERITIES, _NOT_READ = ("error", "warning", "note"), ("FIL001", "FIL005", "FIL006")
 _LISTED, _CAUSE_CHARACTERS = 10, 100
-SAID_ONCE = ("LIC001", "LIC002")
+SAID_ONCE = ("LIC001", "LIC002", "FRI001")
 """Rules of which most assets of a set have the same fault: of several assets they are said once with their count."""
 
 
@@ -48,14 +48,15 @@ def text_of(each: Audited, *, leave: Collection[str] = ()) -> str:
 
 
 def shared_text(audited: Sequence[Audited], codes: Collection[str] = SAID_ONCE) -> str:
-    """Return a line for each of these rules: of how many assets it was found, and what is said of the first."""
+    """Return a line for each of these rules: of how many assets it was found, of which first, and what is said of it."""
     lines = []
     for code in codes:
         found = [finding for each in audited for finding in each.findings if finding.code == code]
         if found:
             first = one_line(found[0].message)
             count = len({finding.asset for finding in found})
-            lines.append(f"{code} {found[0].severity:<8} {count} of {len(audited)} assets: {first}")
+            which = "" if count == len(audited) else f", as {printable_line(found[0].asset)}"
+            lines.append(f"{code} {found[0].severity:<8} {count} of {len(audited)} assets{which}: {first}")
     return "\n".join(lines)
 
 

@@ -1,11 +1,13 @@
 """isaac_grasp: the YAML of grasps that Isaac Sim's grasp editor, GraspDataGen's grasp_sim and GraspGen's tools read.
 
-Sources: GraspDataGen docs/components/grasp-sim.md and ``GraspGuessBuffer.create_isaac_grasp_data`` (the full form),
-GraspGen grasp_gen/dataset/eval_utils.py (the short one, a part of it).
+Sources: the Grasp Editor's page in Isaac Sim's documentation (format_version, object_frame_link), GraspDataGen
+docs/components/grasp-sim.md and ``GraspGuessBuffer.create_isaac_grasp_data`` (the full form), GraspGen
+grasp_gen/dataset/eval_utils.py (the short one, a part of it).
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -32,7 +34,8 @@ def export(twin: TwinContent) -> Exported:
     """Write a file of grasps for each parallel gripper, and the object's mesh in the object frame, +Z up.
 
     Confidence is the robustness where it was measured, else the proposer's score; 0.0 for grasps that failed. Poses are those
-    of the link that ``gripper_frame_link`` names. Raises ExportError for a twin with grasps of no parallel gripper.
+    of the link that ``gripper_frame_link`` names, in the frame of ``object_frame_link``: which prim that is, readers leave to the
+    user. Raises ExportError for a twin with grasps of no parallel gripper.
     """
     grippers = parallel_grippers_of(twin)
     if not grippers:
@@ -63,7 +66,7 @@ def _lines(twin: TwinContent, object_file: str, rows: GraspRows) -> Iterator[str
     """Yield the file's lines, those that held first: readers take the first grasp for the names of the joints."""
     asset, dimensions = ASSETS.get(rows.gripper), parallel_gripper(rows.gripper)
     yield from (f"# {line}\n" for line in provenance_lines(twin.record))
-    yield from _header(object_file)
+    yield from _header(object_file, twin.name)
     if asset is not None and dimensions is not None:
         yield from _gripper_lines(asset, dimensions.opening_m, dimensions.tip_depth_m)
     yield "grasps:\n"
@@ -84,12 +87,19 @@ def _lines(twin: TwinContent, object_file: str, rows: GraspRows) -> Iterator[str
                 yield f"    {when}bite_point: {_row(_bite_point(asset, way_m, float(rows.depth_m[i])))}\n"
 
 
-def _header(object_file: str) -> Iterator[str]:
+def _header(object_file: str, name: str) -> Iterator[str]:
     yield "format: isaac_grasp\n"
-    yield 'format_version: "1.0"\n'  # a string, as GraspDataGen writes it
+    yield "format_version: 1.0\n"  # a number, as Isaac Sim reads it
     yield "created_with: manitwin\n"
+    yield f"object_frame_link: {_text(f'/World/{_prim_name(name)}')}\n"
     yield f"object_file: {_text(object_file)}\n"
     yield "object_scale: 1.0\n"
+
+
+def _prim_name(name: str) -> str:
+    """Return a name that a USD prim can have (USD glossary, identifiers): letters, digits and underscores, no digit first."""
+    plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return plain if plain and not plain[0].isdigit() else f"_{plain}"
 
 
 def _gripper_lines(asset: GripperAsset, opening_m: float, tip_depth_m: float) -> Iterator[str]:

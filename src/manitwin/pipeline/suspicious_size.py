@@ -1,0 +1,44 @@
+"""A size that a mesh declares and such things do not have: said first where grasps fail, since it explains them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from manitwin.engine.stage import Draft
+from manitwin.models.annotators.priors import lookup, unknown_prior
+from manitwin.pipeline.object_state import object_name
+
+CHECK_SCALE = "check its unit and scale first"
+"""What such a rejection's detail says; remedies go by it."""
+
+FACTORS = {
+    1000.0: "metres taken for millimetres", 100.0: "metres taken for centimetres", 10.0: "centimetres taken for millimetres",
+    25.4: "inches taken for millimetres", 1 / 1000: "millimetres taken for metres", 1 / 100: "centimetres taken for metres",
+    1 / 10: "millimetres taken for centimetres", 1 / 25.4: "millimetres taken for inches",
+}  # fmt: skip
+"""By how much the true size is larger than the declared one, and what happened."""
+
+
+def suspicious_size_words(draft: Draft[Any]) -> str | None:
+    """Say that a declared size is not that of such things, and which unit would make it so; None where it is theirs.
+
+    Nothing is said where the size was estimated (``quality.unsaid_size_words``).
+    """
+    if draft.fields.get("size") is not None or not draft.fields.get("geometry", {}).get("metric"):
+        return None
+    physical = draft.fields.get("physical")
+    if physical is None:
+        return None
+    longest_m, prior = float(max(physical["extents_m"])), lookup(object_name(draft))
+    usual = (prior or unknown_prior()).longest_axis_m
+    if usual.low <= longest_m <= usual.high:
+        return None
+    such = "things of a hand's size have" if prior is None else f"nearly every {prior.category} has"
+    mixed = next(
+        (f" ({said}?)" for factor, said in FACTORS.items() if usual.low <= factor * longest_m <= usual.high), ""
+    )
+    return f"it is {_mm(longest_m)} long, but {such} {_mm(usual.low)} to {_mm(usual.high)}{mixed}: {CHECK_SCALE}"
+
+
+def _mm(length_m: float) -> str:
+    return f"{1000 * length_m:.3g} mm" if length_m < 1 else f"{length_m:.3g} m"
