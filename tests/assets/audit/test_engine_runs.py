@@ -7,14 +7,19 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
+import trimesh
 from made_mug import clean
 
-from manitwin.assets.asset import Asset
+from manitwin.assets.asset import Asset, CollisionShape
+from manitwin.assets.audit.ball_runs import balls
 from manitwin.assets.audit.check import audit_asset
 from manitwin.assets.audit.finding import Finding
+from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules import RULES
 from manitwin.assets.audit.run import ENGINES, audit_assets
 from manitwin.errors import UsageError
+from manitwin.formats.meshes.textures import bake_transform
+from manitwin.geometry.poses import rotation_between, transform
 
 RUNNING = [rule for rule in RULES if rule.code.startswith("RUN")]
 INSTALLED = [engine for engine in ENGINES if find_spec(engine) is not None]
@@ -89,3 +94,31 @@ def test_engine_that_is_not_known_or_not_there_is_wrong_use(monkeypatch: pytest.
     monkeypatch.setattr("manitwin.assets.audit.run.find_spec", lambda name: None)
     with pytest.raises(UsageError, match="pip install pybullet"):
         audit_assets(["."], engines=["pybullet"])
+
+
+@pytest.mark.parametrize("engine", INSTALLED)
+def test_a_lid_that_nobody_sees_keeps_a_ball_out(engine: str) -> None:
+    asset = clean()
+    high = asset.visual[0].bounds[1]
+    lid = trimesh.creation.cylinder(
+        0.04, 0.002, transform=trimesh.transformations.translation_matrix([0, 0, high[2] - 0.001])
+    )
+    closed = replace(
+        asset, collision=(*asset.collision, CollisionShape("lid", lid.vertices, lid.faces, True, primitive=True))
+    )
+    (finding,) = [each for each in found(closed, engine) if each.code == "RUN008"]
+    assert finding.severity == "error" and engine in finding.message
+    assert [each for each in found(asset, engine) if each.code == "RUN008"] == []
+
+
+def test_an_opening_is_up_by_the_assets_own_axis() -> None:
+    asset = clean()
+    turn = rotation_between(np.array([0.0, 0, 1]), np.array([0.0, 1, 0]))
+    turned = replace(
+        asset,
+        up="y",
+        visual=tuple(bake_transform(part, transform(turn, np.zeros(3))) for part in asset.visual),
+        collision=tuple(replace(shape, vertices=shape.vertices @ turn.T) for shape in asset.collision),
+    )
+    result = balls(MeasuredAsset(turned, ("mujoco",)))
+    assert result.opening is not None and result.inside == {"mujoco": True}

@@ -1,10 +1,11 @@
-"""Drop a rigid body on a plane in PyBullet."""
+"""Drop a rigid body on a plane, and a ball into a vessel, in PyBullet."""
 
 from __future__ import annotations
 
 import importlib
 import io
 import tempfile
+from collections.abc import Sequence
 from contextlib import redirect_stderr
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,13 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import inverse, quaternion_wxyz, transform, transform_points
 from manitwin.geometry.rigid_body import RigidBody, principal_frame
+from manitwin.physics.ball_drop import BALL_KG, BALL_SECONDS, BallDrop
 
 GRAVITY_M_S2 = 9.81
+_BALL_TIMESTEP_S = 1 / 480
 STILL_M_S, STILL_RAD_S = 2e-3, 2e-2
 
 
@@ -58,6 +62,30 @@ def drop_in_pybullet(
     return end, rests
 
 
+def ball_stays_inside_in_pybullet(hulls: Sequence[np.ndarray], opening: Opening) -> bool:
+    """Drop a ball that fits into an opening and tell whether it goes in and stays there (``BallDrop``)."""
+    pybullet, drop = _quiet_import(), BallDrop.of(hulls, opening)
+    client = pybullet.connect(pybullet.DIRECT)
+    try:
+        pybullet.setGravity(0, 0, -GRAVITY_M_S2, physicsClientId=client)
+        pybullet.setTimeStep(_BALL_TIMESTEP_S, physicsClientId=client)
+        vessel = pybullet.createMultiBody(
+            0, _shape(pybullet, client, [hull @ drop.turn.T for hull in hulls]), physicsClientId=client
+        )
+        sphere = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=drop.radius_m, physicsClientId=client)
+        ball = pybullet.createMultiBody(BALL_KG, sphere, basePosition=drop.start_m.tolist(), physicsClientId=client)
+        for number in (vessel, ball):
+            pybullet.changeDynamics(
+                number, -1, lateralFriction=0.5, restitution=0.0, linearDamping=0.5, physicsClientId=client
+            )
+        for _ in range(round(BALL_SECONDS / _BALL_TIMESTEP_S)):
+            pybullet.stepSimulation(physicsClientId=client)
+        position, _ = pybullet.getBasePositionAndOrientation(ball, physicsClientId=client)
+    finally:
+        pybullet.disconnect(client)
+    return drop.is_inside(np.asarray(position))
+
+
 def _quiet_import() -> Any:
     """Import PyBullet without the line that it writes to standard error."""
     with redirect_stderr(io.StringIO()):
@@ -65,11 +93,17 @@ def _quiet_import() -> Any:
 
 
 def _thing(pybullet: Any, client: int, body: RigidBody, principal_to_object: np.ndarray) -> int:
-    """Add a body whose shapes stand in its principal frame; PyBullet takes the hull of each group of an OBJ file."""
+    """Add a body whose shapes stand in its principal frame."""
     object_to_principal = inverse(principal_to_object)
+    hulls = [transform_points(object_to_principal, hull) for hull in body.hulls]
+    return int(pybullet.createMultiBody(body.mass_kg, _shape(pybullet, client, hulls), physicsClientId=client))
+
+
+def _shape(pybullet: Any, client: int, hulls: Sequence[np.ndarray]) -> int:
+    """Make a collision shape of hulls: PyBullet takes the hull of each group of an OBJ file."""
     lines, count = [], 0
-    for index, hull in enumerate(body.hulls):
-        mesh = trimesh.convex.convex_hull(transform_points(object_to_principal, hull))
+    for index, hull in enumerate(hulls):
+        mesh = trimesh.convex.convex_hull(hull)
         lines.append(f"o hull_{index}")
         lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in mesh.vertices.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in (mesh.faces + count + 1).tolist()]
@@ -78,9 +112,9 @@ def _thing(pybullet: Any, client: int, body: RigidBody, principal_to_object: np.
         file = Path(folder) / "hulls.obj"
         file.write_text("\n".join(lines) + "\n")
         shape = pybullet.createCollisionShape(pybullet.GEOM_MESH, fileName=str(file), physicsClientId=client)
-        if shape < 0:
-            raise RuntimeError("PyBullet cannot make its collision shapes")
-        return int(pybullet.createMultiBody(body.mass_kg, shape, physicsClientId=client))
+    if shape < 0:
+        raise RuntimeError("PyBullet cannot make its collision shapes")
+    return int(shape)
 
 
 def _xyzw(pose: np.ndarray) -> np.ndarray:

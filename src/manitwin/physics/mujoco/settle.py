@@ -11,12 +11,23 @@ from collections.abc import Sequence
 import mujoco
 import numpy as np
 
+from manitwin.geometry.cavity import Opening
 from manitwin.geometry.poses import quaternion_wxyz, transform
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.mujoco.body import OBJECT, SOFT_SOLREF, TIMESTEP_S, add_object, contact_parameters, new_spec
+from manitwin.physics.ball_drop import BALL_KG, BALL_SECONDS, BallDrop
+from manitwin.physics.mujoco.body import (
+    OBJECT,
+    SOFT_SOLREF,
+    STIFF_SOLREF,
+    TIMESTEP_S,
+    add_object,
+    contact_parameters,
+    new_spec,
+)
 from manitwin.physics.sapien.settle import Settled
 
 PLANE_HALF_SIZE_M = 10.0
+_BALL_FRICTION = 0.5
 STILL_M_S, STILL_RAD_S = 1e-3, 1e-2
 
 
@@ -54,3 +65,24 @@ def _settle(model: mujoco.MjModel, body: RigidBody, pose: np.ndarray, drop_m: fl
     speed = data.qvel[model.joint(OBJECT).dofadr[0] :][:6]
     still = np.linalg.norm(speed[:3]) < STILL_M_S and np.linalg.norm(speed[3:]) < STILL_RAD_S
     return Settled.of(body, pose, end, bool(still))
+
+
+def ball_stays_inside_in_mujoco(hulls: Sequence[np.ndarray], opening: Opening) -> bool:
+    """Drop a ball that fits into an opening and tell whether it goes in and stays there (``BallDrop``)."""
+    drop = BallDrop.of(hulls, opening)
+    spec = new_spec(TIMESTEP_S)
+    contact = contact_parameters(_BALL_FRICTION, STIFF_SOLREF)
+    for number, hull in enumerate(hulls):
+        name = f"wall_{number:02d}"
+        spec.add_mesh(name=name, uservert=np.asarray(hull @ drop.turn.T, np.float32).ravel())
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, contype=1, conaffinity=2, **contact)
+    ball = spec.worldbody.add_body(name=OBJECT, pos=drop.start_m)
+    ball.add_freejoint(name=OBJECT)
+    size = [drop.radius_m, 0, 0]
+    ball.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_SPHERE, size=size, mass=BALL_KG, contype=2, conaffinity=1, **contact | {"condim": 6}
+    )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, round(BALL_SECONDS / TIMESTEP_S))
+    return drop.is_inside(np.array(data.xpos[model.body(OBJECT).id]))

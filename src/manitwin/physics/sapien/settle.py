@@ -10,8 +10,9 @@ import sapien
 from sapien import physx
 
 from manitwin.geometry.cavity import Opening
-from manitwin.geometry.poses import quaternion_wxyz, rotation_between, transform_points
+from manitwin.geometry.poses import quaternion_wxyz, transform_points
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody, StaticBox
+from manitwin.physics.ball_drop import BALL_KG, BALL_SECONDS, BallDrop
 from manitwin.physics.sapien.body import (
     CONTACT_OFFSET_M,
     SOLVER_ITERATIONS,
@@ -261,39 +262,25 @@ def _touching(scene: sapien.Scene, names: dict[int, str]) -> dict[tuple[str, str
     return dict(sorted(found.items()))
 
 
-def ball_stays_inside(hulls: Sequence[np.ndarray], opening: Opening, *, seconds: float = 2.0) -> bool:
-    """Drop a ball that fits into an opening and tell whether it goes in and stays there.
-
-    The ball's radius is a third of the rim's or of the depth, whichever is less. It starts above the middle of the
-    rim; the vessel stands fixed with its opening up. In means: its centre ends below the brim, no more than the depth
-    below it, and no farther from the axis than the vessel's widest point.
-    """
-    axis = opening.axis
-    along = [float((hull @ axis).max()) for hull in hulls]
-    radius = min(opening.rim_radius_m, opening.depth_m) / 3
+def ball_stays_inside(hulls: Sequence[np.ndarray], opening: Opening, *, seconds: float = BALL_SECONDS) -> bool:
+    """Drop a ball that fits into an opening and tell whether it goes in and stays there (``BallDrop``)."""
+    drop = BallDrop.of(hulls, opening)
     scene = scene_with_gravity(_BALL_TIMESTEP_S)
-    up = np.array([0.0, 0, 1])
-    turn = rotation_between(axis, up)
     material = physx.PhysxMaterial(0.5, 0.5, 0.0)
     vessel = physx.PhysxRigidStaticComponent()
     for hull in hulls:
         wall = convex_shape(hull, material)
         set_contact(wall, contact_offset_m=CONTACT_OFFSET_M)
         vessel.attach(wall)
-    scene.add_entity(entity_at(vessel, sapien.Pose([0, 0, 0], quaternion_wxyz(turn))))
+    scene.add_entity(entity_at(vessel, sapien.Pose([0, 0, 0], quaternion_wxyz(drop.turn))))
     ball = physx.PhysxRigidDynamicComponent()
-    shape = physx.PhysxCollisionShapeSphere(radius, material)
-    set_contact(shape, contact_offset_m=min(CONTACT_OFFSET_M, radius / 4))
+    shape = physx.PhysxCollisionShapeSphere(drop.radius_m, material)
+    set_contact(shape, contact_offset_m=min(CONTACT_OFFSET_M, drop.radius_m / 4))
     ball.attach(shape)
-    ball.set_mass(0.01)
-    ball.set_inertia(np.full(3, 0.4 * 0.01 * radius**2, dtype=np.float32))
+    ball.set_mass(BALL_KG)
+    ball.set_inertia(np.full(3, 0.4 * BALL_KG * drop.radius_m**2, dtype=np.float32))
     ball.set_linear_damping(1.0)  # takes the bouncing out: only where it ends counts
-    rim = turn @ opening.center_m
-    start = rim + up * (max(along) - float(opening.center_m @ axis) + 1.5 * radius)
-    scene.add_entity(entity_at(ball, sapien.Pose(start)))
+    scene.add_entity(entity_at(ball, sapien.Pose(drop.start_m)))
     for _ in range(round(seconds / _BALL_TIMESTEP_S)):
         scene.step()
-    end = np.asarray(ball.entity.pose.p, dtype=float)
-    widest = max(float(np.linalg.norm((hull @ turn.T - rim)[:, :2], axis=1).max()) for hull in hulls)
-    below_brim = rim[2] - end[2]
-    return bool(0 < below_brim <= opening.depth_m and np.linalg.norm((end - rim)[:2]) < widest)
+    return drop.is_inside(np.asarray(ball.entity.pose.p, dtype=float))

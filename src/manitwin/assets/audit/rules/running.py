@@ -7,9 +7,11 @@ from itertools import chain, combinations, islice
 
 import numpy as np
 
+from manitwin.assets.audit.ball_runs import balls
 from manitwin.assets.audit.engine_runs import Drops, Run, drops
 from manitwin.assets.audit.finding import Complaint, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
+from manitwin.assets.audit.rules.collision import filled_opening, has_convex_pieces
 
 SUNK_M, SUNK_SHARE = 0.003, 0.03
 """Below the plane, or apart in height, and which share of the longest side: a soft contact gives way by less than this."""
@@ -115,6 +117,23 @@ def tips(measured: MeasuredAsset) -> Iterator[Complaint]:
         )
 
 
+def opening_closed(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of an opening that is seen, and that a ball does not get into or does not stay in."""
+    asset = measured.asset
+    if not measured.engines or asset.static or asset.partial or measured.complaints(filled_opening):
+        return  # one cause, one finding
+    if not has_convex_pieces(measured):
+        return
+    found = measured.once(balls)
+    out = [engine for engine, inside in found.inside.items() if not inside]
+    if out and found.opening is not None:
+        radius_m = min(found.opening.rim_radius_m, found.opening.depth_m) / 3
+        yield Complaint(
+            f"a ball of {2000 * radius_m:.3g} mm that fits into the opening that is seen does not stay in it in {', '.join(out)}",
+            values={"ball_radius_m": radius_m, "rim_radius_m": found.opening.rim_radius_m, "inside": found.inside},
+        )
+
+
 def _dropped(measured: MeasuredAsset) -> Drops:
     return measured.once(drops) if measured.engines else Drops(None, None)
 
@@ -199,5 +218,14 @@ RULES = (
         " worth knowing before a scene is made of them.",
         remedy="Turn it, or use the poses that `manitwin build` finds.",
         check=tips,
+    ),
+    Rule(
+        "RUN008",
+        "opening-closed",
+        "error",
+        why="A bowl or a mug is there to put something in. Where what collides closes its mouth or fills its bottom, nothing"
+        " goes in: the ball rests on an unseen lid (ManiSkill #867).",
+        remedy="Decompose the walls into convex pieces that keep the mouth and the inside free; COL003 and COL004 tell where.",
+        check=opening_closed,
     ),
 )
