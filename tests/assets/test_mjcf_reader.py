@@ -392,3 +392,31 @@ def test_soft_strings_are_rods_and_files_of_gmsh_are_read(tmp_path: Path) -> Non
     (tmp_path / "tetra.msh").write_text("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n")
     with pytest.raises(AssetError, match="MuJoCo cannot read"):
         read_asset(mjcf(tmp_path, f'<body name="b">{tetra}</body>'))
+
+
+def test_meshes_of_bodies_that_are_left_out_are_not_read(tmp_path: Path) -> None:
+    wedge().export(tmp_path / "wedge.stl")
+    (tmp_path / "broken.stl").write_bytes(b"solid nothing")
+    meshes = '<asset><mesh file="wedge.stl" scale=".01 .01 .01"/>' + "".join(
+        f'<mesh name="m{n}" file="broken.stl"/>' for n in range(4)
+    )
+    links = "".join(f'<body><joint axis="0 0 1"/><geom type="mesh" mesh="m{n}"/></body>' for n in range(4))
+    body = f'<body name="foot"><geom type="mesh" mesh="wedge" density="500"/>{links}</body>'
+    path = mjcf(tmp_path, body, f"{meshes}</asset>")
+    asset = read_asset(path)
+    assert np.allclose(np.ptp(asset.visual[0].vertices, axis=0), np.ptp(wedge().vertices, axis=0) / 100)
+    assert asset.inertial.mass_kg == pytest.approx(500 * wedge().volume / 1e6, rel=1e-5)
+    assert asset.partial and len(asset.remarks) == 2
+    broken = mjcf(tmp_path, body.replace('mesh="wedge"', 'mesh="m0"'), f"{meshes}</asset>")
+    with pytest.raises(AssetError, match=r"broken\.stl"):
+        read_asset(broken)
+
+
+def test_shape_only_is_the_same_shape_with_textures_that_have_a_size(tmp_path: Path) -> None:
+    Image.new("RGB", (64, 32)).save(tmp_path / "skin.png")
+    wedge().export(tmp_path / "wedge.stl")
+    before = '<asset><texture name="t" type="2d" file="skin.png"/><material name="m" texture="t"/><mesh file="wedge.stl"/></asset>'
+    path = mjcf(tmp_path, '<body><geom type="mesh" mesh="wedge" material="m"/></body>', before)
+    whole, shape = read_asset(path), read_asset(path, shape_only=True)
+    assert material_of(shape.visual[0]).baseColorTexture.size == (64, 32)
+    assert np.allclose(np.sort(whole.visual[0].triangles, axis=None), np.sort(shape.visual[0].triangles, axis=None))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,8 @@ from manitwin.formats.meshes.read import MeshFile, read_mesh
 from manitwin.formats.meshes.source import MeshLimits
 
 MESH_LIMITS = MeshLimits(max_bytes=1 << 29, max_faces=2_000_000)
+SHAPE_LIMITS = replace(MESH_LIMITS, decode_textures=False, shading=False)
+"""For who measures: textures have a size and no pixels, and parts without normals stay so."""
 MAX_SHAPES = 4096
 MAX_FACES = 8_000_000  # of all shapes together: one mesh may be named by many of them
 UNREAD_FORMATS = frozenset({".vtk", ".vtu", ".wrl", ".iv", ".x3d", ".3ds", ".fbx", ".off", ".ac", ".bin", ".mesh"})
@@ -31,11 +33,13 @@ class AssetFiles:
     """The files that an asset names, looked up below ``root`` and nowhere else, links resolved.
 
     ``own`` is the folder of the asset itself; what is read from above it is remarked. ``used`` are the files that were found,
-    ``missing`` the names that were not, ``remarks`` one line each. ``partial``: bodies were left out.
+    ``missing`` the names that were not, ``remarks`` one line each. ``partial``: bodies were left out. ``limits`` are those
+    of each mesh, and say whether its looks are wanted.
     """
 
     root: Path
     own: Path | None = None
+    limits: MeshLimits = MESH_LIMITS
     used: set[Path] = field(default_factory=set)
     missing: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
@@ -117,7 +121,7 @@ class AssetFiles:
             try:
                 folders = self._texture_folders(path)
                 mesh = read_mesh(
-                    path, limits=MESH_LIMITS, root=self.root, texture_folders=folders, hull_of_points=hull_of_points
+                    path, limits=self.limits, root=self.root, texture_folders=folders, hull_of_points=hull_of_points
                 )
             except InputError as error:
                 raise AssetError(error.detail) from error

@@ -153,10 +153,13 @@ def _without_comments(xml: bytes) -> bytes:
     return b"".join([*kept, xml[after:]])
 
 
-def read_asset(path: Path, format: Format | Literal["auto"] = "auto", *, root: Path | None = None) -> Asset:
+def read_asset(
+    path: Path, format: Format | Literal["auto"] = "auto", *, root: Path | None = None, shape_only: bool = False
+) -> Asset:
     """Read the asset at a path, ``auto``: of the format that ``detect`` tells; raises AssetError.
 
-    ``root``: the folder above which no file is read for a description that names some (``root_of`` the path by default). A
+    ``root``: the folder above which no file is read for a description that names some (``root_of`` the path by default).
+    ``shape_only``: textures are not decoded and normals not made where that costs time, which is enough to measure it. A
     format's reader, and the engine that it may need, are loaded only when they are used.
     """
     if format != "auto" and format not in FORMATS:
@@ -164,7 +167,12 @@ def read_asset(path: Path, format: Format | Literal["auto"] = "auto", *, root: P
     _require_there(path)
     chosen = detect(path) if format == "auto" else format
     reader = import_module(f"manitwin.assets.readers.{chosen}")
-    asset: Asset = reader.read(path, root) if chosen in _NAME_FILES else reader.read(path)
+    if chosen not in _NAME_FILES:
+        whole: Asset = reader.read(path)
+        return whole
+    from manitwin.assets.asset_files import MESH_LIMITS, SHAPE_LIMITS
+
+    asset: Asset = reader.read(path, root, SHAPE_LIMITS if shape_only else MESH_LIMITS)
     return asset
 
 

@@ -64,13 +64,13 @@ def audit_path(
     Never raises for an asset's sake.
     """
     try:
-        asset = read_asset(path, root=root)
+        asset = read_asset(path, root=root, shape_only=True)
         findings = audit_asset(asset, rules, engines, engine)
         done: list[str] = []
         if fix:
             done = _mend(asset, findings)
             if done:
-                asset = read_asset(path, root=root)
+                asset = read_asset(path, root=root, shape_only=True)
                 findings = audit_asset(asset, rules, engines, engine)
     except AssetError as error:
         return _unread(path, str(error), rules)

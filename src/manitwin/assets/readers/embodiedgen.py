@@ -9,7 +9,9 @@ import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset import Asset, Contact
+from manitwin.assets.asset_files import MESH_LIMITS
 from manitwin.assets.readers.urdf import UrdfObject, asset_of, gazebo_friction, open_urdf
+from manitwin.formats.meshes.source import MeshLimits
 from manitwin.formats.xml_file import number, text_of
 from manitwin.robots.urdf import origin_of
 
@@ -19,14 +21,14 @@ _UNSAID = ("unknown", "-1", "")
 _HEIGHT_OFF = 0.05  # of the height that the file says: a tilted or wrongly scaled mesh is off by more
 
 
-def read(path: Path, root: Path | None = None) -> Asset:
+def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
     """Read EmbodiedGen's URDF, or the one in a folder (result/NAME.urdf); raises AssetError as the URDF reader does.
 
     Its mu1 and mu2 are the static and the dynamic friction that its annotator was asked for. Without a rotation in the
     visual's origin (older versions) the mesh's Y axis is up.
     Source: embodied_gen/validators/urdf_convertor.py of HorizonRobotics/EmbodiedGen.
     """
-    found = open_urdf(path, root)
+    found = open_urdf(path, root, limits)
     asset = asset_of(found, path, contact=_contact(found))
     info = found.tree.element.find(".//extra_info")
     remarks = list(asset.remarks)

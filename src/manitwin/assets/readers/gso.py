@@ -7,10 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from manitwin.assets.asset import Asset
+from manitwin.assets.asset_files import MESH_LIMITS
 from manitwin.assets.read import SCAN_METADATA, is_file_below
 from manitwin.assets.readers.sdf import asset_of, open_sdf
 from manitwin.errors import AssetError
 from manitwin.formats.bounded_file import read_bytes
+from manitwin.formats.meshes.source import MeshLimits
 
 LICENSE, ATTRIBUTION = "CC-BY-4.0", "Google Research, Google Scanned Objects"
 """Of the collection as a whole (Downs et al. 2022, arXiv 2204.11918, section 3)."""
@@ -19,13 +21,13 @@ _CATEGORY = re.compile(r'categories\s*\{[^}]{0,2000}?first:\s*"([^"]+)"')
 _MAX_TEXT = 1 << 20
 
 
-def read(path: Path, root: Path | None = None) -> Asset:
+def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
     """Read a model's folder, or its model.sdf, as the SDF reader does; raises AssetError.
 
     Textures are taken from materials/textures where the material names them beside the mesh, as all of the collection do.
     """
     folder = path.parent if path.is_file() else path
-    opened = open_sdf(path, root)
+    opened = open_sdf(path, root, limits)
     asset = asset_of(opened, path)
     files = opened.files
     metadata, category = folder / SCAN_METADATA, None

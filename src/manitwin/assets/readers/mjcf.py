@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 
 from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
-from manitwin.assets.asset_files import AssetFiles
+from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
 from manitwin.assets.readers.mjcf_document import UNNAMED, MjcfSource, open_mjcf
@@ -19,13 +19,14 @@ from manitwin.assets.readers.mjcf_shapes import BodyShapes, is_solid
 from manitwin.assets.readers.mjcf_soft import as_shapes_at_rest, soft_parts
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
+from manitwin.formats.meshes.source import MeshLimits
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
 _INERTIA_FROM_GEOM = 1  # mjtInertiaFromGeom: true; 2 is auto
 _WORLD = 0
 
 
-def read(path: Path, root: Path | None = None) -> Asset:
+def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
     """Read an MJCF file, or the only one in a folder; the asset's axes are those of the object's first body.
 
     Defaults, frames and shapes are resolved by MuJoCo; meshes and textures are read here, below ``root`` (``root_of`` the path
@@ -35,12 +36,17 @@ def read(path: Path, root: Path | None = None) -> Asset:
     AssetError naming what is broken. Source: the MJCF reference of MuJoCo.
     """
     file = only_file(path) if path.is_dir() else path
-    files = AssetFiles(root or root_of(path), file.resolve().parent)
+    files = AssetFiles(root or root_of(path), file.resolve().parent, limits)
     files.used.add(file.resolve())
     source = open_mjcf(file, files)
-    result = compiled(source, files)
+
+    def chosen(model: Any) -> set[int]:
+        aside = AssetFiles(files.root, missing=list(files.missing))  # what it remarks is said of the whole model
+        return {index for index, _ in _rigid_bodies(file, model, aside)}
+
+    result = compiled(source, files, chosen)
     if source.soft and not any(is_solid(result.model, body) for body in range(result.model.nbody)):
-        return _soft_asset(path, file, AssetFiles(files.root, files.own))
+        return _soft_asset(path, file, AssetFiles(files.root, files.own, files.limits))
     spec, model = result.spec, result.model
     bodies = _rigid_bodies(file, model, files)
     shapes = BodyShapes(result, files, planes=not any(is_solid(model, index) for index, _ in bodies))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,13 +15,13 @@ from PIL import Image
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles, joined
 from manitwin.assets.readers.mjcf_document import MjcfSource
 from manitwin.errors import AssetError
-from manitwin.formats.meshes.source import MeshSource
+from manitwin.formats.meshes.source import MeshLimits, MeshSource
 from manitwin.formats.meshes.textures import bake_transform, decode_texture
 from manitwin.formats.xml_file import xml_text
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform
 
 _LEAST_MASS_KG, _LEAST_INERTIA_KG_M2 = 1e-9, 1e-12
-_LEAST_ROWS = 2
+_LEAST_ROWS, _FEW_MESHES = 2, 3
 NO_OBJECTS = "planes and height fields were left out: they are no objects"
 _RGB = int(mujoco.mjtTextureRole.mjTEXROLE_RGB)
 
@@ -38,8 +39,11 @@ class CompiledMjcf:
     textures: dict[str, Image.Image]
 
 
-def compiled(source: MjcfSource, files: AssetFiles) -> CompiledMjcf:
+def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[int]] | None = None) -> CompiledMjcf:
     """Compile an MJCF file; geoms of meshes that are not there are left out.
+
+    ``chosen``: tells of a model which of its bodies are wanted. Then the meshes of others are not read, and stand-ins have their
+    place. A robot of fifty meshes, of which one link is looked at, costs one.
 
     Raises AssetError with MuJoCo's own words where it refuses the file.
     """
@@ -50,9 +54,10 @@ def compiled(source: MjcfSource, files: AssetFiles) -> CompiledMjcf:
         raise AssetError(f"{name}: MuJoCo cannot read it: {_line(error)}") from error
     spec.compiler.fusestatic = False  # both would take away bodies and geoms that the file has
     spec.compiler.discardvisual = False
-    meshes = _take_meshes(source, spec, files)
+    found = _find_meshes(source, spec, files)
     textures = _take_textures(source, spec, files)
     _take_height_fields(source, spec, files)
+    meshes = _take_meshes(spec, found, _wanted(spec, found, chosen), files)
     try:
         try:
             model = spec.compile()
@@ -68,27 +73,62 @@ def compiled(source: MjcfSource, files: AssetFiles) -> CompiledMjcf:
     return CompiledMjcf(spec, model, meshes, textures)
 
 
-def _take_meshes(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str, list[trimesh.Trimesh]]:
-    """Read the mesh files, hand their vertices to the spec, and return the parts as MuJoCo scales them."""
-    meshes: dict[str, list[trimesh.Trimesh]] = {}
+def _find_meshes(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str, Path]:
+    """Return the files of meshes by their names; geoms of those that are not there are taken out of the spec."""
+    found: dict[str, Path] = {}
     absent = []
     for mesh in list(spec.meshes):
         if not mesh.file:
             continue  # written out in the file itself
         path = _find(source, mesh.file, files)
+        mesh.file = ""
         if path is None:
             absent.append(mesh)
-            continue
-        parts = files.mesh(path, hull_of_points=True).parts
-        vertices, faces = joined(parts)
-        mesh.uservert, mesh.userface = vertices.reshape(-1), faces.reshape(-1).astype(np.int32)
-        mesh.file = ""
-        to_asset = np.diag([*mesh.scale, 1.0]) @ _reference(mesh)
-        meshes[mesh.name] = [bake_transform(part, to_asset) for part in parts]
+        else:
+            found[mesh.name] = path
     for mesh in absent:
         for geom in [geom for geom in spec.geoms if geom.meshname == mesh.name]:
             spec.delete(geom)
         spec.delete(mesh)
+    return found
+
+
+def _wanted(spec: Any, found: dict[str, Path], chosen: Callable[[Any], set[int]] | None) -> set[str]:
+    """Return the names of the meshes that the chosen bodies have; all where MuJoCo does not compile stand-ins of them."""
+    if chosen is None or len(found) < _FEW_MESHES:
+        return set(found)
+    trial = spec.copy()
+    for mesh in trial.meshes:
+        if mesh.name in found:
+            _stand_in(mesh)
+    trial.compiler.boundmass, trial.compiler.boundinertia = _LEAST_MASS_KG, _LEAST_INERTIA_KG_M2
+    try:
+        bodies = chosen(trial.compile())
+    except (ValueError, RuntimeError, AssetError, mujoco.FatalError):
+        return set(found)
+    holders = {body.id: body for body in (trial.worldbody, *trial.bodies)}
+    return {geom.meshname for index in bodies for geom in holders[index].geoms} & set(found)
+
+
+def _stand_in(mesh: Any) -> None:
+    """Give a mesh the shape of a tetrahedron a decimetre large."""
+    mesh.uservert, mesh.userface = [0, 0, 0, 0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1], [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
+
+
+def _take_meshes(
+    spec: Any, found: dict[str, Path], wanted: set[str], files: AssetFiles
+) -> dict[str, list[trimesh.Trimesh]]:
+    """Read the wanted meshes, hand their vertices to the spec, and return the parts as MuJoCo scales them."""
+    meshes: dict[str, list[trimesh.Trimesh]] = {}
+    for mesh in [mesh for mesh in spec.meshes if mesh.name in found]:
+        if mesh.name not in wanted:
+            _stand_in(mesh)
+            continue
+        parts = files.mesh(found[mesh.name], hull_of_points=True).parts
+        vertices, faces = joined(parts)
+        mesh.uservert, mesh.userface = vertices.reshape(-1), faces.reshape(-1).astype(np.int32)
+        to_asset = np.diag([*mesh.scale, 1.0]) @ _reference(mesh)
+        meshes[mesh.name] = [bake_transform(part, to_asset) for part in parts]
     return meshes
 
 
@@ -104,7 +144,7 @@ def _take_textures(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str
     for texture in spec.textures:
         if not texture.file:
             continue
-        image = _image(_find(source, texture.file, files), files)
+        image = _image(_find(source, texture.file, files), files, files.limits)
         if image is not None:
             images[texture.name or Path(source.places[texture.file][0]).stem] = image
     by_material = {}
@@ -125,7 +165,7 @@ def _take_height_fields(source: MjcfSource, spec: Any, files: AssetFiles) -> Non
     for field in list(spec.hfields):
         heights = None
         if field.file:
-            image = _image(_find(source, field.file, files), files)
+            image = _image(_find(source, field.file, files), files, MESH_LIMITS)
             heights = None if image is None else np.asarray(image.convert("L"), float)[::-1]  # from the lowest row up
             field.file = ""
         elif len(field.userdata) == field.nrow * field.ncol:
@@ -141,10 +181,10 @@ def _take_height_fields(source: MjcfSource, spec: Any, files: AssetFiles) -> Non
         files.remark(NO_OBJECTS)
 
 
-def _image(path: Path | None, files: AssetFiles) -> Image.Image | None:
-    if path is None or path.stat().st_size > MESH_LIMITS.max_bytes:
+def _image(path: Path | None, files: AssetFiles, limits: MeshLimits) -> Image.Image | None:
+    if path is None or path.stat().st_size > limits.max_bytes:
         return None
-    notes = MeshSource(path, MESH_LIMITS)
+    notes = MeshSource(path, limits)
     image = decode_texture(notes.data(), path.name, notes)
     for sentence in notes.findings:
         files.remark(sentence)

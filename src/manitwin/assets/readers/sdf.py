@@ -9,7 +9,7 @@ import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
-from manitwin.assets.asset_files import AssetFiles
+from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.read import is_file_below, only_file
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
@@ -17,6 +17,7 @@ from manitwin.assets.readers.upright import upright_shapes
 from manitwin.assets.readers.urdf_shapes import candidates
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
+from manitwin.formats.meshes.source import MeshLimits
 from manitwin.formats.xml_file import comments_before, number, read_xml, text_of
 
 _MAX_INCLUDES = 8
@@ -37,7 +38,7 @@ class SdfModel:
     files: AssetFiles
 
 
-def read(path: Path, root: Path | None = None) -> Asset:
+def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
     """Read an SDF file, or a model's folder; the asset's axes are those of the model.
 
     Meshes are looked up from the file's folder and from those above it up to ``root`` (``root_of`` the path by default), those
@@ -45,16 +46,16 @@ def read(path: Path, root: Path | None = None) -> Asset:
     and included models are left out with a remark. Raises AssetError naming what is broken. Source: the SDFormat
     specification, version 1.9.
     """
-    opened = open_sdf(path, root)
+    opened = open_sdf(path, root, limits)
     return asset_of(opened, path)
 
 
-def open_sdf(path: Path, folder: Path | None = None) -> SdfModel:
+def open_sdf(path: Path, folder: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> SdfModel:
     """Parse an SDF and choose the object in it; raises AssetError."""
     file = path
     if path.is_dir():
         file = path / MAIN_FILE if is_file_below(path / MAIN_FILE, path) else only_file(path)
-    files = AssetFiles(folder or root_of(path), file.resolve().parent)
+    files = AssetFiles(folder or root_of(path), file.resolve().parent, limits)
     files.used.add(file.resolve())
     file, root = _included(file, read_xml(file, "sdf"), files)
     config = file.parent / CONFIG_FILE

@@ -9,13 +9,14 @@ import numpy as np
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
-from manitwin.assets.asset_files import AssetFiles
+from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
 from manitwin.assets.readers.upright import upright_shapes
 from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.assets.root import root_of
 from manitwin.errors import AssetError
+from manitwin.formats.meshes.source import MeshLimits
 from manitwin.formats.xml_file import comments_before, number, text_of
 from manitwin.robots.urdf import (
     JOINT_TYPES,
@@ -50,21 +51,21 @@ class UrdfObject:
     files: AssetFiles
 
 
-def read(path: Path, root: Path | None = None) -> Asset:
+def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
     """Read a URDF, or the only one in a folder; the asset's axes are those of the first link of the object.
 
     Meshes are looked up from the file's folder and from those above it up to ``root`` (``root_of`` the path by default), those
     of ``package://`` in the folder of the package's name before any other. Links behind joints that move are left out with a
     remark. Raises AssetError naming what is broken. Source: the URDF XML specification of ROS.
     """
-    return asset_of(open_urdf(path, root), path)
+    return asset_of(open_urdf(path, root, limits), path)
 
 
-def open_urdf(path: Path, root: Path | None = None) -> UrdfObject:
+def open_urdf(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> UrdfObject:
     """Parse a URDF and choose the object in it; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
     tree = read_urdf(file, RULES, file.name, _as_loaders_take_it)
-    files = AssetFiles(root or root_of(path), file.resolve().parent)
+    files = AssetFiles(root or root_of(path), file.resolve().parent, limits)
     files.used.add(file.resolve())
     return UrdfObject(file, tree, _rigid_links(tree, files), files)
 

@@ -114,6 +114,8 @@ def _checked(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.T
     parts = [part for part in parts if len(part.faces)]
     if not parts:
         raise source.refused("no_faces", "it has no faces", "export the surface, not points or lines")
+    if all(len(part.vertices) and np.abs(part.vertices).max() <= _MAX_COORDINATE for part in parts):  # NaN is not less
+        return _shaded(parts, source)
     total = sum(len(part.vertices) for part in parts)
     used = [part.vertices[np.unique(part.faces)] for part in parts]
     bad = sum(int((~np.isfinite(vertices)).any(axis=1).sum()) for vertices in used)
@@ -130,4 +132,10 @@ def _checked(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.T
         if unused.any():
             part.vertices[unused] = 0.0
             part.remove_unreferenced_vertices()
+    return _shaded(parts, source)
+
+
+def _shaded(parts: list[trimesh.Trimesh], source: MeshSource) -> list[trimesh.Trimesh]:
+    if not source.limits.shading:
+        return parts
     return [part if normals_of(part) is not None else with_creased_normals(part) for part in parts]

@@ -41,12 +41,14 @@ class MeshLimits:
     """The limits beyond which a mesh file is refused: bytes (with all files it names), triangles, texture pixels.
 
     ``decode_textures`` false: of textures only the size is looked at, and their pixels are decoded by whoever wants them.
+    ``shading`` false: no normals are made for parts without.
     """
 
     max_bytes: int = 1 << 30
     max_faces: int = 4_000_000
     max_texture_pixels: int = 1 << 26
     decode_textures: bool = True
+    shading: bool = True
 
     @property
     def max_vertices(self) -> int:
