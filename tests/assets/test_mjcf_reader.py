@@ -415,7 +415,10 @@ def test_meshes_of_bodies_that_are_left_out_are_not_read(tmp_path: Path) -> None
 def test_shape_only_is_the_same_shape_with_textures_that_have_a_size(tmp_path: Path) -> None:
     Image.new("RGB", (64, 32)).save(tmp_path / "skin.png")
     wedge().export(tmp_path / "wedge.stl")
-    before = '<asset><texture name="t" type="2d" file="skin.png"/><material name="m" texture="t"/><mesh file="wedge.stl"/></asset>'
+    before = (
+        '<asset><texture name="t" type="2d" file="skin.png"/><material name="m" texture="t"/>'
+        '<mesh file="wedge.stl"/></asset>'
+    )
     path = mjcf(tmp_path, '<body><geom type="mesh" mesh="wedge" material="m"/></body>', before)
     whole, shape = read_asset(path), read_asset(path, shape_only=True)
     assert material_of(shape.visual[0]).baseColorTexture.size == (64, 32)

@@ -19,6 +19,7 @@ from manitwin.assets.audit.finding import Audited, Finding
 from manitwin.assets.audit.picture import PANEL_PX, asset_picture, audited_picture
 from manitwin.assets.audit.rules import RULES
 from manitwin.cli.main import app
+from manitwin.formats.meshes.textures import make_part, pbr_material
 from manitwin.web.audit_page import MOST_SHOWN, audit_page, shown_assets
 
 PLACEHOLDER = '<mass value="0.3"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
@@ -115,3 +116,19 @@ def test_command_refuses_a_page_that_cannot_be_written(tmp_path: Path) -> None:
     write_urdf(tmp_path / "set")
     done = CliRunner().invoke(app, ["audit", str(tmp_path / "set"), "--html", str(tmp_path / "no" / "audit.html")])
     assert "cannot be written" in str(done.exception)
+
+
+def test_a_texture_is_seen_where_its_coordinates_put_it() -> None:
+    sheet = Image.new("RGB", (64, 64), (220, 30, 30))
+    sheet.paste((30, 30, 220), (0, 0, 64, 32))  # the upper half
+    wall = trimesh.creation.box((0.2, 0.01, 0.2))
+    uv = np.column_stack([(wall.vertices[:, 0] + 0.1) / 0.2, (wall.vertices[:, 2] + 0.1) / 0.2])
+    part = make_part(
+        wall.vertices, wall.faces, name="wall", uv=uv, material=pbr_material(None, base_color_texture=sheet)
+    )
+    png = asset_picture(replace(clean(), visual=(part,), collision=()))
+    assert png is not None
+    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)[:, :PANEL_PX]
+    blue, red = pixels[..., 2] - pixels[..., 0] > 40, pixels[..., 0] - pixels[..., 2] > 40
+    assert blue.sum() > 2000 and red.sum() > 2000
+    assert np.flatnonzero(blue.any(1)).mean() < np.flatnonzero(red.any(1)).mean(), "blue is above red"

@@ -15,10 +15,10 @@ from manitwin.assets.asset import Asset
 from manitwin.assets.read import read_asset
 from manitwin.assets.within_limits import within_limits
 from manitwin.errors import AssetError
-from manitwin.formats.meshes.textures import linear_to_srgb, material_of
+from manitwin.formats.meshes.textures import linear_to_srgb, material_of, uv_of
 from manitwin.geometry.poses import rotation_between
 from manitwin.geometry.ray_caster import RayCaster
-from manitwin.render.cameras import Camera, hero_camera
+from manitwin.render.cameras import Camera, hero_camera, pixel_rays
 from manitwin.render.false_colors import id_color
 from manitwin.render.raycast import cast_camera, merged
 
@@ -48,7 +48,7 @@ def picture_of_path(path: Path, root: Path | None = None) -> bytes | None:
 
 
 def asset_picture(asset: Asset) -> bytes | None:
-    """Return a PNG of two panels: the visual parts in their plain colours, and the collision shapes, each in one of its own.
+    """Return a PNG of two panels: the visual parts with their textures, and the collision shapes, each in a colour of its own.
 
     Both are seen by one camera, upright. None where nothing has a face, or a vertex is no finite place.
     """
@@ -68,7 +68,7 @@ def asset_picture(asset: Asset) -> bytes | None:
     side = PANEL_PX * _FINER
     camera = hero_camera(corners, fov_y_deg=_FIELD_OF_VIEW_DEG, width_px=side, height_px=side)
     panels = [
-        _panel(seen, [_plain_color(part) for part in seen], upright, camera),
+        _panel(seen, [_plain_color(part) for part in seen], upright, camera, textured=True),
         _panel(felt, [id_color(number + 1) for number in range(len(felt))], upright, camera),
     ]
     buffer = io.BytesIO()
@@ -77,20 +77,53 @@ def asset_picture(asset: Asset) -> bytes | None:
 
 
 def _panel(
-    parts: Sequence[trimesh.Trimesh], colors: Sequence[tuple[int, int, int]], upright: np.ndarray, camera: Camera
+    parts: Sequence[trimesh.Trimesh],
+    colors: Sequence[tuple[int, int, int]],
+    upright: np.ndarray,
+    camera: Camera,
+    *,
+    textured: bool = False,
 ) -> np.ndarray:
-    """Return ``(P, P, 3) uint8`` of parts in one colour each, lit from beside the camera, both sides alike."""
+    """Return ``(P, P, 3) uint8`` of parts in one colour each, or with their textures, lit from beside the camera.
+
+    Both sides of a face are alike.
+    """
     picture = np.full((camera.height_px, camera.width_px, 3), _GROUND_RGB, np.uint8)
     if parts:
         mesh = merged(list(parts))
         turned = trimesh.Trimesh(np.asarray(mesh.vertices) @ upright.T, mesh.faces, process=False)
-        _, normals, face = cast_camera(RayCaster(turned), camera)
+        depth_m, normals, face = cast_camera(RayCaster(turned), camera)
         hit = face >= 0
         light = camera.camera_to_object[:3, :3] @ (np.array([-0.4, 0.5, 1.0]) / np.linalg.norm([-0.4, 0.5, 1.0]))
         shade = _AMBIENT + (1 - _AMBIENT) * np.abs(normals[hit] @ light)
         of_face = np.repeat(np.array(colors, float), [len(part.faces) for part in parts], axis=0)
-        picture[hit] = np.rint(of_face[face[hit]] * shade[:, None]).astype(np.uint8)
+        plain = of_face[face[hit]]
+        if textured:
+            origins, directions = pixel_rays(camera)
+            points = (origins + directions * depth_m.reshape(-1, 1))[hit.reshape(-1)]
+            _put_on_textures(plain, parts, face[hit], points @ upright)
+        picture[hit] = np.rint(plain * shade[:, None]).astype(np.uint8)
     return np.asarray(cv2.resize(picture, (PANEL_PX, PANEL_PX), interpolation=cv2.INTER_AREA))
+
+
+def _put_on_textures(
+    colors: np.ndarray, parts: Sequence[trimesh.Trimesh], faces: np.ndarray, points: np.ndarray
+) -> None:
+    """Set ``colors (N, 3)`` of seen ``points (N, 3)`` on faces of the parts together to those of their textures."""
+    first = 0
+    for part in parts:
+        texture, uv = material_of(part).baseColorTexture, uv_of(part)
+        here = (faces >= first) & (faces < first + len(part.faces))
+        if texture is not None and uv is not None and here.any():
+            corners = np.asarray(part.faces)[faces[here] - first]
+            shares = trimesh.triangles.points_to_barycentric(np.asarray(part.vertices)[corners], points[here])
+            at = np.einsum("nk,nkj->nj", np.nan_to_num(shares), np.asarray(uv)[corners])
+            pixels = np.asarray(texture.convert("RGB"))
+            height, width = pixels.shape[:2]
+            column = np.clip((at[:, 0] % 1.0 * width).astype(int), 0, width - 1)
+            row = np.clip(((1.0 - at[:, 1] % 1.0) * height).astype(int), 0, height - 1)
+            colors[here] = pixels[row, column]
+        first += len(part.faces)
 
 
 def _plain_color(part: trimesh.Trimesh) -> tuple[int, int, int]:
