@@ -43,6 +43,19 @@ def print_grasps(told: dict[str, Any] | None) -> None:
         )
 
 
+def print_frames(functional: list[dict[str, Any]], placements: list[dict[str, Any]] | None) -> None:
+    """Say where the functional points are, and in which of its resting poses the thing could lie there."""
+    if placements is None:
+        return
+    for each in functional:
+        x, y, z = each["position_m"]
+        sure = "" if each["certain"] else ", elsewhere in another pose"
+        out_console.print(f"  {each['label']}: at {x:.4f} {y:.4f} {z:.4f} m{sure}", markup=False)
+    free, stands = [each for each in placements if each["free"]], [each for each in placements if each["stands"]]
+    now = f"; it is in number {stands[0]['placement']}" if stands else ""
+    out_console.print(f"  {len(free)} of {len(placements)} resting poses are free where it is{now}")
+
+
 def print_layout(told: dict[str, Any] | None, out: Path | None) -> None:
     """Say what the layout has, or why there is none."""
     if told is None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform_points
+from manitwin.scenes.locate.carried_frames import CarriedPlacement, carry_placements
 from manitwin.scenes.locate.carried_grasps import CarriedGrasps, carry_grasps
 from manitwin.scenes.locate.depth_view import DepthView, measured_noise_m
 from manitwin.scenes.locate.layout_files import NoLayout
@@ -84,6 +85,12 @@ class LocatedView:
 
         place = sum(bool(each.location.poses) for each, _ in self.things[:number])
         return with_reach(carried, place, self._objects, self._furniture, self.world, self._planner)
+
+    def placements(self, number: int) -> tuple[CarriedPlacement, ...]:
+        """Return the resting poses of a thing on the table that is seen, where it was found."""
+        thing, twin = self.things[number]
+        noise_m = measured_noise_m(self.view, np.ones(self.view.depth_m.shape, bool))
+        return carry_placements(thing, twin, self.view, self.plane, noise_m)
 
     @cached_property
     def scene(self) -> LocatedScene | NoLayout:

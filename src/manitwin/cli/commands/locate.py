@@ -10,7 +10,7 @@ import typer
 from manitwin.cli import choices, options
 from manitwin.cli.console import error_console
 from manitwin.cli.documents import Json, print_document
-from manitwin.cli.located import print_grasps, print_layout, print_thing
+from manitwin.cli.located import print_frames, print_grasps, print_layout, print_thing
 
 if TYPE_CHECKING:
     import numpy as np
@@ -121,6 +121,7 @@ def locate(
         twins = [known.twin(thing.location.twin_id) for thing in things]
     place = LocatedView(view, list(zip(things, twins, strict=True)), camera_to_base, robot, seed)
     carried = [place.grasps(number) if grasps else None for number in range(len(things))]
+    rests = [place.placements(number) if grasps else () for number in range(len(things))]
     guessed = None if asked is None else asked.model
     layout, written = None, None
     if out is not None and any(thing.location.poses for thing in things):
@@ -135,9 +136,9 @@ def locate(
         if isinstance(scene, LocatedScene) and dataset is not None:
             written = scene, dataset
     if one is not None:
-        document = location_document(things[0], one, carried[0], guessed)
+        document = location_document(things[0], one, carried[0], guessed, rests[0])
     else:
-        document = things_document(str(source), place.things, carried, guessed)
+        document = things_document(str(source), place.things, carried, guessed, rests)
     document["layout"] = layout
     if out is not None:
         write_location(out, document, view, things, written)
@@ -147,6 +148,7 @@ def locate(
         for thing, said in zip(things, [document] if one is not None else document["things"], strict=True):
             print_thing(thing, said["name"] or said["twin_id"], one is None)
             print_grasps(said["grasps"])
+            print_frames(said["functional"], said["placements"] if grasps else None)
         print_layout(layout, out)
     raise typer.Exit(0 if any(thing.location.status != "none" for thing in things) else 3)
 

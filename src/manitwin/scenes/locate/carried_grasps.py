@@ -78,7 +78,7 @@ def carry_grasps(thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_
     poses = [pose.object_to_camera for pose in location.poses]
     certain = usable & np.all([_known_in(grasps, usable, poses[0], other) for other in poses[1:]], axis=0)
     turns = thing.model.same_poses[:: max(1, len(thing.model.same_poses) // _MOST_TURNS)]
-    obstacles = _seen_beside(view, thing.mask, poses[0][:3, 3])
+    obstacles = seen_beside(view, thing.mask, poses[0][:3, 3])
     clearance_m = CLEARANCE_M + 2 * noise_m
     found: list[CarriedGrasp] = []
     for place in np.flatnonzero(certain):
@@ -113,7 +113,7 @@ def _known_in(grasps: Grasps, usable: np.ndarray, pose: np.ndarray, other: np.nd
     )
 
 
-def _seen_beside(view: DepthView, mask: np.ndarray, center: np.ndarray) -> np.ndarray:
+def seen_beside(view: DepthView, mask: np.ndarray, center: np.ndarray) -> np.ndarray:
     """Return points ``(N, 3)`` of what is seen near the thing and is no part of it."""
     points = view.points(np.flatnonzero(known_depth(view) & ~mask))
     points = points[np.linalg.norm(points - center, axis=1) < _AROUND_M]

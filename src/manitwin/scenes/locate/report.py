@@ -11,6 +11,7 @@ import numpy as np
 from manitwin.formats.image_file import png_of
 from manitwin.formats.output_folder import new_folder
 from manitwin.geometry.poses import quaternion_wxyz
+from manitwin.scenes.locate.carried_frames import CarriedFrame, CarriedPlacement, carry_frames
 from manitwin.scenes.locate.carried_grasps import CarriedGrasps
 from manitwin.scenes.locate.depth_view import DepthView
 from manitwin.scenes.locate.estimate import AMBIGUOUS_MARGIN, LEAST_SCORE
@@ -27,11 +28,16 @@ LOCATION = "location.json"
 
 
 def location_document(
-    thing: Thing, twin: Twin, carried: CarriedGrasps | None = None, estimator: str | None = None
+    thing: Thing,
+    twin: Twin,
+    carried: CarriedGrasps | None = None,
+    estimator: str | None = None,
+    placements: Sequence[CarriedPlacement] = (),
 ) -> dict[str, Any]:
-    """Return a location as JSON values: the answer, its poses, what it was judged by, and the grasps that can be used there.
+    """Return a location as JSON values: the answer, its poses, what it was judged by, and what of the twin can be used there.
 
-    ``estimator`` is what guessed the poses in the place of the search.
+    ``placements``: its resting poses, where they were asked for. ``estimator`` is what guessed the poses in the place
+    of the search.
     """
     location, symmetries = thing.location, thing.model.symmetries
     return {
@@ -62,6 +68,37 @@ def location_document(
             "axis": None if symmetries.axis is None else symmetries.axis.round(6).tolist(),
         },
         "grasps": None if carried is None else _grasps(carried),
+        "functional": [_frame(each) for each in carry_frames(thing, twin)],
+        "placements": [_placement(each) for each in placements],
+    }
+
+
+def _pose(pose: np.ndarray) -> dict[str, Any]:
+    return {
+        "position_m": pose[:3, 3].round(6).tolist(),
+        "quaternion_wxyz": quaternion_wxyz(pose[:3, :3]).round(7).tolist(),
+    }
+
+
+def _frame(each: CarriedFrame) -> dict[str, Any]:
+    return {
+        "id": each.point_id,
+        "label": each.label,
+        "kind": each.kind,
+        **_pose(each.frame_to_camera),
+        "size_m": None if each.size_m is None else round(each.size_m, 5),
+        "certain": each.certain,
+    }
+
+
+def _placement(each: CarriedPlacement) -> dict[str, Any]:
+    return {
+        "placement": each.number,
+        "probability": round(each.probability, 4),
+        "upright": each.upright,
+        **_pose(each.object_to_camera),
+        "stands": each.stands,
+        "free": each.free,
     }
 
 
@@ -92,13 +129,14 @@ def things_document(
     things: Sequence[tuple[Thing, Twin]],
     carried: Sequence[CarriedGrasps | None],
     estimator: str | None = None,
+    placements: Sequence[Sequence[CarriedPlacement]] = (),
 ) -> dict[str, Any]:
     """Return which twin of a data set each thing of a view is, what was tried in its place, and the grasps of each."""
     return {
         "dataset": dataset,
         "things": [
             {
-                **location_document(thing, twin, grasps, estimator),
+                **location_document(thing, twin, grasps, estimator, rests),
                 "tried": [
                     {
                         "twin_id": each.twin_id,
@@ -108,7 +146,7 @@ def things_document(
                     for each in thing.tried
                 ],
             }
-            for (thing, twin), grasps in zip(things, carried, strict=True)
+            for (thing, twin), grasps, rests in zip(things, carried, placements or [()] * len(things), strict=True)
         ],
     }
 

@@ -1,0 +1,129 @@
+"""A twin's functional frames and resting poses at the pose that it was found in: what else of it is known there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from scipy.spatial import ConvexHull
+
+from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform, transform_points
+from manitwin.scenes.locate.carried_grasps import ALIKE_M, CLEARANCE_M, seen_beside
+from manitwin.scenes.locate.depth_view import DepthView
+from manitwin.scenes.locate.proposals import Plane
+from manitwin.scenes.locate.recognition import Thing
+from manitwin.twin.loaded_twin import Twin
+
+_EDGE_PX = 7
+"""About a mask: pixels of the thing's own edge that the mask has missed are no neighbours."""
+STANDS_RAD = np.deg2rad(10.0)
+"""A thing that leans by less stands in that pose."""
+
+
+@dataclass(frozen=True)
+class CarriedFrame:
+    """A functional point of a twin in the camera's frame: ``frame_to_camera (4, 4)``, m.
+
+    Z is its direction. Without a frame of its own it is the point's, +Z along the normal, and X any (``kind`` is None).
+    ``certain``: it is at one place in all poses of the answer.
+    """
+
+    point_id: str
+    label: str
+    kind: str | None
+    frame_to_camera: np.ndarray
+    size_m: float | None
+    certain: bool
+
+
+@dataclass(frozen=True)
+class CarriedPlacement:
+    """A resting pose of a twin on the observed table, where the thing is now: ``object_to_camera (4, 4)``, m.
+
+    Its turn about the table's normal is the nearest to how the thing lies. ``stands``: it is the one that it is in. ``free``:
+    nothing that is seen beside the thing is within the convex hull of it there.
+    """
+
+    number: int
+    probability: float
+    upright: bool
+    object_to_camera: np.ndarray
+    stands: bool
+    free: bool
+
+
+def carry_frames(thing: Thing, twin: Twin) -> tuple[CarriedFrame, ...]:
+    """Return a twin's functional points at its best pose; none where nothing was found."""
+    poses = [pose.object_to_camera for pose in thing.location.poses]
+    points = twin.record.points
+    if not poses or points is None:
+        return ()
+    found = []
+    for point in points.functional:
+        frame = point.frame
+        if frame is None:
+            own = transform(_with_z(np.array(point.normal)), np.array(point.position_m))
+        else:
+            own = transform(rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz)), np.array(frame.position_m))
+        apart_m = [float(np.linalg.norm((pose @ own)[:3, 3] - (poses[0] @ own)[:3, 3])) for pose in poses]
+        found.append(
+            CarriedFrame(
+                point.id,
+                point.label,
+                None if frame is None else frame.kind,
+                poses[0] @ own,
+                None if frame is None else frame.size_m,
+                max(apart_m) < ALIKE_M,
+            )
+        )
+    return tuple(found)
+
+
+def carry_placements(
+    thing: Thing, twin: Twin, view: DepthView, plane: Plane, noise_m: float
+) -> tuple[CarriedPlacement, ...]:
+    """Return a twin's settled resting poses on the observed table, above where it lies; none where nothing was found."""
+    poses = [pose.object_to_camera for pose in thing.location.poses]
+    if not poses:
+        return ()
+    up = plane.normal
+    middle = transform_points(poses[0], thing.model.center[None])[0]
+    below = middle - plane.height_m(middle) * up
+    plane_to_camera = _with_z(up)
+    own = cv2.dilate(thing.mask.astype(np.uint8), np.ones((_EDGE_PX, _EDGE_PX), np.uint8)).astype(bool)
+    obstacles = seen_beside(view, own, poses[0][:3, 3])
+    obstacles = obstacles[plane.height_m(obstacles) > CLEARANCE_M + 2 * noise_m]  # the table itself bears it
+    found = []
+    for number, each in enumerate(twin.record.placements or []):
+        if not each.settled:
+            continue
+        to_plane = rotation_from_quaternion_wxyz(np.array(each.quaternion_wxyz))
+        turned = plane_to_camera @ _nearest_turn(plane_to_camera.T @ poses[0][:3, :3] @ to_plane.T) @ to_plane
+        lowest_m = float((thing.model.points @ (turned.T @ up)).min())
+        center = turned @ thing.model.center
+        pose = transform(turned, below - center + (center @ up) * up - lowest_m * up)
+        leans_rad = float(np.arccos(np.clip((to_plane[2] @ (poses[0][:3, :3].T @ up)), -1, 1)))
+        hull = ConvexHull(transform_points(pose, thing.model.points)).equations
+        inside = (hull[:, :3] @ obstacles.T + hull[:, 3:] <= CLEARANCE_M + 2 * noise_m).all(0)
+        found.append(
+            CarriedPlacement(
+                number, each.probability, each.upright, pose, bool(leans_rad < STANDS_RAD), not bool(inside.any())
+            )
+        )
+    return tuple(found)
+
+
+def _nearest_turn(rotation: np.ndarray) -> np.ndarray:
+    """Return the turn about Z ``(3, 3)`` that is nearest to a rotation."""
+    angle = np.arctan2(rotation[1, 0] - rotation[0, 1], rotation[0, 0] + rotation[1, 1])
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _with_z(axis: np.ndarray) -> np.ndarray:
+    """Return a rotation ``(3, 3)`` whose Z is an axis, and whose X is square to it and to the least of its components."""
+    z = axis / np.linalg.norm(axis)
+    x = np.cross(np.eye(3)[int(np.abs(z).argmin())], z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
