@@ -19,6 +19,7 @@ import numpy as np
 
 from manitwin.assets.asset import Asset
 from manitwin.assets.read import file_format, find_assets, read_asset
+from manitwin.assets.readers.urdf import open_urdf
 from manitwin.errors import AssetError
 from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
 
@@ -43,15 +44,19 @@ def compared(path: Path, root: Path) -> tuple[str, str]:
         model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         return "MuJoCo does not compile it", " ".join(str(error).split())
-    head = head_of(asset, model)
+    head = head_of(asset, model, root)
     if head is None:
         return "MuJoCo has no body with a shape", ""
     apart = differences(asset, *summed(model, head))
     return ("differs", apart) if apart else ("agrees", "")
 
 
-def head_of(asset: Asset, model: mujoco.MjModel) -> int | None:
-    """Return the first body of the rigid group that the reader takes: the first that is free, else the first with a shape."""
+def head_of(asset: Asset, model: mujoco.MjModel, root: Path) -> int | None:
+    """Return the first body of the rigid group that the reader takes: by its name, else the first free one, else with a shape."""
+    name = asset.name if asset.format == "mjcf" else str(open_urdf(asset.path, root).links[0][0].get("name"))
+    named = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
+    if named > 0:
+        return int(named)
     heads = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0 or model.body_jntnum[b]]
     shaped = [head for head in heads if any(_is_solid(model, body) for body in group_of(model, head))]
     free = [head for head in shaped if asset.format == "mjcf" and _is_free(model, head)]
