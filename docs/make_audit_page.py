@@ -42,7 +42,7 @@ status: 0 no errors, 1 errors, 2 wrong use.
   against it; of one that lacks a mesh the file is missing, and what is left of its shape is not judged.
 - What stands fast (`<static>` in SDF; in MJCF shapes of the world, and bodies without a joint beside others that have one) is
   asked for no mass, inertia, friction or collision. Its size and mass are held against a category where the asset declares one or
-  its name says no less: a "lock" need not be a padlock, a "truck" no toy.
+  its name says no less: a "lock" need not be a padlock, a "truck" no toy. What is soft is asked for nothing of a rigid body.
 - `--fix` writes what follows from the asset's own words, each file whole, with the old one beside it as `<name>.orig`. It never
   moves an origin.
 - `--write-baseline FILE` notes what is found of each asset, and `--baseline FILE` leaves that out from then on: a project with
@@ -57,7 +57,8 @@ status: 0 no errors, 1 errors, 2 wrong use.
 - `--engines` also runs each asset (the RUN rules): its collision shapes, with its declared mass, centre of mass, inertia and
   friction (0.5 where it declares none), are put down on a plane from 5 mm, as they stand in the file, in each of the engines at
   its usual step and at half of it, for 4 s. What declares no mass or inertia is not run, and that is said. Convex hulls of the
-  shapes are taken, as the engines do of bodies that move; joints do not move. PyBullet is one's own to install.
+  shapes are taken, as the engines do of bodies that move; joints do not move. A ball that fits into the opening that is seen is
+  dropped into it, and has to stay there. PyBullet is one's own to install.
 - `--format json` has the numbers behind every finding; `sarif` (2.1.0) is what code hosts show beside a change.
 
 [Findings checked by hand](audit_checked.md) says how often it is right.

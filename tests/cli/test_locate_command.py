@@ -16,6 +16,7 @@ from json_documents import check_keys
 from manitwin.cli.main import app
 from manitwin.dataset.index.rebuild import rebuild
 from manitwin.dataset.search import twin_looks
+from manitwin.errors import UsageError
 from manitwin.formats.label_picture import label_picture
 from manitwin.geometry.poses import inverse, rotation_from_quaternion_wxyz, transform, transform_points
 from manitwin.scenes.loaded_scene import object_pose
@@ -168,3 +169,22 @@ def test_what_cannot_be_asked_is_refused(files: Files, given: tuple[str, ...], s
     words = [word if word.startswith("--") else root / word for word in given]
     done = CliRunner().invoke(app, ["locate", str(files.box), *map(str, words)])
     assert said in str(done.exception) and done.exit_code == 1
+
+
+@pytest.mark.slow
+def test_a_twin_of_another_size_is_found_at_the_things_size_and_gives_no_grasps(files: Files, tmp_path: Path) -> None:
+    small = tmp_path / twin_name(write_thing(tmp_path, 5, slab("box", 0.14 / 1.3, 0.09 / 1.3, 0.05 / 1.3, 0.3)))
+    code, said = run(small, *files.view, "--json")
+    assert code == 3 and json.loads(said)["size"] is None
+    code, said = run(small, *files.view, "--fit-size", "--grasps", "--out", tmp_path / "place", "--json")
+    told = json.loads(said)
+    assert code == 0 and told["size"]["factor"] == pytest.approx(1.3, rel=0.03)
+    assert told["size"]["low"] <= told["size"]["factor"] <= told["size"]["high"]
+    assert told["grasps"] is None and told["placements"] == []
+    assert told["layout"]["scene"] is None and "another size" in told["layout"]["reason"]
+
+
+def test_a_size_is_looked_for_of_one_twin_by_the_own_search(files: Files) -> None:
+    for words in ((files.box.parents[2],), (files.box, "--estimator", "command:true {request} {out}")):
+        done = CliRunner().invoke(app, ["locate", *map(str, words), *files.view, "--fit-size"])
+        assert isinstance(done.exception, UsageError) and "name a twin, without --estimator" in str(done.exception)

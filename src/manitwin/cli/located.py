@@ -26,6 +26,20 @@ def print_thing(thing: Thing, name: str, is_one_of_many: bool) -> None:
         )
 
 
+def print_size(told: dict[str, Any] | None, grasps: bool) -> None:
+    """Say which size was found, how far the shape is off, and what that means for grasps."""
+    from manitwin.scenes.locate.size_fit import OTHER_SIZE, SAME_SIZE
+
+    if told is None:
+        return
+    off = (
+        "" if told["shape_off_m"] is None else f"; its shape is off by {1e3 * told['shape_off_m']:.1f} mm in the median"
+    )
+    out_console.print(f"  {told['factor']:.3g} times the twin's size ({told['low']:.3g} to {told['high']:.3g}){off}")
+    if grasps and abs(told["factor"] - 1) > SAME_SIZE:
+        out_console.print(f"  no grasps: {OTHER_SIZE}")
+
+
 def print_grasps(told: dict[str, Any] | None) -> None:
     """Say how many grasps are free, how many of them the robot reaches, and which is the best."""
     if told is None:

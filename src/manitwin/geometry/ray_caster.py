@@ -28,6 +28,10 @@ class RayCaster:
         vertices, faces = trimesh.util.append_faces([s.vertices for s in surfaces], [s.faces for s in surfaces])
         return cls(trimesh.Trimesh(vertices, faces, process=False))
 
+    def scaled(self, factor: float) -> RayCaster:
+        """Return that of the mesh multiplied by a factor about its origin."""
+        return RayCaster(trimesh.Trimesh(self._mesh.vertices * factor, self._mesh.faces, process=False))
+
     @cached_property
     def face_normals(self) -> np.ndarray:
         """The outward unit normals ``(F, 3)`` of the faces."""

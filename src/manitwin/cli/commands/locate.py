@@ -10,7 +10,7 @@ import typer
 from manitwin.cli import choices, options
 from manitwin.cli.console import error_console
 from manitwin.cli.documents import Json, print_document
-from manitwin.cli.located import print_frames, print_grasps, print_layout, print_thing
+from manitwin.cli.located import print_frames, print_grasps, print_layout, print_size, print_thing
 
 if TYPE_CHECKING:
     import numpy as np
@@ -71,6 +71,12 @@ def locate(
     grasps: Annotated[
         bool, typer.Option("--grasps", help="Also which verified grasps are free of all that is seen, the best first.")
     ] = False,
+    fit_size: Annotated[
+        bool,
+        typer.Option(
+            "--fit-size", help="Also find its size, up to twice or half the twin's: of one from a photo it was a guess."
+        ),
+    ] = False,
     base: Annotated[
         Path | None,
         _file("JSON of the camera's pose in the frame of a robot's base: camera_to_base.", "a calibration's JSON"),
@@ -100,6 +106,7 @@ def locate(
     from manitwin.scenes.locate.pose_model import PoseModel
     from manitwin.scenes.locate.recognition import DatasetTwins, where_is, which_twin
     from manitwin.scenes.locate.report import location_document, things_document, write_location
+    from manitwin.scenes.locate.size_fit import OTHER_SIZE, thing_of_any_size
     from manitwin.twin.dataset_root import DatasetRoot
     from manitwin.twin.loaded_twin import Twin
     from manitwin.twin.store import RECORD
@@ -110,7 +117,13 @@ def locate(
     dataset = DatasetRoot(source).absolute() if one is None else dataset_of_twin(source)
     view, masks = _view(depth, camera, mask, rgb, cloud, seed)
     asked = None
-    if one is not None:
+    size = None
+    if fit_size:
+        _check_fit(one is not None, estimator)
+    if one is not None and fit_size:
+        thing, size = thing_of_any_size(view, masks, PoseModel.of_twin(one), seed=seed)
+        things, twins = [thing], [one]
+    elif one is not None:
         asked = None if model is None else AskedEstimator(model, lambda twin_id: Twin(source), seed)
         things = [where_is(view, masks, PoseModel.of_twin(one), seed=seed, guess=asked)]
         twins = [one]
@@ -120,14 +133,17 @@ def locate(
         things = [which_twin(view, each, known, tried=tried, seed=seed, guess=asked) for each in masks]
         twins = [known.twin(thing.location.twin_id) for thing in things]
     place = LocatedView(view, list(zip(things, twins, strict=True)), camera_to_base, robot, seed)
-    carried = [place.grasps(number) if grasps else None for number in range(len(things))]
-    rests = [place.placements(number) if grasps else () for number in range(len(things))]
+    usable = grasps and (size is None or size.is_own)
+    carried = [place.grasps(number) if usable else None for number in range(len(things))]
+    rests = [place.placements(number) if usable else () for number in range(len(things))]
     guessed = None if asked is None else asked.model
     layout, written = None, None
     if out is not None and any(thing.location.poses for thing in things):
         scene: LocatedScene | NoLayout
         if cloud is not None:
             scene = NoLayout("a cloud of the thing alone shows no table")
+        elif size is not None and not size.is_own:
+            scene = NoLayout(OTHER_SIZE)
         elif dataset is None:
             scene = NoLayout("the twin lies in no data set; give one where manitwin build left it")
         else:
@@ -136,7 +152,7 @@ def locate(
         if isinstance(scene, LocatedScene) and dataset is not None:
             written = scene, dataset
     if one is not None:
-        document = location_document(things[0], one, carried[0], guessed, rests[0])
+        document = location_document(things[0], one, carried[0], guessed, rests[0], size)
     else:
         document = things_document(str(source), place.things, carried, guessed, rests)
     document["layout"] = layout
@@ -147,8 +163,9 @@ def locate(
     else:
         for thing, said in zip(things, [document] if one is not None else document["things"], strict=True):
             print_thing(thing, said["name"] or said["twin_id"], one is None)
+            print_size(said.get("size"), grasps)
             print_grasps(said["grasps"])
-            print_frames(said["functional"], said["placements"] if grasps else None)
+            print_frames(said["functional"], said["placements"] if usable else None)
         print_layout(layout, out)
     raise typer.Exit(0 if any(thing.location.status != "none" for thing in things) else 3)
 
@@ -198,6 +215,15 @@ def _check(
     needed = {"--depth": depth, "--camera": camera}
     if cloud is None and (missing := [name for name, each in needed.items() if each is None]):
         raise UsageError(f"{', '.join(missing)}: missing; give --depth and --camera, or --cloud")
+
+
+def _check_fit(one: bool, estimator: str | None) -> None:
+    from manitwin.errors import UsageError
+
+    if not one or estimator is not None:
+        raise UsageError(
+            "--fit-size: looks for the size of one twin by the built-in search; name a twin, without --estimator"
+        )
 
 
 def _view(

@@ -53,8 +53,8 @@ class CarriedPlacement:
     free: bool
 
 
-def carry_frames(thing: Thing, twin: Twin) -> tuple[CarriedFrame, ...]:
-    """Return a twin's functional points at its best pose; none where nothing was found."""
+def carry_frames(thing: Thing, twin: Twin, factor: float = 1.0) -> tuple[CarriedFrame, ...]:
+    """Return a twin's functional points at its best pose, the thing being ``factor`` times its size; none if it was not found."""
     poses = [pose.object_to_camera for pose in thing.location.poses]
     points = twin.record.points
     if not poses or points is None:
@@ -66,6 +66,7 @@ def carry_frames(thing: Thing, twin: Twin) -> tuple[CarriedFrame, ...]:
             own = transform(_with_z(np.array(point.normal)), np.array(point.position_m))
         else:
             own = transform(rotation_from_quaternion_wxyz(np.array(frame.quaternion_wxyz)), np.array(frame.position_m))
+        own[:3, 3] *= factor
         apart_m = [float(np.linalg.norm((pose @ own)[:3, 3] - (poses[0] @ own)[:3, 3])) for pose in poses]
         found.append(
             CarriedFrame(
@@ -73,7 +74,7 @@ def carry_frames(thing: Thing, twin: Twin) -> tuple[CarriedFrame, ...]:
                 point.label,
                 None if frame is None else frame.kind,
                 poses[0] @ own,
-                None if frame is None else frame.size_m,
+                None if frame is None else factor * frame.size_m,
                 max(apart_m) < ALIKE_M,
             )
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -75,6 +75,24 @@ class PoseModel:
             shown=shown,
             shown_trees=tuple(cKDTree(each) for each in shown),
             symmetries=find_symmetries(mesh, np.random.default_rng(0)),
+        )
+
+    def scaled(self, factor: float) -> PoseModel:
+        """Return the model of the same thing at another size, about the origin of the object frame."""
+        points = self.surface.points * factor
+        shown = tuple(each * factor for each in self.shown)
+        motions = self.near_motions.copy()
+        motions[:, :3, 3] *= factor
+        return PoseModel(
+            twin_id=self.twin_id,
+            caster=self.caster.scaled(factor),
+            surface=Surface(points, self.surface.normals, cKDTree(points), self.surface.diameter_m * factor),
+            center=self.center * factor,
+            sides=self.sides,
+            shown=shown,
+            shown_trees=tuple(cKDTree(each) for each in shown),
+            symmetries=replace(self.symmetries, center_m=self.symmetries.center_m * factor),
+            near_motions=motions,
         )
 
     @property

@@ -18,6 +18,7 @@ from manitwin.scenes.locate.pose_model import PoseModel
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin
 
+NO_MASK = "nothing stands above the table in this picture; give --mask"
 CANDIDATES = 5
 """Twins that are tried of a thing, the most alike: the first alone is often another (docs/search.md)."""
 
@@ -102,7 +103,7 @@ def where_is(
 ) -> Thing:
     """Look for a twin in each of several masks, and return the one that it explains best, or that it is none of them."""
     if not masks:
-        raise UsageError("nothing stands above the table in this picture; give --mask")
+        raise UsageError(NO_MASK)
     answers = [(locate_in_view(view, mask, model, seed=seed, guess=guess), mask) for mask in masks]
     best, mask = max(answers, key=lambda each: each[0].best_score)
     return Thing(mask, best, model, (Tried(model.twin_id, None, best.best_score),))

@@ -19,6 +19,7 @@ from manitwin.scenes.locate.layout_files import write_layout
 from manitwin.scenes.locate.located_scene import LocatedScene
 from manitwin.scenes.locate.overlay import overlay
 from manitwin.scenes.locate.recognition import Thing
+from manitwin.scenes.locate.size_fit import SizeFit
 from manitwin.scenes.perception.object_views import box_of
 from manitwin.twin.loaded_twin import Twin
 from manitwin.twin.store import canonical_json
@@ -33,11 +34,12 @@ def location_document(
     carried: CarriedGrasps | None = None,
     estimator: str | None = None,
     placements: Sequence[CarriedPlacement] = (),
+    size: SizeFit | None = None,
 ) -> dict[str, Any]:
     """Return a location as JSON values: the answer, its poses, what it was judged by, and what of the twin can be used there.
 
-    ``placements``: its resting poses, where they were asked for. ``estimator`` is what guessed the poses in the place
-    of the search.
+    ``placements``: its resting poses, where they were asked for; ``size``: the size that was found.
+    ``estimator`` is what guessed the poses in the place of the search.
     """
     location, symmetries = thing.location, thing.model.symmetries
     return {
@@ -48,6 +50,7 @@ def location_document(
         "name": twin.record.name,
         "frame": FRAME,
         "box": box_of(thing.mask),
+        "size": None if size is None else _size(size),
         "poses": [
             {
                 "position_m": pose.object_to_camera[:3, 3].round(6).tolist(),
@@ -68,8 +71,17 @@ def location_document(
             "axis": None if symmetries.axis is None else symmetries.axis.round(6).tolist(),
         },
         "grasps": None if carried is None else _grasps(carried),
-        "functional": [_frame(each) for each in carry_frames(thing, twin)],
+        "functional": [_frame(each) for each in carry_frames(thing, twin, 1.0 if size is None else size.factor)],
         "placements": [_placement(each) for each in placements],
+    }
+
+
+def _size(size: SizeFit) -> dict[str, Any]:
+    return {
+        "factor": round(size.factor, 4),
+        "low": round(size.low, 4),
+        "high": round(size.high, 4),
+        "shape_off_m": None if size.shape_off_m is None else round(size.shape_off_m, 5),
     }
 
 
