@@ -36,6 +36,12 @@ def collect_add(
         Path | None,
         typer.Option(help="The folder that files of a list lie in; default: the list's own.", metavar="FOLDER"),
     ] = None,
+    alike: Annotated[
+        bool,
+        typer.Option(
+            "--alike", help="Then look at all files, and mark those that look like an earlier one as its duplicates."
+        ),
+    ] = False,
 ) -> None:
     """Add photos, meshes and URLs to a catalogue, each once; what cannot be read is told with its cause and count."""
     from manitwin.dataset.collect.places import require_place
@@ -59,6 +65,12 @@ def collect_add(
             error_console.print(
                 f"  and {len(lines) - _CAUSES_SHOWN} more causes: `manitwin collect status {catalogue}`"
             )
+    if alike:
+        from manitwin.dataset.collect.alike import mark_alike
+
+        found = mark_alike(catalogue)
+        counted = ", ".join(f"{count:,} by {by}" for by, count in found.items())
+        out_console.print(f"{sum(found.values()):,} look like an earlier input: {counted}")
 
 
 def collect_status(

@@ -40,6 +40,14 @@ MIGRATIONS = (
         PRIMARY KEY (list, cause)
     ) STRICT, WITHOUT ROWID;
     """,
+    """
+    CREATE TABLE looks (
+        sha256 TEXT PRIMARY KEY,             -- of the file
+        version INTEGER NOT NULL,
+        look BLOB,                           -- float16; null: it shows nothing
+        alike TEXT                           -- sha256 of the earlier input that it looks like
+    ) STRICT, WITHOUT ROWID;
+    """,
 )
 
 

@@ -63,6 +63,14 @@ _UPSERT = (
 )
 
 
+_MARK_ALIKE = (
+    "UPDATE inputs SET status = 'duplicate', duplicate_of ="
+    " (SELECT min(number) FROM inputs AS other JOIN looks ON looks.alike = other.sha256 WHERE looks.sha256 = inputs.sha256)"
+    " WHERE status = 'ready' AND sha256 IN (SELECT looks.sha256 FROM looks JOIN inputs AS other ON other.sha256 = alike)"
+)
+"""What looks like an earlier input is its duplicate, while that is there."""
+
+
 class Catalogue:
     """One catalogue, open; raises UsageError where there is none and ``make`` is False, and for a file that is none."""
 
@@ -145,6 +153,46 @@ class Catalogue:
                 " GROUP BY sha256 HAVING count(*) > 1)"
                 " WHERE sha256 = digest AND number > first AND duplicate_of IS NOT first"
             )
+            connection.execute(_MARK_ALIKE)
+
+    def without_look(self, version: int) -> list[tuple[str, str, str]]:
+        """Return digest, place and kind of each file that is ready and has no look of a version, in the order they came."""
+        with self._sound():
+            return self._connection.execute(
+                "SELECT sha256, place, kind FROM inputs WHERE status = 'ready' AND sha256 IS NOT NULL AND NOT EXISTS"
+                " (SELECT 1 FROM looks WHERE looks.sha256 = inputs.sha256 AND version = ?) ORDER BY number",
+                (version,),
+            ).fetchall()
+
+    def put_looks(self, version: int, looks: Iterable[tuple[str, bytes | None]]) -> None:
+        """Keep the looks of files by their digests."""
+        with self._writing() as connection:
+            connection.executemany(
+                "INSERT OR REPLACE INTO looks VALUES (?, ?, ?, NULL)",
+                [(digest, version, look) for digest, look in looks],
+            )
+
+    def looks(self, version: int) -> list[tuple[str, str, bytes]]:
+        """Return digest, kind and look of each first file of its bytes that has one, in the order they came."""
+        with self._sound():
+            return self._connection.execute(
+                "SELECT inputs.sha256, kind, look FROM inputs JOIN looks USING (sha256) WHERE version = ? AND look IS NOT NULL"
+                " AND number = (SELECT min(number) FROM inputs AS same WHERE same.sha256 = inputs.sha256) ORDER BY number",
+                (version,),
+            ).fetchall()
+
+    def put_alike(self, alike: Mapping[str, str]) -> None:
+        """Keep which file looks like which earlier one, by their digests, in place of what was kept, and mark them."""
+        with self._writing() as connection:
+            connection.execute(
+                "UPDATE inputs SET status = 'ready', duplicate_of = NULL WHERE status = 'duplicate' AND number ="
+                " (SELECT min(number) FROM inputs AS same WHERE same.sha256 = inputs.sha256)"
+            )
+            connection.execute("UPDATE looks SET alike = NULL WHERE alike IS NOT NULL")
+            connection.executemany(
+                "UPDATE looks SET alike = ? WHERE sha256 = ?", [(of, key) for key, of in alike.items()]
+            )
+            connection.execute(_MARK_ALIKE)
 
     def ready(self) -> Iterator[Row]:
         """Yield the rows that can be used, addresses too, in the order in which they came."""

@@ -1,0 +1,62 @@
+"""Mark inputs of a catalogue that look like an earlier one: the same photo in another size, the same mesh in another format."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from manitwin.dataset.collect.looks import ALIKE, PICTURE, SHAPE, VERSION, similarity
+from manitwin.dataset.collect.store import Catalogue
+from manitwin.formats.isolated import Limits, ProcessCrashed, run_isolated
+from manitwin.models.classifiers.efficientnet_lite import load_weights
+
+LOOK = "manitwin.dataset.collect.looks:look_of_input"
+LIMITS = Limits(seconds=60.0, memory_bytes=8 << 30)
+BATCH = 100
+
+
+def mark_alike(catalogue: Path) -> dict[str, int]:
+    """Look at every file that was not looked at before, and mark what looks like an earlier one as its duplicate.
+
+    Returns how many there are by ``picture`` and by ``shape``. Each file is read in a process with limits; one that cannot be
+    read is like no other. Of several that are alike the first that came stays. Raises UsageError where there is no catalogue,
+    Unavailable without the network's weights.
+    """
+    load_weights()  # asked before anything is read
+    with Catalogue(catalogue) as store:
+        waiting = iter(store.without_look(VERSION))
+        while batch := list(islice(waiting, BATCH)):
+            store.put_looks(VERSION, [(digest, _look(place, kind)) for digest, place, kind in batch])
+        found = list(_alike(store.looks(VERSION)))
+        store.put_alike({digest: of for digest, of, _ in found})
+    counts = Counter(by for _, _, by in found)
+    return {by: counts[by] for by in (PICTURE, SHAPE)}
+
+
+def _look(place: str, kind: str) -> bytes | None:
+    try:
+        look: bytes | None = run_isolated(LOOK, place, kind, limits=LIMITS)
+    except (ProcessCrashed, MemoryError):
+        return None
+    return look
+
+
+def _alike(looks: list[tuple[str, str, bytes]]) -> Iterator[tuple[str, str, str]]:
+    """Yield the digest of each that looks like an earlier one that does not, with the digest of that, and by what."""
+    for by in (PICTURE, SHAPE):
+        mine = [(digest, look) for digest, kind, look in looks if (kind == "image") == (by == PICTURE)]
+        if not mine:
+            continue
+        vectors = np.array([np.frombuffer(look, "<f2") for _, look in mine], np.float32)
+        first: list[int] = []
+        for place, (digest, _) in enumerate(mine):
+            near = similarity(vectors[place], vectors[first], by) if first else np.zeros(0)
+            best = int(near.argmax()) if len(near) else 0
+            if len(near) and near[best] >= ALIKE[by]:
+                yield digest, mine[first[best]][0], by
+            else:
+                first.append(place)

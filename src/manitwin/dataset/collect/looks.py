@@ -1,0 +1,96 @@
+"""What an input looks like, as a vector by which near-duplicates are told: of a picture its look, of a mesh its shape.
+
+Pictures: the features of EfficientNet-Lite0 and the colours of ``models.embedders.looks``, brought to 256 numbers by a fixed
+random projection (Johnson and Lindenstrauss 1984). Meshes: the histogram of the distances of random pairs of surface points (D2
+of Osada et al. 2002), in the square roots of its shares, and the sides of the box along the principal axes; size and turn do
+not matter.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from manitwin.errors import ManiTwinError
+from manitwin.formats.image_file import read_image
+from manitwin.formats.meshes.read import read_mesh
+from manitwin.formats.meshes.source import MeshLimits
+from manitwin.geometry.sampling import sample_surface
+from manitwin.models.embedders.looks import LENGTH, look_of
+from manitwin.render.raycast import merged
+from manitwin.twin.import_record import IMPORTED_MESH
+
+VERSION = 1
+"""Looks of another version are made again."""
+PICTURE, SHAPE = "picture", "shape"
+ALIKE = {PICTURE: 0.93, SHAPE: 0.995}
+"""From so much on two are alike. Set on views and meshes of templates, changed as who passes them on changes them
+(``benchmarks/alike.py``): what a crop of 5 %, another size, compression and brightness leave, and what other things have."""
+NEAR_SIDES = 0.03
+"""Of the longest side: how far the sides of two boxes may be apart."""
+_KEPT = 256
+_SIDE_PX = 448
+_POINTS, _PAIRS, _BINS, _ALMOST_ALL = 4000, 200_000, 64, 0.999
+_LIMITS = MeshLimits(max_bytes=1 << 28, max_faces=2_000_000, decode_textures=False, shading=False)
+
+
+def look_of_input(place: str, kind: str) -> bytes | None:
+    """Return the look of a file (``float16``, little-endian), None where it is broken or shows nothing."""
+    try:
+        vector = picture_look(_rgb(Path(place))) if kind == "image" else _shape(Path(place), kind)
+    except (ManiTwinError, ValueError):
+        return None
+    return vector.astype("<f2").tobytes()
+
+
+def similarity(first: np.ndarray, others: np.ndarray, by: str) -> np.ndarray:
+    """Return how alike a look ``(L,)`` is to others ``(N, L)``, 1 for the same; shapes of other boxes are not alike at all."""
+    if by == PICTURE:
+        return np.asarray(others @ first)
+    apart = np.abs(others[:, _BINS:] - first[_BINS:]).max(1)
+    return np.where(apart <= NEAR_SIDES, others[:, :_BINS] @ first[:_BINS], 0.0)
+
+
+def _rgb(path: Path) -> np.ndarray:
+    """Return a photo on white ``(H, W, 3) uint8``."""
+    pixels = read_image(path, max_side_px=_SIDE_PX).pixels
+    if pixels.shape[2] == 3:
+        return pixels
+    share = pixels[..., 3:].astype(np.float32) / 255
+    return np.asarray(np.rint(pixels[..., :3] * share + 255 * (1 - share)), np.uint8)
+
+
+def picture_look(rgb: np.ndarray) -> np.ndarray:
+    """Return the look of a picture ``(H, W, 3) uint8``, of unit length ``(256,) float32``."""
+    whole = look_of(rgb, np.ones(rgb.shape[:2], np.float32))
+    projected = _projection() @ whole
+    return np.asarray(projected / max(float(np.linalg.norm(projected)), 1e-9), np.float32)
+
+
+def _projection() -> np.ndarray:
+    return np.random.default_rng(VERSION).normal(size=(_KEPT, LENGTH)).astype(np.float32)
+
+
+def _shape(path: Path, kind: str) -> np.ndarray:
+    file = path / IMPORTED_MESH if kind == "asset" else path
+    mesh = merged(read_mesh(file, limits=_LIMITS).parts)
+    return shape_look(mesh)
+
+
+def shape_look(mesh: trimesh.Trimesh) -> np.ndarray:
+    """Return the look of a surface ``(67,) float32``; raises ValueError for one without area."""
+    if not float(mesh.area) > 0:
+        raise ValueError("a surface without area has no shape")
+    rng = np.random.default_rng(VERSION)
+    points = sample_surface(mesh, _POINTS, rng)[0]
+    first, second = rng.integers(0, len(points), (2, _PAIRS))
+    apart = np.linalg.norm(points[first] - points[second], axis=1)
+    shares = (
+        np.histogram(np.minimum(apart / np.quantile(apart, _ALMOST_ALL), 1.0), bins=_BINS, range=(0, 1))[0] / _PAIRS
+    )
+    centered = points - points.mean(0)
+    axes = np.linalg.svd(centered, full_matrices=False)[2]
+    sides = np.sort(np.ptp(centered @ axes.T, axis=0))[::-1]
+    return np.concatenate([np.sqrt(shares), sides / sides[0]]).astype(np.float32)
