@@ -55,7 +55,9 @@ def head_of(asset: Asset, model: mujoco.MjModel, root: Path) -> int | None:
     """Return the first body of the rigid group that the reader takes: by its name, else the first free one, else with a shape."""
     name = asset.name if asset.format == "mjcf" else str(open_urdf(asset.path, root).links[0][0].get("name"))
     named = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, name)
-    if named > 0:
+    if named > 0 and (
+        model.body_parentid[named] == 0 or model.body_jntnum[named]
+    ):  # else a file's name is a part's too
         return int(named)
     heads = [b for b in range(1, model.nbody) if model.body_parentid[b] == 0 or model.body_jntnum[b]]
     shaped = [head for head in heads if any(_is_solid(model, body) for body in group_of(model, head))]

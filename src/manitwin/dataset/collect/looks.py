@@ -26,8 +26,8 @@ VERSION = 1
 """Looks of another version are made again."""
 PICTURE, SHAPE = "picture", "shape"
 ALIKE = {PICTURE: 0.93, SHAPE: 0.995}
-"""From so much on two are alike. Set on views and meshes of templates, changed as who passes them on changes them
-(``benchmarks/alike.py``): what a crop of 5 %, another size, compression and brightness leave, and what other things have."""
+"""From so much on two are alike: between what is left after changes of who passes files on, and what other things have
+(``benchmarks/alike.py``, on public assets)."""
 NEAR_SIDES = 0.03
 """Of the longest side: how far the sides of two boxes may be apart."""
 _KEPT = 256
