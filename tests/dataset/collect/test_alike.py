@@ -15,6 +15,7 @@ from manitwin.cli.main import app
 from manitwin.dataset.collect.alike import mark_alike
 from manitwin.dataset.collect.intake import Given, add
 from manitwin.dataset.collect.looks import SHAPE, shape_look, similarity
+from manitwin.dataset.collect.schema import APPLICATION, MIGRATIONS
 
 MINE = Given(source="mine", licence="CC0-1.0")
 
@@ -94,3 +95,13 @@ def test_shapes_are_alike_in_any_turn_and_size_and_others_are_not() -> None:
     )
     near = similarity(shape_look(solid()), looks, SHAPE)
     assert near[0] > 0.999 and near[1] == 0 and near[2] < 0.95
+
+
+def test_a_catalogue_of_before_looks_is_brought_on(inputs: Path, tmp_path: Path) -> None:
+    catalogue = tmp_path / "old.db"
+    with sqlite3.connect(catalogue) as connection:
+        connection.executescript(f"{MIGRATIONS[0]} PRAGMA application_id = {APPLICATION}; PRAGMA user_version = 1;")
+    add(catalogue, inputs, MINE)
+    with sqlite3.connect(catalogue) as connection:
+        assert connection.execute("PRAGMA user_version").fetchone() == (len(MIGRATIONS),)
+        assert connection.execute("SELECT count(*) FROM looks").fetchone() == (0,)
