@@ -15,14 +15,12 @@ from manitwin.models.matting.object_network import (
     BLOCKS,
     CHANNELS,
     MIXES,
-    SIDES_PX,
+    SIDE_PX,
     decoder_weights,
     in_two_looks,
     network_bytes,
     object_share,
 )
-
-SIDE_PX = SIDES_PX[0]
 
 
 def _scene(center: tuple[int, int], axes: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
@@ -86,7 +84,7 @@ def test_the_layers_are_those_of_a_feature_pyramid() -> None:
             y = convolved(f"mix{level}.{mix}", y)
     quarters = convolved("answer", y, active=False)
     logits = quarters.reshape(2, 2, SIDE_PX // 2, SIDE_PX // 2).transpose(2, 0, 3, 1).reshape(SIDE_PX, SIDE_PX)
-    share = run(network_bytes(load_weights(), decoder_weights(), SIDE_PX))[0]
+    share = run(network_bytes(load_weights(), decoder_weights()))[0]
     assert np.abs(1 / (1 + np.exp(-logits)) - share).max() < 1e-3
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -14,19 +14,14 @@ from manitwin.models.matting.confidence import MatteScores, score
 from manitwin.models.matting.outline import dilated, eroded, opened
 from manitwin.models.matting.segmentation import MOSTLY_NARROW, Segmentation, without_specks
 
-Maker = Literal["rules", "network", "built_in_network", "both"]
-"""``network`` is the one that a person named, or else the built-in one; that one's second opinion has a name of its own. ``both``
-is what the first network found and the parts in focus that rules found besides: no opinion of its own."""
+Maker = Literal["rules", "network", "built_in_network"]
+"""``network`` is the one that a person named, or else the built-in one; that one's second opinion has a name of its own."""
 NETWORKS: tuple[Maker, ...] = ("network", "built_in_network")
 AGREEING = 0.98
 """Likeness of two masks beyond which rules and a network have found the same thing."""
 SURE = 0.9
 """Share of object of a pixel that a network calls certain; below one less that, it is certain of the ground."""
 LEAST_PIXELS = 30
-LEAST_ADDED = 0.003
-UNLIKE_GROUND = 4.0
-"""Of ``Background.distance``: what nine in ten pixels of a border are below."""
-RIM_PX = 2
 
 
 @dataclass(frozen=True)
@@ -39,13 +34,8 @@ class Candidate:
 
     @property
     def by_network(self) -> bool:
-        """Whether a network found it, or most of it."""
-        return self.maker != "rules"
-
-    @property
-    def independent(self) -> bool:
-        """Whether it is an opinion of its own."""
-        return self.maker != "both"
+        """Whether a network found it."""
+        return self.maker in NETWORKS
 
 
 def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float) -> list[Candidate]:
@@ -60,11 +50,6 @@ def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float
         if learned.any():
             seen = replace(found, mask=learned, shadow=found.shadow & ~learned, hard=found.hard & ~learned)
             masks.append((maker, seen))
-            joined = learned | lost_parts(found.mask, seen)
-            if maker == NETWORKS[0] and joined.sum() > (1 + LEAST_ADDED) * learned.sum():
-                masks.append(
-                    ("both", replace(seen, mask=joined, shadow=seen.shadow & ~joined, hard=seen.hard & ~joined))
-                )
     return [Candidate(maker, each, score(each, zoom=zoom)) for maker, each in masks if _has_outline(each.mask)]
 
 
@@ -110,9 +95,10 @@ def overlap(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def misjudged(candidate: Candidate, others: list[Candidate]) -> float:
-    """Return the area, by the candidate's own, of what others see otherwise and with reason.
+    """Return the area, by the candidate's own, of what others see otherwise and what has an outline in focus all around.
 
-    That are parts of theirs that it lost, and holes of theirs with an outline in focus that it fills, as the loop of scissors.
+    That is a piece that they have and the candidate lacks, or a hole of theirs that it fills. A shadow's edge is soft, and
+    ground has none: such a piece is a part of the thing, a grey blade or a dark tip, and such a hole the loop of scissors.
     Where rules and a network have found the same, what a third sees alone is outvoted.
     """
     found = candidate.found
@@ -125,55 +111,34 @@ def misjudged(candidate: Candidate, others: list[Candidate]) -> float:
     total = 0
     for other in agreeing or others:
         theirs = other.found.mask
-        total += int(lost_parts(theirs, found).sum())
+        total += _in_focus(opened(theirs & ~found.mask, 2), ~dilated(found.mask, 3), near_narrow)
         holes = ndimage.binary_fill_holes(theirs) & ~theirs
-        for box, piece in _pieces(opened(holes & found.mask, 2)):
-            if _mean_of(near_narrow[box], piece & ~eroded(piece, 1)) > MOSTLY_NARROW:
-                total += int(piece.sum())
+        total += _in_focus(opened(holes & found.mask, 2), np.ones_like(holes), near_narrow)
     return total / max(int(found.mask.sum()), 1)
 
 
-def lost_parts(mask: np.ndarray, found: Segmentation) -> np.ndarray:
-    """Return the pieces of another ``mask`` (H, W) that ``found`` lacks and that are parts of the thing.
-
-    A shadow's edge is soft, and ground has none: what has an outline in focus, where it is no part of what was found, is a part,
-    a grey blade or a dark tip. What lies within and has not the ground's colour is no hole, but a part too.
-    """
-    near_narrow, free = dilated(found.narrow, 3), ~dilated(found.mask, 3)
-    lost = np.zeros(mask.shape, bool)
-    for box, piece in _pieces(opened(mask & ~found.mask, 2)):
-        outline = piece & ~eroded(piece, 1) & free[box]
-        if outline.any():
-            is_part = _mean_of(near_narrow[box], outline) > MOSTLY_NARROW
-        else:
-            is_part = float(np.median(found.background.distance[box][piece])) > UNLIKE_GROUND
-        if is_part:
-            lost[box] |= piece
-    return lost
-
-
-def _pieces(mask: np.ndarray) -> Iterator[tuple[tuple[slice, slice], np.ndarray]]:
-    """Yield the box around each 4-connected piece of a mask, and the piece in it."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
+def _in_focus(pieces: np.ndarray, free: np.ndarray, near_narrow: np.ndarray) -> int:
+    """Return the area of those pieces (H, W) whose outline, where it is ``free``, is mostly near narrow edges."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(pieces.astype(np.uint8), connectivity=4)
+    total = 0
     for index in range(1, count):
-        left, top, width, height, _ = stats[index]
-        box = (slice(max(0, top - 3), top + height + 3), slice(max(0, left - 3), left + width + 3))
-        yield box, labels[box] == index
-
-
-def _mean_of(values: np.ndarray, where: np.ndarray) -> float:
-    return float(values[where].mean()) if where.any() else 0.0
+        left, top, width, height, area = stats[index]
+        box = np.s_[max(0, top - 3) : top + height + 3, max(0, left - 3) : left + width + 3]
+        piece = labels[box] == index
+        outline = piece & ~eroded(piece, 1) & free[box]
+        if outline.any() and near_narrow[box][outline].mean() > MOSTLY_NARROW:
+            total += int(area)
+    return total
 
 
 def doubts(share: np.ndarray, mask: np.ndarray) -> tuple[float, float, float]:
     """Return how unsure a network's ``share`` (H, W) is, and how much it says against a mask within and beyond it.
 
-    Each as a share of the mask's area: pixels between certain object and certain ground; ground within; object beyond; all but
-    for a rim of two pixels, where a network's picture is blurred.
+    Each as a share of the mask's area: pixels between certain object and certain ground; ground within, object beyond, both but
+    for a rim of two pixels.
     """
     area = max(int(mask.sum()), 1)
-    inside, outside = eroded(mask, RIM_PX), ~dilated(mask, RIM_PX)
-    unsure = float(((share > 1 - SURE) & (share < SURE) & (inside | outside)).sum() / area)
-    within = float((1 - share)[inside].sum() / area)
-    beyond = float(share[outside].sum() / area)
+    unsure = float(((share > 1 - SURE) & (share < SURE)).sum() / area)
+    within = float((1 - share)[eroded(mask, 2)].sum() / area)
+    beyond = float(share[~dilated(mask, 2)].sum() / area)
     return unsure, within, beyond

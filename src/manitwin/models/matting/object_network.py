@@ -21,8 +21,7 @@ from manitwin.models.classifiers.efficientnet_lite import NAME as ENCODER
 
 NAME = "object-network"
 WEIGHTS_FILE = "object_network.npz"
-SIDES_PX = (288, 384)
-"""Of the picture that is looked at, twice: a larger one shows thin parts, a smaller one is surer of shadows. The mean counts."""
+SIDE_PX = 288
 BLOCKS = (0, 2, 4, 10, 15)
 """Of the encoder, after which the picture is 1/2, 1/4, 1/8, 1/16 and 1/32 as large."""
 CHANNELS = (24, 32, 48, 64, 96)
@@ -63,20 +62,17 @@ def in_two_looks(rgb: np.ndarray, look: Callable[[np.ndarray], np.ndarray]) -> n
 
 
 def _seen(rgb: np.ndarray) -> np.ndarray:
-    shares = []
-    for side_px in SIDES_PX:
-        shrinks = max(rgb.shape[:2]) > side_px
-        picture = cv2.resize(rgb, (side_px, side_px), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
-        network = _network(side_px)
-        network.setInput(((picture.astype(np.float32) - MEAN) / DEVIATION).transpose(2, 0, 1)[None].copy())
-        share = np.asarray(network.forward()[0, 0], np.float32)
-        shares.append(np.clip(cv2.resize(share, rgb.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1))
-    return np.asarray(np.mean(shares, axis=0))
+    shrinks = max(rgb.shape[:2]) > SIDE_PX
+    picture = cv2.resize(rgb, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR)
+    network = _network()
+    network.setInput(((picture.astype(np.float32) - MEAN) / DEVIATION).transpose(2, 0, 1)[None].copy())
+    share = np.asarray(network.forward()[0, 0], np.float32)
+    return np.asarray(np.clip(cv2.resize(share, rgb.shape[1::-1], interpolation=cv2.INTER_LINEAR), 0, 1))
 
 
 @cache
-def _network(side_px: int) -> cv2.dnn.Net:
-    return cv2.dnn.readNetFromONNX(np.frombuffer(network_bytes(load_weights(), decoder_weights(), side_px), np.uint8))
+def _network() -> cv2.dnn.Net:
+    return cv2.dnn.readNetFromONNX(np.frombuffer(network_bytes(load_weights(), decoder_weights()), np.uint8))
 
 
 def built_in_model() -> str:
@@ -96,10 +92,10 @@ def _decoder_file() -> bytes:
     return (files("manitwin.models.matting") / WEIGHTS_FILE).read_bytes()
 
 
-def network_bytes(encoder: dict[str, np.ndarray], decoder: dict[str, np.ndarray], side_px: int) -> bytes:
-    """Return encoder and decoder as ONNX: input ``(1, 3, side_px, side_px)`` as the encoder's, output the share of object."""
-    graph, values = trunk(encoder, side_px)
-    sides = [side_px // 2 ** (level + 1) for level in range(len(BLOCKS))]
+def network_bytes(encoder: dict[str, np.ndarray], decoder: dict[str, np.ndarray]) -> bytes:
+    """Return encoder and decoder as ONNX: input ``(1, 3, 288, 288)`` as the encoder's, output the share of object."""
+    graph, values = trunk(encoder, SIDE_PX)
+    sides = [SIDE_PX // 2 ** (level + 1) for level in range(len(BLOCKS))]
 
     def convolved(name: str, value: str, *, active: bool = True) -> str:
         kernel = decoder[f"{name}.weight"].astype(np.float32)
@@ -128,4 +124,4 @@ def network_bytes(encoder: dict[str, np.ndarray], decoder: dict[str, np.ndarray]
             value = convolved(f"mix{level}.{mix}", value)
     quarters = convolved("answer", value, active=False)
     share = graph.node("Sigmoid", [graph.node("DepthToSpace", [quarters], "whole", blocksize=2, mode="CRD")], "share")
-    return graph.to_bytes(share, (1, 1, side_px, side_px))
+    return graph.to_bytes(share, (1, 1, SIDE_PX, SIDE_PX))
