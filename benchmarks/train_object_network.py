@@ -7,8 +7,8 @@
 ``decoder.npz`` becomes ``src/manitwin/models/matting/object_network.npz``. ``encoder`` and ``draw`` want this package; ``train``
 wants PyTorch 2 and NumPy and nothing else, so it can run in an environment of its own. The encoder, EfficientNet-Lite0, is taken
 as it is: it knows real photos, which made ones cannot teach. The pictures are of other seeds than those of every other part, show
-none of the held-out grounds and none of a quarter of the categories, and are varied in each round (``picture_variations.py``).
-Batches follow from the seed, but arithmetic
+none of the held-out grounds and none of a quarter of the categories, and are varied in each round: turned, scaled, mirrored,
+brighter, paler, in other hues, noisier, with other pictures as prints on the thing. Batches follow from the seed, but arithmetic
 is bfloat16 where the processor has it and the learning rate follows the clock: weights differ a little each time; ``matting.py``
 judges them.
 """
@@ -32,7 +32,8 @@ SEEN = {0: 16, 2: 24, 4: 40, 10: 112, 15: 320}
 CHANNELS, MIXES = (24, 32, 48, 64, 96), 2
 MEAN, DEVIATION = 127.0, 128.0
 BATCH, RATE, SEED = 16, 3e-3, 0
-RATE_ON = 1e-3  # of a decoder that has begun
+RATE_ON = 6e-4  # of a decoder that has begun
+LOG_SCALE = (-0.8, 0.45)  # of what is seen of a picture: down to 0.45 of it, since the second look is as close
 
 
 def draw(folder: Path, first: int, count: int) -> None:
@@ -136,6 +137,47 @@ def decoder() -> Any:
     return Decoder()
 
 
+def varied(x: Any, truth: Any) -> tuple[Any, Any]:
+    """Return pictures (B, 3, H, W) in [0, 1] and their truth at the network's size, each seen, lit and printed in its own way."""
+    import torch
+    from torch.nn import functional
+
+    count, _, height, width = x.shape
+
+    def drawn(low: float, high: float, *shape: int) -> torch.Tensor:
+        return torch.empty(count, *shape).uniform_(low, high)
+
+    def each(values: torch.Tensor) -> torch.Tensor:
+        return values[:, None, None, None]
+
+    turn = torch.where(torch.rand(count) < 0.15, drawn(-math.pi, math.pi), drawn(-0.35, 0.35))
+    scale, stretch = torch.exp(drawn(*LOG_SCALE)), torch.exp(drawn(-0.25, 0.25))
+    mirror = torch.where(torch.rand(count) < 0.5, -1.0, 1.0)
+    cos, sin, ratio = torch.cos(turn), torch.sin(turn), height / width
+    first = torch.stack([mirror * cos * scale * stretch, -sin * scale * ratio, drawn(-0.15, 0.15)], 1)
+    second = torch.stack([mirror * sin * scale * stretch / ratio, cos * scale, drawn(-0.15, 0.15)], 1)
+    grid = functional.affine_grid(torch.stack([first, second], 1), [count, 3, SIDE_PX, SIDE_PX], align_corners=False)
+    x = functional.grid_sample(x, grid, padding_mode="reflection", align_corners=False)
+    truth = functional.grid_sample(truth, grid, padding_mode="reflection", align_corners=False)
+    other = x[torch.randperm(count)].flip(3)
+    other = other / (other.mean((1, 2, 3), keepdim=True) + 0.05)
+    printed = truth * each(drawn(0, 1) * (torch.rand(count) < 0.35))
+    printed = printed + (1 - truth) * each(drawn(0, 0.12) * (torch.rand(count) < 0.25))
+    x = x * (1 - printed + printed * other.clamp(0.1, 2.2))
+    x = x.clamp(1e-4, 1) ** each(torch.exp(drawn(-0.4, 0.4)))
+    x = x * torch.exp(drawn(-0.25, 0.25, 3))[:, :, None, None]
+    grey = x.mean(1, keepdim=True)
+    x = grey + (x - grey) * each(torch.where(torch.rand(count) < 0.1, torch.zeros(count), torch.exp(drawn(-0.7, 0.5))))
+    swapped = torch.rand(count) < 0.25
+    x[swapped] = x[swapped][:, torch.randperm(3)]
+    mean = x.mean((2, 3), keepdim=True)
+    x = mean + (x - mean) * each(torch.exp(drawn(-0.4, 0.3)))
+    x = x + torch.randn_like(x) * each(drawn(0, 0.02) * (torch.rand(count) < 0.5))
+    if torch.rand(1) < 0.3:
+        x = functional.avg_pool2d(x, 3, 1, 1)
+    return x.clamp(0, 1), truth
+
+
 def loss_of(answer: Any, truth: Any) -> Any:
     """Return the cross-entropy, three times as heavy along outlines, and one less the soft IoU (Rahman and Wang 2016)."""
     import torch
@@ -157,7 +199,6 @@ def train(
     Returns the weights, batch normalisation folded in, as float16.
     """
     import torch
-    from picture_variations import varied
 
     torch.manual_seed(SEED)
     torch.set_num_threads(threads)
@@ -184,8 +225,9 @@ def train(
         chosen = [rows[index] for index in rng.integers(0, len(rows), BATCH)]
         rgb, truth = (np.stack([pictures[folder][kind][row] for folder, row in chosen]) for kind in (0, 1))
         with torch.no_grad():
-            x = torch.from_numpy(rgb).permute(0, 3, 1, 2).float() / 255
-            x, target = varied(x, torch.from_numpy(truth)[:, None].float() / 255, SIDE_PX)
+            x, target = varied(
+                torch.from_numpy(rgb).permute(0, 3, 1, 2).float() / 255, torch.from_numpy(truth)[:, None].float() / 255
+            )
         picture = ((x * 255 - MEAN) / DEVIATION).contiguous(memory_format=torch.channels_last)
         with torch.autocast("cpu", dtype=torch.bfloat16):
             with torch.no_grad():
