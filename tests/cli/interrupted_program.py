@@ -2,7 +2,8 @@
 
 It notes in FOLDER that it is at work (``started``) and that it is ending (``ending``). MODE ``busy`` computes until it is
 interrupted; ``slow`` then takes for ever over its end; ``late`` gets a second one as Python takes the process down;
-``run`` has two workers asleep in a stage; ``native`` is in native code; ``listing``,
+``run`` has two workers asleep in a stage; ``native`` is in native code; ``server`` serves, and waits longer
+for its last answers than native code may take; ``listing``,
 ``manifest`` and ``inspection`` look at inputs.
 """
 
@@ -12,12 +13,14 @@ import ctypes
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import manitwin.cli.main as cli
+from manitwin.cli.interrupt import NATIVE_PATIENCE_S, first_interrupt_calls
 from manitwin.cli.progress import WatchedRun
 from manitwin.cli.reporting import reported
 
@@ -30,6 +33,9 @@ def work() -> None:
             rehearse()
         if MODE in ("listing", "manifest", "inspection"):
             look_at_inputs()
+        if MODE == "server":
+            serve()
+            return
         (FOLDER / "started").touch()
         if MODE == "native":  # which answers no signal, and lets other threads run
             while True:
@@ -41,6 +47,14 @@ def work() -> None:
         (FOLDER / "ending").touch()
         while MODE == "slow":
             time.sleep(0.01)
+
+
+def serve() -> None:
+    stop = threading.Event()
+    with first_interrupt_calls(stop.set, (signal.SIGINT,)):
+        (FOLDER / "started").touch()
+        stop.wait()
+        time.sleep(NATIVE_PATIENCE_S + 1.0)
 
 
 class InterruptsWhenTakenDown:

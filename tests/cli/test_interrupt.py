@@ -119,6 +119,13 @@ def test_native_code_that_does_not_return_is_ended_too(tmp_path: Path, number: s
     assert program.end() == (130, ["manitwin stats: interrupted"])
 
 
+def test_a_server_that_waits_for_its_last_answers_ends_in_order(tmp_path: Path) -> None:
+    program = Interrupted(tmp_path, "fake", "server")
+    program.wait_for("started")
+    program.send(signal.SIGINT)
+    assert program.end() == (0, [])
+
+
 @pytest.mark.parametrize("what", ["listing", "manifest", "inspection"])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
 def test_a_build_that_looks_at_its_inputs_answers_signals(tmp_path: Path, what: str, number: signal.Signals) -> None:

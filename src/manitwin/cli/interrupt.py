@@ -11,7 +11,8 @@ import signal
 import sys
 import threading
 import time
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from types import FrameType
 from typing import NoReturn
@@ -75,6 +76,30 @@ def leave_when_interrupted() -> None:
     for number in SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:  # as a shell's background jobs have it
             signal.signal(number, leave)
+
+
+@contextmanager
+def first_interrupt_calls(stop: Callable[[], None], numbers: tuple[signal.Signals, ...]) -> Iterator[None]:
+    """Have the first of these signals call ``stop``, which ends a server in order; a second one ends what does not stop.
+
+    Nothing is raised where the signal comes. While the context lasts no thread waits for the command's own handler
+    (``Interrupts``): a server that waits for its last answers is not one that hangs.
+    """
+    before = {number: signal.getsignal(number) for number in numbers}
+    watched = signal.set_wakeup_fd(-1)
+
+    def interrupted(number: int, frame: FrameType | None) -> None:
+        signal.signal(number, before[signal.Signals(number)])
+        stop()
+
+    for number in numbers:
+        signal.signal(number, interrupted)
+    try:
+        yield
+    finally:
+        signal.set_wakeup_fd(watched, warn_on_full_buffer=False)
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 class Interrupts:

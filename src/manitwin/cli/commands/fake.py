@@ -11,6 +11,7 @@ import typer
 from manitwin.cli import choices
 from manitwin.cli.choices import LARGEST_COUNT
 from manitwin.cli.console import out_console
+from manitwin.cli.interrupt import first_interrupt_calls
 
 
 def fake(
@@ -38,15 +39,9 @@ def fake(
     if name is None:
         raise UsageError(f"no service is named; give one of {', '.join(REHEARSALS)}")
     given = Faults.parse(fault or [])
-    stop, before = threading.Event(), signal.getsignal(signal.SIGINT)
-
-    def interrupted(number: int, frame: object) -> None:
-        signal.signal(signal.SIGINT, before)  # a second one ends what does not stop
-        stop.set()
-
+    stop = threading.Event()
     # an interrupt that was raised inside of a line's printing would print that line again
-    signal.signal(signal.SIGINT, interrupted)
-    try:
+    with first_interrupt_calls(stop.set, (signal.SIGINT,)):
         with serving(name, port=port, faults=given, key=key, polls=polls) as server:
             out_console.print(f"{name} at {server.url}, until interrupted (Ctrl-C)")
             if server.key_variable is not None:
@@ -54,5 +49,3 @@ def fake(
             out_console.print(f"manitwin {server.command} {server.option} {server.spec}")
             stop.wait()
         out_console.print("stopped")
-    finally:
-        signal.signal(signal.SIGINT, before)

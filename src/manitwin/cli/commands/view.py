@@ -7,7 +7,7 @@ import signal
 import sys
 import webbrowser
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +15,7 @@ import typer
 
 from manitwin.cli import choices, options
 from manitwin.cli.console import err_console, out_console
+from manitwin.cli.interrupt import first_interrupt_calls
 
 if TYPE_CHECKING:
     from manitwin.web.serve import PageServer
@@ -91,27 +92,13 @@ def view(
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[PageServer], None]]:
-    """Give a function that has the first interrupt end a server in order; a second one ends what does not stop."""
-    running: list[PageServer] = []
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
-    watched = signal.set_wakeup_fd(-1)  # a server that waits for its last answers is not one that hangs (cli.interrupt)
+    """Give a function that has the first interrupt from then on end a server in order; before, it ends the command."""
+    with ExitStack() as ending:
 
-    def interrupted(number: int, frame: object) -> None:
-        signal.signal(number, before[signal.Signals(number)])
-        for server in running:
-            server.stop()
+        def ends(server: PageServer) -> None:
+            ending.enter_context(first_interrupt_calls(server.stop, (signal.SIGINT, signal.SIGTERM)))
 
-    def ends(server: PageServer) -> None:
-        running.append(server)
-        for number in before:
-            signal.signal(number, interrupted)
-
-    try:
         yield ends
-    finally:
-        signal.set_wakeup_fd(watched, warn_on_full_buffer=False)
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _write(source: str, out: Path, sample: int | None, seed: int, where: str, trials: int, twins: str | None) -> None:
