@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import cv2
 import numpy as np
 import pytest
 
-from manitwin.models.matting.candidates import Candidate, candidates, misjudged
+from manitwin.models.matting.candidates import Candidate, candidates, lost_parts, misjudged, overlap
 from manitwin.models.matting.segmentation import Segmentation, segment
 
 SIZE = (300, 400)
@@ -70,3 +71,28 @@ def test_what_a_third_sees_alone_is_outvoted_where_rules_and_a_network_agree() -
     assert misjudged(three["network"], [three["rules"], three["built_in_network"]]) > 0.05, (
         "two networks are not enough"
     )
+
+
+def test_parts_that_rules_alone_found_are_joined_to_what_the_network_found() -> None:
+    truth = ring_found()[1]
+    joined = made(half())["both"]
+    assert overlap(joined.found.mask, truth) > 0.97
+    assert joined.by_network and not joined.independent
+    assert misjudged(joined, [made(half())["rules"]]) < 0.01
+
+
+def test_a_piece_of_soft_outline_is_no_part() -> None:
+    found, truth = ring_found()
+    beside = cv2.ellipse(np.zeros(SIZE, np.uint8), (345, 235), (40, 25), 0, 0, 360, 1, -1) > 0
+    taken = replace(found, mask=found.mask | beside)  # of plain ground, as a shadow that was taken for a part
+    assert not lost_parts(taken.mask, found).any()
+    assert "both" not in {each.maker for each in candidates(taken, [truth.astype(np.float32)], zoom=1.0)}
+
+
+def test_what_lies_within_is_a_part_unless_it_has_the_ground_s_colour() -> None:
+    found, truth = ring_found()
+    notched = truth.copy()
+    notched[60:75, 190:210] = False  # of the ring's own colour
+    seen = replace(found, mask=notched)
+    assert (lost_parts(truth, seen) & ~notched).sum() > 0.8 * (truth & ~notched).sum()
+    assert not lost_parts(filled(), replace(found, mask=truth, narrow=np.zeros_like(truth))).any(), "a hole"

@@ -69,7 +69,8 @@ def test_cap_of_the_ground_s_colour_with_an_outline_in_focus_is_no_shadow(light:
     study = study_photo(_photo(scene))
     matted, truth = study.alpha > 127, cap | body
     assert (matted & truth).sum() / (matted | truth).sum() > 0.95
-    assert study.judged[0].candidate.scores.stable > 0.9  # it has all edges in focus for its outline
+    by_rules = next(each.candidate for each in study.judged if each.candidate.maker == "rules")
+    assert by_rules.scores.stable > 0.9  # it has all edges in focus for its outline
     assert (study.confidence >= MIN_CONFIDENCE) == believed
 
 
@@ -211,4 +212,4 @@ def test_real_photos_are_accepted_where_two_opinions_agree(shared_data: Path) ->
     assert set(reasons.values()) == {"low_confidence_matte"}
     assert "the image border cuts it off" in details["yogurt_carton_box"]
     assert "cluttered" in details["whisk_ai"]
-    assert "seen through it" in details["hand_sanitizer"]
+    assert "do not agree" in details["hand_sanitizer"]

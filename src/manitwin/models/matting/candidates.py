@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -14,14 +14,18 @@ from manitwin.models.matting.confidence import MatteScores, score
 from manitwin.models.matting.outline import dilated, eroded, opened
 from manitwin.models.matting.segmentation import MOSTLY_NARROW, Segmentation, without_specks
 
-Maker = Literal["rules", "network", "built_in_network"]
-"""``network`` is the one that a person named, or else the built-in one; that one's second opinion has a name of its own."""
+Maker = Literal["rules", "network", "built_in_network", "both"]
+"""``network`` is the one that a person named, or else the built-in one; that one's second opinion has a name of its own. ``both``
+is what the first network found and the parts in focus that rules found besides: no opinion of its own."""
 NETWORKS: tuple[Maker, ...] = ("network", "built_in_network")
 AGREEING = 0.98
 """Likeness of two masks beyond which rules and a network have found the same thing."""
 SURE = 0.9
 """Share of object of a pixel that a network calls certain; below one less that, it is certain of the ground."""
 LEAST_PIXELS = 30
+LEAST_ADDED = 0.003
+UNLIKE_GROUND = 4.0
+"""Of ``Background.distance``: what nine in ten pixels of a border are below."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +38,13 @@ class Candidate:
 
     @property
     def by_network(self) -> bool:
-        """Whether a network found it."""
-        return self.maker in NETWORKS
+        """Whether a network found it, or most of it."""
+        return self.maker != "rules"
+
+    @property
+    def independent(self) -> bool:
+        """Whether it is an opinion of its own."""
+        return self.maker != "both"
 
 
 def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float) -> list[Candidate]:
@@ -50,6 +59,10 @@ def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float
         if learned.any():
             seen = replace(found, mask=learned, shadow=found.shadow & ~learned, hard=found.hard & ~learned)
             masks.append((maker, seen))
+            joined = learned | lost_parts(found.mask, seen)
+            if maker == NETWORKS[0] and joined.sum() > (1 + LEAST_ADDED) * learned.sum():
+                whole = replace(seen, mask=joined, shadow=seen.shadow & ~joined, hard=seen.hard & ~joined)
+                masks.append(("both", whole))
     return [Candidate(maker, each, score(each, zoom=zoom)) for maker, each in masks if _has_outline(each.mask)]
 
 
@@ -111,24 +124,44 @@ def misjudged(candidate: Candidate, others: list[Candidate]) -> float:
     total = 0
     for other in agreeing or others:
         theirs = other.found.mask
-        total += _in_focus(opened(theirs & ~found.mask, 2), ~dilated(found.mask, 3), near_narrow)
         holes = ndimage.binary_fill_holes(theirs) & ~theirs
-        total += _in_focus(opened(holes & found.mask, 2), np.ones_like(holes), near_narrow)
+        lost, filled = opened(theirs & ~found.mask, 2), opened(holes & found.mask, 2)
+        for pieces, free in ((lost, ~dilated(found.mask, 3)), (filled, np.ones_like(lost))):
+            total += sum(
+                int(piece.sum()) for box, piece in _pieces(pieces) if _in_focus(piece, free[box], near_narrow[box])
+            )
     return total / max(int(found.mask.sum()), 1)
 
 
-def _in_focus(pieces: np.ndarray, free: np.ndarray, near_narrow: np.ndarray) -> int:
-    """Return the area of those pieces (H, W) whose outline, where it is ``free``, is mostly near narrow edges."""
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(pieces.astype(np.uint8), connectivity=4)
-    total = 0
+def lost_parts(mask: np.ndarray, found: Segmentation) -> np.ndarray:
+    """Return the pieces of another ``mask`` (H, W) that ``found`` lacks and that are parts of the thing.
+
+    What has an outline in focus, where it is no part of what was found, is a part, a grey blade or a dark tip. What lies within
+    and has not the ground's colour is no hole, but a part too.
+    """
+    lost = np.zeros(mask.shape, bool)
+    near_narrow, free = dilated(found.narrow, 3), ~dilated(found.mask, 3)
+    for box, piece in _pieces(opened(mask & ~found.mask, 2)):
+        within = not (piece & ~eroded(piece, 1) & free[box]).any()
+        unlike_ground = np.median(found.background.distance[box][piece]) > UNLIKE_GROUND
+        if unlike_ground if within else _in_focus(piece, free[box], near_narrow[box]):
+            lost[box] |= piece
+    return lost
+
+
+def _in_focus(piece: np.ndarray, free: np.ndarray, near_narrow: np.ndarray) -> bool:
+    """Tell whether the outline of a piece (H, W), where it is ``free``, is mostly near narrow edges."""
+    outline = piece & ~eroded(piece, 1) & free
+    return bool(outline.any() and near_narrow[outline].mean() > MOSTLY_NARROW)
+
+
+def _pieces(mask: np.ndarray) -> Iterator[tuple[tuple[slice, slice], np.ndarray]]:
+    """Yield the box around each 4-connected piece of a mask (H, W), and the piece in it."""
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     for index in range(1, count):
-        left, top, width, height, area = stats[index]
+        left, top, width, height, _ = stats[index]
         box = np.s_[max(0, top - 3) : top + height + 3, max(0, left - 3) : left + width + 3]
-        piece = labels[box] == index
-        outline = piece & ~eroded(piece, 1) & free[box]
-        if outline.any() and near_narrow[box][outline].mean() > MOSTLY_NARROW:
-            total += int(area)
-    return total
+        yield box, labels[box] == index
 
 
 def doubts(share: np.ndarray, mask: np.ndarray) -> tuple[float, float, float]:

@@ -143,7 +143,7 @@ def judged_candidates(
     made = candidates(found, shares, zoom=max(rgb.shape[:2]) / max(found.mask.shape))
     judged = []
     for each in made:
-        others = [other for other in made if other is not each]
+        others = [other for other in made if other is not each and other.independent]
         beside = [Judged(each, features(each, others, share)) for share in shares]
         judged.append(max(beside, key=lambda one: one.confidence))
     return found, judged, shares
