@@ -14,7 +14,7 @@ from handmade import candidates, mug, visual
 from manitwin.engine.stage import Draft
 from manitwin.errors import BadReply
 from manitwin.formats.glb import write_glb
-from manitwin.models.annotators.protocol import CloserPlace, PointsRequest, SelectedPoints, Subject
+from manitwin.models.annotators.protocol import CloserLook, CloserPlace, PointsRequest, SelectedPoints, Subject
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.pipeline.caption import CaptionStage
 from manitwin.pipeline.item import Item
@@ -104,13 +104,15 @@ def test_points_that_are_no_candidates_are_no_answer(draft: Draft, tmp_path: Pat
 class _LooksCloser(RulesAnnotator):
     """Moves every functional point up by a millimetre."""
 
-    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> dict[str, CloserPlace]:
+    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> CloserLook:
         up = np.array([0, 0, 0.001])
-        return {p.id: CloserPlace(np.array(p.position_m) + up, np.array([0, 0, 1.0])) for p in points}
+        places = {p.id: CloserPlace(np.array(p.position_m) + up, np.array([0, 0, 1.0])) for p in points}
+        return CloserLook(places, {points[0].id: np.full((8, 8, 3), 200, np.uint8)})
 
 
 def test_points_go_where_the_closer_look_saw_them_and_say_where_they_were_marked(draft: Draft, tmp_path: Path) -> None:
     fields = PointsStage(_LooksCloser(), GRIPPER).run(draft, tmp_path)
+    assert [path.name for path in (tmp_path / "closer").iterdir()] == ["closer_f0.webp"]
     positions, moved = (
         draft.field("candidates")["positions_m"],
         {r["candidate"]: r for r in fields["refined_candidates"]},

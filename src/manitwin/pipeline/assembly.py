@@ -159,7 +159,7 @@ def _write_accepted(draft: Draft[Item], folder: Path) -> None:
         with np.load(draft.path(PARTS_FILE)) as arrays:
             (folder / FACE_PARTS).write_bytes(labels_to_npy(arrays["visual"]))
     (folder / "views").mkdir()
-    for artifact in ("views/", "marked/"):
+    for artifact in ("views/", "marked/", "closer/"):
         for picture in sorted(draft.path(artifact).iterdir()):
             shutil.copyfile(picture, folder / "views" / picture.name)
     (folder / "collision").mkdir()

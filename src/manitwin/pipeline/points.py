@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -19,29 +19,33 @@ from manitwin.pipeline.frames import with_frames
 from manitwin.pipeline.human_corrections import corrected_points
 from manitwin.pipeline.object_state import findings_of, pictures, read_scaled_subject
 from manitwin.pipeline.refinement import marked_at, refined_points
+from manitwin.pipeline.views import write_webp
 from manitwin.render.raycast import merged, seen_tolerance_m
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint, RefinedCandidate
 
 FUNCTIONAL, GRASP = (2, 4), (2, 3)
 """How many points an object has (paper: 2-4 functional and 2-3 grasp points)."""
+WEBP_QUALITY = 90
+"""Of what is kept of the pictures from nearby."""
 
 
 class PointsStage:
     """Ask the annotator for points, see that each is one of the candidates, and give the functional ones their frames.
 
-    An annotator that can looks at the functional points once more, from nearby. ``frames_missing`` says of each functional point
+    An annotator that can looks at the functional points once more, from nearby; ``closer/`` has the pictures that it was shown.
+    ``frames_missing`` says of each functional point
     without a frame why it has none, ``refined_candidates`` where the views have marked those that have moved since.
     """
 
     name: ClassVar[str] = "points"
-    version: ClassVar[str] = "9"
+    version: ClassVar[str] = "10"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "views/", "marked/", "physical", "size", "language", "candidates", "visible_candidates",
         "cameras", "geometry?", "naming?",
     )  # fmt: skip
     writes: ClassVar[tuple[str, ...]] = (
-        "points", "spare_grasp_points", "points_findings", "frames_missing", "refined_candidates",
+        "closer/", "points", "spare_grasp_points", "points_findings", "frames_missing", "refined_candidates",
     )  # fmt: skip
 
     settings = NO_SETTINGS
@@ -72,7 +76,10 @@ class PointsStage:
         surface = FramedMesh(request.subject.solid, request.center_of_mass_m, draft.seed)
         spares = _spares(selected, request)
         taken = {point.candidate for point in (*selected.grasp, *spares)} | _moved(selected.functional)
-        looked, seen_nearby = self._looked_at(selected.functional, request, taken)
+        looked, seen_nearby, shown = self._looked_at(selected.functional, request, taken)
+        (folder / "closer").mkdir(parents=True, exist_ok=True)
+        for point_id, picture in shown.items():
+            write_webp(picture, folder / "closer" / f"closer_{point_id}.webp", WEBP_QUALITY)
         framed, missing = with_frames(looked, surface)
         functional, refined = refined_points(framed, surface, taken, _on(request.subject))
         marked = {
@@ -91,11 +98,12 @@ class PointsStage:
 
     def _looked_at(
         self, points: Sequence[FunctionalPoint], request: PointsRequest, kept: set[int]
-    ) -> tuple[list[FunctionalPoint], list[RefinedCandidate]]:
-        """Return the points at the places that the annotator chose from nearby, and where the views have marked those."""
+    ) -> tuple[list[FunctionalPoint], list[RefinedCandidate], Mapping[str, np.ndarray]]:
+        """Return the points where the annotator chose from nearby, where the views have marked those, and its pictures."""
         if not isinstance(self._annotator, LooksCloser):
-            return list(points), []
-        better = self._annotator.look_closer(request, points)
+            return list(points), [], {}
+        closer = self._annotator.look_closer(request, points)
+        better = closer.places
         moved = [point for point in points if point.id in better and point.candidate not in kept]
         places = {point.id: better[point.id] for point in moved}
         looked = [
@@ -106,7 +114,7 @@ class PointsStage:
             else point
             for point in points
         ]
-        return looked, [marked_at(point) for point in moved]
+        return looked, [marked_at(point) for point in moved], closer.pictures
 
 
 def _spares(selected: SelectedPoints, request: PointsRequest) -> list[GraspPoint]:

@@ -23,7 +23,7 @@ INPUTS = {
 }
 """Inputs that are pictures which a browser shows."""
 NAMED = {CARD: "image/png", MODEL: "model/gltf-binary", RECORD: "application/json", **INPUTS}
-VIEWS = re.compile(r"views/(rgb|marked)_[0-9]{2}\.webp")
+VIEWS = re.compile(r"views/(rgb_[0-9]{2}|marked_[0-9]{2}|closer_f[0-9]+)\.webp")
 MOST_BYTES = 256 << 20
 """Of a file that is given to a browser, which keeps it in memory more than once. A scan's GLB with its textures has 100 MB."""
 CHUNK_BYTES = 1 << 18

@@ -146,8 +146,9 @@ def pictures(twin: Twin, links: Links) -> str:
         for kind, name, said in shown
     )
     note = (
-        "The model that named the object and chose its points was shown the input, the views (rgb) and the views with the"
-        f" numbered candidates (marked).{'' if links.live else ' The input is not among these files.'}"
+        "The model that named the object and chose its points was shown the input, the views (rgb), the views with the"
+        " numbered candidates (marked) and, where it looks once more, each functional point from nearby (closer)."
+        f"{'' if links.live else ' The input is not among these files.'}"
     )
     return f'<section class="pictures"><h2>Pictures</h2>\n<p class="note">{note}</p>\n<div>{figures}</div></section>\n'
 

@@ -12,7 +12,7 @@ from scripted_chat import ScriptedChat, annotator, points_request
 
 from handmade import mug
 from manitwin.errors import BadReply
-from manitwin.models.annotators.protocol import LooksCloser, PointsRequest
+from manitwin.models.annotators.protocol import CloserLook, LooksCloser, PointsRequest
 from manitwin.models.annotators.rules import RulesAnnotator
 from manitwin.models.annotators.vlm.closer_look import PLACES, Nearby, nearby_places
 from manitwin.models.annotators.vlm.place_checks import PlaceChecks
@@ -79,7 +79,12 @@ def test_chosen_places_come_back_by_point_and_the_own_place_is_no_move(
     chat = ScriptedChat(answer)
     seen = annotator(chat, picture_px=256)
     assert isinstance(seen, LooksCloser) and not isinstance(RulesAnnotator(), LooksCloser)
-    places = seen.look_closer(request_of_mug, points)
+    look = seen.look_closer(request_of_mug, points)
+    places = look.places
+    assert {name: picture.shape for name, picture in look.pictures.items()} == {
+        "f0": (256, 256, 3),
+        "f1": (256, 256, 3),
+    }
     assert set(places) == {"f0"} or (set(places) == set() and rim.positions_m[:, 2].max() == points[0].position_m[2])
     for place in places.values():
         assert place.position_m[2] == rim.positions_m[:, 2].max() >= points[0].position_m[2]
@@ -105,4 +110,4 @@ def test_point_that_no_view_shows_is_not_asked_about(
     hidden = points[0].model_copy(update={"candidate": 1000})
     assert [each.point.id for each in nearby_places(PlaceChecks(request_of_mug), [hidden, points[1]], 256)] == ["f1"]
     chat = ScriptedChat({})
-    assert annotator(chat).look_closer(request_of_mug, [hidden]) == {} and not chat.asked
+    assert annotator(chat).look_closer(request_of_mug, [hidden]) == CloserLook() and not chat.asked

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar, get_args
 
@@ -12,7 +12,7 @@ from manitwin.config import Resource
 from manitwin.models.annotators.protocol import (
     Annotator,
     AnnotatorQuestion,
-    CloserPlace,
+    CloserLook,
     LooksCloser,
     PhysicalEstimates,
     PointsRequest,
@@ -188,11 +188,11 @@ class KeepsGiven:
             return points.selection(None)
         return points.selection(self._inner.select_points(request))
 
-    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> Mapping[str, CloserPlace]:
+    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> CloserLook:
         """Let the inner annotator look closer where it can; given points stay at their candidates."""
         given = request.subject.given
         if not isinstance(self._inner, LooksCloser) or (given is not None and given.functional_points):
-            return {}
+            return CloserLook()
         return self._inner.look_closer(request, points)
 
 

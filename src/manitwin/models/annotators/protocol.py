@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, Protocol, runtime_checkable
 
@@ -115,6 +115,17 @@ class CloserPlace:
     normal: np.ndarray
 
 
+@dataclass(frozen=True)
+class CloserLook:
+    """What a look at functional points from nearby found, and the pictures ``(H, W, 3) uint8`` it was shown, by the points' ids.
+
+    A point that ``places`` does not name stays where it is.
+    """
+
+    places: Mapping[str, CloserPlace] = field(default_factory=dict)
+    pictures: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
 AnnotatorQuestion = Literal["quality", "physical", "captions", "points"]
 """The paper's four questions to a VLM."""
 
@@ -158,6 +169,6 @@ class Annotator(Protocol):
 class LooksCloser(Protocol):
     """An annotator that looks at functional points once more, from nearby."""
 
-    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> Mapping[str, CloserPlace]:
-        """Return better places near the points, by the points' ids; one that is not named stays where it is."""
+    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> CloserLook:
+        """Return better places near the points, and the pictures that show them."""
         ...

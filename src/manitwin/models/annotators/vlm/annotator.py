@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -15,7 +15,7 @@ from manitwin.config import BuildConfig, Resource
 from manitwin.errors import BadReply
 from manitwin.models.annotators.protocol import (
     AnnotatorQuestion,
-    CloserPlace,
+    CloserLook,
     PhysicalEstimates,
     PointsRequest,
     QualityVerdict,
@@ -29,6 +29,7 @@ from manitwin.models.annotators.vlm.closer_look import (
     chosen_places,
     closer_answer,
     closer_question,
+    nearby_pictures,
     nearby_places,
 )
 from manitwin.models.annotators.vlm.grasp_vote import Ballot, ballots, elect, runners_up
@@ -196,13 +197,15 @@ class VlmAnnotator:
         spare = runners_up(cast, votes, checks, [point.candidate for point in grasp])
         return SelectedPoints(functional, grasp, findings + more, spare)
 
-    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> Mapping[str, CloserPlace]:
+    def look_closer(self, request: PointsRequest, points: Sequence[FunctionalPoint]) -> CloserLook:
         """Choose for each point the best of twelve places around it, in one query with a picture of each from nearby."""
         nearby = nearby_places(PlaceChecks(request), points, self.picture_px)
         if not nearby:
-            return {}
-        question = closer_question(request, nearby, self.prompts["closer_look"])
-        return chosen_places(ask(self.chat, question, closer_answer(nearby)).value, nearby)
+            return CloserLook()
+        pictures = nearby_pictures(request, nearby)
+        question = closer_question(request, nearby, pictures, self.prompts["closer_look"])
+        places = chosen_places(ask(self.chat, question, closer_answer(nearby)).value, nearby)
+        return CloserLook(places, {each.point.id: marked for each, marked in zip(nearby, pictures.marked, strict=True)})
 
     def questions(
         self, request: PointsRequest, material: str, extents_m: np.ndarray, chosen: Sequence[FunctionalPoint] = ()
@@ -217,7 +220,9 @@ class VlmAnnotator:
             for vote in range(votes)
         ]
         nearby = nearby_places(checks, chosen, self.picture_px)
-        closer = [closer_question(request, nearby, prompts["closer_look"])] if nearby else []
+        closer = list[Question]()
+        if nearby:
+            closer.append(closer_question(request, nearby, nearby_pictures(request, nearby), prompts["closer_look"]))
         # what it is and how large is known from the physical question on
         unknown = replace(subject, known_as=None, metric=not subject.size_estimated)
         return [

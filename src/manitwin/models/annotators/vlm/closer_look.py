@@ -136,17 +136,24 @@ CLOSER_FORM = _answer({letter: ["1"] for letter in LETTERS})
 """The form of an answer, for what does not depend on the object."""
 
 
-def closer_question(request: PointsRequest, nearby: Sequence[Nearby], prompt: Prompt) -> Question:
-    """Ask for the best place of each point; raises RendererMissing where nothing renders."""
-    subject = request.subject
-    parts = list(subject.parts)
+@dataclass(frozen=True)
+class NearbyPictures:
+    """The pictures ``(H, W, 3) uint8`` of points from nearby, clean and with their numbered places, and the markers' colour."""
+
+    clean: list[np.ndarray]
+    marked: list[np.ndarray]
+    marker: str
+
+
+def nearby_pictures(request: PointsRequest, nearby: Sequence[Nearby]) -> NearbyPictures:
+    """Draw the places around each point; raises RendererMissing where nothing renders."""
+    parts = list(request.subject.parts)
     frames = shared_renderer().render(parts, [each.camera for each in nearby])
     ground = ground_for(frames)
     pictures = [frame.over(BACKDROP, ground) for frame in frames]
     color, surface = marker_color(pictures), RayCaster(merged(parts))
-    shown: list[str | Picture] = []
-    for each, clean in zip(nearby, pictures, strict=True):
-        marked = draw_markers(
+    marked = [
+        draw_markers(
             clean,
             project(each.positions_m, each.camera)[0],
             [str(number) for number in each.numbers],
@@ -154,13 +161,25 @@ def closer_question(request: PointsRequest, nearby: Sequence[Nearby], prompt: Pr
             dot=color.rgb,
             font_px=font_px(each.camera.width_px, each.camera.height_px),
         )
+        for each, clean in zip(nearby, pictures, strict=True)
+    ]
+    return NearbyPictures(pictures, marked, color.name)
+
+
+def closer_question(
+    request: PointsRequest, nearby: Sequence[Nearby], pictures: NearbyPictures, prompt: Prompt
+) -> Question:
+    """Ask for the best place of each point."""
+    subject = request.subject
+    shown: list[str | Picture] = []
+    for each, clean, marked in zip(nearby, pictures.clean, pictures.marked, strict=True):
         words = f"Point {each.letter}, {each.point.label!r} ({each.point.description})"
         shown += [f"{words}, from nearby, clean:", Picture(png_of(clean))]
         shown += [f"Point {each.letter}, with markers:", Picture(png_of(marked))]
     values = {
         "name": name_line(subject.name, subject.known_as),
         "size": size_line(subject, extents_of(subject.parts)),
-        "marker": color.name,
+        "marker": pictures.marker,
         "letters": ", ".join(each.letter for each in nearby),
     }
     instructions, asked = prompt.filled(values, shown)
