@@ -22,7 +22,8 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from composites import Composite, Part, composite
+from composite_things import Part
+from composites import Composite, composite
 from scipy.stats import spearmanr
 
 from manitwin.config import MattingConfig
