@@ -96,17 +96,14 @@ def locate(
         depth, camera, rgb, base = _of_folder(seen, depth, camera, rgb, base, cloud)
     grasps = grasps or robot is not None
     _check(depth, camera, mask, rgb, cloud, base, robot, grasps)
+    from manitwin.cli.locating import find_twin, find_twin_of_any_size, find_twins, scene_of
     from manitwin.config import ServicesConfig
     from manitwin.episodes.located_view import LocatedView
     from manitwin.models.pose_estimators.from_spec import pose_estimator
-    from manitwin.scenes.locate.asked_estimator import AskedEstimator
     from manitwin.scenes.locate.base_file import read_base
-    from manitwin.scenes.locate.layout_files import NoLayout, dataset_of_twin, layout_document
+    from manitwin.scenes.locate.layout_files import dataset_of_twin, layout_document
     from manitwin.scenes.locate.located_scene import LocatedScene
-    from manitwin.scenes.locate.pose_model import PoseModel
-    from manitwin.scenes.locate.recognition import DatasetTwins, where_is, which_twin
     from manitwin.scenes.locate.report import location_document, things_document, write_location
-    from manitwin.scenes.locate.size_fit import OTHER_SIZE, thing_of_any_size
     from manitwin.twin.dataset_root import DatasetRoot
     from manitwin.twin.loaded_twin import Twin
     from manitwin.twin.store import RECORD
@@ -115,46 +112,30 @@ def locate(
     camera_to_base = None if base is None else read_base(base)
     one = Twin(source) if (source / RECORD).exists() else None
     dataset = DatasetRoot(source).absolute() if one is None else dataset_of_twin(source)
-    view, masks = _view(depth, camera, mask, rgb, cloud, seed)
-    asked = None
-    size = None
     if fit_size:
         _check_fit(one is not None, estimator)
-    if one is not None and fit_size:
-        thing, size = thing_of_any_size(view, masks, PoseModel.of_twin(one), seed=seed)
-        things, twins = [thing], [one]
-    elif one is not None:
-        asked = None if model is None else AskedEstimator(model, lambda twin_id: Twin(source), seed)
-        things = [where_is(view, masks, PoseModel.of_twin(one), seed=seed, guess=asked)]
-        twins = [one]
+    view, masks = _view(depth, camera, mask, rgb, cloud, seed)
+    if one is None:
+        found = find_twins(DatasetRoot(source), view, masks, model, tried=tried, seed=seed, on_twin=_drawn)
+    elif fit_size:
+        found = find_twin_of_any_size(one, view, masks, seed)
     else:
-        known = DatasetTwins(DatasetRoot(source), on_twin=_drawn)
-        asked = None if model is None else AskedEstimator(model, known.twin, seed)
-        things = [which_twin(view, each, known, tried=tried, seed=seed, guess=asked) for each in masks]
-        twins = [known.twin(thing.location.twin_id) for thing in things]
-    place = LocatedView(view, list(zip(things, twins, strict=True)), camera_to_base, robot, seed)
-    usable = grasps and (size is None or size.is_own)
+        found = find_twin(one, view, masks, model, seed)
+    things = found.things
+    place = LocatedView(view, list(zip(things, found.twins, strict=True)), camera_to_base, robot, seed)
+    usable = grasps and found.has_own_size
     carried = [place.grasps(number) if usable else None for number in range(len(things))]
     rests = [place.placements(number) if usable else () for number in range(len(things))]
-    guessed = None if asked is None else asked.model
+    if one is not None:
+        document = location_document(things[0], one, carried[0], found.estimator, rests[0], found.size)
+    else:
+        document = things_document(str(source), place.things, carried, found.estimator, rests)
     layout, written = None, None
     if out is not None and any(thing.location.poses for thing in things):
-        scene: LocatedScene | NoLayout
-        if cloud is not None:
-            scene = NoLayout("a cloud of the thing alone shows no table")
-        elif size is not None and not size.is_own:
-            scene = NoLayout(OTHER_SIZE)
-        elif dataset is None:
-            scene = NoLayout("the twin lies in no data set; give one where manitwin build left it")
-        else:
-            scene = place.scene
+        scene = scene_of(place, found, dataset, of_cloud=cloud is not None)
         layout = layout_document(scene)
         if isinstance(scene, LocatedScene) and dataset is not None:
             written = scene, dataset
-    if one is not None:
-        document = location_document(things[0], one, carried[0], guessed, rests[0], size)
-    else:
-        document = things_document(str(source), place.things, carried, guessed, rests)
     document["layout"] = layout
     if out is not None:
         write_location(out, document, view, things, written)
