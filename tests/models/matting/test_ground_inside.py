@@ -29,16 +29,24 @@ def _blade(slot: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     return np.clip(light, 0, 255).astype(np.uint8), mask
 
 
-def _share(slot: np.ndarray | None) -> float:
+def _share(slot: np.ndarray | None, network: np.ndarray | None = None) -> float:
     rgb, mask = _blade(slot)
     background = model_background(rgb)
     gradient = gradient_magnitude(background.lab)
-    return ground_inside(background, mask, gradient, edge_threshold(background, gradient))
+    return ground_inside(background, mask, gradient, edge_threshold(background, gradient), network)
 
 
 @pytest.mark.parametrize("light", [1.0, 0.72])
 def test_slots_that_show_the_ground_are_seen(light: float) -> None:
     assert _share(light * GROUND) > 0.02
+
+
+def test_what_is_lit_unevenly_and_networks_are_sure_of_is_paint_and_no_hole() -> None:
+    sure = np.full(SIZE, 0.97, np.float32)
+    shaded = GROUND * np.linspace(1.0, 0.85, 60)[None, :, None]
+    assert _share(shaded) > 0.02 and _share(shaded, 0.8 * sure) == _share(shaded)
+    assert _share(shaded, sure) == 0.0
+    assert _share(GROUND, sure) == _share(GROUND), "of slots that are lit as the ground is they know nothing"
 
 
 def test_solid_blade_and_slots_of_another_tint_show_no_ground() -> None:

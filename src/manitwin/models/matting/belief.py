@@ -16,6 +16,7 @@ import numpy as np
 from manitwin.errors import ConfigError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.models.matting.candidates import Candidate, alike, at_size, doubts, misjudged, overlap
+from manitwin.models.matting.confidence import MOST_ZOOM
 from manitwin.models.matting.outline import eroded
 
 WEIGHTS_FILE = "belief.json"
@@ -29,8 +30,8 @@ OPINIONS = (
     *("network_overlap", "network_alike", "network_sure", "network_sharp", "network_within", "network_beyond"),
     *("colours", "rival"),
 )
-BULKY = 15.0
-"""Pixels of area for each of the outline, at working size: a fraction of a pixel off costs a bulkier thing next to nothing."""
+BULKY = 18.75
+"""Pixels of the photo, of area for each of the outline: a fraction of a pixel off costs a bulkier thing next to nothing."""
 MOST_SOFT_PX = 8.0
 MOST_MISJUDGED = 0.05
 """Of a mask's area: a cut-out that may be wrong of so much of the thing is not believed, whatever else speaks for it."""
@@ -48,7 +49,7 @@ def features(candidate: Candidate, others: list[Candidate], share: np.ndarray) -
     mask = candidate.found.mask
     share = at_size(share, mask.shape)
     unsure, within, beyond = doubts(share, mask)
-    bulk_px = float(mask.sum() / max(int((mask & ~eroded(mask, 1)).sum()), 1))
+    bulk_px = float(mask.sum() / max(int((mask & ~eroded(mask, 1)).sum()), 1)) * min(candidate.zoom, MOST_ZOOM)
     scores = asdict(candidate.scores)
     rivals = [alike(mask, other.found.mask) for other in others]
     opinions = {

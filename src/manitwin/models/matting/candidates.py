@@ -30,11 +30,15 @@ UNLIKE_GROUND = 4.0
 
 @dataclass(frozen=True)
 class Candidate:
-    """A mask that may be the object, with its scores on the photo; ``maker`` says who found it."""
+    """A mask that may be the object, with its scores on the photo; ``maker`` says who found it.
+
+    ``zoom`` is the photo's size over the mask's.
+    """
 
     maker: Maker
     found: Segmentation
     scores: MatteScores
+    zoom: float = 1.0
 
     @property
     def by_network(self) -> bool:
@@ -63,7 +67,12 @@ def candidates(found: Segmentation, shares: Sequence[np.ndarray], *, zoom: float
             if maker == NETWORKS[0] and joined.sum() > (1 + LEAST_ADDED) * learned.sum():
                 whole = replace(seen, mask=joined, shadow=seen.shadow & ~joined, hard=seen.hard & ~joined)
                 masks.append(("both", whole))
-    return [Candidate(maker, each, score(each, zoom=zoom)) for maker, each in masks if _has_outline(each.mask)]
+    least = np.min([at_size(share, found.mask.shape) for share in shares], axis=0) if shares else None
+    return [
+        Candidate(maker, each, score(each, zoom=zoom, share=least), zoom)
+        for maker, each in masks
+        if _has_outline(each.mask)
+    ]
 
 
 def _has_outline(mask: np.ndarray) -> bool:

@@ -68,8 +68,8 @@ class MatteScores:
         return min(values, key=lambda name: values[name])
 
 
-def score(segmentation: Segmentation, *, zoom: float = 1.0) -> MatteScores:
-    """Score a mask that is not empty; ``zoom`` is the photo's size over the mask's."""
+def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | None = None) -> MatteScores:
+    """Score a mask that is not empty; ``zoom`` is the photo's size over the mask's, ``share`` as for ``ground_inside``."""
     mask, background = segmentation.mask, segmentation.background
     outline = mask & ~eroded(mask, 1)
     border = np.zeros(mask.shape, bool)
@@ -106,7 +106,7 @@ def score(segmentation: Segmentation, *, zoom: float = 1.0) -> MatteScores:
         sharply_bounded=_ramp(-_softly_bounded(segmentation, outline), -0.4, -0.15),
         unshaded=_ramp(-float((strips.shadow | strips.doubtful).sum() / mask.sum()), -0.05, -0.01),
         solid=_ramp(
-            -ground_inside(background, mask, segmentation.gradient, segmentation.edge_threshold), -0.008, -0.002
+            -ground_inside(background, mask, segmentation.gradient, segmentation.edge_threshold, share), -0.008, -0.002
         ),
         thick=_ramp(-outline.sum() / mask.sum() / min(zoom, MOST_ZOOM), -0.25, -0.12),
     )

@@ -15,12 +15,16 @@ RIM = 3.5  # L*a*b*: nowhere does it run on into what surrounds it
 RIM_PX = 3
 MOST_HELD = 0.04  # what encloses a print is a label
 LEAST_SHARE = 1e-3
+CERTAIN, UNEVEN = 0.9, 0.05  # of ten such places in composites all were the thing
 
 
-def ground_inside(background: Background, mask: np.ndarray, gradient: np.ndarray, threshold: float) -> float:
+def ground_inside(
+    background: Background, mask: np.ndarray, gradient: np.ndarray, threshold: float, share: np.ndarray | None = None
+) -> float:
     """Return the share of ``mask`` (H, W) that it encloses on all sides and that has the ground's tint, in light or shade.
 
-    It may be a hole, or a grey part of a thing on grey: what cannot be told apart is doubted.
+    It may be a hole, or a grey part of a thing on grey: what cannot be told apart is doubted. What is lit as unevenly as no
+    ground within a hole, and of what all networks are sure (``share`` (H, W), the least of theirs), is the thing.
     """
     ratio = background.light_ratio
     light = ratio.mean(2)
@@ -46,6 +50,7 @@ def ground_inside(background: Background, mask: np.ndarray, gradient: np.ndarray
             and float(np.hypot(*residual[1:])) < SAME_CHROMA + background.noise_lab
             and float(np.percentile(step[rim], 20)) > RIM
             and holds(part) < MOST_HELD * area
+            and not (share is not None and share[box][part].mean() > CERTAIN and light[box][part].std() > UNEVEN)
         ):
             total += int(area)
     return total / max(int(mask.sum()), 1)
