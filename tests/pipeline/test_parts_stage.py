@@ -102,6 +102,23 @@ def test_name_is_that_of_the_whole_part(role: str, category: str, labels: list[s
     assert prior is not None and part_name(role, prior, labels) == name
 
 
+@pytest.mark.parametrize(
+    ("category", "names"),
+    [
+        ("marker", {"shaft": "barrel", "tip": "cap"}),
+        ("clamp", {"shaft": "spring joint", "tip": "jaws", "end": "handles"}),
+        ("rolling pin", {"shaft": "roller", "tip": "handle", "end": "handle"}),
+        ("wrench", {"shaft": "handle", "tip": "jaw", "end": "end"}),  # no label is of the ring alone
+        ("key", {"shaft": "bow", "tip": "blade"}),  # the shaft goes on to the end that is not told from it
+        ("key", {"shaft": "blade", "end": "bow"}),
+    ],
+)
+def test_sections_are_called_by_the_places_that_they_hold(category: str, names: dict[str, str]) -> None:
+    prior = lookup(category)
+    assert prior is not None and prior.parts == "sectioned"
+    assert {role: part_name(role, prior, [], names) for role in names} == names
+
+
 def test_a_vessel_without_a_handle_has_an_inside_and_a_base(tmp_path: Path) -> None:
     mesh = cup()
     draft = draft_of(tmp_path, mesh, [visual(mesh, baseColorFactor=[200, 10, 10, 255])], "bowl", None)

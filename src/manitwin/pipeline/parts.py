@@ -39,7 +39,7 @@ class PartsStage:
     """Give each face of ``visual.glb`` its part, or none where geometry does not tell it."""
 
     name: ClassVar[str] = "parts"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = (
         "solid.npz", "visual.glb", "points", "physical", "language", "geometry", "naming?",
     )  # fmt: skip
@@ -93,8 +93,9 @@ def _by_form(draft: Draft, solid: trimesh.Trimesh, visual: trimesh.Trimesh) -> _
     points = draft.field("points")
     said = [*points["functional"], *(point for point in points["grasp"] if point["label"])]
     on = parts_at(np.array([point["position_m"] for point in said]), solid, found.role)
+    roles = [found.roles[role] for role in shown]
     names = tuple(
-        part_name(found.roles[role], prior, [p["label"] for p, at in zip(said, on, strict=True) if at == role])
+        part_name(found.roles[role], prior, [p["label"] for p, at in zip(said, on, strict=True) if at == role], roles)
         for role in shown
     )
     places = np.full(len(found.roles), NO_PART, np.uint8)

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from trimesh.creation import annulus, box, cylinder, icosphere, revolve
 
-from manitwin.geometry.parts.part_rules import PartRule
+from manitwin.geometry.parts.membership import PartRule
 from manitwin.geometry.parts.segmentation import Segmentation, carried_over, segmented
 from manitwin.geometry.parts.shape import HeadEnd, measure_shape
 
@@ -169,6 +169,31 @@ def test_hollow_underside_is_base() -> None:
     assert found is not None
     under = mesh.face_normals[:, 2] < -0.3
     assert mesh.area_faces[(found.role == 3) != under].sum() < 0.03 * mesh.area
+
+
+def trough(lower_m: float, upper_m: float, length_m: float, bottom_m: float) -> trimesh.Trimesh:
+    """Return the hull of a lower and a longer, wider upper edge, 0.06 m high."""
+    corners = [
+        [sx * x, sy * y, z]
+        for y, x, z in ((lower_m, length_m, bottom_m), (upper_m, length_m, 0.07))
+        for sx in (-1, 1)
+        for sy in (-1, 1)
+    ]
+    return trimesh.convex.convex_hull(np.array(corners))
+
+
+def test_wall_that_hangs_over_between_two_wide_feet_is_no_base() -> None:
+    wall, hollow = trough(0.02, 0.04, 0.07, 0.01), trough(0.016, 0.036, 0.066, 0.014)
+    feet = [at(box((0.02, 0.1, 0.012)), x, 0, 0.006) for x in (-0.06, 0.06)]
+    vessel = trimesh.boolean.difference([trimesh.boolean.union([wall, *feet]), at(hollow, 0, 0, 0.0005)])
+    mesh = vessel.subdivide_to_size(0.006)
+    mesh = trimesh.Trimesh(mesh.vertices, mesh.faces)
+    found = told(mesh, "open", stands=True)
+    assert found is not None
+    center, normal = mesh.triangles_center, mesh.face_normals
+    hangs = (np.abs(center[:, 0]) < 0.045) & (normal[:, 2] < -0.2) & (normal[:, 2] > -0.6)
+    assert hangs.any() and not (found.role[hangs] == 3).any()
+    assert (found.role[(normal[:, 2] < -0.99) & (center[:, 2] < 0.011)] == 3).mean() > 0.95
 
 
 @pytest.mark.parametrize("noise_m", [0.0, 0.0002])

@@ -7,48 +7,15 @@ its own, with how surely the border was found in [0, 1]; None where the form sho
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from manitwin.geometry.parts.arch import Arch
+from manitwin.geometry.parts.membership import Membership, PartRule
+from manitwin.geometry.parts.outline import LEAST_EXPLAINED, SLICES, best_splits, explained_confidence, filled_outline
 from manitwin.geometry.parts.protrusions import Protrusion
+from manitwin.geometry.parts.sections import LEAST_CONTRAST, ended, sectioned
 from manitwin.geometry.parts.shape import LEAST_HANDLE_REACH, Shape
-
-PartRule = Literal[
-    "handled", "spouted", "capped", "stemmed", "ended", "pistol", "arched", "open", "closed", "faced",
-]  # fmt: skip
-PartRole = Literal[
-    "body", "handle", "spout", "cap", "bowl", "stem", "foot", "head", "neck", "housing", "grip", "inside", "rim", "base", "top",
-    "band", "cup", "side", "front", "back",
-]  # fmt: skip
-ROLES: dict[PartRule, tuple[PartRole, ...]] = {
-    "handled": ("body", "handle"),
-    "spouted": ("body", "handle", "spout"),
-    "capped": ("body", "cap"),
-    "stemmed": ("bowl", "stem", "foot"),
-    "ended": ("head", "neck", "handle"),
-    "pistol": ("housing", "grip"),
-    "arched": ("band", "cup"),
-    "open": ("body", "inside", "rim", "base"),
-    "closed": ("body", "top", "base"),
-    "faced": ("side", "front", "back"),
-}
-"""The parts that each rule may tell; those of ``open``, ``closed`` and ``faced`` are of the surface alone (``skin_rules``)."""
-
-
-@dataclass(frozen=True)
-class Membership:
-    """The part of each point ``(N,)``, an index into ``roles``, and how sure the border is.
-
-    Nearer to a border than ``band_share`` of the longest side hollows tell the parts, and not the rule.
-    """
-
-    roles: tuple[str, ...]
-    index: np.ndarray
-    confidence: float
-    band_share: float = 0.1
 
 
 def membership(rule: PartRule, shape: Shape, points_m: np.ndarray) -> Membership | None:
@@ -185,92 +152,6 @@ def _stemmed(shape: Shape, points_m: np.ndarray) -> Membership | None:
     return Membership(("bowl", "stem", "foot"), np.where(share > last, 0, np.where(share < first, 2, 1)), 0.8)
 
 
-_SLICES = 48
-_LEAST_EXPLAINED = 0.35  # of the outline's variance by stretches of one width and thickness each
-_NECK_GAIN = 0.2  # what a third stretch must explain besides
-_NECK_NARROW = 0.8  # of the handle's width and thickness (geometric mean): a neck is at most that
-_LEAST_CONTRAST = 1.2  # of width and thickness on both sides of a border
-_LEAST_STRETCH = 3  # slices
-_ENDS = (0.05, 0.85)  # of the length: where a head may end
-
-
-def _ended(shape: Shape, points_m: np.ndarray) -> Membership | None:
-    """Head and handle, with a narrower neck between them where there is one: stretches of the long axis.
-
-    The borders are where width and thickness change most: one or two change points by least squares over the outline.
-    """
-    if not shape.has_ends:
-        return None
-    outline = _section_outline(shape)
-    along = shape.axis.along(points_m)
-    one, (split,) = _best_splits(outline, 1)
-    two, (neck, grip) = _best_splits(outline, 2)
-    middle, handle = outline[neck:grip].mean(), outline[grip:].mean()
-    if two - one >= _NECK_GAIN and two >= _LEAST_EXPLAINED and middle <= handle + np.log(_NECK_NARROW):
-        index = np.searchsorted(np.array([neck, grip]) / _SLICES, along, side="right")
-        return Membership(("head", "neck", "handle"), index, _explained_confidence(two))
-    apart = float(np.linalg.norm(outline[:split].mean(0) - outline[split:].mean(0)))
-    if one < _LEAST_EXPLAINED or apart < np.log(_LEAST_CONTRAST):
-        return None
-    return Membership(("head", "handle"), (along >= split / _SLICES).astype(int), _explained_confidence(one))
-
-
-def _explained_confidence(explained: float) -> float:
-    return float(np.clip(0.3 + 0.7 * explained, 0.5, 0.9))
-
-
-def _best_splits(outline: np.ndarray, count: int) -> tuple[float, tuple[int, ...]]:
-    """Return how much of the outline's variance stretches of one width each explain, and where the best ones begin.
-
-    The outline ``(K, 2)`` is cut at ``count`` places (one or two), each stretch being at least three slices long.
-    """
-    sums = np.vstack([np.zeros(outline.shape[1]), np.cumsum(outline, axis=0)])
-
-    def between(a: np.ndarray | int, b: np.ndarray | int) -> np.ndarray:
-        """Return what the mean of the stretch from ``a`` to ``b`` keeps of its sum of squares."""
-        return np.asarray(((sums[b] - sums[a]) ** 2).sum(-1) / np.maximum(np.asarray(b) - a, 1))
-
-    whole = float((outline**2).sum()) - float(between(0, _SLICES))
-    low, high = max(round(_ENDS[0] * _SLICES), 1), round(_ENDS[1] * _SLICES)
-    first = np.arange(low, high + 1)
-    if count == 1:
-        kept = between(0, first) + between(first, _SLICES)
-        best = int(kept.argmax())
-        return _share(kept[best] - between(0, _SLICES), whole), (int(first[best]),)
-    a, b = np.meshgrid(first, first, indexing="ij")
-    kept = np.where(b - a >= _LEAST_STRETCH, between(0, a) + between(a, b) + between(b, _SLICES), -np.inf)
-    i, j = np.unravel_index(int(kept.argmax()), kept.shape)
-    return _share(kept[i, j] - between(0, _SLICES), whole), (int(first[i]), int(first[j]))
-
-
-def _share(explained: float, whole: float) -> float:
-    return float(explained) / max(whole, 1e-12)
-
-
-def _section_outline(shape: Shape) -> np.ndarray:
-    """Return log width and log thickness of slices of the long axis, ``(48, 2)``."""
-    along = shape.axis.along(shape.surface_m)
-    across = (shape.surface_m - shape.axis.origin_m) @ shape.axis.across.T
-    level = np.clip((along * _SLICES).astype(int), 0, _SLICES - 1)
-    return _filled_outline([across[level == k] for k in range(_SLICES)], 1e-3 * shape.size_m)
-
-
-def _filled_outline(slices: list[np.ndarray], least_m: float) -> np.ndarray:
-    """Return the logs of both extents of each slice's samples ``(N, 2)``; a slice of few is between its neighbours."""
-    rows = [
-        np.log(np.maximum(np.ptp(np.quantile(each, (0.03, 0.97), axis=0), axis=0), least_m))
-        if len(each) > 3
-        else np.full(2, np.nan)
-        for each in slices
-    ]
-    outline = np.array(rows)
-    places = np.arange(len(rows))
-    for column in outline.T:
-        known = np.isfinite(column)
-        column[~known] = np.interp(places[~known], places[known], column[known])
-    return outline
-
-
 def _pistol(shape: Shape, points_m: np.ndarray) -> Membership | None:
     """Housing and grip: what lies below the barrel is grip."""
     if shape.pistol is None:
@@ -287,22 +168,22 @@ def _arched(shape: Shape, points_m: np.ndarray) -> Membership | None:
     if shape.arch is None:
         return None
     outline = _leg_outline(shape.arch, shape.surface_m, shape.size_m)
-    explained, (split,) = _best_splits(outline, 1)
+    explained, (split,) = best_splits(outline, 1)
     wider = float((outline[:split].mean(0) - outline[split:].mean(0)).mean())
-    if explained < _LEAST_EXPLAINED or wider < np.log(_LEAST_CONTRAST):
+    if explained < LEAST_EXPLAINED or wider < np.log(LEAST_CONTRAST):
         return None
-    border = -1 + (1 + _ARCH_TOP) * split / _SLICES
+    border = -1 + (1 + _ARCH_TOP) * split / SLICES
     towards, _ = shape.arch.places(points_m)
-    return Membership(("band", "cup"), (towards < border).astype(int), _explained_confidence(explained))
+    return Membership(("band", "cup"), (towards < border).astype(int), explained_confidence(explained))
 
 
 def _leg_outline(arch: Arch, surface_m: np.ndarray, size_m: float) -> np.ndarray:
     """Return log width and log thickness ``(48, 2)`` of an arch's legs, from their ends up."""
     towards, across = arch.places(surface_m)
     width = (surface_m - arch.origin_m) @ np.cross(arch.apex, arch.apart)
-    level = np.floor((towards + 1) / (1 + _ARCH_TOP) * _SLICES).astype(int)
+    level = np.floor((towards + 1) / (1 + _ARCH_TOP) * SLICES).astype(int)
     leg = np.stack([width, np.abs(across) * arch.half_m[1]], axis=1)
-    return _filled_outline([leg[level == k] for k in range(_SLICES)], 1e-3 * size_m)
+    return filled_outline([leg[level == k] for k in range(SLICES)], 1e-3 * size_m)
 
 
 _RULES: dict[PartRule, Callable[[Shape, np.ndarray], Membership | None]] = {
@@ -310,7 +191,8 @@ _RULES: dict[PartRule, Callable[[Shape, np.ndarray], Membership | None]] = {
     "spouted": _spouted,
     "capped": _capped,
     "stemmed": _stemmed,
-    "ended": _ended,
+    "ended": ended,
+    "sectioned": sectioned,
     "pistol": _pistol,
     "arched": _arched,
 }

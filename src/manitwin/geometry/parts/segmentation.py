@@ -9,7 +9,8 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from manitwin.geometry.parts.cut_up import cut_up
-from manitwin.geometry.parts.part_rules import PartRule, membership
+from manitwin.geometry.parts.membership import PartRule
+from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import Shape
 from manitwin.geometry.parts.skin_rules import skin_membership
 from manitwin.geometry.parts.surface_graph import EDGE_SHARE, SurfaceGraph

@@ -12,13 +12,16 @@ import trimesh
 from manitwin.geometry.boxes import oriented_bounding_box
 from manitwin.geometry.cavity import Opening, find_opening
 from manitwin.geometry.parts.arch import Arch, find_arch
+from manitwin.geometry.parts.outline import SLICES
 from manitwin.geometry.parts.pistol import Pistol, find_pistol
 from manitwin.geometry.parts.protrusions import Protrusion, RoundBody, round_body
+from manitwin.geometry.parts.section_borders import section_borders
 from manitwin.geometry.ray_caster import local_thickness
 from manitwin.geometry.sampling import sample_surface
 
-HeadEnd = Literal["wide", "narrow", "thin", "thick", "heavy", "up"]
-"""What tells the working end: its width, its thickness, the side of the centre of mass, or being the upper one."""
+HeadEnd = Literal["wide", "narrow", "thin", "thick", "short", "heavy", "up"]
+"""What tells the working end: its width, its thickness, being the shorter section (a cap; the wider end where no border shows),
+the side of the centre of mass, or being the upper one."""
 
 _SLICES = 32
 _DIRECTIONS = 12
@@ -70,7 +73,8 @@ def long_axis(
     share = local[:, 0] / length + 0.5
     width, thickness = _outline(share, local[:, 1:])
     center_share = float((center_of_mass_m - obb_to_object[:3, 3]) @ axes[0] / length + 0.5)
-    if _head_is_last(head_end, width, thickness, center_share, axes[0]):
+    shorter = _shorter_is_last(share, local[:, 1:], length) if head_end == "short" else None
+    if _head_is_last(head_end, width, thickness, center_share, axes[0]) if shorter is None else shorter:
         axes[0], width, thickness, center_share = -axes[0], width[::-1], thickness[::-1], 1 - center_share
     return LongAxis(
         origin_m=obb_to_object[:3, 3] - axes[0] * length / 2,
@@ -112,9 +116,15 @@ def _head_is_last(
         return bool(axis[2] > 0)
     if rule == "heavy":
         return center_share > 0.5
-    profile = width if rule in ("wide", "narrow") else thickness
+    profile = width if rule in ("wide", "narrow", "short") else thickness
     first, last = float(np.mean(profile[:count])), float(np.mean(profile[-count:]))
-    return last > first if rule in ("wide", "thick") else last < first
+    return last > first if rule in ("wide", "thick", "short") else last < first
+
+
+def _shorter_is_last(share: np.ndarray, across_m: np.ndarray, length_m: float) -> bool | None:
+    """Tell whether the shorter of two sections comes last; None where there are not two."""
+    borders = section_borders(share, across_m, length_m)
+    return borders[0][0] > SLICES / 2 if borders is not None and len(borders[0]) == 1 else None
 
 
 def _head_share(width: np.ndarray) -> float:

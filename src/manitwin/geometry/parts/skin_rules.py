@@ -13,7 +13,7 @@ import trimesh
 from scipy.spatial import ConvexHull, cKDTree
 
 from manitwin.geometry.cavity import Opening
-from manitwin.geometry.parts.part_rules import Membership, PartRule
+from manitwin.geometry.parts.membership import Membership, PartRule
 from manitwin.geometry.parts.shape import Shape
 from manitwin.geometry.parts.surface_graph import SurfaceGraph
 from manitwin.geometry.ray_caster import RayCaster
@@ -38,7 +38,7 @@ _LEAST_INSIDE = 0.05  # of the area
 _DOWN, _LOW, _LOW_M = -0.6, 0.1, 0.003  # z of the normal, share of the height, m: what a vessel stands on
 _FOOT_SHARE, _FOOT_M = 0.02, 0.001  # of the height, m: as near to the ground as that touches it
 _FOOT_MARGIN = 1.05  # the fillet of a bottom's edge is of it
-_VAULT = -0.1  # z of the normal: a vault between the feet is of the base, however steep; the wall above a foot is not
+_VAULT = -0.1  # z of the normal: a vault between the feet is of the base, however steep, where it looks at itself
 _OFF_M = 1e-5  # above the surface: where a ray begins
 
 
@@ -58,7 +58,8 @@ def _open(shape: Shape, graph: SurfaceGraph, mesh: trimesh.Trimesh) -> Membershi
     low, high = shape.bounds_m[:, 2]
     flat = (normals[:, 2] < _DOWN) & (centers[:, 2] < low + max(_LOW * (high - low), _LOW_M))
     base = flat & _over_footprint(centers, graph.corners_m, _FOOT_MARGIN)
-    base |= (normals[:, 2] < _VAULT) & _over_footprint(centers, graph.corners_m, 1.0)
+    vault = (normals[:, 2] < _VAULT) & _over_footprint(centers, graph.corners_m, 1.0)
+    base |= vault & ((normals[:, 2] < _DOWN) | _looks_at_itself(caster, centers, normals, asked=vault))
     base &= ~inside & _seen_from_below(caster, centers, normals, asked=base & ~inside)
     index = np.where(inside, 1, np.where(base, 3, 0))
     crest, around = _crest(opening, graph.corners_m)
@@ -88,6 +89,17 @@ def _seen_from_below(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarr
     if len(which):
         start = centers_m[which] + _OFF_M * normals[which]
         seen[which] = caster.first_hits(start, np.broadcast_to([0.0, 0.0, -1.0], start.shape))[1] < 0
+    return seen
+
+
+def _looks_at_itself(caster: RayCaster, centers_m: np.ndarray, normals: np.ndarray, asked: np.ndarray) -> np.ndarray:
+    """Tell of the pieces ``asked`` ``(P,)`` whether the thing is sideways of them too; False of all others."""
+    seen, which = np.zeros(len(centers_m), bool), np.flatnonzero(asked)
+    if len(which):
+        sideways = normals[which] * [1.0, 1.0, 0.0]
+        length = np.linalg.norm(sideways, axis=1, keepdims=True)
+        rays = np.where(length > 1e-9, sideways / np.maximum(length, 1e-9), [1.0, 0.0, 0.0])
+        seen[which] = caster.first_hits(centers_m[which] + _OFF_M * normals[which], rays)[1] >= 0
     return seen
 
 

@@ -27,6 +27,9 @@ _FEATURES: dict[str, tuple[Feature, ...]] = {
     "side": ("side", "end"),
     "front": ("front",),
     "back": ("back",),
+    "shaft": ("middle", "center", "handle", "side", "neck"),
+    "tip": ("tip", "head", "edge", "top"),
+    "end": ("handle_end", "handle", "base"),
 }
 """By role, the features whose label in a prior is the name of the whole part, the best first."""
 _WORDS: dict[str, frozenset[str]] = {
@@ -41,7 +44,7 @@ _WORDS: dict[str, frozenset[str]] = {
     "bowl": frozenset(["bowl", "cup"]),
     "inside": frozenset(["inside", "interior", "cavity", "hollow", "floor", "surface"]),
     "rim": frozenset(["rim", "lip", "brim", "edge"]),
-    "base": frozenset(["base", "bottom", "underside", "foot"]),
+    "base": frozenset(["base", "bottom", "underside", "foot", "sole"]),
     "top": frozenset(["top", "lid"]),
     "grip": frozenset(["grip", "handle"]),
     "housing": frozenset(["housing", "body", "barrel"]),
@@ -50,6 +53,11 @@ _WORDS: dict[str, frozenset[str]] = {
     "side": frozenset(["side", "sides", "edge", "edges"]),
     "front": frozenset(["front", "cover", "surface", "wiping", "screen", "display"]),
     "back": frozenset(["back"]),
+    "shaft": frozenset(
+        ["shaft", "body", "barrel", "joint", "roller", "handle", "bulb", "cover", "tube", "bow", "blade"]
+    ),
+    "tip": frozenset(["tip", "cap", "jaw", "jaws", "stem", "head", "blade", "base", "end", "nozzle", "handle"]),
+    "end": frozenset(["end", "handle", "handles", "grip", "seam", "bow", "base"]),
 }
 """By role, the words of which a label has one where it names the whole part and no place on it."""
 
@@ -63,16 +71,29 @@ def roles_named(label: str, roles: Iterable[str]) -> list[str]:
     return list(dict.fromkeys(named))
 
 
-def part_name(role: str, prior: Prior, labels_there: Iterable[str]) -> str:
+def part_name(role: str, prior: Prior, labels_there: Iterable[str], shown: Iterable[str] = ()) -> str:
     """Return what a part of a role is called; ``labels_there`` are those of the points that lie on it, in their order.
 
-    The prior's label stands where a point on the part has it, or no label there names the whole part.
+    The prior's label stands where a point on the part has it, or no label there names the whole part. ``shown`` are the roles of
+    the thing: a shaft goes on to an end that is not told from it, and both ends of a rolling pin are handles.
     """
-    by_feature = {part.feature: part.label for part in reversed(prior.functional)}
-    usual = next((by_feature[feature] for feature in _FEATURES.get(role, ()) if feature in by_feature), role)
-    if not _WORDS[role] & set(usual.lower().split()):
-        usual = role  # finger rings are a place on the handle
+    usual = _usual(role, prior, set(shown))
     said = [" ".join(label.lower().split()) for label in labels_there]
     if usual in said:
         return usual
     return next((label for label in said if _WORDS[role] & set(label.split())), usual)
+
+
+def _usual(role: str, prior: Prior, shown: set[str]) -> str:
+    """Return the prior's label of a part; its role where the prior has no label of the whole part."""
+    by_feature = {part.feature: part.label for part in reversed(prior.functional)}
+    features = _FEATURES.get(role, ())
+    if role == "shaft":
+        features += (() if "end" in shown else _FEATURES["end"]) + (() if "tip" in shown else _FEATURES["tip"])
+    elif role == "tip" and "end" in shown:
+        features += ("handle_end",)
+    labels = [by_feature[feature] for feature in features if feature in by_feature]
+    if role == "end" and "shaft" in shown:
+        labels = [label for label in labels if label != _usual("shaft", prior, shown)]
+    usual = next(iter(labels), role)
+    return usual if _WORDS[role] & set(usual.lower().split()) else role  # finger rings are a place on the handle

@@ -18,7 +18,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from manitwin.errors import ManiTwinError, choose_from
 from manitwin.formats.toml_file import parse_toml
 from manitwin.geometry.parts.features import Feature
-from manitwin.geometry.parts.part_rules import PartRole, PartRule
+from manitwin.geometry.parts.membership import PartRole, PartRule
 from manitwin.geometry.parts.shape import HeadEnd
 from manitwin.twin.point_records import GraspType
 from manitwin.twin.record_values import Estimate, Finite, Record

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from manitwin.geometry.parts.part_rules import ROLES
+from manitwin.geometry.parts.membership import ROLES
 from manitwin.models.annotators.part_names import roles_named
 from manitwin.models.annotators.priors import lookup
 from manitwin.models.annotators.protocol import PhysicalEstimates, Subject
