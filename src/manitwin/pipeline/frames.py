@@ -27,7 +27,9 @@ def with_frames(points: Sequence[FunctionalPoint], surface: FramedMesh) -> tuple
         if point.frame is None:
             found = find_frame(surface, np.array(point.position_m), np.array(point.normal), point.label)
             if isinstance(found, FeatureFrame):
-                off_m = off_feature_m(found.kind, found.position_m, found.rotation, found.size_m, surface.samples[0])
+                off_m = off_feature_m(
+                    found.kind, found.position_m, found.rotation, found.size_m, surface.samples[0], surface.mesh
+                )
                 if off_m <= max(ON_FEATURE_M, surface.spacing_m):
                     point = point.model_copy(update={"frame": _recorded(found)})
                 else:

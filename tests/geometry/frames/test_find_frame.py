@@ -177,3 +177,11 @@ def test_place_on_a_thorn_has_no_frame() -> None:
     surface = framed(thing)
     tip = find_frame(surface, np.array([0.0, 0.0, 0.0099]), np.array([0.8, 0.0, 0.6]), "joint")
     assert isinstance(tip, Unclear)
+
+
+def test_distance_of_a_frame_is_exact_where_samples_are_far_apart() -> None:
+    cube = trimesh.creation.box((0.4, 0.4, 0.4))
+    center, corners = np.array([0, 0, 0.2]), np.asarray(cube.vertices)
+    assert off_feature_m("face", center, np.eye(3), 0.2, corners) > 0.2
+    assert off_feature_m("face", center, np.eye(3), 0.2, corners, cube) == pytest.approx(0, abs=1e-9)
+    assert off_feature_m("face", np.array([0, 0, 0.23]), np.eye(3), 0.2, corners, cube) == pytest.approx(0.03)

@@ -84,6 +84,7 @@ def frames_off_feature(measured: MeasuredAsset) -> Iterator[Complaint]:
             rotation_from_quaternion_wxyz(np.array(point.frame.quaternion_wxyz)),
             point.frame.size_m,
             measured.samples,
+            measured.visual,
         )
         for point in measured.record.points.functional
         if point.frame is not None
