@@ -57,7 +57,7 @@ SECTIONS = {
     "umbrella": {"handle": "end"},
     "wrench": {"jaw": "tip", "ring": "end", "hole": "end"},
 }
-"""Of long things the sections, by category; all else is shaft. A told section counts for the true one that most of it is:
+"""Of long things the sections, by category; all else is shaft. A told section counts for the true one that it is most like:
 which is called the shaft is a convention. An allen key is one bar that is bent: no part of the template begins
 where its arms meet."""
 RIM_M, RIM_SHARE = 0.018, 0.4
@@ -75,9 +75,7 @@ def main() -> None:
     parser.add_argument("--rules", help="only categories of these rules")
     arguments = parser.parse_args()
     half = [name for name in sorted(load_templates()) if held_out(name) == arguments.held_out]
-    ruled = [
-        name for name in half if (prior := lookup(name)) is not None and prior.parts in TRUE_ROLES and scored(name)
-    ]
+    ruled = [name for name in half if scored(name)]
     if arguments.rules:
         ruled = [name for name in ruled if lookup(name).parts in arguments.rules.split(",")]  # type: ignore[union-attr]
     found: dict[bool, list[float | None]] = {False: [], True: []}
@@ -102,9 +100,15 @@ def main() -> None:
 
 
 def scored(category: str) -> bool:
-    """Tell whether the template's parts say where the rule's borders are."""
-    prior = lookup(category)
-    return prior is not None and (prior.parts != "sectioned" or bool(SECTIONS.get(category)))
+    """Tell whether the template's parts say where the rule's borders are: a flashlight's head and barrel are one of them."""
+    prior, templates = lookup(category), load_templates()
+    if prior is None or prior.parts not in TRUE_ROLES:
+        return False
+    if prior.parts == "sectioned":
+        return bool(SECTIONS.get(category))
+    rest, roles = TRUE_ROLES[prior.parts]
+    names = make(templates[category], read_text(category, templates), np.random.default_rng(0)).mesh.names
+    return len({roles.get(name, rest) for name in names}) > 1
 
 
 def score(category: str, seed: int, rough: bool) -> float | None:
@@ -126,7 +130,7 @@ def score(category: str, seed: int, rough: bool) -> float | None:
         truth = with_rim(mesh, truth)
     answer, areas = np.array(told.roles)[told.role], np.asarray(mesh.area_faces)
     if prior.parts == "sectioned":
-        answer = by_majority(answer, truth, areas)
+        answer = by_best_match(answer, truth, areas)
     answer = np.where(np.isin(answer, [rest, *roles.values()]), answer, rest)
     if prior.parts in ("open", "closed") and not np.isin(("base", "underside"), made.mesh.names).any():
         answer = np.where(answer == "base", rest, answer)  # the template does not tell its base from its wall
@@ -137,13 +141,14 @@ def score(category: str, seed: int, rough: bool) -> float | None:
     return float(np.mean(each))
 
 
-def by_majority(answer: np.ndarray, truth: np.ndarray, areas: np.ndarray) -> np.ndarray:
-    """Return for each told section the true one that most of its area is."""
-    names = np.unique(truth)
+def by_best_match(answer: np.ndarray, truth: np.ndarray, areas: np.ndarray) -> np.ndarray:
+    """Return for each told section the true one with which its intersection over union is the best."""
+    names, matched = np.unique(truth), answer.copy()
     for told in np.unique(answer):
         mine = answer == told
-        answer = np.where(mine, names[np.argmax([areas[mine & (truth == name)].sum() for name in names])], answer)
-    return answer
+        match = [areas[mine & (truth == name)].sum() / areas[mine | (truth == name)].sum() for name in names]
+        matched[mine] = names[int(np.argmax(match))]
+    return matched
 
 
 def with_rim(mesh: trimesh.Trimesh, truth: np.ndarray) -> np.ndarray:

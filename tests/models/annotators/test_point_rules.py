@@ -52,6 +52,18 @@ def test_a_screwdriver_works_with_its_thin_end() -> None:
     assert labelled(selected, "handle")[0] > 0.1
 
 
+def test_places_that_are_parts_lie_on_them() -> None:
+    bars = []
+    for angle in (0.35, -0.35):
+        bar = trimesh.creation.box((0.16, 0.014, 0.014))
+        bar.apply_transform(trimesh.transformations.rotation_matrix(angle, [0, 0, 1]))
+        bars.append(bar)
+    crossed = trimesh.boolean.union(bars).subdivide_to_size(0.01)
+    selected = select(trimesh.Trimesh(crossed.vertices, crossed.faces), "clamp")
+    jaws, joint, handles = (labelled(selected, label)[0] for label in ("jaws", "spring joint", "handles"))
+    assert abs(joint) < 0.03 and min(abs(jaws), abs(handles)) > 0.033 and jaws * handles < 0
+
+
 def test_an_empty_middle_is_held_by_the_rim() -> None:
     bowl = cup(radius_m=0.075, height_m=0.07, wall_m=0.004)
     for point in select(bowl, "bowl").grasp:

@@ -12,7 +12,10 @@ from functools import cached_property
 import numpy as np
 
 from manitwin.geometry.parts.features import Feature, feature_scores
+from manitwin.geometry.parts.membership import Membership
+from manitwin.geometry.parts.part_rules import membership
 from manitwin.geometry.parts.shape import Shape, SurfacePoints, measure_shape, surface_points
+from manitwin.models.annotators.part_names import part_name
 from manitwin.models.annotators.priors import FunctionalPart, GraspPart, Prior, unknown_prior
 from manitwin.models.annotators.protocol import PointsRequest, SelectedPoints
 from manitwin.twin.point_records import FunctionalPoint, GraspPoint, GraspType
@@ -26,6 +29,7 @@ _FINGER_CLEARANCE_M = 0.004  # of the opening: the pads need some play on both s
 _PINCH_M = 0.03  # matter between two fingertips: what is thicker is taken between the pads, with both fingers along it
 _UNSEEN = 0.3  # a candidate in no view can be chosen only where no seen one is near as good
 _TAKEN = 0.35  # a candidate that already stands for another part
+_ELSEWHERE = 0.3  # a candidate that is not on the part that the place's label is the name of
 
 _GENERIC_FUNCTIONAL: tuple[Feature, ...] = ("top", "end", "base", "front")
 _GENERIC_GRASP: tuple[Feature, ...] = ("center", "side", "middle", "edge", "rim")
@@ -85,11 +89,29 @@ class PointSelection:
             seen[list(view)] = True
         return np.where(seen, 1.0, _UNSEEN) if seen.any() else np.ones(len(seen))
 
+    @cached_property
+    def _parts(self) -> Membership | None:
+        """The parts of samples of the surface, then of the candidates, where the form tells them."""
+        if self.prior.parts is None:
+            return None
+        places = np.concatenate([self.shape.surface_m, self.request.positions_m])
+        return membership(self.prior.parts, self.shape, places)
+
+    def _on_own_part(self, feature: Feature) -> np.ndarray:
+        """Weight candidates by whether they are on the part that the label of a place is the name of."""
+        label = next((part.label for part in self.prior.functional if part.feature == feature), None)
+        if label is None or self._parts is None:
+            return np.ones(len(self.request.positions_m))
+        roles, count = self._parts.roles, len(self.request.positions_m)
+        shown = [roles[i] for i in np.unique(self._parts.index[:-count])]
+        named = [roles.index(role) for role in shown if part_name(role, self.prior, (), shown) == label]
+        return np.where(np.isin(self._parts.index[-count:], named) | (not named), 1.0, _ELSEWHERE)
+
     def _best(self, feature: Feature, weights: np.ndarray, taken: list[int], spread_m: float) -> _Choice | None:
         scores = feature_scores(feature, self.shape, self.points)
         if scores is None:
             return None
-        ranked = scores * weights
+        ranked = scores * weights * self._on_own_part(feature)
         if taken:
             ranked[taken] = -1.0
             near = np.min(
