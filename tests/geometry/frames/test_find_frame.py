@@ -185,3 +185,12 @@ def test_distance_of_a_frame_is_exact_where_samples_are_far_apart() -> None:
     assert off_feature_m("face", center, np.eye(3), 0.2, corners) > 0.2
     assert off_feature_m("face", center, np.eye(3), 0.2, corners, cube) == pytest.approx(0, abs=1e-9)
     assert off_feature_m("face", np.array([0, 0, 0.23]), np.eye(3), 0.2, corners, cube) == pytest.approx(0.03)
+
+
+def test_place_on_an_edge_has_the_frame_of_the_side_that_it_looks_to() -> None:
+    plate = trimesh.creation.box((0.2, 0.03, 0.004))
+    edge = found(plate, [0.03, 0.015, 0.002], [0, 0.6, 0.8], "head")
+    assert edge.kind == "surface" and edge.z @ [0, 0, 1] > 0.99
+    assert abs(edge.position_m[2] - 0.002) < 1e-4 and np.linalg.norm(edge.position_m - [0.03, 0.015, 0.002]) < 0.005
+    corner = find_frame(framed(plate), np.array([0.1, 0.015, 0.002]), np.full(3, 3**-0.5), "head")
+    assert isinstance(corner, Unclear)  # three sides, and it looks to none of them

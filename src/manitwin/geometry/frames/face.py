@@ -6,6 +6,7 @@ import numpy as np
 
 from manitwin.geometry.distance import closest_points_on_triangles
 from manitwin.geometry.frames.feature import UP, FeatureFrame, Found, FramedMesh, Unclear, rotation_of
+from manitwin.geometry.frames.on_feature import ON_FEATURE_M
 from manitwin.geometry.frames.patch import Patch, flat_patch
 
 _ANGLE_RAD = np.radians(20.0)  # of the patch's normal: a scanned mallet's face, flat to 0.9 mm, is within that
@@ -85,15 +86,40 @@ def _is_steady(mean: np.ndarray, normal: np.ndarray) -> bool:
     return length >= _STEADY and float(mean @ normal) >= _STEADY_COSINE * length
 
 
+def _steady_normal(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, reach_m: float) -> np.ndarray | None:
+    means = (surface.mean_normal(point_m, normal, share * reach_m) for share in _NEARER)
+    return next((mean for mean in means if _is_steady(mean, normal)), None)
+
+
+_MOST_BESIDE = 8  # places beside an edge that are looked at
+
+
+def _beside(
+    surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray, reach_m: float
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Return the nearest place beside a point on an edge with one normal, not far from its own, and that."""
+    positions, normals = surface.samples
+    near = surface.near(point_m, min(reach_m, ON_FEATURE_M))
+    near = near[normals[near] @ normal > 0]
+    near = near[np.linalg.norm(positions[near] - point_m, axis=1).argsort(kind="stable")]
+    for index in near[:_MOST_BESIDE]:
+        mean = _steady_normal(surface, positions[index], normals[index], reach_m)
+        if mean is not None and _is_steady(mean, normal):
+            return positions[index], mean
+    return point_m, None
+
+
 def surface_frame(surface: FramedMesh, point_m: np.ndarray, normal: np.ndarray) -> Found:
     """Return a place of the surface: the point itself, Z the mean normal around it, the radius of what is flat there.
 
-    On a thin or bent part what is near enough to have one normal is less: it is looked for twice nearer.
+    On a thin or bent part what is near enough to have one normal is less: it is looked for twice nearer. Of a point on an edge
+    the place is on a side beside it.
     """
     positions, normals = surface.samples
     reach = max(0.02 * surface.size_m, 2.5 * surface.spacing_m)
-    means = (surface.mean_normal(point_m, normal, share * reach) for share in _NEARER)
-    mean = next((mean for mean in means if _is_steady(mean, normal)), None)
+    mean = _steady_normal(surface, point_m, normal, reach)
+    if mean is None:
+        point_m, mean = _beside(surface, point_m, normal, reach)
     if mean is None:
         return Unclear("the surface turns too sharply where the point is")
     z = mean / np.linalg.norm(mean)
