@@ -195,7 +195,8 @@ def test_materials_are_those_of_the_table() -> None:
         ("frying pan", "body=aluminium; handle=plastic; bracket=steel", {"body": "aluminium", "handle": "plastic"}),
         ("hammer", "shaft=steel; head=unknown", None),  # a shaft may be head, neck or handle
         ("cup", "body=ceramic; handle=wood", {"body": "ceramic"}),  # no rule tells a cup's handle
-        ("clamp", "body=steel; handle=wood", None),  # a form whose parts no rule tells
+        ("clamp", "jaws=steel; handles=plastic", {"tip": "steel", "end": "plastic"}),
+        ("toy", "body=steel; handle=wood", None),  # a form whose parts no rule tells
     ],
 )
 def test_materials_go_to_the_parts_that_they_name(name: str, said: str, told: dict[str, str] | None) -> None:
