@@ -423,3 +423,68 @@ def test_shape_only_is_the_same_shape_with_textures_that_have_a_size(tmp_path: P
     whole, shape = read_asset(path), read_asset(path, shape_only=True)
     assert material_of(shape.visual[0]).baseColorTexture.size == (64, 32)
     assert np.allclose(np.sort(whole.visual[0].triangles, axis=None), np.sort(shape.visual[0].triangles, axis=None))
+
+
+DIALECTS = {
+    "is called 'heavy'": (
+        '<default class="heavy"><geom density="50"/><default class="light"><geom density="5"/></default></default>'
+        '<default class="second"><geom size="0.2"/></default>',
+        '<body><freejoint/><geom size="0.1" class="heavy"/><geom class="second"/><geom size="0.1" class="light"/></body>',
+        4 / 3 * np.pi * (50 * 0.1**3 + 50 * 0.2**3 + 5 * 0.1**3),
+    ),
+    "the attribute 'group'": (
+        '<default><default class="c" group="1"><geom size="0.1" mass="2"/></default></default>',
+        '<body childclass="c"><freejoint/><geom/><site rgba="0.1 0.2 red 1"/></body>',
+        2.0,
+    ),
+    "the type 'fixed'": (
+        "",
+        '<body><freejoint/><geom size="0.1" mass="1"/>'
+        '<body pos="0 0 1"><joint type="fixed"/><geom size="0.1" mass="2"/></body></body>',
+        3.0,
+    ),
+    "are called 'g'": (
+        "",
+        '<body name="b"><freejoint/><geom name="g" size="0.1" mass="1"/><geom name="g" size="0.2" mass="2"/></body>',
+        3.0,
+    ),
+    "'m' is written twice": (
+        '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/><mesh name="m" vertex="0 0 0 9 0 0 0 9 0 0 0 9"/></asset>',
+        '<body><freejoint/><geom type="mesh" mesh="m" density="6"/></body>',
+        1.0,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("said", DIALECTS)
+def test_what_mujoco_of_today_refuses_is_read_as_older_ones_and_others_do(tmp_path: Path, said: str) -> None:
+    before, worldbody, mass_kg = DIALECTS[said]
+    path = mjcf(tmp_path, worldbody, before)
+    with pytest.raises(ValueError):
+        mujoco.MjModel.from_xml_path(str(path))
+    asset = read_asset(path)
+    assert asset.inertial.mass_kg == pytest.approx(mass_kg)
+    assert any(said in sentence for sentence in asset.lenient) and set(asset.lenient) <= set(asset.remarks)
+    found = [finding for finding in audit_path(path, RULES).findings if finding.code == "FIL009"]
+    assert any(said in finding.message for finding in found) and all(f.severity == "warning" for f in found)
+
+
+def test_global_coordinates_are_those_of_the_world(tmp_path: Path) -> None:
+    compiler = '<compiler coordinate="global"/>'
+    inner = '<body><joint pos="0 0 1.05" axis="0 1 0"/><geom type="capsule" fromto="0 0 1 0 0 0.6" size="0.05"/></body>'
+    for place in ("", 'pos="0 0 1.25"'):
+        body = f'<body {place}><freejoint/><geom type="box" pos="0.3 0 1.25" size="0.1 0.2 0.3"/>{inner}</body>'
+        asset = read_asset(mjcf(tmp_path, body.replace('type="box" ', 'type="box" mass="1" '), compiler))
+        stands = [0.3, 0, 1.25] if not place else [0.3, 0, 0]  # in the axes of its body
+        assert np.allclose(np.mean(asset.visual[0].bounds, axis=0), stands)
+        assert any("global" in sentence for sentence in asset.lenient)
+    turned = '<body pos="0 0 1" euler="0 0 90"><geom size="0.1"/></body>'
+    with pytest.raises(AssetError, match="global coordinates"):
+        read_asset(mjcf(tmp_path, turned, compiler))
+
+
+def test_shapes_of_plugins_alone_are_said_to_be_code(tmp_path: Path) -> None:
+    before = '<extension><plugin plugin="mujoco.sdf.torus"><instance name="t"/></plugin></extension>'
+    body = '<body><geom type="sdf"><plugin instance="t"/></geom></body>'
+    with pytest.raises(AssetError, match="a plug-in computes: it is code"):
+        read_asset(mjcf(tmp_path, body, before))

@@ -9,6 +9,7 @@ import pytest
 import trimesh
 from PIL import Image
 
+from manitwin.assets.asset import Asset
 from manitwin.assets.audit.run import audit_assets, find_all
 from manitwin.assets.read import find_assets, read_asset
 from manitwin.assets.root import root_of, upward
@@ -153,3 +154,45 @@ def test_a_model_of_models_is_read_as_the_first_that_it_includes(tmp_path: Path)
     fragments: list[Path] = []
     assert [path.name for path in find_all([tmp_path], fragments)] == ["board", "peg"]
     assert [path.parent.name for path in fragments] == ["sun"]
+
+
+def test_files_that_only_a_program_finds_are_read_by_their_path_and_said(tmp_path: Path) -> None:
+    for place in ("assets/stls/things/bin/a.stl", "other/parts/things/bin/b.stl", "assets/xmls/deep/bin/c.stl"):
+        (tmp_path / place).parent.mkdir(parents=True)
+        trimesh.creation.box([1, 2, 3]).export(tmp_path / place)
+    (tmp_path / "assets/xmls/one").mkdir()
+
+    def asset(name: str) -> Asset:
+        mesh = f"<asset><mesh name='m' file='{name}'/></asset><worldbody><geom type='mesh' mesh='m'/></worldbody>"
+        file = tmp_path / "assets/xmls/one/object.xml"
+        file.write_text(f"<mujoco>{mesh}</mujoco>")
+        return read_asset(file, root=tmp_path)
+
+    for name in ("things/bin/a.stl", "package://mine/far/deep/bin/c.stl"):
+        found = asset(name if "a.stl" in name else "mine/xmls/deep/bin/c.stl")
+        assert len(found.visual) == 1 and found.missing_files == ()
+        assert len(found.lenient) == 1 and "not where it says" in found.lenient[0]
+    assert asset("things/bin/b.stl").missing_files == ("things/bin/b.stl",), "beside no folder above it"
+    assert asset("bin/a.stl").missing_files == ("bin/a.stl",), "two parts of a path may be anybody's"
+    (tmp_path / "assets/stls/things/bin/a.stl").unlink()
+    secret = tmp_path.parent / "secret.stl"
+    trimesh.creation.box([1, 2, 3]).export(secret)
+    (tmp_path / "assets/stls/things/bin/a.stl").symlink_to(secret)
+    assert asset("things/bin/a.stl").missing_files == ("things/bin/a.stl",), "a link out of the root"
+
+
+def test_templates_are_no_assets_and_are_said(tmp_path: Path) -> None:
+    for name, size in (
+        ("box", "DIM0 DIM1 0.1"),
+        ("jinja", "{{ size }} 1 1"),
+        ("plain", "1 1 1"),
+        ("broken", "0.1O 1 1"),
+        ("nan", "NAN 1 1"),
+    ):
+        box = f"<geometry><box size='{size}'/></geometry>"
+        (tmp_path / f"{name}.urdf").write_text(
+            f"<robot name='{name.upper()}'><link name='BASE_LINK'><visual>{box}</visual></link></robot>"
+        )
+    templates: list[Path] = []
+    assert [path.stem for path in find_all([tmp_path], [], templates)] == ["broken", "nan", "plain"]
+    assert [path.stem for path in templates] == ["box", "jinja"]

@@ -191,7 +191,6 @@ def test_no_file_outside_of_the_models_folder_is_read(tmp_path: Path, uri: str) 
         (link("a", pose="<pose>0 0 0</pose>"), "are not 6 numbers"),
         (link("a", '<visual name="v"><geometry><box><size>1 -1 1</size></box></geometry></visual>'), "not above zero"),
         (link("a", '<visual name="v"><geometry/></visual>'), "holds 0 shapes"),
-        (link("a", f'<visual name="v">{BOX}</visual><inertial><inertia/></inertial>'), "lacks one of ixx"),
         (link("a", ""), "no link of it has a shape"),
     ],
 )
@@ -199,6 +198,19 @@ def test_what_is_broken_is_said_in_one_line(tmp_path: Path, inside: str, message
     with pytest.raises(AssetError, match=message) as caught:
         read(tmp_path, inside)
     assert "\n" not in str(caught.value)
+
+
+def test_an_inertia_that_lacks_a_moment_is_not_read_and_said(tmp_path: Path) -> None:
+    inertia = "<inertia><ixx>0.1</ixx><iyy>0.1</iyy><ixx>0.1</ixx></inertia>"  # the third was meant for izz
+    asset = read(tmp_path, link("a", f'<visual name="v">{BOX}</visual><inertial><mass>2</mass>{inertia}</inertial>'))
+    assert asset.inertial.mass_kg == 2 and asset.inertial.inertia_kg_m2 is None
+    assert asset.lenient == ("the inertia of link 'a' lacks izz, and was not read",)
+
+
+def test_a_terrain_is_said_to_be_none_of_the_objects_that_are_read(tmp_path: Path) -> None:
+    terrain = "<geometry><heightmap><uri>hill.png</uri><size>9 9 1</size></heightmap></geometry>"
+    with pytest.raises(AssetError, match="<heightmap>, which is not read"):
+        read(tmp_path, link("a", f'<visual name="v">{terrain}</visual>'))
 
 
 def test_a_document_type_is_refused(tmp_path: Path) -> None:

@@ -278,3 +278,18 @@ def test_gltf_stands_as_what_collides_says_and_upright_where_nothing_does(
     extents = np.ptp(asset.visual[0].vertices, axis=0)
     assert int(extents.argmax()) == (2 if turned else 1)
     assert any("glTF meshes were turned" in remark for remark in asset.remarks) == turned
+
+
+def test_what_loaders_take_beside_the_specification_is_read_and_said(tmp_path: Path) -> None:
+    trimesh.creation.box([1, 1, 1]).export(tmp_path / "cube.stl")
+    shape = '<geometry><mesh filename="cube.stl" scale="1 2 3 1"/><material name="m"/></geometry>'
+    joint = '<joint name="j" type="fixed"><parent link="base"/><child link="l"/><origin xyz="0 0 1"/></joint>'
+    asset = read_asset(urdf(tmp_path, f'<link name="l"><visual>{shape}</visual></link>{joint}'))
+    assert np.allclose(asset.visual[0].bounds, [[-0.5, -1, -0.5], [0.5, 1, 2.5]])
+    said = " ".join(asset.lenient)
+    for words in ("holds <material> beside its shape", "4 factors of scale", "hangs from the link 'base'"):
+        assert words in said
+    ball = joint.replace("fixed", "spherical").replace("base", "l").replace('child link="l"', 'child link="k"')
+    box = f"<visual>{BOX_SHAPE}</visual>"
+    balls = read_asset(urdf(tmp_path, f'<link name="l">{box}</link><link name="k">{box}</link>{ball}'))
+    assert len(balls.visual) == 1 and balls.partial and balls.lenient == ()

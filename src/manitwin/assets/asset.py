@@ -94,7 +94,8 @@ class Asset:
     """One asset; ``path`` is the file or folder that was given, ``files`` all that belong to it, sorted.
 
     ``up`` is the axis that stands up by the format's rule or the file's word; ``unit_m`` the length of a file's unit, None
-    where it declares none. ``missing_files`` are named and not there; ``remarks`` are what the reader had to note, one line each.
+    where it declares none. ``missing_files`` are named and not there; ``remarks`` are what the reader had to note, one line each;
+    ``lenient`` those of them that a loader which goes by the letter of the format would refuse, or not find.
     ``rests`` are declared resting poses, asset to plane ``(4, 4)``. ``static``: it is said to stand fast, as buildings do, and is
     no object that moves. ``partial``: other bodies of the file, such as a robot's links, were left out; its name is of
     them all. ``soft``: it deforms; what is
@@ -123,6 +124,7 @@ class Asset:
     files: tuple[Path, ...] = ()
     missing_files: tuple[str, ...] = ()
     remarks: tuple[str, ...] = field(default=())
+    lenient: tuple[str, ...] = ()
 
 
 def combined_inertial(bodies: list[Inertial]) -> Inertial:

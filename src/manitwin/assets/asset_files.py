@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from manitwin.assets.root import upward
+from manitwin.assets.root import upward, with_the_path
 from manitwin.errors import AssetError, InputError
 from manitwin.formats.meshes.read import MeshFile, read_mesh
 from manitwin.formats.meshes.source import MeshLimits
@@ -25,6 +25,7 @@ UNREAD_FORMATS = frozenset({".vtk", ".vtu", ".wrl", ".iv", ".x3d", ".3ds", ".fbx
 MESHES = frozenset({".obj", ".stl", ".dae", ".msh", ".glb", ".gltf", ".ply", ".usd", ".usda", ".usdc", ".usdz"})
 MOST_NAMED = 3
 """Of the parts that are left out: of a robot's or a building's, a person reads the count."""
+_MOST_VAIN_SEARCHES = 8
 _NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' is not there")
 
 
@@ -33,8 +34,9 @@ class AssetFiles:
     """The files that an asset names, looked up below ``root`` and nowhere else, links resolved.
 
     ``own`` is the folder of the asset itself; what is read from above it is remarked. ``used`` are the files that were found,
-    ``missing`` the names that were not, ``remarks`` one line each. ``partial``: bodies were left out. ``limits`` are those
-    of each mesh, and say whether its looks are wanted.
+    ``missing`` the names that were not, ``remarks`` one line each, of which ``lenient``
+    are those of ``took_leniently``. ``partial``: bodies were left out. ``limits`` are those of each mesh, and say whether its
+    looks are wanted.
     """
 
     root: Path
@@ -43,8 +45,11 @@ class AssetFiles:
     used: set[Path] = field(default_factory=set)
     missing: list[str] = field(default_factory=list)
     remarks: list[str] = field(default_factory=list)
+    lenient: list[str] = field(default_factory=list)
     partial: bool = False
     _meshes: dict[Path, MeshFile] = field(default_factory=dict)
+    _strayed: dict[str, Path] = field(default_factory=dict)
+    _vain_searches: int = 0
     _shapes: int = 0
     _faces: int = 0
 
@@ -52,6 +57,12 @@ class AssetFiles:
         """Note something once."""
         if sentence not in self.remarks:
             self.remarks.append(sentence)
+
+    def took_leniently(self, sentence: str) -> None:
+        """Remark something that is read here, and that a loader which goes by the letter refuses or does not find."""
+        self.remark(sentence)
+        if sentence not in self.lenient:
+            self.lenient.append(sentence)
 
     @property
     def lacks_a_mesh(self) -> bool:
@@ -71,27 +82,55 @@ class AssetFiles:
 
         ``name`` is what the asset calls it.
         """
-        root = self.root.resolve()
         outside = False
         for candidate in candidates:
-            try:
-                resolved = candidate.resolve()
-                inside = resolved.is_relative_to(root)
-                found = inside and resolved.is_file()
-            except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
-                continue
-            if found:
-                self._note_above(resolved)
-                self.used.add(resolved)
-                return resolved
+            found, inside = self._below(candidate)
+            if found is not None:
+                self._note_above(found)
+                self.used.add(found)
+                return found
             outside = outside or not inside
+        elsewhere = self._elsewhere(name)
+        if elsewhere is not None:
+            return elsewhere
         self.missing.append(_short(name))
         if outside:
             self.remark(f"{_short(name)} lies outside the asset's folder and was not read")
         return None
 
-    def used_one(self, candidates: Iterable[Path]) -> Path | None:
-        """Return the first candidate that was found and read before; None where none was."""
+    def _below(self, candidate: Path) -> tuple[Path | None, bool]:
+        """Return a file below the root with its links resolved, else None, and whether its place would be below."""
+        try:
+            resolved = candidate.resolve()
+            inside = resolved.is_relative_to(self.root.resolve())
+            return (resolved if inside and resolved.is_file() else None), inside
+        except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
+            return None, True
+
+    def _elsewhere(self, name: str) -> Path | None:
+        """Return the file of a name that is not where the asset says, which is remarked; None where there is none."""
+        if name in self._strayed:
+            return self._strayed[name]
+        if self.own is None or self._vain_searches >= _MOST_VAIN_SEARCHES:
+            return None
+        for candidate in with_the_path(name.replace("\\", "/"), self.own, self.root):
+            found, _ = self._below(candidate)
+            if found is not None:
+                if not self._strayed:
+                    place = _short(str(found.relative_to(self.root.resolve())))
+                    self.took_leniently(
+                        f"files are not where it says, and were read from elsewhere below the root: {_short(name)} from {place}"
+                    )
+                self.used.add(found)
+                self._strayed[name] = found
+                return found
+        self._vain_searches += 1
+        return None
+
+    def used_one(self, name: str, candidates: Iterable[Path]) -> Path | None:
+        """Return the file of a name that ``find`` has found before; None where it has not."""
+        if name in self._strayed:
+            return self._strayed[name]
         for candidate in candidates:
             try:
                 resolved = candidate.resolve()

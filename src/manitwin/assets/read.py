@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -27,6 +28,11 @@ _ENDS = (b"</mujoco>", b"</robot>", b"</sdf>")
 _PRIM = re.compile(rb"^\s*def\b", re.MULTILINE)
 _COMPOSED = (b"references", b"payload")
 """What brings prims of other layers into one without any."""
+_NUMBERS = re.compile(rb"""\b(?:xyz|rpy|rgba|size|scale|radius|length|value|pos|quat)=["']([^"'<>]*)["']""")
+_TO_FILL_IN = re.compile(
+    rb"(?<![\w.])(?!NAN\b|INF\b|INFINITY\b)[A-Z][A-Z_]{2,}[0-9]*(?![\w.])|\{\{?\s*[A-Za-z_]\w*\s*\}|\$[({]"
+)
+"""Words and brackets that stand for numbers, which a program puts in their place."""
 _MARKS = re.compile(rb"<extra_info[\s/>]|<custom_data[\s/>]")
 _ROBOTWIN_DATA = re.compile(r"model_data\d*\.json")
 
@@ -126,22 +132,45 @@ def _xml_format(file: Path) -> Format | None:
     return None
 
 
-def _is_fragment(file: Path) -> bool:
-    """Tell whether an XML description holds no shape, and is there for others to include: it is no asset by itself."""
-    suffix = file.suffix.lower()
-    if suffix not in (".urdf", ".xml", ".mjcf", ".sdf", ".usda"):
-        return False
-    with open_regular(file, AssetError) as stream:
-        content = stream.read(_FRAGMENT_BYTES)
-    if len(content) == _FRAGMENT_BYTES:
-        return False
-    if suffix == ".usda":
-        return _PRIM.search(content) is None and not any(word in content for word in _COMPOSED) and b"class " in content
-    content = _without_comments(content)
+@dataclass(frozen=True)
+class _Aside:
+    """The descriptions that were found and are no assets by themselves."""
+
+    fragments: list[Path]
+    templates: list[Path]
+
+    def takes(self, file: Path) -> bool:
+        """Tell whether a description is no asset, and keep it: it has no shape, or words where numbers should be."""
+        suffix = file.suffix.lower()
+        if suffix not in (".urdf", ".xml", ".mjcf", ".sdf", ".usda"):
+            return False
+        with open_regular(file, AssetError) as stream:
+            content = stream.read(_FRAGMENT_BYTES)
+        if len(content) == _FRAGMENT_BYTES:
+            return False
+        content = content if suffix == ".usda" else _without_comments(content)
+        fragment = _has_no_prim(content) if suffix == ".usda" else _has_no_shape(content)
+        if fragment:
+            self.fragments.append(file)
+        elif template := suffix != ".usda" and _is_template(content):
+            self.templates.append(file)
+        return fragment or template
+
+
+def _has_no_prim(content: bytes) -> bool:
+    return _PRIM.search(content) is None and not any(word in content for word in _COMPOSED) and b"class " in content
+
+
+def _has_no_shape(content: bytes) -> bool:
+    """Tell whether an XML description holds no shape, and is there for others to include."""
     if content.rstrip().endswith(b"</mujoco>") and b"<include" not in content:
         content = b"".join(_WORLD_BODY.findall(content)) + b"</mujoco>"  # defaults name shapes, and make none
     ends = any(content.rstrip().endswith(end) for end in _ENDS)  # what is cut short is a broken asset, not a fragment
     return ends and (not any(tag in content for tag in _SHAPES) or b"<xacro:macro" in content)
+
+
+def _is_template(content: bytes) -> bool:
+    return any(_TO_FILL_IN.search(numbers) for numbers in _NUMBERS.findall(content))
 
 
 def _without_comments(xml: bytes) -> bytes:
@@ -176,18 +205,20 @@ def read_asset(
     return asset
 
 
-def find_assets(path: Path, fragments: list[Path] | None = None) -> Iterator[Path]:
+def find_assets(path: Path, fragments: list[Path] | None = None, templates: list[Path] | None = None) -> Iterator[Path]:
     """Yield every asset at or below a path, in the order of their names; hidden folders are left out.
 
     A folder that is one asset as a whole is not looked into; links to folders, and to files out of the folder, are not
     followed. A RoboTwin folder gives its model_data files. Descriptions without a shape, which others include, are no assets and
-    go to ``fragments``. Raises AssetError where the path is not there.
+    go to ``fragments``; those with words for numbers, which programs fill in, to ``templates``. Raises AssetError where the
+    path is not there.
     """
     _require_there(path)
     if not path.is_dir():
         yield path
         return
-    yield from _assets_below(path, path, [] if fragments is None else fragments)
+    aside = _Aside([] if fragments is None else fragments, [] if templates is None else templates)
+    yield from _assets_below(path, path, aside)
 
 
 def is_file_below(file: Path, folder: Path) -> bool:
@@ -205,13 +236,12 @@ def _require_there(path: Path) -> None:
         raise AssetError(f"{path}: is no regular file, and only such are read; give a file or a folder")
 
 
-def _assets_below(path: Path, root: Path, fragments: list[Path]) -> Iterator[Path]:
+def _assets_below(path: Path, root: Path, aside: _Aside) -> Iterator[Path]:
     form = folder_format(path)
     if form == "robotwin":
         yield from robotwin_data(path)
         return
-    if form == "sdf" and _is_fragment(path / "model.sdf"):
-        fragments.append(path / "model.sdf")  # a light, say
+    if form == "sdf" and aside.takes(path / "model.sdf"):  # a light, say
         return
     if form is not None:
         yield path
@@ -222,10 +252,8 @@ def _assets_below(path: Path, root: Path, fragments: list[Path]) -> Iterator[Pat
         file = Path(entry.path)
         if not is_file_below(file, root) or file_format(file) is None:
             continue
-        if _is_fragment(file):
-            fragments.append(file)
-        else:
+        if not aside.takes(file):
             yield file
     for entry in entries:
         if entry.is_dir(follow_symlinks=False):
-            yield from _assets_below(Path(entry.path), root, fragments)
+            yield from _assets_below(Path(entry.path), root, aside)

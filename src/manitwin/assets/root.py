@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 PACKAGE_MARKS = ("package.xml", "model.config")
 """A package of ROS, and a model of Gazebo: their folders are self-contained."""
+LEAST_COMMON_PARTS = 3
+"""So much of a path says which file is meant: meshes/base_link.stl is in every second robot's folder."""
+_MOST_PARTS, _MOST_FOLDERS = 32, 256
 REPOSITORY_MARK = ".git"
 
 
@@ -38,3 +42,30 @@ def upward(folder: Path, root: Path) -> Iterator[Path]:
         while folder != root:
             folder = folder.parent
             yield folder
+
+
+def with_the_path(name: str, folder: Path, root: Path) -> Iterator[Path]:
+    """Yield where a file may lie that is not where a description says: what programs load from folders that only they know.
+
+    That is a path of ``LEAST_COMMON_PARTS`` or more of the name's last parts below a folder or one above it up to the root, or
+    all of them below a folder directly in one of these.
+    """
+    parts = [
+        part for part in name.partition("://")[2 if "://" in name else 0].split("/") if part not in ("", ".", "..")
+    ]
+    if not LEAST_COMMON_PARTS <= len(parts) <= _MOST_PARTS:
+        return
+    for above in upward(folder, root):
+        for first in range(len(parts) - LEAST_COMMON_PARTS + 1):
+            yield above.joinpath(*parts[first:])
+        for beside in _folders_in(above):
+            yield beside.joinpath(*parts)
+
+
+def _folders_in(folder: Path) -> list[Path]:
+    try:
+        with os.scandir(folder) as scanned:
+            inside = [e.name for e in scanned if not e.name.startswith(".") and e.is_dir(follow_symlinks=False)]
+    except OSError:
+        return []
+    return [folder / name for name in sorted(inside)[:_MOST_FOLDERS]]

@@ -176,3 +176,15 @@ TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
 )
 def test_anything_else_is_left_to_the_full_reader(text: str) -> None:
     assert plain_triangles(text) is None
+
+
+def test_indices_of_normals_and_texture_coordinates_that_are_nowhere_are_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "bare.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1/1/1 2/2/2 3/3/3\n")
+    mesh = read_mesh(path)
+    assert len(mesh.parts) == 1 and len(mesh.parts[0].faces) == 1
+    said = " ".join(mesh.findings)
+    assert "name normals, of which it has none" in said and "name texture coordinates, of which it has none" in said
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//2 3//3\n")  # some: the file was cut
+    with pytest.raises(InputError, match="normal 3 of 1"):
+        read_mesh(path)

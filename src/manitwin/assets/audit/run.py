@@ -33,16 +33,18 @@ AUDIT = "manitwin.assets.audit.check:audit_by_codes"
 SELECT = "manitwin.assets.audit.selection:selected_texts"
 
 
-def find_all(paths: Iterable[Path], fragments: list[Path] | None = None) -> list[Path]:
+def find_all(
+    paths: Iterable[Path], fragments: list[Path] | None = None, templates: list[Path] | None = None
+) -> list[Path]:
     """Return every asset at or below the paths, each once; raises UsageError for a path that is not there.
 
-    ``fragments`` gets the descriptions without a shape, which are no assets.
+    ``fragments`` gets the descriptions without a shape, ``templates`` those with words for numbers: neither are assets.
     """
     found: dict[Path, None] = {}
     for path in paths:
         if not os.path.exists(path):
             raise UsageError(f"{path}: no such file or folder")
-        found.update(dict.fromkeys(find_assets(path, fragments)))
+        found.update(dict.fromkeys(find_assets(path, fragments, templates)))
     return list(found)
 
 

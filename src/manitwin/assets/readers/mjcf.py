@@ -13,6 +13,7 @@ from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
+from manitwin.assets.readers.mjcf_contents import COMPUTED
 from manitwin.assets.readers.mjcf_document import UNNAMED, MjcfSource, open_mjcf
 from manitwin.assets.readers.mjcf_model import compiled
 from manitwin.assets.readers.mjcf_shapes import BodyShapes, is_solid
@@ -69,6 +70,7 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS)
         files=files.sorted_files(),
         missing_files=files.missing_names(),
         remarks=tuple(files.remarks),
+        lenient=tuple(files.lenient),
         partial=files.partial,
     )
 
@@ -98,6 +100,7 @@ def _soft_asset(path: Path, file: Path, files: AssetFiles) -> Asset:
         files=files.sorted_files(),
         missing_files=files.missing_names(),
         remarks=tuple(files.remarks),
+        lenient=tuple(files.lenient),
     )
 
 
@@ -122,11 +125,12 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, 
     if not shaped:
         if is_solid(model, _WORLD):
             return world
-        if files.missing and groups:  # whose meshes are not there
-            return next(iter(groups.values()))
+        if files.missing:  # the meshes of its shapes
+            return next(iter(groups.values()), world)
         if model.ngeom:
             return next((g for g in groups.values() if any(model.body_geomnum[index] for index, _ in g)), world)
-        raise AssetError(f"{file.name}: no body of it has a geom")
+        code = ", but those that a plug-in computes: it is code, and none is run" if COMPUTED in files.remarks else ""
+        raise AssetError(f"{file.name}: no body of it has a geom{code}")
     files.remark_left_out([f"body {model.body(g[0][0]).name!r} moves by itself" for g in shaped[1:]], "bodies")
     return shaped[0]
 

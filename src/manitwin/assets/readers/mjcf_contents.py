@@ -9,6 +9,7 @@ from pathlib import Path
 from lxml import etree  # type: ignore[import-untyped]
 
 from manitwin.assets.asset_files import AssetFiles
+from manitwin.assets.readers.mjcf_dialects import rewrite_dialects
 from manitwin.errors import AssetError
 from manitwin.formats.xml_file import MAX_NUMBER
 
@@ -17,6 +18,7 @@ _ASSETS = frozenset({"mesh", "material", "texture", "hfield", "model"})
 _UNSEEN = ("light", "camera")
 _COMPOSITE, _FLEX = "composite", "flexcomp"
 _CODE = "plugin"
+COMPUTED = "shapes that a plug-in computes were left out: it is code, and none is run"
 _WORDS = frozenset(
     {"name", "file", "mesh", "material", "texture", "class", "childclass", "model", "user", "prefix", "body", "frame"}
 )
@@ -54,8 +56,7 @@ def keep_rigid_objects(
             entry.getparent().remove(entry)
     for element in root.iter(etree.Element):
         _check_numbers(file, element)
-    _leave_out_repeated(root, files)
-    _leave_out_unknown_materials(root, files)
+    rewrite_dialects(root, files)
     return soft
 
 
@@ -91,30 +92,9 @@ def _leave_out_plugins(root: etree._Element, files: AssetFiles) -> None:
             holder.getparent().remove(holder)
         else:  # it adds a force, say
             continue
-        files.remark("shapes that a plug-in computes were left out: it is code, and none is run")
+        files.remark(COMPUTED)
     for geom in [geom for geom in root.iter("geom") if geom.get("mesh") in computed and computed]:
         geom.getparent().remove(geom)
-
-
-def _leave_out_repeated(root: etree._Element, files: AssetFiles) -> None:
-    """Take out assets that are written twice: parts of robots and scenes bring their own, and are joined by programs."""
-    seen: dict[tuple[str, str], dict[str, str]] = {}
-    for entry in root.xpath("asset/*[@name]"):
-        key, written = (entry.tag, entry.get("name")), dict(entry.attrib)
-        if seen.setdefault(key, written) is not written and seen[key] == written:
-            entry.getparent().remove(entry)
-            files.remark(
-                f"<{entry.tag}> {entry.get('name')[:60]!r} is written twice, which MuJoCo refuses; once was read"
-            )
-
-
-def _leave_out_unknown_materials(root: etree._Element, files: AssetFiles) -> None:
-    known = {entry.get("name") for entry in root.iterfind("asset/material")}
-    for element in root.iter("geom", "site"):
-        name = element.get("material")
-        if name is not None and name not in known:
-            del element.attrib["material"]
-            files.remark(f"the material {name[:60]!r} is nowhere written, which MuJoCo refuses; its shapes are grey")
 
 
 def _check_numbers(file: Path, element: etree._Element) -> None:

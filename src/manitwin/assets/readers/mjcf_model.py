@@ -65,7 +65,7 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
             if "mass and inertia of moving bodies" not in str(error):
                 raise
             if not files.missing:  # else it would have one with its meshes
-                files.remark("a body of it moves and has no mass, which MuJoCo refuses")
+                files.took_leniently("a body of it moves and has no mass, which MuJoCo refuses")
             spec.compiler.boundmass, spec.compiler.boundinertia = _LEAST_MASS_KG, _LEAST_INERTIA_KG_M2
             model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:

@@ -86,7 +86,12 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         lambda turn: SdfShapes(opened.file, opened.frames, opened.files, turn_gltf=turn).all(opened.links), opened.files
     )
     if not visual and not collision and not opened.files.missing:
-        raise AssetError(f"{opened.file.name}: no link of it has a shape")
+        terrain = any(link.find(".//heightmap") is not None for link in opened.links)
+        raise AssetError(
+            f"{opened.file.name}: its shape is a <heightmap>, which is not read; it is a terrain, no object"
+            if terrain
+            else f"{opened.file.name}: no link of it has a shape"
+        )
     licence, attribution = _licence(opened)
     named = None if opened.config is None else text_of(opened.config, "name")
     return Asset(
@@ -105,6 +110,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         files=opened.files.sorted_files(),
         missing_files=opened.files.missing_names(),
         remarks=tuple(opened.files.remarks),
+        lenient=tuple(opened.files.lenient),
         partial=opened.files.partial,
     )
 
@@ -185,11 +191,15 @@ def _of_link(opened: SdfModel, link: etree._Element) -> Inertial:
     to_model = opened.frames.to_model(base or link.get("name")) @ pose_of(inertial, what)
     tensor = None
     if inertial.find("inertia") is not None:
-        if any(text_of(inertial, f"inertia/{key}") is None for key in ("ixx", "iyy", "izz")):
-            raise AssetError(f"{what}: its inertia lacks one of ixx, iyy, izz")
-        xx, xy, xz, yy, yz, zz = (number(text_of(inertial, f"inertia/{k}") or "0", f"{what} {k}") for k in _MOMENTS)
-        rotation = to_model[:3, :3]
-        tensor = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
+        lacks = [key for key in ("ixx", "iyy", "izz") if text_of(inertial, f"inertia/{key}") is None]
+        if lacks:
+            opened.files.took_leniently(
+                f"the inertia of link {link.get('name')!r} lacks {', '.join(lacks)}, and was not read"
+            )
+        else:
+            xx, xy, xz, yy, yz, zz = (number(text_of(inertial, f"inertia/{k}") or "0", f"{what} {k}") for k in _MOMENTS)
+            rotation = to_model[:3, :3]
+            tensor = rotation @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ rotation.T
     return Inertial(None if mass is None else number(mass, f"{what} mass"), to_model[:3, 3], tensor)
 
 

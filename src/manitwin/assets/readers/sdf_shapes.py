@@ -194,7 +194,7 @@ class SdfShapes:
 
     def _mesh_path(self, element: etree._Element) -> Path | None:
         uri = text_of(element, "geometry/mesh/uri")
-        return None if uri is None else self._files.used_one(self._candidates(uri))
+        return None if uri is None else self._files.used_one(uri, self._candidates(uri))
 
 
 def _primitive(shape: etree._Element, what: str) -> trimesh.Trimesh | None:

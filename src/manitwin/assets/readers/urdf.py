@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,12 +31,16 @@ from manitwin.robots.urdf import (
 )
 
 _TRIPLES = frozenset({"xyz", "rpy", "rgba", "size", "scale"})
+_AXES = 3
 _WORLD = "world"
 """Drake and Gazebo know it without a <link>."""
 
+_OF_SOME_LOADERS = ("spherical", "ball", "screw", "universal")
+"""Joints of PyBullet and MuJoCo (the first) and Drake, which the specification does not have."""
+
 RULES = UrdfRules(
     error=AssetError,
-    joint_types=(*JOINT_TYPES, "floating", "planar"),
+    joint_types=(*JOINT_TYPES, "floating", "planar", *_OF_SOME_LOADERS),
     geometries=("box", "capsule", "cylinder", "mesh", "sphere"),
     simulated=False,
 )
@@ -64,24 +69,42 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS)
 def open_urdf(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> UrdfObject:
     """Parse a URDF and choose the object in it; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
-    tree = read_urdf(file, RULES, file.name, _as_loaders_take_it)
     files = AssetFiles(root or root_of(path), file.resolve().parent, limits)
+    tree = read_urdf(file, RULES, file.name, partial(_as_loaders_take_it, files=files))
     files.used.add(file.resolve())
     return UrdfObject(file, tree, _rigid_links(tree, files), files)
 
 
-def _as_loaders_take_it(root: etree._Element) -> None:
-    """Leave out what tools of others add to shapes in namespaces of their own, and add the world that joints hang from."""
+def _as_loaders_take_it(root: etree._Element, files: AssetFiles) -> None:
+    """Leave out what tools of others add to shapes, and add the links that joints hang from and the file does not have."""
     for geometry in root.iter("geometry"):
         for foreign in [child for child in geometry.iterchildren("*") if etree.QName(child).namespace]:
             geometry.remove(foreign)
+        first, *others = [*geometry.iterchildren("*")] or [None]
+        misplaced = others if first is not None and first.tag in RULES.geometries else []
+        for other in misplaced:
+            geometry.remove(other)
+            files.took_leniently(f"a <geometry> holds <{str(other.tag)[:40]}> beside its shape, which was left out")
+    for mesh in root.iter("mesh"):
+        factors = (mesh.get("scale") or "").replace(",", " ").split()
+        if len(factors) > _AXES:
+            mesh.set("scale", " ".join(factors[:_AXES]))
+            files.took_leniently(f"a mesh has {len(factors)} factors of scale, of which the first three were taken")
     for element in root.iter("origin", "color", "box", "mesh"):
         for key in _TRIPLES.intersection(element.attrib):  # "0.1, 0, 0.2" is read as three numbers
             element.set(key, element.get(key).replace(",", " "))
+    _add_absent_parents(root, files)
+
+
+def _add_absent_parents(root: etree._Element, files: AssetFiles) -> None:
     links = {link.get("name") for link in root.findall("link")}
-    parents = {parent.get("link") for parent in root.iterfind("joint/parent")}
-    if links and _WORLD in parents - links:
-        root.insert(0, etree.Element("link", name=_WORLD))
+    parents = dict.fromkeys(parent.get("link") for parent in root.iterfind("joint/parent"))
+    for name in [name for name in parents if links and name and name not in links]:
+        root.insert(0, etree.Element("link", name=name))
+        if name != _WORLD:
+            files.took_leniently(
+                f"a joint hangs from the link {name[:60]!r}, which is nowhere; it was read as one without a shape"
+            )
 
 
 def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> Asset:
@@ -107,6 +130,7 @@ def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> A
         files=found.files.sorted_files(),
         missing_files=found.files.missing_names(),
         remarks=tuple(found.files.remarks),
+        lenient=tuple(found.files.lenient),
         partial=found.files.partial,
     )
 

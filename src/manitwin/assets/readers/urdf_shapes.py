@@ -105,7 +105,8 @@ class LinkShapes:
         shape = element.find("geometry/mesh")
         if shape is None:
             return None
-        return self._files.used_one(self._candidates(shape.get("filename") or ""))
+        name = shape.get("filename") or ""
+        return self._files.used_one(name, self._candidates(name))
 
     def _color(self, element: etree._Element) -> np.ndarray | None:
         material = element.find("material")

@@ -74,7 +74,8 @@ def audit(
         raise UsageError("--select and --ignore leave no rule; leave one of them out")
     run_in = check_engines((engines or "").split(",") if engines else ())
     fragments: list[Path] = []
-    assets = find_all(paths or [], fragments)
+    templates: list[Path] = []
+    assets = find_all(paths or [], fragments, templates)
     if not assets:
         raise UsageError(f"{', '.join(map(str, paths or []))}: holds no asset of a known format; {VALID_ASSETS}")
     audited = []
@@ -86,6 +87,11 @@ def audit(
     if fragments:
         err_console.print(
             f"{len(fragments)} descriptions without a shape, which others include, are no assets and were left alone"
+        )
+    if templates:
+        err_console.print(
+            f"{len(templates)} templates, whose numbers are words for a program to fill in, are no assets and were left alone:"
+            f" {', '.join(file.name for file in templates[:3])}{' ...' if len(templates) > 3 else ''}"
         )
     _write_end(audited, rules, format)
     if html is not None:

@@ -171,6 +171,9 @@ def _unique_corners(group: _Group, counts: tuple[int, int, int], source: MeshSou
     """Return triangles ``(F, 3)`` into unique ``(v, vt, vn)`` rows ``(V, 3)``."""
     rows = np.asarray(group.corners, dtype=np.int64)
     for column, (count, what) in enumerate(zip(counts, ("vertex", "texture coordinate", "normal"), strict=True)):
+        if column and not count and rows[:, column].max() >= 0:
+            rows[:, column] = -1  # loaders do not miss what they can do without
+            source.find(f"its faces name {what}s, of which it has none")
         if rows[:, column].max() >= count:
             raise source.unreadable(
                 f"a face names {what} {rows[:, column].max() + 1} of {count}",

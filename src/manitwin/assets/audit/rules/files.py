@@ -85,7 +85,14 @@ def altered(measured: MeasuredAsset) -> Iterator[Complaint]:
 def remarks(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Pass on what the reader had to note."""
     for remark in measured.asset.remarks:
-        yield Complaint(remark)
+        if remark not in measured.asset.lenient:
+            yield Complaint(remark)
+
+
+def taken_leniently(measured: MeasuredAsset) -> Iterator[Complaint]:
+    """Complain of what was read though a loader that goes by the letter would refuse it, or not find it."""
+    for said in measured.asset.lenient:
+        yield Complaint(said)
 
 
 RULES = (
@@ -153,5 +160,15 @@ RULES = (
         why="A rejected twin is an answer, not an asset: its record says why there is none.",
         remedy="`manitwin status --why` tells; nothing is to be done here.",
         check=unreadable,
+    ),
+    Rule(
+        "FIL009",
+        "taken-leniently",
+        "warning",
+        why="What one loader takes another refuses: MuJoCo of today does not read top-level classes of other names, joints of"
+        " the type fixed or two assets of one name, urdfdom no joint whose parent is nowhere; and meshes that only a program"
+        " finds are missing for everybody else. It was read here as the more lenient loaders do, and audited.",
+        remedy="Write it as the format's reference has it, and meshes by paths from the file.",
+        check=taken_leniently,
     ),
 )

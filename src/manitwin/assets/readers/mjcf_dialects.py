@@ -1,0 +1,123 @@
+"""What older MuJoCo, and others, take in an MJCF file and MuJoCo of today refuses: rewritten to what they make of it."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+from lxml import etree  # type: ignore[import-untyped]
+
+from manitwin.assets.asset_files import AssetFiles
+
+_ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
+_PLACED = ("body", "geom", "inertial", "joint", "frame")
+_ORIGIN = (0.0, 0.0, 0.0)
+_MAIN = "main"
+_CLASSES = ("class", "childclass")
+_NOT_OF_DEFAULTS = ("class",)
+"""The attributes that <default> has."""
+
+
+def rewrite_dialects(root: etree._Element, files: AssetFiles) -> None:
+    """Rewrite a parsed MJCF, each thing with a remark: one that goes by the letter would refuse the file.
+
+    Top-level classes under other names (older MuJoCo took the first one for all that have no class), attributes of <default>
+    beside its class, coordinates of the world (before 2.3.4) where no body is turned, fixed joints (of PyBullet and SAPIEN),
+    assets of one name (programs that join files take the first), and materials that are nowhere written. Sites are no shapes.
+    """
+    for site in list(root.iter("site")):
+        site.getparent().remove(site)
+    for default in root.iter("default"):
+        for key in [key for key in default.attrib if key not in _NOT_OF_DEFAULTS]:
+            del default.attrib[key]
+            files.took_leniently(f"<default> has the attribute {key[:40]!r}, which MuJoCo refuses; it was left out")
+    _name_top_class(root, files)
+    _take_global_coordinates(root, files)
+    for joint in list(root.iter("joint")):
+        if joint.get("type") == "fixed":
+            joint.getparent().remove(joint)
+            files.took_leniently(
+                "a joint is of the type 'fixed', which MuJoCo refuses; its body was read without a joint"
+            )
+    _leave_out_repeated(root, files)
+    _leave_out_unknown_materials(root, files)
+
+
+def _name_top_class(root: etree._Element, files: AssetFiles) -> None:
+    """Call the first top-level class ``main``, and put others with names into it."""
+    tops = root.findall("default")
+    named = [top for top in tops if top.get("class", _MAIN) != _MAIN]
+    for top in named:
+        name = top.get("class")
+        files.took_leniently(
+            f"the top-level <default> is called {name[:60]!r}, which MuJoCo refuses; it was read as older ones do"
+        )
+        if top is not tops[0]:
+            root.remove(top)
+            tops[0].append(top)
+            continue
+        del top.attrib["class"]
+        for element in root.iter(etree.Element):
+            for key in _CLASSES:
+                if element.get(key) == name:
+                    element.set(key, _MAIN)
+
+
+def _take_global_coordinates(root: etree._Element, files: AssetFiles) -> None:
+    """Write places that are given in the world relative to their bodies, as MuJoCo takes them; a turned body is left to it."""
+    compilers = [each for each in root.iterfind("compiler") if each.get("coordinate") == "global"]
+    bodies = list(root.iterfind("worldbody//body"))
+    if not compilers or any(body.get(key) is not None for body in bodies for key in _ORIENTATIONS):
+        return
+    for compiler in compilers:
+        del compiler.attrib["coordinate"]
+    files.took_leniently("its coordinates are global, which MuJoCo refuses; they were read as older ones do")
+    places: dict[etree._Element, tuple[float, float, float]] = {}
+    for body in bodies:  # one without a place has that of what holds it
+        places[body] = _three(body.get("pos"), places.get(body.getparent(), _ORIGIN))
+    for element in [each for each in root.iterfind("worldbody//*") if each.tag in _PLACED]:
+        origin = places.get(element.getparent(), _ORIGIN)
+        for key in ("pos", "fromto"):
+            with suppress(ValueError):  # MuJoCo says what is wrong with it
+                values = [float(word) for word in element.get(key, "").split()]
+                moved = [value - origin[axis % 3] for axis, value in enumerate(values)]
+                if moved:
+                    element.set(key, " ".join(map(repr, moved)))
+
+
+def _three(text: str | None, otherwise: tuple[float, float, float]) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(word) for word in (text or "").split())
+    except ValueError:
+        return otherwise
+    return x, y, z
+
+
+def _leave_out_repeated(root: etree._Element, files: AssetFiles) -> None:
+    """Take out assets that are written twice: parts of robots and scenes bring their own, and are joined by programs."""
+    seen: set[tuple[str, str]] = set()
+    for entry in root.xpath("asset/*[@name]"):
+        key = (entry.tag, entry.get("name"))
+        if key in seen:
+            entry.getparent().remove(entry)
+            files.took_leniently(
+                f"<{entry.tag}> {entry.get('name')[:60]!r} is written twice, which MuJoCo refuses; the first was read"
+            )
+        seen.add(key)
+    named: set[tuple[str, str]] = set()
+    for element in root.xpath("worldbody//geom[@name] | worldbody//body[@name] | worldbody//joint[@name]"):
+        key = (element.tag, element.get("name"))
+        if key in named:
+            del element.attrib["name"]
+            files.took_leniently(f"two <{key[0]}> are called {key[1][:60]!r}, which MuJoCo refuses; both were read")
+        named.add(key)
+
+
+def _leave_out_unknown_materials(root: etree._Element, files: AssetFiles) -> None:
+    known = {entry.get("name") for entry in root.iterfind("asset/material")}
+    for element in root.iter("geom"):
+        name = element.get("material")
+        if name is not None and name not in known:
+            del element.attrib["material"]
+            files.took_leniently(
+                f"the material {name[:60]!r} is nowhere written, which MuJoCo refuses; its shapes are grey"
+            )
