@@ -488,3 +488,15 @@ def test_shapes_of_plugins_alone_are_said_to_be_code(tmp_path: Path) -> None:
     body = '<body><geom type="sdf"><plugin instance="t"/></geom></body>'
     with pytest.raises(AssetError, match="a plug-in computes: it is code"):
         read_asset(mjcf(tmp_path, body, before))
+
+
+def test_a_plane_of_a_body_stands_fast_though_no_joint_is_in_the_file(tmp_path: Path) -> None:
+    assert read_asset(mjcf(tmp_path, '<body name="floor"><geom type="plane" size="1 1 1"/></body>')).static
+
+
+def test_a_file_of_composites_alone_says_what_they_are(tmp_path: Path) -> None:
+    rope = '<body><composite type="cable" count="9 1 1" size="1"><geom type="capsule" size="0.01"/></composite></body>'
+    with pytest.raises(AssetError, match="those of <composite>, which bends"):
+        read_asset(mjcf(tmp_path, rope))
+    beside = read_asset(mjcf(tmp_path, f'{rope}<body name="ball"><freejoint/><geom size="0.1"/></body>'))
+    assert beside.name == "ball" and any("<composite> is no rigid body" in remark for remark in beside.remarks)

@@ -293,3 +293,13 @@ def test_what_loaders_take_beside_the_specification_is_read_and_said(tmp_path: P
     box = f"<visual>{BOX_SHAPE}</visual>"
     balls = read_asset(urdf(tmp_path, f'<link name="l">{box}</link><link name="k">{box}</link>{ball}'))
     assert len(balls.visual) == 1 and balls.partial and balls.lenient == ()
+
+
+def test_what_is_soft_in_pybullet_is_said_and_left_out(tmp_path: Path) -> None:
+    soft = '<deformable name="torus"><visual filename="torus.vtk"/></deformable>'
+    with pytest.raises(
+        AssetError, match=r"object\.urdf: its only body, <deformable> 'torus' is PyBullet's for what bends"
+    ):
+        read_asset(urdf(tmp_path, soft))
+    asset = read_asset(urdf(tmp_path, f'{soft}<link name="l"><visual>{BOX_SHAPE}</visual></link>'))
+    assert len(asset.visual) == 1 and "left out" in asset.remarks[0]

@@ -13,6 +13,8 @@ from typing import Literal
 import numpy as np
 import trimesh
 
+from manitwin.assets.joints import DeclaredJoint
+
 Format = Literal["twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso"]
 FrameKind = Literal["contact", "functional", "target", "orientation"]
 
@@ -51,12 +53,16 @@ class Inertial:
 
 @dataclass(frozen=True)
 class Contact:
-    """Surface properties as declared; ``material`` is a word for it."""
+    """Surface properties as declared; ``material`` is a word for it.
+
+    ``of_others``: bodies of the file that were left out declare a friction, and this one does not.
+    """
 
     friction_static: float | None = None
     friction_dynamic: float | None = None
     restitution: float | None = None
     material: str | None = None
+    of_others: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,7 +101,8 @@ class Asset:
 
     ``up`` is the axis that stands up by the format's rule or the file's word; ``unit_m`` the length of a file's unit, None
     where it declares none. ``missing_files`` are named and not there; ``remarks`` are what the reader had to note, one line each;
-    ``lenient`` those of them that a loader which goes by the letter of the format would refuse, or not find.
+    ``lenient`` those of them that a loader which goes by the letter of the format would refuse, or not find. ``joints`` are all
+    of the file, those of bodies that were left out too.
     ``rests`` are declared resting poses, asset to plane ``(4, 4)``. ``static``: it is said to stand fast, as buildings do, and is
     no object that moves. ``partial``: other bodies of the file, such as a robot's links, were left out; its name is of
     them all. ``soft``: it deforms; what is
@@ -125,6 +132,7 @@ class Asset:
     missing_files: tuple[str, ...] = ()
     remarks: tuple[str, ...] = field(default=())
     lenient: tuple[str, ...] = ()
+    joints: tuple[DeclaredJoint, ...] = ()
 
 
 def combined_inertial(bodies: list[Inertial]) -> Inertial:

@@ -77,10 +77,11 @@ class AssetFiles:
         for part in parts if len(parts) <= MOST_NAMED else ():
             self.remark(f"{part} and was left out: one rigid object is read")
 
-    def find(self, name: str, candidates: Iterable[Path]) -> Path | None:
+    def find(self, name: str, candidates: Iterable[Path], below: str | None = None) -> Path | None:
         """Return the first candidate that is a file below the root; None, and noted as missing, where there is none.
 
-        ``name`` is what the asset calls it.
+        ``name`` is what the asset calls it, ``below`` more of its path where the asset says that elsewhere. Where no candidate
+        is there, its path is looked up elsewhere below the root (``with_the_path``).
         """
         outside = False
         for candidate in candidates:
@@ -90,7 +91,7 @@ class AssetFiles:
                 self.used.add(found)
                 return found
             outside = outside or not inside
-        elsewhere = self._elsewhere(name)
+        elsewhere = self._elsewhere(below or name)
         if elsewhere is not None:
             return elsewhere
         self.missing.append(_short(name))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from manitwin.assets.audit.finding import Finding
 from manitwin.assets.audit.rules import RULES, RULES_BY_CODE
 from manitwin.assets.audit.run import TAKEN_BY, audit_assets
 from manitwin.assets.audit.taken_by import A_HULL_EACH_GROUP, ONE_HULL, TRIANGLES
+from manitwin.assets.joints import DeclaredJoint
 from manitwin.errors import UsageError
 from manitwin.formats.npy_file import labels_to_npy
 from manitwin.geometry.poses import transform
@@ -113,6 +115,12 @@ def tilted_rest(asset: Asset) -> Asset:
     return replace(asset, rests=(turn,))
 
 
+def with_joint(kind: str = "revolute", **changes: Any) -> Break:
+    """A lid on a joint with limits of a right angle, or what is changed of it."""
+    joint = DeclaredJoint("lid", kind, "mug", "top", np.array([0, 0, 1.0]), 0.0, 1.57)
+    return lambda asset: replace(asset, format="urdf", joints=(replace(joint, **changes),))
+
+
 def mirrored() -> np.ndarray:
     return np.diag([1.0, 1, -1, 1])
 
@@ -127,6 +135,14 @@ BROKEN: dict[str, Break] = {
         visual=(trimesh.Trimesh(np.where(np.arange(3) == 1, np.nan, solid().vertices), solid().faces, process=False),),
     ),
     "FIL007": lambda a: replace(a, remarks=("a second link was left out",)),
+    "FIL009": lambda a: replace(a, remarks=("a joint is of no type",), lenient=("a joint is of no type",)),
+    "JNT001": with_joint(axis=np.zeros(3)),
+    "JNT002": with_joint(lower=1.0, upper=-1.0),
+    "JNT003": with_joint(upper=90.0),
+    "JNT004": with_joint(lower=None, upper=None),
+    "JNT005": with_joint(lower=1.57),
+    "JNT006": with_joint(follows="gone"),
+    "JNT007": with_joint(axis=np.array([0, 0, 2.0])),
     "MAS001": lambda a: replace(a, inertial=Inertial()),
     "MAS002": with_inertial(mass_kg=0.0),
     "MAS003": with_mass(0.016),
@@ -438,3 +454,42 @@ def test_groups_of_an_obj_are_hulls_of_their_own_where_the_engine_makes_them_so(
     assert {*ONE_HULL, *A_HULL_EACH_GROUP, *TRIANGLES} == set(TAKEN_BY)
     with pytest.raises(UsageError, match="mujoco"):
         audit_assets([path], engine="mujuco")
+
+
+def test_friction_that_another_body_of_the_file_declares_is_declared() -> None:
+    assert "FRI001" not in codes(
+        audit_asset(with_contact(friction_static=None, friction_dynamic=None, of_others=True)(clean()), RULES)
+    )
+
+
+def test_concave_meshes_of_sdf_count_as_they_are_drawn_unless_an_engine_is_named() -> None:
+    def mesh(asset: Asset) -> Asset:
+        return replace(
+            one_concave_mesh(asset),
+            format="sdf",
+            collision=(replace(one_concave_mesh(asset).collision[0], convex=True),),
+        )
+
+    about_collision = {code for code in RULES_BY_CODE if code.startswith("COL")}
+    assert codes(audit_asset(mesh(clean()), RULES)) & about_collision == set()
+    assert "COL003" in codes(audit_asset(mesh(clean()), RULES, engine="mujoco"))
+    filled = replace(BROKEN["COL003"](clean()), format="sdf")
+    assert "COL003" in codes(audit_asset(filled, RULES)), "convex pieces are what they are"
+
+
+def test_of_what_stands_fast_it_is_meant_that_only_a_part_collides() -> None:
+    legs = replace(clean(), visual=(*clean().visual, textured(box((0.01, 0.01, 0.5), (0.04, 0.04, -0.25)))))
+    assert "COL002" in codes(audit_asset(legs, RULES))
+    assert not {c for c in codes(audit_asset(replace(legs, static=True), RULES)) if c.startswith("COL")}
+
+
+def test_a_bore_that_no_pencil_fits_into_is_no_opening() -> None:
+    def tube(bore_m: float) -> Asset:
+        outer, inner = box((0.03, 0.03, 0.2), (0, 0, 0.1)), box((bore_m, bore_m, 0.19), (0, 0, 0.11))
+        mesh = trimesh.boolean.difference([outer, inner], engine="manifold")
+        return replace(
+            clean(), visual=(textured(mesh),), collision=(shape("hull", np.asarray(outer.vertices)),), frames=()
+        )
+
+    assert "COL003" in codes(audit_asset(tube(0.018), RULES))
+    assert "COL003" not in codes(audit_asset(tube(0.008), RULES))

@@ -1,7 +1,7 @@
 """Defects as they are found in assets, planted one by one in a clean URDF: each is found, and by a rule that names it.
 
-The kinds are those that `simcheck mutate` (0.2) plants in a rigid object; its five others are of joints, which an object without
-any does not have.
+The kinds are those that `simcheck mutate` (0.2) plants in a rigid object; its five others are of joints, of which an axis of no
+length, exchanged limits and limits in degrees are found (test_joint_rules.py).
 """
 
 from __future__ import annotations

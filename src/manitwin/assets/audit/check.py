@@ -10,7 +10,7 @@ from manitwin.assets.asset_files import MESHES
 from manitwin.assets.audit.finding import Audited, Complaint, Finding, Rule
 from manitwin.assets.audit.measured import MeasuredAsset
 from manitwin.assets.audit.rules import RULES_BY_CODE
-from manitwin.assets.audit.taken_by import OF_HULLS, TRIANGLES, as_taken_by
+from manitwin.assets.audit.taken_by import DRAWN_FORMATS, OF_HULLS, TRIANGLES, as_taken_by
 from manitwin.assets.read import read_asset
 from manitwin.errors import AssetError, TwinError
 from manitwin.twin.store import RECORD, read_record
@@ -38,7 +38,7 @@ def audit_asset(
     asset = as_taken_by(asset, engine)
     if engine in TRIANGLES:
         rules = [rule for rule in rules if rule.code not in OF_HULLS]
-    measured = MeasuredAsset(asset, tuple(engines))
+    measured = MeasuredAsset(asset, tuple(engines), as_drawn=engine is None and asset.format in DRAWN_FORMATS)
     broken = [code for code in STOPS if measured.complaints(RULES_BY_CODE[code].check)]
     if broken:
         rules = [rule for rule in rules if rule.code in broken]

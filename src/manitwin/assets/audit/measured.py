@@ -46,10 +46,14 @@ class SurfaceIntegrals:
 
 @dataclass
 class MeasuredAsset:
-    """Measurements of one asset, in its own axes and metres; ``engines`` are those that it is to be run in."""
+    """Measurements of one asset, in its own axes and metres; ``engines`` are those that it is to be run in.
+
+    ``as_drawn``: meshes that collide do so with their triangles, as they do in Gazebo.
+    """
 
     asset: Asset
     engines: tuple[str, ...] = ()
+    as_drawn: bool = False
     _kept: dict[Callable[..., Any], Any] = field(default_factory=dict)
 
     def once(self, measure: Callable[[MeasuredAsset], Measure]) -> Measure:

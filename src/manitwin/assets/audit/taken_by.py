@@ -13,6 +13,8 @@ A_HULL_EACH_GROUP = ("pybullet",)
 """Bullet's importer of URDF makes a compound of the groups of an OBJ file."""
 TRIANGLES = ("gazebo",)
 """Gazebo's engines collide with the triangles themselves."""
+DRAWN_FORMATS = ("sdf",)
+"""Whose own engine is one of these: without an engine that is named, concave meshes count as they are drawn."""
 OF_HULLS = ("COL003", "COL004", "COL005", "COL006", "COL007")
 """Rules of what convex hulls leave open or fill."""
 

@@ -13,7 +13,8 @@ from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
-from manitwin.assets.readers.mjcf_contents import COMPUTED
+from manitwin.assets.readers.joint_elements import mjcf_joints
+from manitwin.assets.readers.mjcf_contents import COMPUTED, LEFT_OUT_COMPOSITE
 from manitwin.assets.readers.mjcf_document import UNNAMED, MjcfSource, open_mjcf
 from manitwin.assets.readers.mjcf_model import compiled
 from manitwin.assets.readers.mjcf_shapes import BodyShapes, is_solid
@@ -50,7 +51,8 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS)
         return _soft_asset(path, file, AssetFiles(files.root, files.own, files.limits))
     spec, model = result.spec, result.model
     bodies = _rigid_bodies(file, model, files)
-    shapes = BodyShapes(result, files, planes=not any(is_solid(model, index) for index, _ in bodies))
+    ground = not any(is_solid(model, index) for index, _ in bodies)
+    shapes = BodyShapes(result, files, planes=ground)
     visual, collision = shapes.of(bodies)
     names = [model.body(index).name for index, _ in bodies]
     licence, attribution = stated_licence(source.texts)
@@ -64,13 +66,14 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS)
         unit_m=1.0,
         inertial=_declared_inertial(source, spec, model, bodies, files),
         contact=_declared_contact(source, model, shapes.colliding(bodies), files),
-        static=_stands_fast(model, bodies[0][0]),
+        static=ground or _stands_fast(model, bodies[0][0]),  # MuJoCo lets no plane move
         license=licence,
         attribution=attribution,
         files=files.sorted_files(),
         missing_files=files.missing_names(),
         remarks=tuple(files.remarks),
         lenient=tuple(files.lenient),
+        joints=mjcf_joints(model),
         partial=files.partial,
     )
 
@@ -129,10 +132,18 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, 
             return next(iter(groups.values()), world)
         if model.ngeom:
             return next((g for g in groups.values() if any(model.body_geomnum[index] for index, _ in g)), world)
-        code = ", but those that a plug-in computes: it is code, and none is run" if COMPUTED in files.remarks else ""
-        raise AssetError(f"{file.name}: no body of it has a geom{code}")
+        raise AssetError(f"{file.name}: no body of it has a geom{_but(files.remarks)}")
     files.remark_left_out([f"body {model.body(g[0][0]).name!r} moves by itself" for g in shaped[1:]], "bodies")
     return shaped[0]
+
+
+def _but(remarks: list[str]) -> str:
+    """Return what there is instead of the geoms of rigid bodies."""
+    if COMPUTED in remarks:
+        return ", but those that a plug-in computes: it is code, and none is run"
+    if LEFT_OUT_COMPOSITE in remarks:
+        return ", but those of <composite>, which bends or moves in itself; only rigid bodies and <flexcomp> are read"
+    return ""
 
 
 def _stands_fast(model: Any, body: int) -> bool:

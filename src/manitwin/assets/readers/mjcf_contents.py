@@ -44,7 +44,7 @@ def keep_rigid_objects(
     for tag in (_COMPOSITE,) if keep_soft else (_COMPOSITE, _FLEX):
         for element in list(root.iter(tag)):
             element.getparent().remove(element)
-            files.remark(f"<{tag}> is no rigid body and was left out")
+            files.remark(_left_out(tag))
     for element in list(root.iter(*_UNSEEN)):
         element.getparent().remove(element)
     for section in list(root):
@@ -58,6 +58,13 @@ def keep_rigid_objects(
         _check_numbers(file, element)
     rewrite_dialects(root, files)
     return soft
+
+
+def _left_out(tag: str) -> str:
+    return f"<{tag}> is no rigid body and was left out"
+
+
+LEFT_OUT_COMPOSITE = _left_out(_COMPOSITE)
 
 
 def written_out(element: etree._Element, sizes: dict[str, float]) -> float:

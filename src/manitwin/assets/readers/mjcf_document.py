@@ -6,7 +6,7 @@ MuJoCo is given texts alone and opens nothing: a mesh, texture or height field i
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from lxml import etree  # type: ignore[import-untyped]
 
@@ -27,8 +27,8 @@ class MjcfSource:
     """The XML that MuJoCo is given, and what was taken from it.
 
     ``texts`` are the comments at its head, and those of <custom> as ``name: data``. ``models`` are the XMLs that it attaches by
-    the names that it has for them, ``places`` by their keys the name that the file writes for a mesh, texture or height field
-    and where it should be. ``soft``: bodies that are not rigid were left out, or are
+    the names that it has for them, ``places`` by their keys the name that the file writes for a mesh, texture or height field,
+    where it should be, and the name below the compiler's folder. ``soft``: bodies that are not rigid were left out, or are
     read with ``soft_files`` by the names that the XML has for them.
     """
 
@@ -36,7 +36,7 @@ class MjcfSource:
     root: etree._Element
     texts: tuple[str, ...] = ()
     models: dict[str, etree._Element] = field(default_factory=dict)
-    places: dict[str, tuple[str, Path]] = field(default_factory=dict)
+    places: dict[str, tuple[str, Path, str]] = field(default_factory=dict)
     soft: bool = False
     soft_files: dict[str, bytes] = field(default_factory=dict)
 
@@ -144,7 +144,8 @@ class _Composition:
             name = entry.get("file").replace("\\", "/")
             plain = name.rpartition("/")[2] if strip else name
             key = f"{len(self._source.places)}.file"
-            self._source.places[key] = (plain, file.parent / folders[kind] / plain)
+            below = PurePosixPath(folders[kind], plain).as_posix()
+            self._source.places[key] = (plain, file.parent / folders[kind] / plain, below)
             if entry.tag in ("mesh", "hfield") and not entry.get("name"):
                 entry.set("name", Path(plain).stem)
             entry.set("file", key)

@@ -192,8 +192,8 @@ def _image(path: Path | None, files: AssetFiles, limits: MeshLimits) -> Image.Im
 
 
 def _find(source: MjcfSource, key: str, files: AssetFiles) -> Path | None:
-    name, place = source.places[key]
-    return files.find(name, [place])
+    name, place, below = source.places[key]
+    return files.find(name, [place], below)
 
 
 def _line(error: Exception) -> str:

@@ -40,8 +40,8 @@ def as_shapes_at_rest(source: MjcfSource, files: AssetFiles) -> None:
 
 
 def _take_file(flex: etree._Element, source: MjcfSource, files: AssetFiles) -> bool:
-    name, place = source.places[flex.attrib.pop("file")]
-    path = files.find(name, [place])
+    name, place, below = source.places[flex.attrib.pop("file")]
+    path = files.find(name, [place], below)
     if path is None:
         return False
     if flex.get("type") == "gmsh":

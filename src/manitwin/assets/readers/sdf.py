@@ -12,6 +12,7 @@ from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.licence_text import stated_licence, stated_or_none
 from manitwin.assets.read import is_file_below, only_file
+from manitwin.assets.readers.joint_elements import sdf_joints
 from manitwin.assets.readers.sdf_shapes import ModelFrames, SdfShapes, pose_of
 from manitwin.assets.readers.upright import upright_shapes
 from manitwin.assets.readers.urdf_shapes import candidates
@@ -111,6 +112,7 @@ def asset_of(opened: SdfModel, path: Path) -> Asset:
         missing_files=opened.files.missing_names(),
         remarks=tuple(opened.files.remarks),
         lenient=tuple(opened.files.lenient),
+        joints=sdf_joints(opened.model),
         partial=opened.files.partial,
     )
 
@@ -212,7 +214,8 @@ def _declared_contact(opened: SdfModel) -> Contact:
     if not said_mu:  # PyBullet reads its <contact> of URDF in SDF too
         lateral = next((t for link in opened.links if (t := text_of(link, "contact/lateral_friction"))), None)
         friction = None if lateral is None else number(lateral, f"{opened.file.name}: lateral_friction")
-        return Contact(friction, friction, restitution)
+        others = next(opened.model.iter("mu", "lateral_friction"), None) is not None
+        return Contact(friction, friction, restitution, of_others=others)
     values = [number(text, f"{opened.file.name}: mu") for _, text in said_mu]
     if max(values) > min(values):
         opened.files.remark(

@@ -13,6 +13,7 @@ from manitwin.assets.asset import Asset, Contact, Inertial, combined_inertial
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles
 from manitwin.assets.licence_text import stated_licence
 from manitwin.assets.read import only_file
+from manitwin.assets.readers.joint_elements import urdf_joints
 from manitwin.assets.readers.upright import upright_shapes
 from manitwin.assets.readers.urdf_shapes import LinkShapes
 from manitwin.assets.root import root_of
@@ -31,7 +32,7 @@ from manitwin.robots.urdf import (
 )
 
 _TRIPLES = frozenset({"xyz", "rpy", "rgba", "size", "scale"})
-_AXES = 3
+_AXES, _SOFT = 3, "deformable"
 _WORLD = "world"
 """Drake and Gazebo know it without a <link>."""
 
@@ -70,13 +71,18 @@ def open_urdf(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LI
     """Parse a URDF and choose the object in it; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, limits)
-    tree = read_urdf(file, RULES, file.name, partial(_as_loaders_take_it, files=files))
+    tree = read_urdf(file, RULES, file.name, partial(_as_loaders_take_it, files=files, name=file.name))
     files.used.add(file.resolve())
     return UrdfObject(file, tree, _rigid_links(tree, files), files)
 
 
-def _as_loaders_take_it(root: etree._Element, files: AssetFiles) -> None:
+def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> None:
     """Leave out what tools of others add to shapes, and add the links that joints hang from and the file does not have."""
+    for soft in root.findall(_SOFT):
+        said = f"<{_SOFT}> {(soft.get('name') or '')[:60]!r} is PyBullet's for what bends: it is no rigid body"
+        if root.find("link") is None:
+            raise AssetError(f"{name}: its only body, {said}, and only rigid ones are read from URDF")
+        files.remark(f"{said} and was left out")
     for geometry in root.iter("geometry"):
         for foreign in [child for child in geometry.iterchildren("*") if etree.QName(child).namespace]:
             geometry.remove(foreign)
@@ -131,6 +137,7 @@ def asset_of(found: UrdfObject, path: Path, contact: Contact | None = None) -> A
         missing_files=found.files.missing_names(),
         remarks=tuple(found.files.remarks),
         lenient=tuple(found.files.lenient),
+        joints=urdf_joints(found.tree),
         partial=found.files.partial,
     )
 
@@ -167,7 +174,8 @@ def _declared_contact(found: UrdfObject) -> Contact:
             return Contact(friction, friction, restitution)
     gazebo = gazebo_friction(found)
     if gazebo is None:
-        return Contact()
+        root = found.tree.element
+        return Contact(of_others=next(root.iter("lateral_friction", "mu1"), None) is not None)
     first, second = gazebo
     if second is not None and second != first:
         found.files.remark(f"mu1 {first} and mu2 {second} are two directions in Gazebo; the first was taken")

@@ -12,6 +12,7 @@ from manitwin.assets.audit.rules import (
     friction,
     grasps,
     inertia,
+    joints,
     licence,
     mass,
     placement,
@@ -22,8 +23,8 @@ from manitwin.assets.audit.rules import (
 )
 
 MODULES = (
-    files, mass, inertia, center_of_mass, collision, scale, friction, frames, contacts, grasps, placement, licence, textures,
-    twin, running
+    files, mass, inertia, center_of_mass, collision, scale, friction, joints, frames, contacts, grasps, placement, licence,
+    textures, twin, running
 )  # fmt: skip
 
 RULES: tuple[Rule, ...] = tuple(rule for module in MODULES for rule in module.RULES)

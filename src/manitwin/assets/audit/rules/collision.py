@@ -20,6 +20,9 @@ BOX_SLACK_M, BOX_SLACK_SHARE = 0.003, 0.03
 LEAST_KEPT = 0.5
 """Of an open cavity: less, and what is put in stands on air."""
 
+LEAST_OPENING_M = 0.01
+"""As wide as a pencil: a flute's bore is no place to put things in."""
+
 STICKS_OUT_M, STICKS_OUT_SHARE = 0.01, 0.05
 """How far collision shapes may reach into the open air: a finger's thickness."""
 
@@ -58,8 +61,8 @@ def flat(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def box_differs(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of a collision whose box is not that of the visual."""
-    if measured.visual is None or measured.collision is None:
-        return
+    if measured.visual is None or measured.collision is None or measured.asset.static:
+        return  # of what stands fast often only what is met collides, such as a table's top
     seen, felt = np.asarray(measured.visual.bounds), np.asarray(measured.collision.bounds)
     apart = float(np.abs(seen - felt).max())
     if apart > max(BOX_SLACK_M, BOX_SLACK_SHARE * measured.longest_m):
@@ -72,7 +75,7 @@ def box_differs(measured: MeasuredAsset) -> Iterator[Complaint]:
 
 def has_convex_pieces(measured: MeasuredAsset) -> bool:
     """Tell whether the collision is made of convex pieces, in the place of what is seen: only then is it what it looks."""
-    if any(shape.as_drawn for shape in measured.asset.collision):
+    if any(shape.as_drawn for shape in measured.asset.collision) or measured.once(_drawn):
         return False
     return bool(len(measured.shapes)) and not measured.complaints(box_differs) and not measured.complaints(not_convex)
 
@@ -83,6 +86,9 @@ def filled_opening(measured: MeasuredAsset) -> Iterator[Complaint]:
     if measured.asset.static or air is None or air.opens is None or not has_convex_pieces(measured):
         return
     if measured.asset.partial:  # a link of a robot is hollow where the next one sits
+        return
+    across = np.ptp(air.points_m[air.hollow], axis=0)[np.abs(air.opens) < 0.5]
+    if not len(across) or float(across.min()) < LEAST_OPENING_M:
         return
     kept = 1 - float(measured.shapes.within(air.points_m[air.hollow]).mean())
     if kept < LEAST_KEPT:
@@ -121,7 +127,7 @@ def stands_for_object(measured: MeasuredAsset) -> bool:
 
 def uncovered(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of visible surface that nothing collides for."""
-    if measured.visual is None or not has_convex_pieces(measured):
+    if measured.visual is None or measured.asset.static or not has_convex_pieces(measured):
         return
     limit = max(UNCOVERED_M, UNCOVERED_SHARE * measured.longest_m)
     looked = measured.samples[::3]
@@ -160,16 +166,27 @@ def _is_concave(shape: CollisionShape, hull_volume_m3: float) -> bool:
     return abs(volume) < CONVEX_SHARE * hull_volume_m3
 
 
+def _drawn(measured: MeasuredAsset) -> list[CollisionShape]:
+    """Return the concave meshes that collide with their triangles."""
+    if not measured.as_drawn:
+        return []
+    volumes = _with_hull_volume(measured)
+    return [shape for shape, volume in volumes if not shape.primitive and _is_concave(shape, volume)]
+
+
 def costly(measured: MeasuredAsset) -> Iterator[Complaint]:
     """Complain of more shapes, or of convex hulls of more vertices, than engines take well."""
     shapes = measured.asset.collision
     if len(shapes) > MANY_SHAPES:
         yield Complaint(f"{len(shapes)} collision shapes: every contact becomes slow", values={"shapes": len(shapes)})
+    drawn = {id(shape) for shape in measured.once(_drawn)}
     corners = zip(measured.shapes.kept, measured.shapes.corners, strict=True)
     large = [
         (shapes[index], count)
         for index, count in corners
-        if shapes[index].convex and not (shapes[index].primitive or shapes[index].as_drawn) and count > MANY_VERTICES
+        if shapes[index].convex
+        and not (shapes[index].primitive or shapes[index].as_drawn or id(shapes[index]) in drawn)
+        and count > MANY_VERTICES
     ]
     if large:
         most = max(count for _, count in large)

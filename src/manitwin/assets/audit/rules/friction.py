@@ -17,7 +17,7 @@ def missing(measured: MeasuredAsset) -> Iterator[Complaint]:
     if measured.asset.static or not measured.asset.collision:  # nothing of it rubs
         return
     contact = measured.asset.contact
-    if contact.friction_static is None and contact.friction_dynamic is None:
+    if contact.friction_static is None and contact.friction_dynamic is None and not contact.of_others:
         yield Complaint("no friction is declared: the scene's default decides whether a grasp holds")
 
 

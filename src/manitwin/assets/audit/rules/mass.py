@@ -89,7 +89,7 @@ def possible_mass_kg(measured: MeasuredAsset) -> tuple[float, float, str] | None
         most = max(
             most, (density.high if name in HOLDS_NOTHING else max(density.high, HEAVIEST_CONTENTS_KG_M3)) * hull_m3
         )
-    what = "any matter" if names == ["unknown"] else " or ".join(names)
+    what = "common matter" if names == ["unknown"] else " or ".join(names)
     return least / SLACK, most * SLACK, what
 
 

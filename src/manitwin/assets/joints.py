@@ -1,0 +1,31 @@
+"""The joints that an asset's file declares, of the body that is read and of all others in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+ABOUT_AN_AXIS = ("revolute", "continuous", "prismatic", "screw", "hinge", "slide")
+TURNS = ("revolute", "hinge")
+"""Between two limits, that is; a continuous joint has none."""
+LIMITED = ("revolute", "prismatic")
+"""Which the URDF specification asks for a <limit>."""
+
+
+@dataclass(frozen=True)
+class DeclaredJoint:
+    """One joint, ``kind`` in the words of its format; None is what the file does not say.
+
+    ``axis (3,)`` is in the joint's frame as written, NaN where it is no three numbers. ``lower`` and ``upper`` are radians or
+    metres, infinite where the file says that there is none. ``follows`` is the joint that it copies.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    axis: np.ndarray | None = None
+    lower: float | None = None
+    upper: float | None = None
+    follows: str | None = None
