@@ -1,6 +1,6 @@
 """How many of the assets below folders are read: `python benchmarks/assets_read.py FOLDER... [--most N] [--seed S]`.
 
-A file that its makers call malformed or invalid, to test that loaders refuse it, is counted apart, and every one that is not read is
+A file that its makers call malformed or invalid, to test that loaders refuse it, is counted apart; every one that is not read is
 named with its cause. Of a folder with more assets than ``--most`` so many are drawn.
 """
 

@@ -443,6 +443,16 @@ DIALECTS = {
         '<body pos="0 0 1"><joint type="fixed"/><geom size="0.1" mass="2"/></body></body>',
         3.0,
     ),
+    "the class 'gone' is nowhere": (
+        "",
+        '<body name="b" childclass="gone"><freejoint/><geom class="gone" size="0.1" mass="1"/></body>',
+        1.0,
+    ),
+    "the world has an <inertial>": (
+        "",
+        '<inertial pos="0 0 0" mass="5" diaginertia="1 1 1"/><body><freejoint/><geom size="0.1" mass="1"/></body>',
+        1.0,
+    ),
     "are called 'g'": (
         "",
         '<body name="b"><freejoint/><geom name="g" size="0.1" mass="1"/><geom name="g" size="0.2" mass="2"/></body>',

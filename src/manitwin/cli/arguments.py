@@ -20,6 +20,7 @@ PLACES = frozenset(
         "source",
         "episodes",
         "scenes",
+        "prompts",
         "out",
         "config",
         "record",

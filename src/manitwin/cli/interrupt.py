@@ -17,7 +17,9 @@ from functools import cache
 from types import FrameType
 from typing import NoReturn
 
-RESUMABLE = frozenset({"build", "run", "layout", "trajectories", "render", "publish", "import", "collect add"})
+RESUMABLE = frozenset(
+    {"build", "run", "layout", "trajectories", "render", "publish", "import", "collect add", "collect draw"}
+)
 """Commands that go on where they stopped."""
 RESUMABLE_STATUS = 4
 INTERRUPTED_STATUS = 130

@@ -25,7 +25,7 @@ from manitwin.cli.commands.build import build, run
 from manitwin.cli.commands.capture import capture
 from manitwin.cli.commands.carve import carve
 from manitwin.cli.commands.catalog import catalog
-from manitwin.cli.commands.collect import collect_add, collect_plan, collect_status
+from manitwin.cli.commands.collect import collect_add, collect_draw, collect_plan, collect_status
 from manitwin.cli.commands.doctor import doctor
 from manitwin.cli.commands.evaluate import evaluate
 from manitwin.cli.commands.export import export
@@ -115,7 +115,12 @@ for name, reviewing in (
     ("tune", review_tune),
 ):
     register(app, reviewing, f"review {name}")
-for name, collecting in (("add", collect_add), ("status", collect_status), ("plan", collect_plan)):
+for name, collecting in (
+    ("add", collect_add),
+    ("status", collect_status),
+    ("plan", collect_plan),
+    ("draw", collect_draw),
+):
     register(app, collecting, f"collect {name}")
 
 

@@ -22,7 +22,8 @@ def rewrite_dialects(root: etree._Element, files: AssetFiles) -> None:
 
     Top-level classes under other names (older MuJoCo took the first one for all that have no class), attributes of <default>
     beside its class, coordinates of the world (before 2.3.4) where no body is turned, fixed joints (of PyBullet and SAPIEN),
-    assets of one name (programs that join files take the first), and materials that are nowhere written. Sites are no shapes.
+    assets of one name (programs that join files take the first), an <inertial> of the world, and materials and classes that are
+    nowhere written. Sites are no shapes.
     """
     for site in list(root.iter("site")):
         site.getparent().remove(site)
@@ -38,8 +39,11 @@ def rewrite_dialects(root: etree._Element, files: AssetFiles) -> None:
             files.took_leniently(
                 "a joint is of the type 'fixed', which MuJoCo refuses; its body was read without a joint"
             )
+    for inertial in root.xpath("worldbody/inertial"):  # of a part that a program puts into a body
+        inertial.getparent().remove(inertial)
+        files.took_leniently("the world has an <inertial>, which MuJoCo refuses; it was left out")
     _leave_out_repeated(root, files)
-    _leave_out_unknown_materials(root, files)
+    _leave_out_unknown(root, files)
 
 
 def _name_top_class(root: etree._Element, files: AssetFiles) -> None:
@@ -112,12 +116,16 @@ def _leave_out_repeated(root: etree._Element, files: AssetFiles) -> None:
         named.add(key)
 
 
-def _leave_out_unknown_materials(root: etree._Element, files: AssetFiles) -> None:
-    known = {entry.get("name") for entry in root.iterfind("asset/material")}
-    for element in root.iter("geom"):
+def _leave_out_unknown(root: etree._Element, files: AssetFiles) -> None:
+    materials = {entry.get("name") for entry in root.iterfind("asset/material")}
+    classes = {_MAIN, *(default.get("class") for default in root.iter("default"))}
+    for element in root.iterfind("worldbody//*"):
         name = element.get("material")
-        if name is not None and name not in known:
+        if element.tag == "geom" and name is not None and name not in materials:
             del element.attrib["material"]
             files.took_leniently(
                 f"the material {name[:60]!r} is nowhere written, which MuJoCo refuses; its shapes are grey"
             )
+        for key in [key for key in _CLASSES if element.get(key, _MAIN) not in classes]:
+            name = element.attrib.pop(key)
+            files.took_leniently(f"the class {name[:60]!r} is nowhere written, which MuJoCo refuses; it was left out")

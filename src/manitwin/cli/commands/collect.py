@@ -126,3 +126,56 @@ def collect_plan(
     for cause, count in plan.left_out.items():
         out_console.print(f"left out, {cause}: {count}")
     out_console.print(f"{out / MANIFEST}: {len(plan.chosen)} inputs; {out / PROMPTS}: {len(plan.prompts)} texts")
+
+
+def collect_draw(
+    prompts: Annotated[
+        Path,
+        options.existing(
+            "A plan's folder, or a CSV of texts and names.", "PLAN|PROMPTS.csv", "a plan that collect plan made"
+        ),
+    ],
+    images: Annotated[
+        str,
+        typer.Option(
+            "--images",
+            help="Who draws: command:PROGRAM {text} {out}, fal:ENDPOINT or openai:MODEL@URL.",
+            metavar="SPEC",
+        ),
+    ],
+    out: Annotated[Path, options.output_folder("The folder to write pictures and their manifest into.")],
+    config: options.Config = None,
+    max_cost_usd: options.MaxCost = None,
+    json_: Json = False,
+) -> None:
+    """Have a text-to-image model draw the prompts of a plan, each once; run again to go on."""
+    from manitwin.config import BuildConfig, load_config
+    from manitwin.dataset.collect.drawing import ANSWERS, MANIFEST, draw_pictures, read_prompts
+
+    settings = BuildConfig() if config is None else load_config(config)
+    if max_cost_usd is not None:
+        limited = settings.services.model_copy(update={"max_cost_usd": max_cost_usd})
+        settings = settings.model_copy(update={"services": limited})
+    wanted = read_prompts(prompts)
+    from manitwin.models.text_to_image.choose import choose_text_to_image
+
+    painter = choose_text_to_image(images, settings, out / ANSWERS)
+    done = draw_pictures(
+        wanted, out, painter, settings, said=lambda line: error_console.print(line, markup=False, soft_wrap=True)
+    )
+    if json_:
+        print_document(
+            {
+                "prompts": len(wanted),
+                "made": done.made,
+                "there": done.there,
+                "refused": done.refused,
+                "usd": done.usd,
+                "stopped": done.stopped,
+            }
+        )
+        return
+    told = f"{out / MANIFEST}: {done.made} drawn, {done.there} there before, {done.refused} refused, {done.usd:.4f} USD"
+    out_console.print(told, markup=False, soft_wrap=True)
+    if done.stopped is not None:
+        error_console.print(done.stopped, markup=False, soft_wrap=True, style="yellow")

@@ -1,4 +1,4 @@
-"""A server that keeps the contract of fal's queue, with three endpoints behind it.
+"""A server that keeps the contract of fal's queue, with four endpoints behind it.
 
 Queue: https://fal.ai/docs/api-reference/inference-api (202 while under way, 200 when complete; the addresses of a request use the
 owner and the app only) and https://docs.fal.ai/model-endpoints/queue. Errors: .../documentation/model-apis/request-errors (flat,
@@ -31,6 +31,9 @@ REFUSALS = {
 
 def _pictures(value: Any) -> str | None:
     return picture_url(value[0]) if isinstance(value, list) and 1 <= len(value) <= 5 else "must be a list of URLs"
+
+
+IMAGES = "images"
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,11 @@ ENDPOINTS = {
         "model_mesh",
     ),
     "fal-ai/hunyuan3d-v3/text-to-3d": _Endpoint({"prompt": text(1024)}, ("prompt",), "model_glb"),
+    "fal-ai/flux/dev": _Endpoint(
+        {"prompt": text(4096), "seed": whole(0, 2**31 - 1), "num_images": whole(1, 4), "image_size": text(64)},
+        ("prompt",),
+        IMAGES,
+    ),
 }
 
 
@@ -166,6 +174,9 @@ class FakeFal(FakeVendor):
         if asked.fails:
             problem = {"loc": ["body"], "msg": "No object was found in the picture", "type": "generation_error"}
             return Response(422, {"detail": [problem]})
+        if endpoint.output == IMAGES:
+            drawn = {"url": f"{base_url}{FILES}{asked.id}/picture.png", "content_type": "image/png", "width": 128}
+            return Response(200, {IMAGES: [drawn], "seed": asked.seed, "has_nsfw_concepts": [False]})
         link = f"{base_url}{FILES}{asked.id}/model.glb"
         made = {"url": link, "content_type": "model/gltf-binary", "file_name": "model.glb", "file_size": 1}
         return Response(200, {"timings": {"prepare": 0.1, "generation": 3.0}, endpoint.output: made})

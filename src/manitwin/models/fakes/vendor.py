@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from manitwin.models.fakes.faults import Faults
 from manitwin.models.fakes.meshes import mesh_file
+from manitwin.models.fakes.pictures import picture_png
 from manitwin.models.fakes.server import Request, Response
 
 FILES = "/files/"
@@ -91,6 +92,8 @@ class FakeVendor(ABC):
             return Response(404, b"<Error><Code>NoSuchKey</Code></Error>", XML)
         if self.faults.strike("expired_link"):
             return Response(403, b"<Error><Code>AccessDenied</Code></Error>", XML)
+        if name.endswith(".png"):
+            return Response(200, picture_png(seed), {"Content-Type": "image/png"})
         data = mesh_file("usdz" if name.endswith(".usdz") else "glb", self.faults, seed)
         response = Response(200, data, {"Content-Type": "model/gltf-binary"})
         return replace(response, cut_after=len(data) // 2) if self.faults.strike("disconnects") else response

@@ -55,6 +55,8 @@ class CommandGenerator:
     """
 
     name = "command"
+    written_name = "generated.glb"
+    """What the program writes to; its ending says of which kind it is to be."""
     needs: Resource = "gpu"
     asked_with: frozenset[Asked] = IMAGE_OR_TEXT  # by what stands in the command; so as long as none is chosen
 
@@ -104,14 +106,18 @@ class CommandGenerator:
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
         """Write the mesh below ``folder``; raises BadReply where the program left none."""
-        made = self._job(job_id).folder / "generated.glb"
+        made = self._job(job_id).folder / self.written_name
         try:
-            _check_mesh(made)
-            path = folder / "generated.glb"
+            self.check(made)
+            path = folder / self.written_name
             shutil.move(made, path)
         finally:
             shutil.rmtree(self._jobs.pop(job_id).folder, ignore_errors=True)
         return Generated(path, self.model, {"program": self.model})
+
+    def check(self, made: Path) -> None:
+        """Raise BadReply for what is no mesh."""
+        _check_mesh(made)
 
     def _job(self, job_id: str) -> _Ended:
         if job_id not in self._jobs:
@@ -141,7 +147,7 @@ class CommandGenerator:
         values = {
             "image": str(image),
             "text": text,
-            "out": str(folder / "generated.glb"),
+            "out": str(folder / self.written_name),
             "seed": str(request.seed),
             "folder": str(folder),
         }

@@ -61,6 +61,7 @@ class FalGenerator(VendorGenerator):
     name = "fal"
     url, keys = VENDOR, (KEY,)
     default_model = DEFAULT
+    written_name, made = "generated.glb", "GLB"
     remedy = f"check {KEY} and your balance at https://fal.ai/dashboard/billing"
 
     def __init__(
@@ -68,7 +69,7 @@ class FalGenerator(VendorGenerator):
     ):
         if endpoint.count("/") < 1 or not all(endpoint.split("/")):
             raise ConfigError(f"fal: {endpoint!r} is no endpoint; give OWNER/APP such as {DEFAULT}")
-        self.takes = ENDPOINTS.get(endpoint) or _guessed(endpoint)
+        self.takes = self.taken_by(endpoint)
         super().__init__(endpoint, url, key, config, sleep, listed_usd=self.takes.usd if url == VENDOR else None)
         takes: dict[Asked, bool] = {"image": self.takes.image is not None, "text": self.takes.prompt}
         self.asked_with = frozenset(asked for asked, taken in takes.items() if taken)
@@ -77,6 +78,16 @@ class FalGenerator(VendorGenerator):
             hosts += [f"https://{host}" for host in VENDOR_HOSTS if f"https://{host}" != url]
         # where a request that was taken is asked after
         self._begun = [self._served(host, key, config, sleep, _unless_failed) for host in hosts]
+
+    @staticmethod
+    def taken_by(endpoint: str) -> Endpoint:
+        """Return what an endpoint takes."""
+        return ENDPOINTS.get(endpoint) or _guessed(endpoint)
+
+    @staticmethod
+    def first_address(result: Any) -> str | None:
+        """Return the address of what was made, None where a result has none."""
+        return first_glb(result)
 
     def priced_as(self, model: str) -> str:
         """Return the name by which a missing price is asked for: prices are those of endpoints."""
@@ -112,18 +123,18 @@ class FalGenerator(VendorGenerator):
         if status != "COMPLETED":
             raise BadReply(f"fal: the request has the unknown status {self._service.said(str(status))!r}")
         result = self._result(response_url)
-        if _is_failure(result):
+        if result.get("detail") and self.first_address(result) is None:
             return JobState("failed", self._service.said(words_of(result)))
         return JobState("done")
 
     def fetch(self, job_id: str, folder: Path) -> Generated:
-        """Write the GLB below ``folder``."""
+        """Write what was made below ``folder``."""
         response_url = _addresses(job_id)[1]
 
         def link() -> str:
-            return checked_address(first_glb(self._result(response_url)), "fal", "GLB")
+            return checked_address(self.first_address(self._result(response_url)), "fal", self.made)
 
-        path = folder / "generated.glb"
+        path = folder / self.written_name
         self._service.download(link(), path, fresh_url=link)
         return Generated(path, self.model, {"endpoint": self.model})
 
@@ -203,10 +214,6 @@ def _unless_failed(status: int, body: Any) -> Refusal | None:
     if status in (400, 422) or (status >= 500 and isinstance(body, Mapping) and "error_type" in body):
         return None
     return refusal_by_status(status, body)
-
-
-def _is_failure(result: Mapping[str, Any]) -> bool:
-    return bool(result.get("detail")) and first_glb(result) is None
 
 
 def _guessed(endpoint: str) -> Endpoint:

@@ -33,12 +33,13 @@ def run_generator(
     jobs: JobMemory,
     submit_again: bool = False,
     sleep: Callable[[float], None] = time.sleep,
+    flaw_of: Callable[[Path], str | None] = flaw,
 ) -> Generated:
     """Return the mesh that ``request`` gives, written below ``folder``.
 
     A job that was submitted before is polled again. Waits double from 1 s to 30 s and add up to at most
     ``settings.max_wait_s`` (waits are counted, not the clock). A job that fails, or whose mesh cannot be used
-    (``acceptance.flaw``: the failure classes of the paper's "Asset Generation"), is asked again with the next seed,
+    (``flaw_of``, for meshes the failure classes of the paper's "Asset Generation"), is asked again with the next seed,
     ``settings.attempts`` times in all. A job that the service no longer knows is submitted again. Jobs of services
     (``needs`` "generator") are remembered, also after success, with what they cost: a crash before the result is stored
     loses neither. ``submit_again`` allows what may pay twice: to submit again where an earlier submit of a paid job
@@ -56,6 +57,7 @@ def run_generator(
         request_digest(generator, request, settings),
         settings.max_wait_s,
         sleep,
+        flaw_of,
     )
     try:
         return _driven(drive, request, settings.attempts, submit_again)
@@ -135,6 +137,7 @@ class _Drive:
     digest: str
     left_s: float
     sleep: Callable[[float], None]
+    flaw_of: Callable[[Path], str | None]
     kept: _Note | None = None
 
     def recalled(self, submit_again: bool) -> _Note:
@@ -180,7 +183,7 @@ class _Drive:
         if not generated.path.is_file() or generated.path.stat().st_size == 0:
             generated.path.unlink(missing_ok=True)
             raise BadReply(f"{self.generator.name}: its job is done but left no mesh; run it again")
-        wrong = None if self.generator.needs in ("cpu", "vlm") else flaw(generated.path)
+        wrong = None if self.generator.needs in ("cpu", "vlm") else self.flaw_of(generated.path)
         if wrong is not None:
             generated.path.unlink()
             raise _Failed(wrong)

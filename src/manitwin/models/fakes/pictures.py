@@ -1,0 +1,24 @@
+"""The pictures that fake text-to-image services draw: a coloured disc on a light ground."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from PIL import Image
+
+SIDE_PX = 128
+_GROUND = 235
+
+
+def picture_png(seed: int, *, blank: bool = False) -> bytes:
+    """Return a PNG, another for each seed; ``blank``: of one colour, as some services answer to what they refuse."""
+    rng = np.random.default_rng(seed)
+    pixels = np.full((SIDE_PX, SIDE_PX, 3), 0 if blank else _GROUND, np.uint8)
+    if not blank:
+        rows, columns = np.mgrid[:SIDE_PX, :SIDE_PX]
+        inside = (rows - SIDE_PX / 2) ** 2 + (columns - SIDE_PX / 2) ** 2 < (SIDE_PX * rng.uniform(0.2, 0.4)) ** 2
+        pixels[inside] = rng.integers(20, 200, 3)
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, "PNG")
+    return stream.getvalue()
