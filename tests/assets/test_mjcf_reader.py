@@ -443,6 +443,22 @@ DIALECTS = {
         '<body pos="0 0 1"><joint type="fixed"/><geom size="0.1" mass="2"/></body></body>',
         3.0,
     ),
+    "has fullinertia and quat": (
+        "",
+        '<body><freejoint/><geom size="0.1"/>'
+        '<inertial pos="0 0 0" mass="2" quat="0.7 0.7 0 0" fullinertia="1 1 1 0 0 0"/></body>',
+        2.0,
+    ),
+    "<region> is none of MJCF": (
+        "",
+        '<body><freejoint/><region size="1"/><geom size="0.1" mass="1" shine="2"/><region/></body>',
+        1.0,
+    ),
+    "the attribute 'shine' of <geom>": (
+        "",
+        '<body><freejoint/><geom size="0.1" mass="1" shine="2" glow="3"/></body>',
+        1.0,
+    ),
     "the class 'gone' is nowhere": (
         "",
         '<body name="b" childclass="gone"><freejoint/><geom class="gone" size="0.1" mass="1"/></body>',
@@ -510,3 +526,11 @@ def test_a_file_of_composites_alone_says_what_they_are(tmp_path: Path) -> None:
         read_asset(mjcf(tmp_path, rope))
     beside = read_asset(mjcf(tmp_path, f'{rope}<body name="ball"><freejoint/><geom size="0.1"/></body>'))
     assert beside.name == "ball" and any("<composite> is no rigid body" in remark for remark in beside.remarks)
+
+
+def test_a_body_at_a_place_that_mujoco_does_not_know_is_not_left_out(tmp_path: Path) -> None:
+    with pytest.raises(AssetError, match="unrecognized element"):
+        read_asset(mjcf(tmp_path, '<body><geom size="0.1"><body><geom size="0.2"/></body></geom></body>'))
+    many = " ".join(f'a{n}="1"' for n in range(20))
+    with pytest.raises(AssetError, match="knows fewer than"):
+        read_asset(mjcf(tmp_path, f'<body><geom size="0.1" {many}/></body>'))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from contextlib import suppress
 
 from lxml import etree  # type: ignore[import-untyped]
@@ -10,6 +12,14 @@ from manitwin.assets.asset_files import AssetFiles
 
 _ORIENTATIONS = ("quat", "axisangle", "xyaxes", "zaxis", "euler")
 _PLACED = ("body", "geom", "inertial", "joint", "frame")
+MOST_LEFT_OUT = 16
+"""Kinds of elements and attributes that a document may have more than MuJoCo knows."""
+_UNKNOWN_ATTRIBUTE = re.compile(r"unrecognized attribute: '([^']+)'\s+Element '([^']+)'")
+_UNKNOWN_ELEMENT = re.compile(r"unrecognized element\s+Element '([^']+)'")
+_HOLD_SHAPES = frozenset(
+    {"worldbody", "body", "frame", "geom", "inertial", "joint", "freejoint", "asset", "mesh", "default"}
+)
+"""Whose place is wrong where MuJoCo does not know them: without them the file is another one."""
 _ORIGIN = (0.0, 0.0, 0.0)
 _MAIN = "main"
 _CLASSES = ("class", "childclass")
@@ -42,8 +52,30 @@ def rewrite_dialects(root: etree._Element, files: AssetFiles) -> None:
     for inertial in root.xpath("worldbody/inertial"):  # of a part that a program puts into a body
         inertial.getparent().remove(inertial)
         files.took_leniently("the world has an <inertial>, which MuJoCo refuses; it was left out")
+    for inertial in root.iter("inertial"):
+        if inertial.get("fullinertia") is not None and inertial.attrib.pop("quat", None) is not None:
+            files.took_leniently(
+                "an <inertial> has fullinertia and quat, which MuJoCo refuses; quat was left out, as older ones did"
+            )
     _leave_out_repeated(root, files)
     _leave_out_unknown(root, files)
+
+
+def leave_out_unknown_to_schema(said: str, roots: Iterable[etree._Element], files: AssetFiles) -> bool:
+    """Take out of documents what MuJoCo ``said`` that its schema does not know; return whether that was anything."""
+    attribute, element = _UNKNOWN_ATTRIBUTE.search(said), _UNKNOWN_ELEMENT.search(said)
+    tag = attribute.group(2) if attribute else element.group(1) if element else None
+    if tag is None or (attribute is None and tag in _HOLD_SHAPES):
+        return False
+    found = [each for root in roots for each in root.iter(tag)]
+    for each in found:
+        if attribute:
+            each.attrib.pop(attribute.group(1), None)
+        else:
+            each.getparent().remove(each)
+    what = f"the attribute {attribute.group(1)[:40]!r} of <{tag[:40]}>" if attribute else f"<{tag[:40]}>"
+    files.took_leniently(f"{what} is none of MJCF, which MuJoCo refuses; it was left out")
+    return bool(found)
 
 
 def _name_top_class(root: etree._Element, files: AssetFiles) -> None:

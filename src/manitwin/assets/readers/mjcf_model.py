@@ -13,6 +13,7 @@ import trimesh
 from PIL import Image
 
 from manitwin.assets.asset_files import MESH_LIMITS, AssetFiles, joined
+from manitwin.assets.readers.mjcf_dialects import MOST_LEFT_OUT, leave_out_unknown_to_schema
 from manitwin.assets.readers.mjcf_document import MjcfSource
 from manitwin.errors import AssetError
 from manitwin.formats.meshes.source import MeshLimits, MeshSource
@@ -48,10 +49,7 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
     Raises AssetError with MuJoCo's own words where it refuses the file.
     """
     name = source.file.name
-    try:
-        spec = mujoco.MjSpec.from_string(xml_text(source.root), include=source.model_texts())
-    except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise AssetError(f"{name}: MuJoCo cannot read it: {_line(error)}") from error
+    spec = _specified(source, files)
     spec.compiler.fusestatic = False  # both would take away bodies and geoms that the file has
     spec.compiler.discardvisual = False
     found = _find_meshes(source, spec, files)
@@ -71,6 +69,17 @@ def compiled(source: MjcfSource, files: AssetFiles, chosen: Callable[[Any], set[
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         raise AssetError(f"{name}: MuJoCo cannot compile it: {_line(error)}") from error
     return CompiledMjcf(spec, model, meshes, textures)
+
+
+def _specified(source: MjcfSource, files: AssetFiles) -> Any:
+    """Return MuJoCo's spec of a document, without what its schema does not know; raises AssetError with its words."""
+    for _ in range(MOST_LEFT_OUT):
+        try:
+            return mujoco.MjSpec.from_string(xml_text(source.root), include=source.model_texts())
+        except (ValueError, RuntimeError, mujoco.FatalError) as error:
+            if not leave_out_unknown_to_schema(str(error), (source.root, *source.models.values()), files):
+                raise AssetError(f"{source.file.name}: MuJoCo cannot read it: {_line(error)}") from error
+    raise AssetError(f"{source.file.name}: MuJoCo knows fewer than {MOST_LEFT_OUT} of its elements and attributes")
 
 
 def _find_meshes(source: MjcfSource, spec: Any, files: AssetFiles) -> dict[str, Path]:
