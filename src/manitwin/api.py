@@ -148,17 +148,22 @@ def export_twin(
 
 
 def import_assets(
-    paths: str | Path | Iterable[str | Path], out: str | Path, *, format: Format | Literal["auto"] = "auto"
+    paths: str | Path | Iterable[str | Path],
+    out: str | Path,
+    *,
+    format: Format | Literal["auto"] = "auto",
+    lock_joints: bool = False,
 ) -> list[Imported]:
     """Import all assets at and below ``paths`` into folders below ``out`` that ``build`` takes; return what became of each.
 
-    An asset that cannot be read has an ``error`` and no folder. Nothing is written over. Raises UsageError for a path that is
-    not there, and where a folder of another kind has an asset's name.
+    ``lock_joints``: what moves by joints (URDF, MJCF, SDF) is one rigid body as the file stands, where else the first rigid
+    part is taken. An asset that cannot be read has an ``error`` and no folder. Nothing is written over. Raises UsageError for a
+    path that is not there, and where a folder of another kind has an asset's name.
     """
     from manitwin.assets.importers.importer import import_assets as imported
 
     given = [paths] if isinstance(paths, str | Path) else paths
-    return list(imported([Path(path) for path in given], Path(out), format=format))
+    return list(imported([Path(path) for path in given], Path(out), format=format, lock_joints=lock_joints))
 
 
 Settings = TypeVar("Settings", "LayoutsConfig", "TasksConfig", "TrajectoriesConfig", "PicturesConfig")

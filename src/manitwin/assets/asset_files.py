@@ -77,6 +77,13 @@ class AssetFiles:
         for part in parts if len(parts) <= MOST_NAMED else ():
             self.remark(f"{part} and was left out: one rigid object is read")
 
+    def remark_locked(self, joints: Sequence[str]) -> None:
+        """Note joints that move and are held as the file stands."""
+        if joints:
+            more = f" and {len(joints) - MOST_NAMED} more" if len(joints) > MOST_NAMED else ""
+            named = ", ".join(_short(name) for name in joints[:MOST_NAMED])
+            self.remark(f"joints were locked as the file stands, so that it is one rigid body: {named}{more}")
+
     def find(self, name: str, candidates: Iterable[Path], below: str | None = None) -> Path | None:
         """Return the first candidate that is a file below the root; None, and noted as missing, where there is none.
 

@@ -43,6 +43,7 @@ VALID_ASSETS = (
 """What a person is told who gave something else."""
 _NAME_FILES = ("urdf", "mjcf", "sdf", "gso", "embodiedgen")
 """Descriptions that name meshes of other folders."""
+WITH_JOINTS = ("urdf", "mjcf", "sdf")
 FORMATS: tuple[Format, ...] = ("twin", "urdf", "mjcf", "sdf", "usd", "robotwin", "manitwin100k", "embodiedgen", "gso")
 
 
@@ -183,11 +184,17 @@ def _without_comments(xml: bytes) -> bytes:
 
 
 def read_asset(
-    path: Path, format: Format | Literal["auto"] = "auto", *, root: Path | None = None, shape_only: bool = False
+    path: Path,
+    format: Format | Literal["auto"] = "auto",
+    *,
+    root: Path | None = None,
+    shape_only: bool = False,
+    lock_joints: bool = False,
 ) -> Asset:
     """Read the asset at a path, ``auto``: of the format that ``detect`` tells; raises AssetError.
 
     ``root``: the folder above which no file is read for a description that names some (``root_of`` the path by default).
+    ``lock_joints``: what moves by joints is read as one rigid body as the file stands; of formats that have some.
     ``shape_only``: textures are not decoded and normals not made where that costs time, which is enough to measure it. A
     format's reader, and the engine that it may need, are loaded only when they are used.
     """
@@ -196,12 +203,15 @@ def read_asset(
     _require_there(path)
     chosen = detect(path) if format == "auto" else format
     reader = import_module(f"manitwin.assets.readers.{chosen}")
+    if lock_joints and chosen not in WITH_JOINTS:
+        raise AssetError(f"{path.name}: joints are locked in {', '.join(WITH_JOINTS)}; {chosen} is read as it stands")
     if chosen not in _NAME_FILES:
         whole: Asset = reader.read(path)
         return whole
     from manitwin.assets.asset_files import MESH_LIMITS, SHAPE_LIMITS
 
-    asset: Asset = reader.read(path, root, SHAPE_LIMITS if shape_only else MESH_LIMITS)
+    limits = SHAPE_LIMITS if shape_only else MESH_LIMITS
+    asset: Asset = reader.read(path, root, limits, lock_joints=True) if lock_joints else reader.read(path, root, limits)
     return asset
 
 

@@ -31,7 +31,7 @@ def imported_files(asset: Asset) -> tuple[dict[str, bytes], ImportRecord]:
 
 
 def read_for_import(
-    place: Path, format: Format | Literal["auto"], root: Path | None = None
+    place: Path, format: Format | Literal["auto"], root: Path | None = None, lock_joints: bool = False
 ) -> tuple[dict[str, bytes], ImportRecord]:
     """Read an asset below a ``root`` and return what is imported of it, in a process with limits; raises AssetError."""
-    return imported_files(read_asset(place, format, root=root))
+    return imported_files(read_asset(place, format, root=root, lock_joints=lock_joints))

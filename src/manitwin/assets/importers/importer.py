@@ -42,9 +42,12 @@ class Imported:
     there_already: bool = False
 
 
-def import_assets(paths: Iterable[Path], out: Path, *, format: Format | Literal["auto"] = "auto") -> Iterator[Imported]:
+def import_assets(
+    paths: Iterable[Path], out: Path, *, format: Format | Literal["auto"] = "auto", lock_joints: bool = False
+) -> Iterator[Imported]:
     """Import all assets at and below paths into ``out``, each into a folder of its name; yield what became of each.
 
+    ``lock_joints``: what moves by joints is taken as one rigid body, as ``read_asset`` has it.
     An asset that cannot be read, or not within limits of time and memory, is said and left out. Nothing is written over: an
     asset that is there already is left as it is, and another one of the same name gets a folder whose name ends in a digest
     of what was imported. Raises UsageError for a path that is not there, and where a folder of another kind has the name.
@@ -54,7 +57,7 @@ def import_assets(paths: Iterable[Path], out: Path, *, format: Format | Literal[
             raise UsageError(f"{path}: not there; give an asset's file or folder, or a folder of assets")
         for place in _places(path, format):
             try:
-                files, record = within_limits(READ, place, format, root_of(place, [path]))
+                files, record = within_limits(READ, place, format, root_of(place, [path]), lock_joints)
             except AssetError as error:
                 yield Imported(place, None, None, str(error))
                 continue

@@ -28,13 +28,14 @@ _INERTIA_FROM_GEOM = 1  # mjtInertiaFromGeom: true; 2 is auto
 _WORLD = 0
 
 
-def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
+def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, lock_joints: bool = False) -> Asset:
     """Read an MJCF file, or the only one in a folder; the asset's axes are those of the object's first body.
 
     Defaults, frames and shapes are resolved by MuJoCo; meshes and textures are read here, below ``root`` (``root_of`` the path
     by default). An <inertial> is what the file declares; a mass that follows from a geom's mass or density that the file writes
     is kept with the centre and inertia that MuJoCo computes of it, with a remark; what only MuJoCo's own default density gives
-    is not declared. A file of planes and height fields alone is shown as sheets, one of soft bodies alone at rest. Raises
+    is not declared. With ``lock_joints`` bodies are held as the
+    file stands. A file of planes and height fields alone is shown as sheets, one of soft bodies alone at rest. Raises
     AssetError naming what is broken. Source: the MJCF reference of MuJoCo.
     """
     file = only_file(path) if path.is_dir() else path
@@ -44,13 +45,13 @@ def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS)
 
     def chosen(model: Any) -> set[int]:
         aside = AssetFiles(files.root, missing=list(files.missing))  # what it remarks is said of the whole model
-        return {index for index, _ in _rigid_bodies(file, model, aside)}
+        return {index for index, _ in _rigid_bodies(file, model, aside, lock_joints)}
 
     result = compiled(source, files, chosen)
     if source.soft and not any(is_solid(result.model, body) for body in range(result.model.nbody)):
         return _soft_asset(path, file, AssetFiles(files.root, files.own, files.limits))
     spec, model = result.spec, result.model
-    bodies = _rigid_bodies(file, model, files)
+    bodies = _rigid_bodies(file, model, files, lock_joints)
     ground = not any(is_solid(model, index) for index, _ in bodies)
     shapes = BodyShapes(result, files, planes=ground)
     visual, collision = shapes.of(bodies)
@@ -107,17 +108,18 @@ def _soft_asset(path: Path, file: Path, files: AssetFiles) -> Asset:
     )
 
 
-def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, np.ndarray]]:
+def _rigid_bodies(file: Path, model: Any, files: AssetFiles, lock_joints: bool) -> list[tuple[int, np.ndarray]]:
     """Return the bodies of a rigid group that has a geom, with their poses in the group's first body.
 
-    It is the first one that a free joint lets go, else the first.
+    It is the first one that a free joint lets go, else the first. With ``lock_joints`` no other joint divides bodies.
     """
     groups: dict[int, list[tuple[int, np.ndarray]]] = {}
     head_of: dict[int, int] = {0: 0}
     poses: dict[int, np.ndarray] = {0: np.eye(4)}
     for index in range(1, model.nbody):
         parent = int(model.body_parentid[index])
-        starts = parent == 0 or model.body_jntnum[index] > 0
+        moves = model.body_jntnum[index] > 0 and not (lock_joints and not _is_free(model, index))
+        starts = parent == 0 or moves
         head_of[index] = index if starts else head_of[parent]
         own = transform(rotation_from_quaternion_wxyz(model.body_quat[index]), model.body_pos[index])
         poses[index] = np.eye(4) if starts else poses[parent] @ own
@@ -134,6 +136,10 @@ def _rigid_bodies(file: Path, model: Any, files: AssetFiles) -> list[tuple[int, 
             return next((g for g in groups.values() if any(model.body_geomnum[index] for index, _ in g)), world)
         raise AssetError(f"{file.name}: no body of it has a geom{_but(files.remarks)}")
     files.remark_left_out([f"body {model.body(g[0][0]).name!r} moves by itself" for g in shaped[1:]], "bodies")
+    inside = {index for index, _ in shaped[0][1:]}  # the first one's own joints let all of it go
+    files.remark_locked(
+        [model.joint(j).name or f"joint_{j:02d}" for j in range(model.njnt) if int(model.jnt_bodyid[j]) in inside]
+    )
     return shaped[0]
 
 

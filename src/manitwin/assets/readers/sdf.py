@@ -39,19 +39,21 @@ class SdfModel:
     files: AssetFiles
 
 
-def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
+def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, lock_joints: bool = False) -> Asset:
     """Read an SDF file, or a model's folder; the asset's axes are those of the model.
 
     Meshes are looked up from the file's folder and from those above it up to ``root`` (``root_of`` the path by default), those
-    of ``model://`` in the folder of the model's name before any other. Links behind joints that move, nested
-    and included models are left out with a remark. Raises AssetError naming what is broken. Source: the SDFormat
-    specification, version 1.9.
+    of ``model://`` in the folder of the model's name before any other. Links behind joints that move, nested and included models
+    are left out with a remark; with ``lock_joints`` the links are held as the file stands. Raises AssetError naming what is
+    broken. Source: the SDFormat specification, version 1.9.
     """
-    opened = open_sdf(path, root, limits)
+    opened = open_sdf(path, root, limits, lock_joints=lock_joints)
     return asset_of(opened, path)
 
 
-def open_sdf(path: Path, folder: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> SdfModel:
+def open_sdf(
+    path: Path, folder: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, lock_joints: bool = False
+) -> SdfModel:
     """Parse an SDF and choose the object in it; raises AssetError."""
     file = path
     if path.is_dir():
@@ -65,7 +67,7 @@ def open_sdf(path: Path, folder: Path | None = None, limits: MeshLimits = MESH_L
         files.used.add(config.resolve())
     model = _only_model(file, root, files)
     frames = ModelFrames(file, model)
-    return SdfModel(file, root, beside, model, _rigid_links(file, model, frames, files), frames, files)
+    return SdfModel(file, root, beside, model, _rigid_links(file, model, frames, files, lock_joints), frames, files)
 
 
 def _included(file: Path, root: etree._Element, files: AssetFiles) -> tuple[Path, etree._Element]:
@@ -144,7 +146,7 @@ def _stands_fast(model: etree._Element) -> bool:
 
 
 def _rigid_links(
-    file: Path, model: etree._Element, frames: ModelFrames, files: AssetFiles
+    file: Path, model: etree._Element, frames: ModelFrames, files: AssetFiles, lock_joints: bool
 ) -> tuple[etree._Element, ...]:
     """Return the links of the first rigid group that has a shape, in the order of the file; all of what stands fast."""
     links = {link.get("name"): link for link in model.findall("link")}
@@ -157,7 +159,11 @@ def _rigid_links(
         kind = joint.get("type") or ""
         if ends[1] in links and kind != "fixed":
             moves[ends[1]] = f"{joint.get('name')} ({kind})"
-        if kind == "fixed" and all(end in links for end in ends) and group[ends[0]] is not group[ends[1]]:
+        if (
+            (kind == "fixed" or lock_joints)
+            and all(end in links for end in ends)
+            and group[ends[0]] is not group[ends[1]]
+        ):
             small, large = sorted((group[end] for end in ends), key=len)
             large |= small
             group.update(dict.fromkeys(small, large))
@@ -172,6 +178,8 @@ def _rigid_links(
             left_out.append(f"link {name!r} {how}")
     files.remark_left_out(left_out, "links")
     chosen = chosen or group[next(iter(links))]
+    if lock_joints:
+        files.remark_locked([joint for name, joint in moves.items() if name in chosen])
     return tuple(link for name, link in links.items() if name in chosen)
 
 

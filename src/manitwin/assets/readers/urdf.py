@@ -32,6 +32,7 @@ from manitwin.robots.urdf import (
 )
 
 _TRIPLES = frozenset({"xyz", "rpy", "rgba", "size", "scale"})
+_LET_GO = ("floating", "planar")
 _AXES, _SOFT = 3, "deformable"
 _WORLD = "world"
 """Drake and Gazebo know it without a <link>."""
@@ -57,23 +58,26 @@ class UrdfObject:
     files: AssetFiles
 
 
-def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> Asset:
+def read(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, lock_joints: bool = False) -> Asset:
     """Read a URDF, or the only one in a folder; the asset's axes are those of the first link of the object.
 
     Meshes are looked up from the file's folder and from those above it up to ``root`` (``root_of`` the path by default), those
     of ``package://`` in the folder of the package's name before any other. Links behind joints that move are left out with a
-    remark. Raises AssetError naming what is broken. Source: the URDF XML specification of ROS.
+    remark, or with ``lock_joints`` held as the file stands. Raises AssetError naming what is broken. Source: the URDF XML
+    specification of ROS.
     """
-    return asset_of(open_urdf(path, root, limits), path)
+    return asset_of(open_urdf(path, root, limits, lock_joints=lock_joints), path)
 
 
-def open_urdf(path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS) -> UrdfObject:
+def open_urdf(
+    path: Path, root: Path | None = None, limits: MeshLimits = MESH_LIMITS, *, lock_joints: bool = False
+) -> UrdfObject:
     """Parse a URDF and choose the object in it; raises AssetError."""
     file = only_file(path) if path.is_dir() else path
     files = AssetFiles(root or root_of(path), file.resolve().parent, limits)
     tree = read_urdf(file, RULES, file.name, partial(_as_loaders_take_it, files=files, name=file.name))
     files.used.add(file.resolve())
-    return UrdfObject(file, tree, _rigid_links(tree, files), files)
+    return UrdfObject(file, tree, _rigid_links(tree, files, lock_joints), files)
 
 
 def _as_loaders_take_it(root: etree._Element, files: AssetFiles, name: str) -> None:
@@ -201,7 +205,7 @@ def _value(found: UrdfObject, element: etree._Element | None) -> float | None:
     return None if element is None else number(element.get("value"), f"{found.file.name}: {element.tag}")
 
 
-def _rigid_links(tree: UrdfTree, files: AssetFiles) -> tuple[tuple[etree._Element, np.ndarray], ...]:
+def _rigid_links(tree: UrdfTree, files: AssetFiles, lock_joints: bool) -> tuple[tuple[etree._Element, np.ndarray], ...]:
     """Return the links of the first rigid group that has a shape, with their poses in the group's first link."""
     links, heads = tree.links, tree.roots()
     held = {child_of(joint): joint for joint in tree.joints.values()}
@@ -213,7 +217,8 @@ def _rigid_links(tree: UrdfTree, files: AssetFiles) -> tuple[tuple[etree._Elemen
         group = [(head, np.eye(4))]
         for name, pose in group:
             for child in children[name]:
-                if held[child].get("type") == "fixed":
+                kind = held[child].get("type")
+                if kind == "fixed" or (lock_joints and kind not in _LET_GO):
                     group.append((child, pose @ origin_of(held[child])))
                 else:
                     heads.append(child)
@@ -228,6 +233,9 @@ def _rigid_links(tree: UrdfTree, files: AssetFiles) -> tuple[tuple[etree._Elemen
         left_out.append(f"link {group[0][0]!r} {how}")
     files.remark_left_out(left_out, "links")
     chosen = shaped[0] if shaped else groups[0]
+    inside = {name for name, _ in chosen}
+    moving = [name for name, joint in tree.joints.items() if child_of(joint) in inside and joint.get("type") != "fixed"]
+    files.remark_locked([name for name in moving if parent_of(tree.joints[name]) in inside])
     return tuple((links[name], pose) for name, pose in chosen)
 
 

@@ -32,6 +32,12 @@ def import_(
             metavar="FORMAT",
         ),
     ] = "auto",
+    lock_joints: Annotated[
+        bool,
+        typer.Option(
+            "--lock-joints", help="Take what moves by joints (URDF, MJCF, SDF) as one rigid body, as the file stands."
+        ),
+    ] = False,
     report: Annotated[
         Path | None,
         typer.Option(help="Also write as JSON what was kept and dropped of each asset, and why.", metavar="FILE"),
@@ -43,7 +49,7 @@ def import_(
 
     done = there = failed = 0
     every = []
-    for imported in import_assets(paths, out, format=format):  # type: ignore[arg-type]
+    for imported in import_assets(paths, out, format=format, lock_joints=lock_joints):  # type: ignore[arg-type]
         every.append(imported)
         if imported.record is None or imported.folder is None:
             failed += 1
