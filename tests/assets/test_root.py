@@ -196,3 +196,12 @@ def test_templates_are_no_assets_and_are_said(tmp_path: Path) -> None:
     templates: list[Path] = []
     assert [path.stem for path in find_all([tmp_path], [], templates)] == ["broken", "nan", "plain"]
     assert [path.stem for path in templates] == ["box", "jinja"]
+
+
+def test_a_name_in_other_letters_is_read_and_said(tmp_path: Path) -> None:
+    box(tmp_path / "meshes/Cup_Visual.STL")
+    asset = read_asset(urdf(tmp_path / "cup.urdf", "meshes/cup_visual.stl"))
+    assert len(asset.visual) == 1 and asset.missing_files == ()
+    assert asset.lenient == ("the case of letters in meshes/cup_visual.stl is not that of the file Cup_Visual.STL",)
+    box(tmp_path / "meshes/CUP_VISUAL.stl")
+    assert read_asset(urdf(tmp_path / "cup.urdf", "meshes/cup_visual.stl")).missing_files == ("meshes/cup_visual.stl",)

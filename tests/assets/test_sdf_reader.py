@@ -299,3 +299,11 @@ def test_gltf_of_a_model_is_turned_where_what_collides_says_so(tmp_path: Path) -
     for size, along in (("0.1 0.1 1.0", 2), ("0.1 1.0 0.1", 1)):
         felt = f'<collision name="c"><geometry><box><size>{size}</size></box></geometry></collision>'
         assert int(np.ptp(read(tmp_path, link("a", seen + felt)).visual[0].vertices, axis=0).argmax()) == along
+
+
+def test_a_model_whose_config_is_broken_is_read_without_it_and_said(tmp_path: Path) -> None:
+    inside = link("a", f'<visual name="v">{BOX}</visual>')
+    (tmp_path / "model.sdf").write_text(f"<sdf version='1.6'><model name='m'>{inside}</model></sdf>")
+    (tmp_path / "model.config").write_text("<model><name>thing</model>")
+    asset = read_asset(tmp_path)
+    assert asset.name == "m" and len(asset.lenient) == 1 and "model.config" in asset.lenient[0]

@@ -111,3 +111,12 @@ def test_the_encoding_that_a_late_declaration_says_is_kept() -> None:
     assert (
         parse_xml("\n<?xml version='1.0' encoding='iso-8859-1'?><a b='ä'/>".encode("latin-1"), "a", "x").get("b") == "ä"
     )
+
+
+def test_an_ampersand_that_begins_no_reference_is_read_as_itself() -> None:
+    for text in ("rail & curtain", "a &amp b", "&"):
+        data = f"<model><d k='1&2'>{text} &lt; &#38;</d></model>".encode()
+        root = parse_xml(data, "model", "m.config")
+        assert root.findtext("d") == text + " < &" and root.find("d").get("k") == "1&2"
+    with pytest.raises(AssetError, match="broken"):
+        parse_xml(b"<model><d>a & b</model>", "model", "m.config")

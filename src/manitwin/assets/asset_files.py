@@ -25,7 +25,7 @@ UNREAD_FORMATS = frozenset({".vtk", ".vtu", ".wrl", ".iv", ".x3d", ".3ds", ".fbx
 MESHES = frozenset({".obj", ".stl", ".dae", ".msh", ".glb", ".gltf", ".ply", ".usd", ".usda", ".usdc", ".usdz"})
 MOST_NAMED = 3
 """Of the parts that are left out: of a robot's or a building's, a person reads the count."""
-_MOST_VAIN_SEARCHES = 8
+_MOST_VAIN_SEARCHES, _MOST_TRIED = 8, 8
 _NOT_THERE = re.compile(r"^(?:texture|material library) '(.+)' is not there")
 
 
@@ -91,14 +91,16 @@ class AssetFiles:
         is there, its path is looked up elsewhere below the root (``with_the_path``).
         """
         outside = False
+        tried: list[Path] = []
         for candidate in candidates:
+            tried.append(candidate)
             found, inside = self._below(candidate)
             if found is not None:
                 self._note_above(found)
                 self.used.add(found)
                 return found
             outside = outside or not inside
-        elsewhere = self._elsewhere(below or name)
+        elsewhere = self._in_other_letters(name, tried) or self._elsewhere(below or name)
         if elsewhere is not None:
             return elsewhere
         self.missing.append(_short(name))
@@ -115,6 +117,30 @@ class AssetFiles:
         except (OSError, ValueError, RuntimeError):  # a name that no file system can hold; a loop of links
             return None, True
 
+    def _in_other_letters(self, name: str, tried: Sequence[Path]) -> Path | None:
+        """Return the file whose name differs in capital letters alone, which is remarked; None where there is none."""
+        if self._vain_searches >= _MOST_VAIN_SEARCHES:
+            return None
+        for candidate in tried[:_MOST_TRIED]:
+            try:
+                folder = candidate.parent.resolve()
+                inside = folder.is_relative_to(self.root.resolve())
+                alike = (
+                    [each for each in folder.iterdir() if each.name.lower() == candidate.name.lower()] if inside else []
+                )
+            except (OSError, ValueError, RuntimeError):  # as in _below
+                continue
+            found = self._below(alike[0])[0] if len(alike) == 1 else None
+            if found is not None:
+                if not any("the case of letters" in each for each in self.lenient):  # once, of many meshes
+                    self.took_leniently(
+                        f"the case of letters in {_short(name)} is not that of the file {_short(found.name)}"
+                    )
+                self.used.add(found)
+                self._strayed[name] = found
+                return found
+        return None
+
     def _elsewhere(self, name: str) -> Path | None:
         """Return the file of a name that is not where the asset says, which is remarked; None where there is none."""
         if name in self._strayed:
@@ -124,7 +150,7 @@ class AssetFiles:
         for candidate in with_the_path(name.replace("\\", "/"), self.own, self.root):
             found, _ = self._below(candidate)
             if found is not None:
-                if not self._strayed:
+                if not any("were read from elsewhere" in each for each in self.lenient):
                     place = _short(str(found.relative_to(self.root.resolve())))
                     self.took_leniently(
                         f"files are not where it says, and were read from elsewhere below the root: {_short(name)} from {place}"

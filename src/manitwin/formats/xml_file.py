@@ -21,6 +21,7 @@ from manitwin.formats.markdown import one_line
 
 MAX_XML_BYTES = 64 << 20
 _HYPHENS_IN_COMMENT = "ERR_HYPHEN_IN_COMMENT"
+_BARE_AMPERSAND = ("ERR_NAME_REQUIRED", "ERR_ENTITYREF_SEMICOL_MISSING")
 _UNKNOWN_PREFIX = "NS_ERR_UNDEFINED_NAMESPACE"
 _HEAD_BYTES, _DECLARATION_BYTES = 1 << 16, 1 << 10
 MAX_NUMBER = 1e9  # no length, mass or moment of an object that a gripper meets comes near
@@ -74,6 +75,8 @@ def parse_xml(
         kinds = {entry.type_name for entry in parser.error_log}
         if _HYPHENS_IN_COMMENT in kinds and (mended := _with_sound_comments(data)) != data:
             return parse_xml(mended, tag, name, refusal=refusal, comments=comments, max_bytes=max_bytes)
+        if kinds.intersection(_BARE_AMPERSAND) and (mended := _with_sound_ampersands(data)) != data:
+            return parse_xml(mended, tag, name, refusal=refusal, comments=comments, max_bytes=max_bytes)
         if kinds != {_UNKNOWN_PREFIX}:
             raise refusal(f"{name}: its XML is broken ({' '.join(str(error).split())[:120]}); mend it") from error
         root = _without_unknown_prefixes(etree.fromstring(data, _parser(comments, huge_tree, recover=True)))
@@ -103,6 +106,11 @@ def _with_sound_comments(data: bytes) -> bytes:
         return b"<!--" + inside + (b" -->" if inside.endswith(b"-") else b"-->")
 
     return re.sub(rb"<!--(.*?)-->", apart, data, flags=re.DOTALL)
+
+
+def _with_sound_ampersands(data: bytes) -> bytes:
+    """Return a document whose ampersands that begin no reference are written out, which TinyXML and so Gazebo does not mind."""
+    return re.sub(rb"&(?!#?\w+;)", b"&amp;", data)
 
 
 def _without_unknown_prefixes(root: etree._Element) -> etree._Element:

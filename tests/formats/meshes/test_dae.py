@@ -82,3 +82,9 @@ def test_shapes_of_broken_materials_are_read_and_grey(tmp_path: Path) -> None:
     mesh = read_mesh(path)
     assert len(mesh.parts) == 1 and mesh.parts[0].visual.material.baseColorTexture is None
     assert "materials in it are broken" in " ".join(mesh.findings)
+
+
+def test_comments_among_the_shapes_of_a_mesh_leave_it_whole(tmp_path: Path) -> None:
+    path = _write(tmp_path)
+    path.write_text(path.read_text().replace("<polylist", "<!-- <polylist count='0'/> --><polylist", 1))
+    assert len(read_mesh(path).parts) == 1

@@ -62,7 +62,12 @@ def open_sdf(
     files.used.add(file.resolve())
     file, root = _included(file, read_xml(file, "sdf"), files)
     config = file.parent / CONFIG_FILE
-    beside = read_xml(config, "model", inside=config.parent) if is_file_below(config, config.parent) else None
+    beside = None
+    if is_file_below(config, config.parent):
+        try:
+            beside = read_xml(config, "model", inside=config.parent)
+        except AssetError as error:
+            files.took_leniently(f"{error}; its name, author and licence were not read")
     if beside is not None:
         files.used.add(config.resolve())
     model = _only_model(file, root, files)

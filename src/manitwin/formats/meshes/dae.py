@@ -36,6 +36,7 @@ def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, s
     if skinned:
         raise source.refused("animated", "the mesh is bound to a skeleton", "apply the pose and export a still mesh")
     try:
+        data = _without_comments(data, source)
         document = _without_broken_materials(_document(data), data, source)
         with np.errstate(all="ignore"):  # what overflows is found where vertices are checked
             parts = _parts(document, source)
@@ -46,6 +47,16 @@ def read_dae(source: MeshSource) -> tuple[list[trimesh.Trimesh], float | None, s
 
 def _document(data: bytes) -> Any:
     return collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
+
+
+def _without_comments(data: bytes, source: MeshSource) -> bytes:
+    """Return a document without comments: pycollada leaves out a mesh that has one among its shapes."""
+    if b"<!--" not in data:
+        return data
+    refusal = partial(InputError, "unreadable")
+    root = parse_xml(data, "COLLADA", source.path.name, refusal=refusal, comments=False, max_bytes=None)
+    whole: bytes = etree.tostring(root)
+    return whole
 
 
 def _without_broken_materials(document: Any, data: bytes, source: MeshSource) -> Any:
