@@ -96,7 +96,14 @@ PAGES: dict[str, Arrangement] = {
         rewritten={r" --address auto": ""},  # without one, it starts a cluster on this machine
         not_run={r"^pip install": NO_NETWORK},
     ),
-    "docs/collect.md": Arrangement(rewritten={r"products\.csv": "list.csv"}),
+    "docs/collect.md": Arrangement(
+        rewritten={r"products\.csv": "list.csv"},
+        not_run={
+            r"collect draw .*command:": FOREIGN,
+            r"collect draw .*(fal|openai):": NO_NETWORK,
+            r"drawn/manifest\.csv": "its pictures are those of the model that is not here",
+        },
+    ),
     "docs/dataset.md": Arrangement(slow=(r"--timeout", r"manitwin index", r"truncate", r"mass_kg < 0\.4\"")),
     "docs/episodes.md": Arrangement(
         not_run={r"^from lerobot": "LeRobot has an environment of its own: make lerobot-real reads such a set with it"},
