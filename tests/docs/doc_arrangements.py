@@ -97,11 +97,9 @@ PAGES: dict[str, Arrangement] = {
         not_run={r"^pip install": NO_NETWORK},
     ),
     "docs/collect.md": Arrangement(
-        rewritten={r"products\.csv": "list.csv"},
-        not_run={
-            r"collect draw .*command:": FOREIGN,
-            r"collect draw .*(fal|openai):": NO_NETWORK,
-            r"drawn/manifest\.csv": "its pictures are those of the model that is not here",
+        rewritten={
+            r"products\.csv": "list.csv",
+            r"^manitwin collect draw plan": "head -4 plan/prompts.csv > few.csv; manitwin collect draw few.csv",
         },
     ),
     "docs/dataset.md": Arrangement(slow=(r"--timeout", r"manitwin index", r"truncate", r"mass_kg < 0\.4\"")),

@@ -43,6 +43,15 @@ _, image, out, seed = sys.argv
 trimesh.creation.cylinder(radius=0.12, height=1.0).export(out)
 """
 
+DRAWING = """\
+import sys
+from PIL import Image, ImageDraw
+_, text, out = sys.argv
+picture = Image.new("RGB", (256, 256), "white")
+ImageDraw.Draw(picture).ellipse((40, 60, 216, 200), fill=(180, 60 + len(text) % 100, 40))
+picture.save(out)
+"""
+
 GROUPED = ("mug_front", "mug_side", "spoon")
 
 
@@ -103,6 +112,7 @@ class Folders:
         for name in ("samples", "docs", "benchmarks", "src", "scripts", "Makefile"):
             (page / name).symlink_to(ROOT / name)
         (page / "generator.py").write_text(GENERATOR)
+        (page / "draw.py").write_text(DRAWING)
         (page / ".venv").symlink_to(ROOT / ".venv")
         (page / "small.toml").write_text(SMALL)
         (page / "run.toml").write_text(SMALL)
