@@ -129,6 +129,6 @@ def test_touch_of_one_step_between_two_rows_is_not_missed(
     execution = Execution(world, robot, TrialSettings(50.0, 1.0, timestep_s=1 / 120), planner.tip_pose)
     pair = ("panda_link7", "board")
     monkeypatch.setattr(world.contacts, "unplanned", lambda *_, **__: {pair} if execution.steps == 10 else set())
-    execution.wait(phase, 18)
+    execution.wait(phase, 3)
     assert execution.unplanned == {pair}
     assert execution.recording().unplanned_contact.tolist() == [False, False, True, False]

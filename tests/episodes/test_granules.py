@@ -60,7 +60,7 @@ def test_sixty_granules_fall_into_a_bowl_and_stay_there() -> None:
             contacts = world.contacts.read()
             assert world.contacts.pressing(contacts) == {frozenset({"object_01", "table"})}
             execution = Execution(world, panda()[0], TrialSettings(50.0, 1.0, timestep_s=1 / 120), panda()[1].tip_pose)
-            execution.wait(Phase.REST, 12)
+            execution.wait(Phase.REST, 2)
             positions = execution.recording().granule_positions_m
             assert positions is not None
             assert positions.shape == (3, GRANULES, 3)

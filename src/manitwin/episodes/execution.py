@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from sapien import physx
 
+from manitwin.episodes.commanded_arm import CommandedArm
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.goals.world_state import Event
+from manitwin.episodes.joint_targets import JointTargets
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase
 from manitwin.episodes.recorder import Recorder
 from manitwin.episodes.recording import RATE_HZ, Recording
 from manitwin.geometry.poses import inverse
-from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts, Touches
-from manitwin.physics.sapien.controls.control import HandControl, control_of
+from manitwin.physics.sapien.contacts import NONE_MEANT, ROBOT_NAME, MeantContacts, Touches
+from manitwin.physics.sapien.controls.control import control_of
 from manitwin.physics.sapien.world import RobotWorld
 from manitwin.physics.trial import TrialSettings
+from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.robot import Robot
 
 IN_HAND = frozenset(
@@ -26,26 +29,18 @@ IN_HAND = frozenset(
 )
 STILL_ROWS, REST_ROWS = 5, 10  # 0.25 s and 0.5 s
 FRAME_S = 1 / 60  # between two looks at how hard the hand presses
-STEADY_FRAMES = 6  # the hand presses for so long before it moves on
+STEADY_ROWS = 2  # the hand presses for so long before it moves on
 OPENING_S = 0.1  # after the hand has let go, before the hand withdraws
 # Nine touches of fingers and table lasted 12 to 25 ms: looking at the recorded rows alone, every 50 ms, missed 4 of them.
 WATCH_S = 0.0125
 TRACKING_S = 0.05  # after a motion, for the arm to come to rest
 
 
-@dataclass(eq=False)
-class _Arm:
-    """Where an arm of the world is told to be, its hand, and whether that keeps pressing."""
-
-    tip_pose: Callable[[np.ndarray], np.ndarray]
-    commanded_rad: np.ndarray
-    hand: HandControl
-    presses: bool = False
-
-
 class Execution:
     """Moves the robot of a world and records what happens.
 
+    All that it does takes whole rows, and between rows arms and hands are told what the environment of a task tells them, so that
+    the recorded actions lead to the recorded states again. Guarded moves end between rows: there the actions are nearly so.
     Of two arms one moves at a time, the one that is used; the other stays where it is told to be, and goes on pressing.
     """
 
@@ -63,11 +58,14 @@ class Execution:
                 f"a timestep of {closing.timestep_s:g} s does not divide the {1 / RATE_HZ:g} s between two rows"
             )
         self._steps_per_look = max(1, int(WATCH_S / closing.timestep_s + 1e-9))
-        self._arms = list[_Arm]()
+        self._arms = list[CommandedArm]()
         for number, (arm, tip_pose) in enumerate(zip(robot.arms or (robot,), tip_poses, strict=True)):
             world.use(number)
             home_rad = np.array(arm.home_rad, float)
-            self._arms.append(_Arm(tip_pose, home_rad, control_of(world, closing)))
+            fingers = isinstance(arm.gripper, MultiFingerGripper)
+            told = closing if fingers else replace(closing, steps_per_frame=self._steps_per_row)
+            targets = JointTargets(home_rad, *world.robot.limits_rad)
+            self._arms.append(CommandedArm(tip_pose, home_rad, targets, control_of(world, told), told.steps_per_frame))
         world.use(0)
         self._arm = self._arms[0]
         self.meant: MeantContacts = NONE_MEANT
@@ -119,72 +117,72 @@ class Execution:
         self,
         motion: Motion,
         until: Callable[[], bool] | None = None,
-        adjusted: Callable[[int], tuple[np.ndarray, np.ndarray]] | None = None,
+        adjusted: Callable[[int], np.ndarray] | None = None,
+        *,
+        yields: bool = False,
     ) -> bool:
         """Move the arm along a motion and wait until it has come to rest.
 
         A guarded move ends as soon as ``until`` is true, which is asked after every step, and the arm stays where it then is
-        told to be. ``adjusted`` gives what is added to a row's positions and velocities ``(n,)`` as it is reached. Returns
-        whether it went all the way.
+        told to be, or, where it ``yields``, where it is. ``adjusted`` gives what is added to a sample's positions ``(n,)``; it
+        is asked for all samples of a row as that begins. Returns whether it went all the way.
         """
-        robot = self._world.robot
-        for row, (positions, velocities) in enumerate(zip(motion.positions_rad, motion.velocities_rad_s, strict=True)):
+        samples = motion.positions_rad
+        for first in range(0, len(samples), self._steps_per_row):
+            last = min(first + self._steps_per_row, len(samples)) - 1
+            target_rad = samples[last]
             if adjusted is not None:
-                more_rad, faster_rad_s = adjusted(row)
-                positions, velocities = positions + more_rad, velocities + faster_rad_s
-            # the drives pull to where the arm is to be in the middle of the step, or it would run ahead of its targets
-            robot.set_targets(positions - velocities * (self._closing.timestep_s / 2), velocities)
-            self._arm.commanded_rad = positions
-            self._advance(motion.phase)
-            if until is not None and until():
-                robot.set_targets(self.commanded_rad, np.zeros_like(self.commanded_rad))
+                target_rad = target_rad + [adjusted(sample) for sample in range(first, last + 1)][-1]
+            self._arm.commanded_rad = target_rad
+            if not self._carry_out_row(motion.phase, until, yields=yields):
                 return False
-        robot.set_targets(self.commanded_rad, np.zeros_like(self.commanded_rad))
-        self.wait(motion.phase, self._steps(TRACKING_S))
+        self.wait_s(motion.phase, TRACKING_S)
         return True
 
     def yield_here(self) -> None:
         """Take the joints as they are for those that they are told to be: what presses against the arm presses no more."""
-        self._arm.commanded_rad = self._world.robot.joint_positions()
-        self._world.robot.set_targets(self.commanded_rad, np.zeros_like(self.commanded_rad))
+        self._stop_at(self._world.robot.joint_positions())
 
     def wait_s(self, phase: Phase, time_s: float) -> None:
-        """Stay for a while."""
-        self.wait(phase, self._steps(time_s))
+        """Stay for a while, whole rows."""
+        self.wait(phase, int(np.ceil(time_s * RATE_HZ - 1e-9)))
 
-    def wait(self, phase: Phase, steps: int) -> None:
+    def wait(self, phase: Phase, rows: int) -> None:
         """Stay where the robot is told to be."""
-        for _ in range(steps):
-            self._advance(phase)
+        for _ in range(rows):
+            self._carry_out_row(phase)
 
     def shape(self, grasp: Grasp | None) -> None:
         """Shape the hand for a grasp; jaws and cups stay as they are."""
-        for _ in self._arm.hand.shaping(None if grasp is None else grasp.joints_rad):
-            self.wait(Phase.REACH, self._closing.steps_per_frame)
+        self._play(Phase.REACH, self._arm.hand.shaping(None if grasp is None else grasp.joints_rad))
 
     def close(self) -> None:
         """Close the hand until it presses; from then on it keeps pressing with the closing force, whatever gives way."""
-        self._world.expect_load(True)
-        self._arm.presses, closing, steady = True, self._closing, 0
-        for _ in range(round(closing.close_time_s / closing.frame_s)):
-            self.wait(Phase.CLOSE, closing.steps_per_frame)
+        self._arm.presses, steady = True, 0
+        for _ in range(round(self._closing.close_time_s * RATE_HZ)):
+            self._carry_out_row(Phase.CLOSE)
             steady = steady + 1 if self._arm.hand.presses else 0
-            if steady > STEADY_FRAMES:
+            if steady > STEADY_ROWS:
                 break
 
     def close_empty(self) -> None:
         """Close the hand on nothing, at the closing speed; it does not press."""
-        for _ in self._arm.hand.closing_empty():
-            self.wait(Phase.CLOSE, self._closing.steps_per_frame)
-        self.wait(Phase.CLOSE, self._steps(OPENING_S))
+        self._play(Phase.CLOSE, self._arm.hand.closing_empty())
+        self.wait_s(Phase.CLOSE, OPENING_S)
 
     def open(self) -> None:
         """Let go, at the closing speed."""
         self._arm.presses = False
-        for _ in self._arm.hand.opening():
-            self.wait(Phase.OPEN, self._closing.steps_per_frame)
-        self.wait(Phase.OPEN, self._steps(OPENING_S))
-        self._world.expect_load(self._is_held)
+        self._play(Phase.OPEN, self._arm.hand.opening())
+        self.wait_s(Phase.OPEN, OPENING_S)
+
+    @property
+    def touches_target(self) -> bool:
+        """Whether any part of a robot presses on the target."""
+        robots = {ROBOT_NAME, *(robot.robot.name for robot in self._world.robots)}
+        pressing = self._world.contacts.pressing(self._world.contacts.read())
+        name = self._world.placed[self._world.target].name
+        return any(name in pair and pair & robots for pair in pressing)
 
     def target_to_world(self) -> np.ndarray:
         """Return the target's pose ``(4, 4)``."""
@@ -202,7 +200,7 @@ class Execution:
         watch, poses = self._world.rest_watch(still_rows), deque([self._poses()], maxlen=REST_ROWS)
         pressing = deque([self._world.contacts.pressing(self._world.contacts.read())], maxlen=STILL_ROWS)
         for _ in range(max_steps // self._steps_per_row):
-            self.wait(Phase.REST, self._steps_per_row - self.steps % self._steps_per_row)
+            self.wait(Phase.REST, 1)
             poses.append(self._poses())
             pressing.append(self._world.contacts.pressing(self._world.contacts.read()))
             watch.look()
@@ -214,14 +212,51 @@ class Execution:
     def _poses(self) -> list[np.ndarray]:
         return [self._world.object_to_world(number) for number in range(len(self._world.placed))]
 
-    def _steps(self, time_s: float) -> int:
-        return round(time_s / self._closing.timestep_s)
+    def _play(self, phase: Phase, told: Iterator[np.ndarray]) -> None:
+        """Tell the hand one thing after the other, until there is no more and the row ends."""
+        arm = self._arm
+        arm.next_told = next(told, None)
+        arm.rest_told = told
+        while arm.next_told is not None:
+            self._carry_out_row(phase)
+
+    def _carry_out_row(self, phase: Phase, until: Callable[[], bool] | None = None, *, yields: bool = False) -> bool:
+        """Go on until the next row is recorded, as an environment would that is told what that row says: an action.
+
+        Returns False where ``until`` became true on the way. The row then says where the arm stopped; of one that yields to a
+        blow it says where it was going, or the blow would be slower when the actions are carried out again.
+        """
+        count, dt, goes_on = self._steps_per_row, self._closing.timestep_s, True
+        ways = []
+        for arm in self._arms:
+            arm.commanded_rad = np.asarray(arm.commanded_rad, np.float32).astype(float)
+            arm.action_rad = arm.commanded_rad
+            ways.append(arm.targets.towards(arm.action_rad, count))
+        for step in range(count):
+            for arm, robot, (positions, steps) in zip(self._arms, self._world.robots, ways, strict=True):
+                if goes_on or arm is not self._arm:
+                    # the drives pull to where the arm is to be in the middle of the step, or it would run ahead of its targets
+                    velocities = steps[step] / (count * dt)
+                    robot.set_targets(positions[step] - velocities * (dt / 2), velocities)
+                arm.tell(step, self._closing.steps_per_frame)
+            if step == 0:
+                self._world.expect_load(any(arm.may_hold for arm in self._arms))
+            self._advance(phase)
+            if goes_on and until is not None and until():
+                goes_on = False
+                here = self._world.robot.joint_positions() if yields else ways[self.used][0][step]
+                self._stop_at(here)
+                if not yields:
+                    self._arm.action_rad = self._arm.commanded_rad
+        return goes_on
+
+    def _stop_at(self, joints_rad: np.ndarray) -> None:
+        """Tell the arm to be at rest at ``joints_rad (n,)`` from now on."""
+        self._arm.commanded_rad = np.asarray(joints_rad, np.float32).astype(float)
+        self._arm.targets.stop(self._arm.commanded_rad)
+        self._world.robot.set_targets(self._arm.commanded_rad, np.zeros_like(self._arm.commanded_rad))
 
     def _advance(self, phase: Phase) -> None:
-        if self.steps % self._closing.steps_per_frame == 0:
-            for arm in self._arms:
-                if arm.presses:
-                    arm.hand.squeeze()
         ends_row = (self.steps + 1) % self._steps_per_row == 0
         before = self._joint_positions() if ends_row else None
         self._world.step()
@@ -235,7 +270,7 @@ class Execution:
     def _watch(self, phase: Phase, contacts: Sequence[physx.PhysxContact]) -> None:
         for arm in self._arms:
             arm.hand.look(contacts)
-        in_hand = phase in IN_HAND or (len(self._arms) > 1 and self._is_held)
+        in_hand = phase in IN_HAND or self.meant.palm or (len(self._arms) > 1 and self._is_held)
         unplanned = self._world.contacts.unplanned(contacts, in_hand=in_hand, meant=self.meant)
         for watch in self.watches:
             watch.look(self._world.contacts, contacts, self.length_s)
@@ -248,8 +283,8 @@ class Execution:
         """Add a row. Speeds are those of the last step: PhysX's are those at its end, where stiff drives have slowed down."""
         velocities = (self._joint_positions() - joint_positions_before_rad) / self._closing.timestep_s
         self._recorder.add(
-            np.concatenate([arm.commanded_rad for arm in self._arms]),
-            np.concatenate([arm.hand.told for arm in self._arms]),
+            np.concatenate([arm.action_rad for arm in self._arms]),
+            np.concatenate([arm.told for arm in self._arms]),
             self._hands_state,
             phase,
             velocities,

@@ -190,8 +190,7 @@ class HeldCourse(Course):
         duration_s = guard.duration_s if guard.speed_m_s is None else PEAK_OF_QUINTIC * way_m / guard.speed_m_s
         motion = self._planner.timed(joints, duration_s, Phase.ACT, beyond=guard.beyond)
         touched: Callable[[], bool] = lambda: watch.force_n >= guard.stop_n  # noqa: E731
-        execution.follow(motion, until=touched)
-        if guard.beyond > 1:
+        if execution.follow(motion, until=touched, yields=guard.beyond > 1) and guard.beyond > 1:
             execution.yield_here()
         execution.wait_s(Phase.HOLD, YIELDED_S if guard.beyond > 1 else PRESSED_S)
 

@@ -30,12 +30,12 @@ class Admittance:
     timestep_s: float
     height_m: float = 0.0
 
-    def next_change(self, per_metre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Move on by a timestep; returns what it adds to positions and velocities ``(n,)``, given the change for a metre."""
-        before_m, speed_m_s = self.height_m, GAIN_M_S_N * (self.force_n() - self.wanted_n)
+    def next_change(self, per_metre: np.ndarray) -> np.ndarray:
+        """Move on by a timestep; returns what it adds to positions ``(n,)``, given the change for a metre."""
+        speed_m_s = GAIN_M_S_N * (self.force_n() - self.wanted_n)
         moved_m = self.height_m + float(np.clip(speed_m_s, -FASTEST_M_S, FASTEST_M_S)) * self.timestep_s
         self.height_m = float(np.clip(moved_m, -FARTHEST_M, FARTHEST_M))
-        return self.height_m * per_metre, (self.height_m - before_m) / self.timestep_s * per_metre
+        return self.height_m * per_metre
 
 
 def with_heights(joints: CubicSpline, arm: ArmKinematics, normal: np.ndarray) -> CubicSpline | None:

@@ -30,11 +30,13 @@ ROBOT_NAME = "robot"
 class MeantContacts:
     """The contacts that are meant for a while, by the names of bodies: of the fingers, and of the target in the hand.
 
-    Without ``target`` it is not asked what the target touches, as in pick-and-place.
+    Without ``target`` it is not asked what the target touches, as in pick-and-place. ``palm``: the target may touch the palm
+    though it is no longer in the hand, as what was let go in the air falls to some side.
     """
 
     fingers: frozenset[str] = frozenset()
     target: frozenset[str] | None = None
+    palm: bool = False
 
 
 NONE_MEANT = MeantContacts()

@@ -127,6 +127,12 @@ class SapienRobot:
         for set_position, target in zip(self._finger_setters, targets.tolist(), strict=True):
             set_position(target)
 
+    @property
+    def limits_rad(self) -> tuple[np.ndarray, np.ndarray]:
+        """The least and the largest positions ``(n,)`` of the arm's joints."""
+        low, high = np.asarray(self.articulation.get_qlimits(), float)[self._arm_at].T
+        return low, high
+
     def joint_positions(self) -> np.ndarray:
         """Return the arm's joint positions ``(n,)`` rad."""
         return np.asarray(self.articulation.get_qpos()[self._arm_at], float)

@@ -135,8 +135,7 @@ class RobotWorld:
         """Choose the solver's iterations for a hand that holds something, or is empty."""
         iterations = self._iterations_held if held else self._iterations
         for robot in self.robots:
-            robot.articulation.set_solver_position_iterations(iterations)
-        self.bodies[self.target].solver_position_iterations = iterations
+            robot.articulation.set_solver_position_iterations(iterations)  # also for all that the robot touches
 
     def take(self, number: int) -> None:
         """Make another object the target."""

@@ -18,7 +18,7 @@ from manitwin.robots.grippers.suction import SuctionGripper
 class HandControl(Protocol):
     """A robot's hand. ``told (h,)`` is what it is told, ``state (h,)`` what it is, by the names of ``Robot``.
 
-    Iterators tell one step of a motion at a time; a frame of ``TrialSettings`` is to pass after each.
+    What it is to be told next is chosen here, one frame of ``TrialSettings`` at a time; nothing moves before ``tell``.
     """
 
     @property
@@ -40,19 +40,19 @@ class HandControl(Protocol):
         """Tell it ``(h,)``, as a policy does; what it held it lets go of where that says so."""
         ...
 
-    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
+    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[np.ndarray]:
         """Take the first of a grasp's joints ``(2, J)``, those before closing and those to close to; others do nothing."""
         ...
 
-    def squeeze(self) -> None:
-        """Close by one frame; once it presses, go on pressing."""
+    def squeeze(self) -> np.ndarray:
+        """Choose what closes it by one frame; once it presses, what goes on pressing."""
         ...
 
-    def closing_empty(self) -> Iterator[None]:
+    def closing_empty(self) -> Iterator[np.ndarray]:
         """Close on nothing."""
         ...
 
-    def opening(self) -> Iterator[None]:
+    def opening(self) -> Iterator[np.ndarray]:
         """Let go."""
         ...
 

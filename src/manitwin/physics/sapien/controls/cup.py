@@ -72,23 +72,21 @@ class CupControl:
             self._let_go()
         self._on = on
 
-    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
+    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[np.ndarray]:
         """Stay as it is."""
         return iter(())
 
-    def squeeze(self) -> None:
+    def squeeze(self) -> np.ndarray:
         """Switch the vacuum on."""
-        self._on = True
+        return np.ones(1)
 
-    def closing_empty(self) -> Iterator[None]:
+    def closing_empty(self) -> Iterator[np.ndarray]:
         """Stay as it is: only jaws are used as a tool."""
         return iter(())
 
-    def opening(self) -> Iterator[None]:
+    def opening(self) -> Iterator[np.ndarray]:
         """Switch the vacuum off."""
-        self._on = False
-        self._let_go()
-        yield
+        yield np.zeros(1)
 
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
         """Seal on what the lip touches, or let go of what is too much for it."""

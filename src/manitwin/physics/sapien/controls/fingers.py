@@ -41,10 +41,10 @@ class FingersControl:
 
     def tell(self, told: np.ndarray) -> None:
         """Tell the joints' targets."""
-        self._closing = None
-        self._tell(np.asarray(told, float))
+        self._told = np.asarray(told, float)
+        self._world.robot.set_hand_targets(self._told)
 
-    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
+    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[np.ndarray]:
         """Move to the joints before closing; those to close to are kept for ``squeeze``."""
         if grasp_joints_rad is None:
             raise ValueError(f"a grasp of {self._gripper.name} needs its joints before closing and those to close to")
@@ -52,7 +52,7 @@ class FingersControl:
         self._closing = None
         return self._to(self._before)
 
-    def squeeze(self) -> None:
+    def squeeze(self) -> np.ndarray:
         """Move on the targets of all fingers that do not press yet."""
         if self._closing is None:
             assert self._goal is not None, "a hand closes on a grasp that it was shaped for"
@@ -64,13 +64,13 @@ class FingersControl:
                 strength=self._settings.force_n / self._gripper.force_n,
                 frame_s=self._settings.frame_s,
             )
-        self._tell(self._closing.move_on(self._world.robot.hand_positions()))
+        return self._closing.move_on(self._world.robot.hand_positions())
 
-    def closing_empty(self) -> Iterator[None]:
+    def closing_empty(self) -> Iterator[np.ndarray]:
         """Stay as it is: only jaws are used as a tool."""
         return iter(())
 
-    def opening(self) -> Iterator[None]:
+    def opening(self) -> Iterator[np.ndarray]:
         """Go back to the joints before closing."""
         self._closing = None
         return self._to(self._before)
@@ -82,13 +82,8 @@ class FingersControl:
         """Return what the contacts tell."""
         return touches
 
-    def _to(self, joints_rad: np.ndarray) -> Iterator[None]:
+    def _to(self, joints_rad: np.ndarray) -> Iterator[np.ndarray]:
         start, step_rad = self._told, self._gripper.drive.speed_rad_s * self._settings.frame_s
         frames = int(np.ceil(np.abs(joints_rad - start).max() / step_rad))
         for frame in range(1, frames + 1):
-            self._tell(start + frame / frames * (joints_rad - start))
-            yield
-
-    def _tell(self, joints_rad: np.ndarray) -> None:
-        self._told = joints_rad
-        self._world.robot.set_hand_targets(joints_rad)
+            yield start + frame / frames * (joints_rad - start)

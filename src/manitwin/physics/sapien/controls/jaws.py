@@ -49,31 +49,31 @@ class JawsControl:
 
     def tell(self, told: np.ndarray) -> None:
         """Tell the opening."""
-        self._tell(float(told[0]))
+        self._target_m = float(told[0])
+        self._robot.set_opening_target(self._target_m)
 
-    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[None]:
+    def shaping(self, grasp_joints_rad: np.ndarray | None) -> Iterator[np.ndarray]:
         """Stay open."""
         return iter(())
 
-    def squeeze(self) -> None:
+    def squeeze(self) -> np.ndarray:
         """Move the target on by one frame."""
-        self._tell(2 * self._shared.move_on(self._robot.opening_m() / 2))
+        return np.array([2 * self._shared.move_on(self._robot.opening_m() / 2)])
 
-    def closing_empty(self) -> Iterator[None]:
+    def closing_empty(self) -> Iterator[np.ndarray]:
         """Close at the closing speed; what they do not hold they do not press."""
         target_m = self._target_m
         while target_m > 0:
             target_m = max(0.0, target_m - self._way_m)
-            self._tell(target_m)
-            yield
+            yield np.array([target_m])
 
-    def opening(self) -> Iterator[None]:
-        """Open at the closing speed."""
+    def opening(self) -> Iterator[np.ndarray]:
+        """Open at the closing speed; they close again from there."""
+        self._shared = SharedTarget(self._full_m, self._settings)
         target_m = max(self._target_m, 0.0)
         while target_m < self._full_m:
             target_m = min(self._full_m, target_m + self._way_m)
-            self._tell(target_m)
-            yield
+            yield np.array([target_m])
 
     def look(self, contacts: Sequence[physx.PhysxContact]) -> None:
         """See nothing: jaws feel what they press on."""
@@ -85,7 +85,3 @@ class JawsControl:
     @property
     def _way_m(self) -> float:
         return 2 * self._settings.close_speed_m_s * self._settings.frame_s
-
-    def _tell(self, opening_m: float) -> None:
-        self._target_m = opening_m
-        self._robot.set_opening_target(opening_m)

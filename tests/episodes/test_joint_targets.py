@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from manitwin.episodes.environment.arms import JointTargets
+from manitwin.episodes.joint_targets import JointTargets
 
 LIMITS = np.full(1, -10.0), np.full(1, 10.0)
 
