@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 from held_skills import around, attempt, beside, goal_of, mallet
+from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.planning.problem import Phase
+from manitwin.episodes.planning.problem import Grasp, Phase
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.geometry.poses import transform
 
@@ -53,3 +54,33 @@ def test_only_what_has_a_striking_face_strikes() -> None:
     assert SKILLS["strike"].suits(SPOT.pool, SPOT.twin(0), None)
     base = around(BODY, (replace(FRAMES[0], label="base"),), 0.5, 0.05)
     assert not SKILLS["strike"].suits(base.pool, base.twin(0), None)
+
+
+def test_a_grasp_whose_tilted_fingers_reach_beyond_the_face_is_not_taken() -> None:
+    (frame,) = FRAMES
+    across = frame.frame_to_object @ transform(
+        np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    )  # closes along the face's X, Z of the hand along its Y
+    goal = goal_of("strike", SPOT)
+    assert goal.path is not None
+    asked = {}
+
+    def task(scene):
+        asked["task"] = goal.path(scene)
+        asked["depth_m"] = scene.tip_depth_m
+        return asked["task"]
+
+    attempt(SPOT, replace(goal, path=task), GRASPS[:1])
+    rank = asked["task"].rank
+
+    def held(behind_m: float, tilt_rad: float) -> Grasp:
+        """A grasp across the head, its pads' middle so far behind the face, its approach tilted towards it."""
+        turn = Rotation.from_euler("x", tilt_rad).as_matrix()
+        tip = transform(translation=np.array([0.0, 0, -asked["depth_m"]]))
+        return Grasp("g", across @ transform(None, np.array([0.0, behind_m, 0])) @ transform(turn) @ tip, 0.04)
+
+    assert rank(held(0.016, 0.0)) is not None
+    assert rank(held(0.012, 0.0)) is None  # half a finger's width is 9 mm
+    tilted = [rank(held(0.016, sign * np.radians(40))) for sign in (1, -1)]
+    assert None in tilted
+    assert rank(held(0.04, 0.0)) is not None

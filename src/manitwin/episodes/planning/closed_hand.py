@@ -1,4 +1,4 @@
-"""The closed hand as a tool: the corners of its fingertips, and which of them comes first."""
+"""The closed hand as a tool: the corners of its fingertips, which of them comes first, and where they are when it holds."""
 
 from __future__ import annotations
 
@@ -17,6 +17,15 @@ def fingertip_corners(parts: ArmPlanning) -> np.ndarray:
         [points for i in sorted(hand.fingers) if (points := corners_of(hand.geometry.geometryObjects[i])) is not None]
     )
     return np.asarray(corners[corners[:, 2] > corners[:, 2].max() - TIP_M])
+
+
+def open_fingertips(corners_m: np.ndarray, width_m: float) -> np.ndarray:
+    """Return the corners ``(N, 3)`` of closed fingertips where they are with ``width_m`` between the pads.
+
+    Corners in the plane in which pads meet are on both sides.
+    """
+    left, right = (corners_m[side * corners_m[:, 0] > -1e-4] + [side * width_m / 2, 0, 0] for side in (-1.0, 1.0))
+    return np.concatenate([left, right])
 
 
 def first_corner(corners_m: np.ndarray, hand_to_world: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, float]:

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 from manitwin.episodes.events import StrikeWatch
 from manitwin.episodes.fixtures import Fixture, block
 from manitwin.episodes.goals.goal import Goal, Literal
+from manitwin.episodes.planning.closed_hand import open_fingertips
 from manitwin.episodes.planning.held_path import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill
@@ -23,7 +24,9 @@ from manitwin.scenes.layouts.twin_frames import TwinFrame
 BLOCK = "block"
 ABOVE_M, BELOW_M, FREE_KNOTS = 0.12, 0.03, 6  # the blow begins so far above, and would end so far below the top
 ROLLS = 8
-FINGERS_BEHIND_M = 0.012  # half a finger's width and a little: fingers farther out would touch before the face does
+FINGERS_BEHIND_M = (
+    0.005  # corners of fingers farther out would touch before the face does, or as the tool turns in the hand
+)
 LEVER_STEP_M = 0.03  # grasps whose levers differ by less count as equal: heavy heads turn in a hand far from them
 BLOW = Guard(first=0, stop_n=1e-3, duration_s=0.5, beyond=1.7)
 SLOWEST_S = 1.2  # of the whole way at the joints' limits, which leaves 0.23 m/s at the touch: 1.875 x 0.15 m / 1.2 s
@@ -63,9 +66,10 @@ class Strike(HeldSkill):
             paths.append(HeldPath(np.array(poses) @ inverse(face.frame_to_object), frozenset({BLOCK}), FREE_KNOTS))
 
         def rank(grasp: Grasp) -> float | None:
-            tips = transform_points(grasp.gripper_to_object, np.array([[0.0, 0, scene.tip_depth_m]]))[0]
-            if transform_points(inverse(face.frame_to_object), tips[None])[0, 2] > -FINGERS_BEHIND_M:
+            corners = transform_points(grasp.gripper_to_object, open_fingertips(scene.fingertips_m, grasp.width_m))
+            if transform_points(inverse(face.frame_to_object), corners)[:, 2].max() > -FINGERS_BEHIND_M:
                 return None
+            tips = transform_points(grasp.gripper_to_object, np.array([[0.0, 0, scene.tip_depth_m]]))[0]
             lever_m = float(np.linalg.norm(tips - target.body.center_of_mass_m))
             return round(lever_m / LEVER_STEP_M)
 
