@@ -112,6 +112,7 @@ SKILLS = Choices(
         "in_front_of",
         "near",
         "upright",
+        "lift",
         "hang",
         "insert",
         "pour",

@@ -49,6 +49,10 @@ TEMPLATES: Mapping[str, tuple[str, ...]] = {
         "stand {a} up", "put {a} upright", "{a} has fallen over: stand {it} up", "set {a} back on {its} base",
         "pick up {a} and put {it} down upright", "please stand {a} upright again",
     ),
+    "lifted": (
+        "lift {a}", "pick up {a}", "take {a} and hold {it} up", "raise {a} off the table", "grasp {a} and lift {it}",
+        "please hold {a} up",
+    ),
     "hung": (
         "hang {a} on the peg", "hang up {a}", "put {a} on the hook", "pick up {a} and hang {it} on the peg",
         "take {a} and slip {it} over the peg", "please hang {a} up by its hole",

@@ -10,6 +10,7 @@ from manitwin.episodes.skills.cut_motion import CutMotion
 from manitwin.episodes.skills.handover import Handover
 from manitwin.episodes.skills.hang import Hang
 from manitwin.episodes.skills.insert import Insert
+from manitwin.episodes.skills.lift import Lift
 from manitwin.episodes.skills.place_in import PlaceIn
 from manitwin.episodes.skills.place_on import PLACE_ON, STACK
 from manitwin.episodes.skills.pour import Pour
@@ -31,6 +32,7 @@ _SKILLS: tuple[Skill, ...] = (
     STACK,
     *SIDE_SKILLS,
     Upright(),
+    Lift(),
     Hang(),
     Insert(),
     Press(),
