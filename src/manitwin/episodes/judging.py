@@ -16,7 +16,9 @@ from manitwin.episodes.skills.held_skill import tip_of
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
 
-SWINGS_S = 8.0  # what hangs swings for longer than what stands rocks, and stands still at each turn
+SWINGS_S = (
+    8.0  # what hangs swings and what lies in a bowl rolls for longer than what stands rocks, and is still at each turn
+)
 
 
 def is_reached_already(start: Start, world: RobotWorld) -> bool:
@@ -69,8 +71,7 @@ def judge(
 ) -> None:
     """Wait until all is at rest, and take down the outcome."""
     settings, target = start.settings, start.objects[world.target]
-    let_go = max(execution.touches.finger_forces_n) == 0
-    if start.skill_goal is not None and start.skill_goal.is_of_a_path and let_go:
+    if start.skill_goal is not None and max(execution.touches.finger_forces_n) == 0:
         last = execution.rest(round(max(settings.max_rest_s, SWINGS_S) / settings.timestep_s), REST_ROWS)
     else:
         last = execution.rest(round(settings.max_rest_s / settings.timestep_s))

@@ -9,8 +9,11 @@ import numpy as np
 from manitwin.episodes.courses.course import Course, Ended
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.outcome import moved_m, turned_rad
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, PickPlacePlan
+from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.geometry.poses import inverse
+from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
 
 SMALL_SLIP_M, SMALL_SLIP_RAD = 0.004, np.radians(2.0)  # a fifth of what a placement may be off: no reason to give up
 
@@ -61,8 +64,26 @@ class PickPlaceCourse(Course):
         execution.follow(placement.lower)
         self.check_held(execution)
         self.measure_slip(plan, execution)
+        goal = self.start.skill_goal
+        if goal is not None and goal.lets_fall:
+            self._let_fall(placement.retreat, execution)
+            return
         execution.open()
         execution.follow(placement.retreat)
+
+    def _let_fall(self, retreat: Motion, execution: Execution) -> None:
+        """Let go in the air and withdraw, and once more where the target has come to lean on the hand."""
+        execution.meant = MeantContacts(palm=True)
+        execution.open()
+        execution.follow(retreat)
+        planner = self.start.planner
+        if isinstance(planner, PickPlacePlanner) and execution.touches_target:
+            here = execution.target_to_world(), execution.commanded_rad
+            away = plan_withdrawal(planner.parts, self.problem, *here, blind=False)
+            self.facts.replans["withdrawn" if away is not None else "not_withdrawn"] += 1
+            if away is not None:
+                execution.follow(away)
+        execution.meant = NONE_MEANT
 
     def _placed_anew(self, plan: PickPlacePlan, execution: Execution, *, with_carry: bool) -> _Placement | None:
         """Plan the placement from the pose in the hand."""

@@ -1,9 +1,9 @@
-"""``place_in``: let an object go in a vessel, on end a little below the rim, or lying where it comes to rest."""
+"""``place_in``: let an object go in a vessel where it comes to rest, lying or leaning, or on end a little below the rim."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import zip_longest
+from itertools import chain
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -12,14 +12,17 @@ from manitwin.episodes.skills.dropping import rest_after_drop
 from manitwin.episodes.skills.skill import Skill, Surroundings, tries
 from manitwin.geometry.boxes import smallest_enclosing_circle
 from manitwin.geometry.hull_distance import PlacedParts
-from manitwin.geometry.poses import rotation_between, transform
+from manitwin.geometry.poses import rotation_between, transform, transform_points
 from manitwin.scenes.layouts.pool import Pool, PoolTwin
 from manitwin.scenes.layouts.stacking import RIM_SLACK, Mouth, mouth_of, open_poses, put_into
 
 LEAST_DEPTH_M = 0.025  # of a vessel: what is put on a plate lies on it, and rolls off
 LET_GO_M = 0.04  # the lower end is so deep below the rim: a hand that goes deeper meets the rim
 LEAST_ROOM_M = 0.004  # all around a thing on end
-FREE_FALL_M = 0.002  # above where a lying thing would come to rest
+FREE_FALL_M, LEANING_FALL_M = (
+    0.002,
+    0.004,
+)  # above where a thing would come to rest: lying by its shape, or as a drop showed
 LYING_TRIED, ON_END_TRIED = 6, 12
 PERTURBED, OFF_M, OFF_RAD = 3, 0.005, np.radians(3)
 
@@ -27,7 +30,8 @@ PERTURBED, OFF_M, OFF_RAD = 3, 0.005, np.radians(3)
 class PlaceIn(Skill):
     """Put the target into its partner, a vessel that opens upward."""
 
-    name, predicate, has_partner, most_poses = "place_in", "in", True, 6
+    name, predicate, has_partner, most_poses = "place_in", "in", True, 10
+    lets_fall = True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
         """Accept a vessel that is deeper than a plate, with a rim wider than the target's two smaller sides."""
@@ -41,10 +45,11 @@ class PlaceIn(Skill):
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:
-        """Yield poses on end with the lower end below the rim, and poses just above where the target would lie.
+        """Yield poses just above where the target would lie or lean, and poses on end with the lower end below the rim.
 
         Those from which it comes to rest in the vessel when it is let go there in physics, also when that is a little beside:
-        a banana that balances on the rim of a bowl is no goal.
+        a banana that balances on the rim of a bowl is no goal. Where a drop ended is one, by turns with where it began, those
+        first that move the least: a fork on end in a bowl falls to any side, over the rim or against the hand.
         """
         assert partner is not None
         mouth = mouth_of(around.body(partner), around.objects[partner].object_to_world)
@@ -53,9 +58,14 @@ class PlaceIn(Skill):
         vessel = around.parts(partner)
         on_end = tries(lambda: _on_end(around.body(target).parts.whole, mouth, rng), ON_END_TRIED)
         lying = tries(lambda: _lying(around, target, vessel, mouth, rng), LYING_TRIED)
-        long = _extents(around.body(target).parts.whole)[2] > mouth.depth_m
         goal = self.goal(around.objects[target], around.objects[partner])
-        for pose in _by_turns(on_end, lying) if long else _by_turns(lying, on_end):
+        found = list[tuple[float, np.ndarray, np.ndarray]]()
+        for pose in (*lying, *on_end):
+            rest = rest_after_drop(around, target, partner, goal, pose)
+            if rest is not None:
+                found.append((_farthest_m(around.body(target).parts.whole, pose, rest), pose, rest))
+        found.sort(key=lambda each: each[0])
+        for pose in chain.from_iterable((_raised(rest), begun) for _, begun, rest in found):
             if all(rest_after_drop(around, target, partner, goal, each) is not None for each in _nearby(pose, rng)):
                 yield pose
 
@@ -89,15 +99,17 @@ def _lying(
     return pose
 
 
-def _by_turns(first: Iterator[np.ndarray], second: Iterator[np.ndarray]) -> Iterator[np.ndarray]:
-    """Yield from two iterators in turn: the hand may meet the rim for all poses of one kind."""
-    for pair in zip_longest(first, second):
-        yield from (pose for pose in pair if pose is not None)
+def _raised(rest: np.ndarray) -> np.ndarray:
+    return transform(translation=np.array([0.0, 0, LEANING_FALL_M])) @ rest
+
+
+def _farthest_m(points: np.ndarray, before: np.ndarray, after: np.ndarray) -> float:
+    """Return how far the point moves that moves the farthest between two poses ``(4, 4)``."""
+    return float(np.linalg.norm(transform_points(after, points) - transform_points(before, points), axis=1).max())
 
 
 def _nearby(pose: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
-    """Yield a pose, and some that differ from it as a placement does from its plan."""
-    yield pose
+    """Yield poses that differ from one as a placement does from its plan."""
     for _ in range(PERTURBED):
         turn = Rotation.from_rotvec(rng.normal(0, OFF_RAD, 3)).as_matrix() @ pose[:3, :3]
         yield transform(turn, pose[:3, 3] + np.array([*rng.normal(0, OFF_M, 2), 0.0]))
@@ -106,10 +118,6 @@ def _nearby(pose: np.ndarray, rng: np.random.Generator) -> Iterator[np.ndarray]:
 def _axes(points: np.ndarray) -> np.ndarray:
     """Return the principal axes ``(3, 3)``, the longest last."""
     return np.asarray(np.linalg.eigh(np.cov(points.T))[1])
-
-
-def _extents(points: np.ndarray) -> np.ndarray:
-    return np.sort(np.ptp(points @ _axes(points), axis=0))
 
 
 def _radius_on_end(points: np.ndarray) -> float:

@@ -58,7 +58,7 @@ class SkillGoal:
     objects, by name. Of a skill that moves the target along a held path there is the ``path`` that is made once all has come to
     rest, and its ``fixtures``; the one pose is then that of the beginning. ``granules`` lie in one of the objects;
     ``places_m`` are marked places ``(3,)`` in the world. ``pushes``: the closed hand pushes the target to one of them.
-    ``hands_over``: one arm hands the target over to another one.
+    ``hands_over``: one arm hands the target over to another one. ``lets_fall``: the target is let go in the air.
     """
 
     goal: Goal
@@ -73,6 +73,7 @@ class SkillGoal:
     places_m: Mapping[str, np.ndarray] = field(default_factory=dict)
     pushes: bool = False
     hands_over: bool = False
+    lets_fall: bool = False
 
     @property
     def is_of_a_path(self) -> bool:
@@ -92,6 +93,7 @@ class Skill(ABC):
     predicate: str
     most_poses: int = 12
     arms: int = 1
+    lets_fall: bool = False
 
     @abstractmethod
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
@@ -133,7 +135,8 @@ def set_goal(
     if not poses:
         return None
     numbers = (target, *([] if partner is None else [partner]))
-    return SkillGoal(goal, poses, None if second is None else second.name, openings_of(around, numbers))
+    name = None if second is None else second.name
+    return SkillGoal(goal, poses, name, openings_of(around, numbers), lets_fall=skill.lets_fall)
 
 
 def openings_of(around: Surroundings, numbers: Sequence[int]) -> dict[str, Opening]:

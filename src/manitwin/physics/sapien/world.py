@@ -17,6 +17,7 @@ from sapien import physx
 from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, StaticBox
 from manitwin.physics.sapien.body import entity_at, graspable_component, static_box, static_plane
 from manitwin.physics.sapien.contacts import ContactReader, Role
+from manitwin.physics.sapien.falling import Falling
 from manitwin.physics.sapien.granules import FALL_S, GranuleFill, Granules
 from manitwin.physics.sapien.robot import SapienRobot
 from manitwin.physics.sapien.scene import system_with_gravity
@@ -84,6 +85,7 @@ class RobotWorld:
             for number, arm in enumerate(robot.arms or (robot,))
         )
         self.robot = self.robots[0]
+        self._falling, self._expects_load = Falling(self.bodies, timestep_s, contact_offset_m=contact_offset_m), False
         self.expect_load(False)
         self._fixed = [
             (surface, box.name, role) for surface, box, role in zip(surfaces, standing, bearing, strict=True)
@@ -104,6 +106,7 @@ class RobotWorld:
             self.robot,
             self.robots,
             self.bodies,
+            self._falling,
             self._fixed,
             self.granules,
             self._scene,
@@ -127,12 +130,16 @@ class RobotWorld:
 
     def step(self, count: int = 1) -> None:
         """Let ``count`` timesteps pass."""
-        step = self._system.step
+        step, look = self._system.step, self._falling.look
         for _ in range(count):
             step()
+            look()
 
     def expect_load(self, held: bool) -> None:
         """Choose the solver's iterations for a hand that holds something, or is empty."""
+        if held and not self._expects_load:
+            self._falling.end()
+        self._expects_load = held
         iterations = self._iterations_held if held else self._iterations
         for robot in self.robots:
             robot.articulation.set_solver_position_iterations(iterations)  # also for all that the robot touches
