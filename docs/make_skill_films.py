@@ -42,6 +42,7 @@ from manitwin.twin.loaded_twin import TwinSource
 FILMS = Path(__file__).resolve().parent / "films"
 RECORD = FILMS / "films.json"
 SIZE_PX, EVERY, SPEED, QUALITY = 224, 5, 3.0, 45
+STILL, STILL_FRAMES = 0.1, 2  # the mean difference of two pictures that look the same, and half a second
 SEED, ATTEMPTS, TRIES = 7, 4, 4
 TARGETS = {
     "pick_place": "mug",
@@ -105,6 +106,12 @@ def film(episode: StoredEpisode, twins: Path) -> list[np.ndarray]:
         return [views[0].rgb for views in frames]
 
 
+def until_still(pictures: list[np.ndarray]) -> list[np.ndarray]:
+    """Leave out the end, but half a second, in which nothing moves: what is kept in the hand is watched for two seconds."""
+    moves = [k for k, each in enumerate(pictures) if np.abs(each.astype(float) - pictures[-1]).mean() > STILL]
+    return pictures[: max(moves, default=-1) + 1 + STILL_FRAMES]
+
+
 def _box(said: dict[str, Any]) -> StaticBox:
     rotation = rotation_from_quaternion_wxyz(np.array(said["quaternion_wxyz"]))
     return StaticBox(said["name"], np.array(said["half_extents_m"]), transform(rotation, np.array(said["position_m"])))
@@ -118,16 +125,15 @@ def main() -> None:
     asked = parser.parse_args()
     for skill in asked.skills.split(","):
         episode = an_episode(asked.twins, skill)
-        write_animation(
-            film(episode, asked.twins), FILMS / f"{skill}.webp", rate_hz=SPEED * RATE_HZ / EVERY, quality=QUALITY
-        )
+        pictures = until_still(film(episode, asked.twins))
+        write_animation(pictures, FILMS / f"{skill}.webp", rate_hz=SPEED * RATE_HZ / EVERY, quality=QUALITY)
         shown = json.loads(RECORD.read_text()) if RECORD.exists() else {}
         names = [TwinSource(asked.twins).twin(each.twin_id).record.language for each in episode.objects]
         shown[skill] = {
             "episode": of_episode(episode),
             "goal": episode.attempt.goal,
             "objects": [None if each is None else each.category for each in names],
-            "seconds": round(episode.attempt.length_s, 1),
+            "seconds": round((len(pictures) - 1) * EVERY / RATE_HZ, 1),
         }
         print(skill, shown[skill], (FILMS / f"{skill}.webp").stat().st_size, flush=True)
         RECORD.write_text(json.dumps(dict(sorted(shown.items())), indent=1) + "\n")

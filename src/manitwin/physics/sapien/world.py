@@ -136,7 +136,7 @@ class RobotWorld:
             look()
 
     def expect_load(self, held: bool) -> None:
-        """Choose the solver's iterations for a hand that holds something, or is empty."""
+        """Choose the solver's iterations for a hand that holds something, or is empty; as it closes, nothing falls any more."""
         if held and not self._expects_load:
             self._falling.end()
         self._expects_load = held
