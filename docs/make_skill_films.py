@@ -54,7 +54,6 @@ TARGETS = {
     "upright": "bottle",
     "handover": "hammer",
     "lift": "mug",
-    "push": "box",
 }  # of skills that take anything, what shows them best; each twin is then tried once a seed
 EYE = np.array([0.45, -0.85, 0.55])  # from what is shown, in a direction that an arm at the origin does not hide
 LEAST_WAY_M, WAY_SHARE = 0.45, 1.5  # of the camera from there, and by how far all of it reaches

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, zip_longest
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -48,8 +48,9 @@ class PlaceIn(Skill):
         """Yield poses just above where the target would lie or lean, and poses on end with the lower end below the rim.
 
         Those from which it comes to rest in the vessel when it is let go there in physics, also when that is a little beside:
-        a banana that balances on the rim of a bowl is no goal. Where a drop ended is one, by turns with where it began, those
-        first that move the least: a fork on end in a bowl falls to any side, over the rim or against the hand.
+        a banana that balances on the rim of a bowl is no goal. Where a drop ended is one, by turns with where it began: a fork
+        on end in a bowl falls to any side, over the rim or against the hand. Of those that lie and of those on end, by turns,
+        the ones come first that move the least: the hand may meet the rim for all of one kind.
         """
         assert partner is not None
         mouth = mouth_of(around.body(partner), around.objects[partner].object_to_world)
@@ -59,13 +60,16 @@ class PlaceIn(Skill):
         on_end = tries(lambda: _on_end(around.body(target).parts.whole, mouth, rng), ON_END_TRIED)
         lying = tries(lambda: _lying(around, target, vessel, mouth, rng), LYING_TRIED)
         goal = self.goal(around.objects[target], around.objects[partner])
-        found = list[tuple[float, np.ndarray, np.ndarray]]()
-        for pose in (*lying, *on_end):
-            rest = rest_after_drop(around, target, partner, goal, pose)
-            if rest is not None:
-                found.append((_farthest_m(around.body(target).parts.whole, pose, rest), pose, rest))
-        found.sort(key=lambda each: each[0])
-        for pose in chain.from_iterable((_raised(rest), begun) for _, begun, rest in found):
+
+        def steadiest(poses: Iterator[np.ndarray]) -> list[tuple[np.ndarray, np.ndarray]]:
+            """Return where drops that reach the goal end, a little above, and where they begin."""
+            rests = [(begun, rest_after_drop(around, target, partner, goal, begun)) for begun in poses]
+            found = [(begun, rest) for begun, rest in rests if rest is not None]
+            found.sort(key=lambda each: _farthest_m(around.body(target).parts.whole, *each))
+            return [(_raised(rest), begun) for begun, rest in found]
+
+        pairs = chain.from_iterable(zip_longest(steadiest(lying), steadiest(on_end), fillvalue=()))
+        for pose in chain.from_iterable(pairs):
             if all(rest_after_drop(around, target, partner, goal, each) is not None for each in _nearby(pose, rng)):
                 yield pose
 
