@@ -31,15 +31,22 @@ def test_a_recorded_trial_is_that_of_run(engine: SapienTrial | MujocoTrial, shar
     assert recording.object_to_hand.shape == (count, 4, 4) and recording.hand_m.shape == (count, 3)
 
 
-def test_hand_goes_up_by_the_lift_and_back_from_each_slide() -> None:
+def test_hand_goes_up_by_the_lift_and_out_along_each_axis() -> None:
     recording = SapienTrial().record(box(CUBE_M, 0.5), PANDA, above([0, 0, 0]), SETTINGS)
     phases = np.array(recording.phases)
     assert list(dict.fromkeys(recording.phases)) == ["open", "close", "lift", "hold", "slide"]
     assert (recording.hand_m[phases == "close"] == 0).all()
     assert recording.hand_m[phases == "lift"][-1] == pytest.approx([0, 0, SETTINGS.lift_m], abs=1e-9)
-    assert recording.hand_m[-1] == pytest.approx([0, 0, SETTINGS.lift_m], abs=1e-9)
-    away = np.abs(recording.hand_m[phases == "slide"] - [0, 0, SETTINGS.lift_m]).max(0)
-    assert (away[:2] > 0.9 * SETTINGS.slide_m).all(), "the last look of a slide is at its end"
+    out = np.array([0, 0, SETTINGS.lift_m]) + SETTINGS.slide_m
+    assert recording.hand_m[-1] == pytest.approx(out, abs=1e-9)
+
+
+def test_hand_comes_back_from_each_slide_of_a_grasp_at_the_limit() -> None:
+    recording = SapienTrial().record(box(CUBE_M, 0.98 * LIMIT_KG), PANDA, above([0, 0, 0]), SETTINGS)
+    assert recording.result.outcome == "held"
+    slides = recording.hand_m[np.array(recording.phases) == "slide"] - [0, 0, SETTINGS.lift_m]
+    assert slides[-1] == pytest.approx([0, 0, 0], abs=1e-9)
+    assert (np.abs(slides).max(0) > 0.9 * SETTINGS.slide_m).all(), "the last look of a slide is at its end"
 
 
 def test_pads_close_onto_the_box_and_it_stays_in_the_hand() -> None:

@@ -90,23 +90,23 @@ def smallest_enclosing_circle(points: np.ndarray) -> tuple[np.ndarray, float]:
         points = points[ConvexHull(points).vertices]
     slack = 1e-10 * (np.ptp(points, axis=0).max() + 1e-12)
     center, radius = points[0], 0.0
-    for i in range(1, len(points)):
-        if _inside(points[i], center, radius, slack):
-            continue
+    i = 0
+    while (i := _next_outside(points, i + 1, len(points), center, radius + slack)) < len(points):
         center, radius = points[i], 0.0
-        for j in range(i):
-            if _inside(points[j], center, radius, slack):
-                continue
+        j = -1
+        while (j := _next_outside(points, j + 1, i, center, radius + slack)) < i:
             center = (points[i] + points[j]) / 2
             radius = float(np.linalg.norm(points[i] - center))
-            for k in range(j):
-                if not _inside(points[k], center, radius, slack):
-                    center, radius = _circumcircle(points[i], points[j], points[k])
+            k = -1
+            while (k := _next_outside(points, k + 1, j, center, radius + slack)) < j:
+                center, radius = _circumcircle(points[i], points[j], points[k])
     return center, float(np.linalg.norm(points - center, axis=1).max())
 
 
-def _inside(point: np.ndarray, center: np.ndarray, radius: float, slack: float) -> bool:
-    return float(np.linalg.norm(point - center)) <= radius + slack
+def _next_outside(points: np.ndarray, first: int, end: int, center: np.ndarray, reach: float) -> int:
+    """Return the first of the points from ``first`` on that is farther than ``reach`` from a centre; ``end`` where none is."""
+    outside = np.linalg.norm(points[first:end] - center, axis=1) > reach
+    return first + int(outside.argmax()) if outside.any() else end
 
 
 def _circumcircle(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> tuple[np.ndarray, float]:

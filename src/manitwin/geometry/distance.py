@@ -22,7 +22,7 @@ def closest_faces(points: np.ndarray, mesh: trimesh.Trimesh) -> tuple[np.ndarray
     Source: branch and bound over a balanced tree of boxes, from the nearest corner on; point to triangle after Ericson,
     Real-Time Collision Detection, 5.1.5.
     """
-    return _BoxTree(np.asarray(mesh.triangles, dtype=float)).closest(np.asarray(points, dtype=float).reshape(-1, 3))
+    return ClosestFaces(mesh).of(points)
 
 
 def signed_distance(points: np.ndarray, mesh: trimesh.Trimesh) -> np.ndarray:
@@ -96,6 +96,17 @@ def _edge_normals(mesh: trimesh.Trimesh) -> np.ndarray:
     normals = np.zeros((len(mesh.edges_unique), 3))
     np.add.at(normals, mesh.faces_unique_edges.ravel(), np.repeat(mesh.face_normals, 3, axis=0))
     return normals
+
+
+class ClosestFaces:
+    """A mesh prepared for ``closest_faces``, where it is asked more than once."""
+
+    def __init__(self, mesh: trimesh.Trimesh):
+        self._tree = _BoxTree(np.asarray(mesh.triangles, dtype=float))
+
+    def of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the face index ``(N,)`` closest to each point ``(N, 3)`` and its exact distance ``(N,)`` m."""
+        return self._tree.closest(np.asarray(points, dtype=float).reshape(-1, 3))
 
 
 class _BoxTree:

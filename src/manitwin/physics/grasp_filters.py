@@ -61,6 +61,28 @@ def pad_contacts(
     gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: RayCaster, center_of_mass_m: np.ndarray
 ) -> PadContacts:
     """Cast rays from both open pads of grasps ``(N, 4, 4)`` against the union of the hulls."""
+    plus, minus = (_pad_hits(gripper, gripper_to_object, hulls, side) for side in (1, -1))
+    return _both_pads(gripper, gripper_to_object, plus, minus, center_of_mass_m)
+
+
+@dataclass(frozen=True)
+class _PadHits:
+    """What one pad of each of N grasps meets.
+
+    ``depth_m (N,)`` of the first cell's contact (inf: nothing), ``cells (N,)`` that touch, ``center_m (N, 2)`` of these on the
+    pad, ``alignment (N,)`` the mean cosine of their normals and the closing axis.
+    """
+
+    depth_m: np.ndarray
+    cells: np.ndarray
+    center_m: np.ndarray
+    alignment: np.ndarray
+
+    def take(self, index: np.ndarray) -> _PadHits:
+        return _PadHits(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+
+
+def _pad_hits(gripper: ParallelGripper, gripper_to_object: np.ndarray, hulls: RayCaster, side: int) -> _PadHits:
     half_y, half_z = gripper.pad_half_extents_m
     y, z = np.meshgrid(
         np.linspace(-INSET * half_y, INSET * half_y, ACROSS),
@@ -69,26 +91,34 @@ def pad_contacts(
     )
     grid = np.stack([y.ravel(), z.ravel()], axis=1)
     rotation, origin = gripper_to_object[:, :3, :3], gripper_to_object[:, :3, 3]
-    depth, facing = [], []
-    for side in (1, -1):
-        pads = np.column_stack([np.full(len(grid), side * gripper.opening_m / 2), grid])
-        starts = np.einsum("nij,kj->nki", rotation, pads) + origin[:, None]
-        inwards = np.repeat(-side * rotation[:, None, :, 0], len(grid), axis=1)
-        distance, face = hulls.first_hits(starts.reshape(-1, 3), inwards.reshape(-1, 3))
-        cosine = np.where(face >= 0, -(hulls.face_normals[face] * inwards.reshape(-1, 3)).sum(1), 0.0)
-        depth.append(distance.reshape(-1, len(grid)))
-        facing.append(cosine.reshape(-1, len(grid)))
-    first = [d.min(1) for d in depth]
-    touching = [(d <= f[:, None] + SAME_CONTACT_M) & np.isfinite(d) for d, f in zip(depth, first, strict=True)]
-    count = [t.sum(1) for t in touching]
-    centers = [t @ grid / np.maximum(c, 1)[:, None] for t, c in zip(touching, count, strict=True)]
-    alignment = [(t * f).sum(1) / np.maximum(c, 1) for t, f, c in zip(touching, facing, count, strict=True)]
-    line = np.einsum("nij,nj->ni", rotation[:, :, 1:], (centers[0] + centers[1]) / 2) + origin
+    pads = np.column_stack([np.full(len(grid), side * gripper.opening_m / 2), grid])
+    starts = np.einsum("nij,kj->nki", rotation, pads) + origin[:, None]
+    inwards = np.repeat(-side * rotation[:, None, :, 0], len(grid), axis=1).reshape(-1, 3)
+    distance, face = hulls.first_hits(starts.reshape(-1, 3), inwards)
+    cosine = np.where(face >= 0, -(hulls.face_normals[face] * inwards).sum(1), 0.0).reshape(-1, len(grid))
+    depth = distance.reshape(-1, len(grid))
+    first = depth.min(1)
+    touching = (depth <= first[:, None] + SAME_CONTACT_M) & np.isfinite(depth)
+    count = touching.sum(1)
+    some = np.maximum(count, 1)
+    return _PadHits(first, count, touching @ grid / some[:, None], (touching * cosine).sum(1) / some)
+
+
+def _both_pads(
+    gripper: ParallelGripper,
+    gripper_to_object: np.ndarray,
+    plus: _PadHits,
+    minus: _PadHits,
+    center_of_mass_m: np.ndarray,
+) -> PadContacts:
+    rotation, origin = gripper_to_object[:, :3, :3], gripper_to_object[:, :3, 3]
+    line = np.einsum("nij,nj->ni", rotation[:, :, 1:], (plus.center_m + minus.center_m) / 2) + origin
+    met = np.isfinite(plus.depth_m + minus.depth_m)
     return PadContacts(
-        width_m=np.where(np.isfinite(first[0] + first[1]), gripper.opening_m - first[0] - first[1], np.inf),
-        cells=np.minimum(*count),
-        offset_m=np.linalg.norm(centers[0] - centers[1], axis=1),
-        alignment=np.minimum(*alignment),
+        width_m=np.where(met, gripper.opening_m - plus.depth_m - minus.depth_m, np.inf),
+        cells=np.minimum(plus.cells, minus.cells),
+        offset_m=np.linalg.norm(plus.center_m - minus.center_m, axis=1),
+        alignment=np.minimum(plus.alignment, minus.alignment),
         lever_m=np.linalg.norm(np.cross(center_of_mass_m - line, rotation[:, :, 0]), axis=1),
     )
 
@@ -116,15 +146,21 @@ class GraspFilter:
 
     def __call__(self, gripper_to_object: np.ndarray) -> FilteredGrasps:
         """Keep the grasps ``(N, 4, 4)`` whose pads would touch well and whose open hand is free of the object."""
-        contacts = pad_contacts(self._gripper, gripper_to_object, self._caster, self._center_of_mass_m)
-        touching = (contacts.width_m < self._gripper.opening_m) & (contacts.cells >= MIN_CELLS)
+        gripper = self._gripper
+        plus = _pad_hits(gripper, gripper_to_object, self._caster, 1)
+        met = np.flatnonzero((plus.cells >= MIN_CELLS) & (plus.alignment >= self._min_alignment))
+        minus = _pad_hits(
+            gripper, gripper_to_object[met], self._caster, -1
+        )  # half of all rays, where one pad is enough to tell
+        contacts = _both_pads(gripper, gripper_to_object[met], plus.take(met), minus, self._center_of_mass_m)
+        touching = (contacts.width_m < gripper.opening_m) & (contacts.cells >= MIN_CELLS)
         facing = (contacts.offset_m <= MAX_OFFSET_M) & (contacts.alignment >= self._min_alignment)
-        index = np.flatnonzero(touching & facing)
+        both = np.flatnonzero(touching & facing)
         overlaps = self._collision.overlaps(
-            self._gripper, gripper_to_object[index], opening_m=self._gripper.opening_m, clearance_m=CLEARANCE_M
+            gripper, gripper_to_object[met[both]], opening_m=gripper.opening_m, clearance_m=CLEARANCE_M
         )
-        left = index[~overlaps]
-        return FilteredGrasps(left, contacts.take(left), len(index))
+        left = both[~overlaps]
+        return FilteredGrasps(met[left], contacts.take(left), len(both))
 
 
 def torque_ratio(lever_m: np.ndarray, *, mass_kg: float, force_n: float, friction: float) -> np.ndarray:

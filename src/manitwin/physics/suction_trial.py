@@ -141,6 +141,10 @@ class _Scene:
         """Switch the vacuum on."""
         self.on = self.sealed
 
+    def presses(self) -> bool:
+        """Tell whether the vacuum holds."""
+        return self.on
+
     def contacts(self) -> HandContacts:
         """Return how hard the lip presses unloaded; where the gripper's body is in the object, it is there without end."""
         return HandContacts((self.settings.force_n if self.on else 0.0,), np.inf if self.overlaps else 0.0)

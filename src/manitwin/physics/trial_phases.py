@@ -20,10 +20,16 @@ from manitwin.twin.grasp_summary import Outcome
 
 CHECK_EVERY_FRAMES = 4
 SLIDE_DIRECTIONS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1]], float)
-# Out along +X and back loads the object along both -X and +X: after three slides all six directions have been loaded
-# once, and the other three repeat them. Of 1,735 grasps (25 objects) that had moved less than a fifth of the limit by
-# then, one failed in the repetition, so such a grasp is not asked again: 0.62 of the steps.
-ALL_LOADED_AFTER, SURE_SHARE = 3, 0.2
+# A stroke speeds up and slows down, so one along +X loads the object along -X and +X: three out along X, Y and Z load all six
+# directions once, three out and back twice, and the whole twelve four times. Of 1,735 grasps (25 objects) that had moved less
+# than a fifth of the limit after six strokes, one failed in the other six, so such a grasp is not asked again. After three
+# strokes, half as much may have moved: the same rate of creep.
+LOADED_ONCE, LOADED_TWICE, SURE_SHARE = (0, 2, 4), 6, 0.2
+CLOSED_SPEED_M_S, CLOSED_SPEED_RAD_S = (
+    0.001,
+    0.01,
+)  # what moves less in a hand that presses with all its force is at rest
+STILL_SHARE = 0.01  # of the closing speed: slower fingers have been stopped, and do not just lag behind their target
 MET_M = 1e-6  # pads this close have met
 Phase = Literal["open", "close", "lift", "hold", "slide"]
 TrialWatch = Callable[[Phase, float, np.ndarray], None]
@@ -47,6 +53,10 @@ class TrialScene(Protocol):
 
     def squeeze(self) -> None:
         """Move the fingers' common target on by one frame, until they press with the closing force."""
+        ...
+
+    def presses(self) -> bool:
+        """Tell whether the fingers press with the closing force by now, as far as they know."""
         ...
 
     def contacts(self) -> HandContacts:
@@ -88,6 +98,7 @@ class _Phases:
         self.displacement_m = self.rotation_rad = self.penetration_m = 0.0
         self.forces_n: tuple[float, ...] = ()
         self.closed_rotation: np.ndarray | None = None
+        self.pressed: list[tuple[np.ndarray, np.ndarray]] = []
 
     def run(self) -> TrialResult:
         outcome: Outcome = "held"
@@ -117,8 +128,25 @@ class _Phases:
         for _ in range(round(settings.close_time_s / settings.frame_s)):
             self.scene.squeeze()
             self._advance(weightless)
+            if self._rests_in_closed_hand():
+                break
         self._check_hold("misses")
         self.closed_rotation = self.scene.object_rotation()
+
+    def _rests_in_closed_hand(self) -> bool:
+        """Tell whether the hand has pressed for some frames and nothing has moved: what is left of the time changes nothing."""
+        if not self.scene.presses():
+            self.pressed = []
+            return False
+        self.pressed.append((self.scene.center_of_mass_m(), self.scene.object_rotation()))
+        if len(self.pressed) <= self.settings.stable_frames:
+            return False
+        (place, rotation), (now, turned) = self.pressed[-1 - self.settings.stable_frames], self.pressed[-1]
+        time_s = self.settings.stable_frames * self.settings.frame_s
+        return (
+            float(np.linalg.norm(now - place)) < CLOSED_SPEED_M_S * time_s
+            and rotation_angle_rad(turned @ rotation.T) < CLOSED_SPEED_RAD_S * time_s
+        )
 
     def _lift(self) -> None:
         settings, self.phase = self.settings, "lift"
@@ -144,12 +172,19 @@ class _Phases:
         settings, self.phase = self.settings, "slide"
         reference = self.scene.center_of_mass_m()
         self.displacement_m = 0.0
-        for number, direction in enumerate(SLIDE_DIRECTIONS):
-            if number == ALL_LOADED_AFTER and self.displacement_m < SURE_SHARE * settings.max_displacement_m:
+        strokes = [sign * settings.slide_m * direction for direction in SLIDE_DIRECTIONS for sign in (1, -1)]
+        sure_m, order = SURE_SHARE * settings.max_displacement_m, list(range(len(strokes)))
+        for number in LOADED_ONCE:
+            order.remove(number)
+            self._move(strokes[number], settings.slide_time_s, reference, settings.max_displacement_m, "slips")
+            if self.displacement_m >= sure_m / 2:
                 break
-            for sign in (1, -1):
-                path = sign * settings.slide_m * direction
-                self._move(path, settings.slide_time_s, reference, settings.max_displacement_m, "slips")
+        else:
+            order = []
+        for number in order:
+            if number >= LOADED_TWICE and self.displacement_m < sure_m:
+                break
+            self._move(strokes[number], settings.slide_time_s, reference, settings.max_displacement_m, "slips")
         self._check_hold("slips")
 
     def _move(self, path_m: np.ndarray, time_s: float, reference: np.ndarray, limit_m: float, outcome: Outcome) -> None:
@@ -211,12 +246,14 @@ class SharedTarget:
 
     Coordinates are the distances (m) of the pads from the plane between them. Pads that meet (``met_m`` and less) have
     nothing between them, whatever they overlap: the target goes back to where it was, as a gripper opens again that
-    reports an empty hand. Without this, fingers that have tunnelled into a thin and light object hold it.
+    reports an empty hand. Without this, fingers that have tunnelled into a thin and light object hold it. ``presses`` tells
+    whether the fingers have come to a stop, as far behind the target as the closing force pushes.
     """
 
     def __init__(self, opening_m: float, settings: TrialSettings, met_m: float = MET_M):
         self.value_m = self._open_m = opening_m / 2
-        self._met_m, self._met = met_m, False
+        self._met_m, self._met, self.presses = met_m, False, False
+        self._before_m: float | None = None
         self._press_m = settings.force_n / settings.finger_stiffness_n_m
         self._ramp_m = settings.close_speed_m_s * settings.frame_s
 
@@ -224,7 +261,10 @@ class SharedTarget:
         """Move on by one frame and return the target; ``mean_position_m`` is that of the two fingers."""
         self._met = self._met or mean_position_m <= self._met_m
         if self._met:
-            self.value_m = self._open_m
+            self.value_m, self.presses = self._open_m, False
             return self.value_m
-        self.value_m = max(self.value_m - self._ramp_m, mean_position_m - self._press_m)
+        goal_m = self.value_m - self._ramp_m
+        self.value_m = max(goal_m, mean_position_m - self._press_m)
+        stopped = self._before_m is not None and abs(mean_position_m - self._before_m) < STILL_SHARE * self._ramp_m
+        self._before_m, self.presses = mean_position_m, stopped and self.value_m > goal_m
         return self.value_m

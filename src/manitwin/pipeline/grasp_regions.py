@@ -7,7 +7,7 @@ nearest point, is this project's: a knob 11 cm from a handle would carry the han
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -16,7 +16,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from manitwin.engine.stage import Draft
-from manitwin.geometry.distance import closest_faces, closest_points_on_triangles
+from manitwin.geometry.distance import ClosestFaces, closest_points_on_triangles
 from manitwin.geometry.grasp_diversity import fingertips
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
@@ -55,6 +55,11 @@ class Contacts:
     touches: np.ndarray
     part: np.ndarray
     share: np.ndarray
+
+    @staticmethod
+    def joined(parts: Sequence[Contacts]) -> Contacts:
+        """Return the contacts of all parts, one after the other."""
+        return Contacts(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Contacts)))
 
 
 @dataclass(frozen=True)
@@ -117,7 +122,20 @@ class PartedSolid:
 
     def _parts_at(self, places_m: np.ndarray) -> np.ndarray:
         """Tell which parts a fingertip at each place may touch, ``(P, 256) bool``: its own, and what borders a narrow one."""
-        own = self.labels[closest_faces(places_m, self.solid)[0]]
+        keys = [place.tobytes() for place in places_m]
+        new = [row for row, key in enumerate(keys) if key not in self._known_parts_at]
+        if new:
+            allowed = self._found_parts_at(places_m[new])
+            self._known_parts_at.update((keys[row], found) for row, found in zip(new, allowed, strict=True))
+        return np.stack([self._known_parts_at[key] for key in keys])
+
+    @cached_property
+    def _known_parts_at(self) -> dict[bytes, np.ndarray]:
+        """What was found so far, by the place: a search asks for the same few places after every trial."""
+        return {}
+
+    def _found_parts_at(self, places_m: np.ndarray) -> np.ndarray:
+        own = self.labels[self._closest.of(places_m)[0]]
         allowed = np.zeros((len(places_m), NO_PART + 1), bool)
         labels, tree = self._samples
         for row, near in enumerate(tree.query_ball_point(places_m, PAD_M)):
@@ -127,6 +145,10 @@ class PartedSolid:
             allowed[row, own[row]] = True
         allowed[:, NO_PART] = False
         return allowed
+
+    @cached_property
+    def _closest(self) -> ClosestFaces:
+        return ClosestFaces(self.solid)
 
     @cached_property
     def _samples(self) -> tuple[np.ndarray, cKDTree]:
@@ -163,7 +185,7 @@ class PartedSolid:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         if not len(place_m):
             return place_m, np.zeros(0, bool), np.zeros(0, np.uint8), np.zeros(0)
-        face, _ = closest_faces(place_m, self.solid)
+        face, _ = self._closest.of(place_m)
         positions, _ = closest_points_on_triangles(place_m, np.asarray(self.solid.triangles)[face])
         return positions, np.ones(len(face), bool), self.labels[face], np.ones(len(face))
 

@@ -12,7 +12,7 @@ from manitwin.config import GraspConfig
 from manitwin.models.graspers.protocol import Grasper, GraspProposals, GraspRequest, Screen
 from manitwin.physics.grasp_selection import select_likely
 from manitwin.physics.trial import TrialResult
-from manitwin.pipeline.grasp_regions import PartedSolid
+from manitwin.pipeline.grasp_regions import Contacts, PartedSolid
 from manitwin.pipeline.proposals import Kept
 from manitwin.twin.point_records import GraspPoint
 
@@ -57,12 +57,13 @@ class PointSearch:
         self.request, self.grasper, self.screen, self.settings = request, grasper, screen, settings
         self.tried, self.attempt = tried, attempt
         self.results: list[TrialResult] = []
+        self._touched = self._contacts(tried.grasps)  # of all that was tried, row by row
         self.passed: dict[int, Counter[str]] = {}
         """How many proposals at a candidate passed each filter."""
 
     def outcomes_at(self, point: GraspPoint, others: list[GraspPoint]) -> Counter[str]:
         """Count the outcomes of what was tried at a point: fingertips touch its part there, no other point more nearly."""
-        mine = self._belongs(self.tried.grasps, point, others)
+        mine = self._serves(self._touched, point, others)
         return Counter(outcome for outcome, is_mine in zip(self.tried.outcome, mine, strict=True) if is_mine)
 
     def short(self, point: GraspPoint, others: list[GraspPoint]) -> bool:
@@ -83,8 +84,10 @@ class PointSearch:
             missing = self.settings.least_per_point - so_far["held"]
             count = min(budget, max(missing, HOPELESS_TRIES - so_far.total()) if so_far["held"] else HOPELESS_TRIES)
             chosen = among[select_likely(some.gripper_to_object, some.depth_m, left.merits.take(among), count)]
-            results = self.attempt(left.proposals.take(chosen))
-            self.tried.add(left.proposals.take(chosen), [result.outcome for result in results])
+            more = left.proposals.take(chosen)
+            results = self.attempt(more)
+            self.tried.add(more, [result.outcome for result in results])
+            self._touched = Contacts.joined([self._touched, self._contacts(more)])
             self.results += results
             free[chosen] = False
             budget -= len(chosen)
@@ -125,6 +128,11 @@ class PointSearch:
 
     def _belongs(self, grasps: GraspProposals, point: GraspPoint, others: list[GraspPoint]) -> np.ndarray:
         """Tell which grasps ``(N,)`` serve a point, by what their fingertips touch, and none of the other points more nearly."""
+        return self._serves(self._contacts(grasps), point, others)
+
+    def _serves(self, contacts: Contacts, point: GraspPoint, others: list[GraspPoint]) -> np.ndarray:
         places = np.array([p.position_m for p in (point, *(p for p in others if p.id != point.id))])
-        contacts = self.held.contacts(grasps.gripper_to_object, grasps.depth_m, grasps.width_m)
         return self.held.served(contacts, places) == 0
+
+    def _contacts(self, grasps: GraspProposals) -> Contacts:
+        return self.held.contacts(grasps.gripper_to_object, grasps.depth_m, grasps.width_m)

@@ -37,7 +37,7 @@ class PointTrialsStage:
     """
 
     name: ClassVar[str] = "point_trials"
-    version: ClassVar[str] = "3"
+    version: ClassVar[str] = "4"
     reads: ClassVar[tuple[str, ...]] = (
         *READS, "hulls.npz", "points", "spare_grasp_points", "physical", "placements",
         PROPOSALS.format(""), VERDICTS.format(""),

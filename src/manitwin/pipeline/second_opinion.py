@@ -31,7 +31,7 @@ class SecondOpinionStage:
     with both engines' verdicts.
     """
 
-    version = "3"
+    version = "4"
     needs: Resource = "cpu"
 
     def __init__(

@@ -29,7 +29,7 @@ class VerifyStage:
     gripper rejects the object; another gripper does not.
     """
 
-    version = "3"
+    version = "4"
     needs: Resource = "cpu"
 
     def __init__(self, settings: VerifyConfig, trial: GraspTrial, gripper: Gripper, suffix: str = ""):

@@ -88,6 +88,9 @@ def read_obj(source: MeshSource) -> list[trimesh.Trimesh]:
 def _lines(data: bytes, source: MeshSource) -> Iterator[str]:
     """Yield the lines of a text one by one, those that end with a backslash joined with the next."""
     stream = io.TextIOWrapper(io.BytesIO(data), encoding="utf-8", errors="replace")
+    if len(data) < _MAX_LINE and b"\\" not in data:  # no line can be too long, and none is joined with the next
+        yield from stream
+        return
     joined: list[str] = []
     length = 0
     for line in iter(partial(stream.readline, _MAX_LINE), ""):
@@ -109,8 +112,9 @@ def _parse(data: bytes, source: MeshSource) -> _Document:
     group: _Group | None = None
     material = ""
     corner_cache: dict[str, tuple[int, int, int]] = {}
+    known = corner_cache.get
     triangles = 0
-    most = source.limits.max_faces
+    most, most_vertices = source.limits.max_faces, source.limits.max_vertices
     for number, line in enumerate(_lines(data, source), start=1):
         words = line.split(None, 1)
         if not words:
@@ -121,8 +125,10 @@ def _parse(data: bytes, source: MeshSource) -> _Document:
                 raise source.unreadable(f"line {number} is too long for a {keyword!r}", "export it again")
             if keyword == "vt" and len(rest.split(None, 1)) < 2:
                 rest = f"{rest} 0"
-            tables[keyword].append(rest)
-            source.check_vertices(len(tables[keyword]))
+            table = tables[keyword]
+            table.append(rest)
+            if len(table) > most_vertices:
+                source.check_vertices(len(table))
         elif keyword == "f":
             if group is None:
                 group = document.groups.setdefault(material, _Group())
@@ -130,11 +136,12 @@ def _parse(data: bytes, source: MeshSource) -> _Document:
             # one word more than may be: the rest of the line
             said = rest.split(None, most + 3)
             try:
-                corners = [corner_cache.get(word) or _corner(word, document, corner_cache) for word in said[: most + 3]]
+                corners = [known(word) or _corner(word, document, corner_cache) for word in said[: most + 3]]
             except ValueError as error:
                 raise source.unreadable(f"line {number} is no face: {line[:60]!r}", "export it again") from error
             triangles += max(len(said) - 2, 1)
-            source.check_faces(triangles)
+            if triangles > most:
+                source.check_faces(triangles)
             if len(corners) < 3:
                 continue  # a point or a line written as a face
             group.sizes.append(len(corners))

@@ -42,7 +42,7 @@ class PostureGrasper:
         hand = of_kind(request.gripper, MultiFingerGripper)
         rng = np.random.default_rng(request.seed)
         points, normals = starting_points(request, max(1, request.max_proposals // ROLLS), rng)
-        caster = RayCaster(request.solid)
+        caster = request.surface
         pairs = antipodal_pairs(
             caster,
             points,

@@ -10,6 +10,7 @@ import trimesh
 
 from manitwin.config import Resource
 from manitwin.errors import Rejected
+from manitwin.geometry.ray_caster import RayCaster
 from manitwin.physics.grasp_selection import Merits
 from manitwin.robots.grippers.gripper import Gripper
 
@@ -22,7 +23,8 @@ class GraspRequest:
     metres. ``focus_points_m`` ``(P, 3)`` are the selected points: proposals should be denser around them.
     ``grasp_points_m (G, 3)`` are those of them that are for grasping, ``grasp_types`` how each wants to be grasped.
     ``supports`` are the placements ``object_to_plane (4, 4)`` that it will be picked from. Where ``within_m`` is given, only
-    grasps of the surface within it of a focus point are of use.
+    grasps of the surface within it of a focus point are of use. ``surface`` is the solid prepared for rays, which requests about
+    one object share.
     """
 
     solid: trimesh.Trimesh
@@ -38,6 +40,11 @@ class GraspRequest:
     grasp_types: tuple[str, ...] = ()
     supports: tuple[np.ndarray, ...] = ()
     within_m: float | None = None
+    surface: RayCaster = field(default=None)  # type: ignore[assignment]  # that of the solid
+
+    def __post_init__(self) -> None:
+        if self.surface is None:
+            object.__setattr__(self, "surface", RayCaster(self.solid))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ import numpy as np
 
 from manitwin.errors import Rejected
 from manitwin.geometry.antipodal import antipodal_pairs
-from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screened
 from manitwin.physics.grasp_filters import PEAK_SLIDE_ACCELERATION_M_S2, GraspFilter, pad_merits, torque_ratio
@@ -58,7 +57,7 @@ class PadScreen:
         request, opening_m = self._request, self._gripper.opening_m
         rng = np.random.default_rng(request.seed)
         points, normals, _ = sample_surface(request.solid, WIDTH_SAMPLES, rng)
-        caster, anything = RayCaster(request.solid), float(np.linalg.norm(request.solid.extents))
+        caster, anything = request.surface, float(np.linalg.norm(request.solid.extents))
         pairs = antipodal_pairs(caster, points, normals, friction=self._friction, max_width_m=anything, rng=rng)
         if not len(pairs):
             return Rejected("no_proposal", "no two opposite surface points can be pressed together")
@@ -81,7 +80,7 @@ class SealScreen:
     def __init__(self, request: GraspRequest):
         self._request, self._gripper = request, of_kind(request.gripper, SuctionGripper)
         self._friction = (self._gripper.finger_friction + request.object_friction) / 2
-        self._surface, self._collision = RayCaster(request.solid), HandCollision(request.hulls)
+        self._surface, self._collision = request.surface, HandCollision(request.hulls)
 
     def __call__(self, raw: GraspProposals) -> Screened:
         """Keep the proposals that seal; they cost what they need of the lip's limits."""

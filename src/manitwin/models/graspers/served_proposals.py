@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from manitwin.errors import BadReply
-from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.grasp_server import GraspServer, ServerError, said
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
@@ -94,6 +93,6 @@ def ask_for_proposals(
         raise BadReply(f"{server.what}: the answer holds {said(error)}") from error
     best = np.argsort(-score, kind="stable")[: request.max_proposals]
     poses, score = poses[best], score[best].clip(0, 1)
-    contacts = pad_contacts(gripper, poses, RayCaster(request.solid), request.center_of_mass_m)
+    contacts = pad_contacts(gripper, poses, request.surface, request.center_of_mass_m)
     width_m = contacts.width_m.clip(0, gripper.opening_m)
     return GraspProposals(poses, width_m, np.full(len(poses), gripper.tip_depth_m), score)

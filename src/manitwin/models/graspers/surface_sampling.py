@@ -7,7 +7,6 @@ from scipy.spatial import cKDTree
 
 from manitwin.config import Resource
 from manitwin.geometry.antipodal import AntipodalPairs, antipodal_pairs, grasp_frames, tangents
-from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest
 from manitwin.physics.suction import seal
@@ -77,7 +76,7 @@ class AntipodalGrasper:
         friction = (gripper.finger_friction + request.object_friction) / 2 / CONE_SAFETY
         points, normals = starting_points(request, max(1, request.max_proposals // ROLLS), rng)
         pairs = antipodal_pairs(
-            RayCaster(request.solid),
+            request.surface,
             points,
             normals,
             friction=friction,
@@ -121,7 +120,7 @@ class SuctionGrasper:
         rolls = rng.uniform(0, 2 * np.pi, (len(points), CUP_ROLLS))
         first = _frames(cup, points, -normals, rolls[:, 0])
         # one normal of a scanned surface is noise: where the lip seals, its plane tells the direction
-        inward = seal(cup, first, RayCaster(request.solid)).inward
+        inward = seal(cup, first, request.surface).inward
         poses = np.concatenate([_frames(cup, points, inward, rolls[:, number]) for number in range(CUP_ROLLS)])
         count = len(poses)
         lever_m = np.linalg.norm(np.cross(request.center_of_mass_m - points, inward), axis=1)

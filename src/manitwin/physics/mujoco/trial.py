@@ -129,6 +129,10 @@ class _Scene:
         """
         self.target.move_on(float(self.data.qpos[self.joints].mean()))
 
+    def presses(self) -> bool:
+        """Tell whether the fingers' target is as far ahead of them as the closing force wants."""
+        return self.target.presses
+
     def contacts(self) -> HandContacts:
         """Return how hard the +X and the -X finger press inwards, and the deepest overlap with the hand."""
         forces, deepest, wrench = [0.0, 0.0], 0.0, np.zeros(6)

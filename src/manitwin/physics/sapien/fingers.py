@@ -181,6 +181,10 @@ class FingeredHand:
         """Move on the targets of all fingers that do not press yet."""
         self._drive_to(self._closing.move_on(np.asarray(self.articulation.get_qpos())))
 
+    def presses(self) -> bool:
+        """Tell whether every finger presses or has come to its end."""
+        return self._closing.all_press
+
     def pressing_n(self, pushes: list[tuple[int, np.ndarray]]) -> tuple[float, ...]:
         """Return how hard thumb and palm together, and the other fingers together, push the object (N)."""
         forces = [0.0, 0.0]

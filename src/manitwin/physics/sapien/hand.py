@@ -95,6 +95,10 @@ class FixedHand:
         mean_m = (plus.entity_pose.p[0] - minus.entity_pose.p[0]) / 2
         self.close_to(self._target.move_on(float(mean_m)))
 
+    def presses(self) -> bool:
+        """Tell whether the fingers' target is as far ahead of them as the closing force wants."""
+        return self._target.presses
+
     def pressing_n(self, pushes: list[tuple[int, np.ndarray]]) -> tuple[float, ...]:
         """Return how hard the +X and the -X finger press inwards on the object (N)."""
         forces = [0.0, 0.0]

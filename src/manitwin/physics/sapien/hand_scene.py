@@ -39,6 +39,10 @@ class SapienHand(Protocol):
         """Close by one frame, until it presses as hard as it should."""
         ...
 
+    def presses(self) -> bool:
+        """Tell whether it presses as hard as it should."""
+        ...
+
     def pressing_n(self, pushes: list[tuple[int, np.ndarray]]) -> tuple[float, ...]:
         """Return how hard each side presses, given which body (by ``per_scene_id``) pushes the object how (N, hand's frame)."""
         ...
@@ -86,6 +90,10 @@ class HandScene:
     def squeeze(self) -> None:
         """Close the hand by one frame."""
         self.hand.squeeze()
+
+    def presses(self) -> bool:
+        """Tell whether the hand presses with the closing force by now."""
+        return self.hand.presses()
 
     def contacts(self) -> HandContacts:
         """Return how hard each side of the hand presses, and the deepest overlap with the hand."""
