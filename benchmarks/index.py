@@ -1,11 +1,13 @@
 """Time filters on the index of a synthetic data set of 100,000 twins and 6.2 million grasps.
 
     python benchmarks/index.py [--twins N] [--grasps-per-twin N] [--keep FOLDER]
+    python benchmarks/index.py --rows DATASET
 
 The tables are written in parts as ``manitwin index`` leaves them; numbers and poses are random, words are drawn from lists,
 so that nothing compresses better than in a real set. Every filter is timed with a fresh connection (the list of parts, the
 views and the lock included; the files are in the machine's cache) and again on the same one. Columns are wall and CPU
-seconds, best of five; CPU counts all threads.
+seconds, best of five; CPU counts all threads. ``--rows`` times the rows of the finished twins of a real data set instead, as
+their folders are and as if nothing but the mesh said its shape.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute
 
+from manitwin.dataset.index import rows
 from manitwin.dataset.index.dataset import Dataset
 from manitwin.dataset.index.near_duplicates import near_duplicates
 from manitwin.dataset.index.part_list import PartList
@@ -84,7 +87,7 @@ def descriptors(count: int, rng: np.random.Generator) -> pa.Array:
     return pa.FixedSizeListArray.from_arrays(pa.array(values.ravel()), DESCRIPTOR_LENGTH)
 
 
-def rows(ids: np.ndarray, per_twin: int, rng: np.random.Generator) -> dict[str, pa.Table]:
+def made_rows(ids: np.ndarray, per_twin: int, rng: np.random.Generator) -> dict[str, pa.Table]:
     """Return the tables of twins with so many grasps each."""
     count = len(ids)
     category = words(rng, CATEGORIES, count)
@@ -134,9 +137,25 @@ def write_index(root: DatasetRoot, twins: int, per_twin: int) -> None:
     ids = np.sort(np.array([f"{n:016x}" for n in rng.choice(2**62, twins, replace=False)]))
     parts = []
     for number, chunk in enumerate(np.array_split(ids, max(1, ceil(twins * per_twin / PART_ROWS)))):
-        tables = {name: joined(name, [table]) for name, table in rows(chunk, per_twin, rng).items()}
+        tables = {name: joined(name, [table]) for name, table in made_rows(chunk, per_twin, rng).items()}
         parts.append(write_rows(root, number, tables))
     PartList(tuple(parts), len(parts)).write(root)
+
+
+def time_rows(data: Path) -> None:
+    """Print what the rows of finished twins cost, in turns with the shape that their folders say and a measured one."""
+    folders = sorted(path.parent for path in data.glob("twins/*/*/grasps.parquet"))
+    spent = {"as it is": 0.0, "shape measured": 0.0}
+    said = rows.read_shape
+    rows.rows_of(folders[0])
+    for folder in folders:
+        for name, read in (("as it is", said), ("shape measured", lambda folder: None)):
+            rows.read_shape = read
+            start = time.process_time()
+            rows.rows_of(folder)
+            spent[name] += time.process_time() - start
+    for name, seconds in spent.items():
+        print(f"rows of a twin, {name}: {1e3 * seconds / len(folders):.1f} CPU-ms (mean of {len(folders)})")
 
 
 def questions(twin_id: str) -> Iterator[tuple[str, Callable[[Index], int]]]:
@@ -195,7 +214,11 @@ def main() -> None:
     parser.add_argument("--twins", type=int, default=100_000)
     parser.add_argument("--grasps-per-twin", type=int, default=62)
     parser.add_argument("--keep", type=Path, default=None, help="Write the index here, or use the one that is here.")
+    parser.add_argument("--rows", type=Path)
     arguments = parser.parse_args()
+    if arguments.rows is not None:
+        time_rows(arguments.rows)
+        return
     with tempfile.TemporaryDirectory() as scratch:
         root = DatasetRoot(arguments.keep or scratch)
         if not root.exists("index/parts.json"):

@@ -62,6 +62,15 @@ RETIRED_SECTIONS = ("caption", "points", "finish")
 Elevation = Annotated[float, Field(ge=-80, le=80)]
 
 
+class SourceConfig(Section):
+    """What a twin's folder keeps of its input: a ``copy`` byte for byte, or a ``reference``, names, sizes and digests.
+
+    Of a scan the input is most of the folder.
+    """
+
+    keep: Literal["copy", "reference"] = "copy"
+
+
 class ViewsConfig(Section):
     """The eight pictures of the object (paper, "Physical Property Estimation"); no size: the one the annotator reads best.
 
@@ -335,6 +344,7 @@ class BuildConfig(Section):
     simulator: str = "sapien"
     second_simulator: str = "mujoco"
     grippers: tuple[str, ...] = Field(default=("panda",), min_length=1)
+    source: SourceConfig = SourceConfig()
     matting: MattingConfig = MattingConfig()
     naming: NamingConfig = NamingConfig()
     generate: GenerateConfig = GenerateConfig()

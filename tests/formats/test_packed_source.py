@@ -63,6 +63,31 @@ def test_a_sparse_file_of_gigabytes_is_told_and_not_copied(tmp_path: Path) -> No
     assert name == "source.txt" and b"4294967297 bytes, not kept" in content and b"\x1b" not in content
 
 
+def test_a_reference_says_names_sizes_and_digests_and_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "in" / "a.obj").write_text("mtllib m.mtl\n")
+    (tmp_path / "in" / "m.mtl").write_text("newmtl a\n")
+    name, sha256 = packed_source.pack_source(tmp_path / "in" / "a.obj", tmp_path / "kept", keep=False)
+    content = (tmp_path / "kept" / name).read_bytes()
+    assert [path.name for path in (tmp_path / "kept").iterdir()] == [name] == ["source.txt"]
+    assert sha256 == hashlib.sha256(content).hexdigest()
+    digests = [hashlib.sha256(text).hexdigest() for text in (b"mtllib m.mtl\n", b"newmtl a\n")]
+    assert content.decode().splitlines() == [
+        f"a.obj: 13 bytes, sha256 {digests[0]}, not kept",
+        f"m.mtl: 9 bytes, sha256 {digests[1]}, not kept",
+    ]
+
+
+def test_photos_by_reference_keep_their_order(tmp_path: Path) -> None:
+    for called in ("z.png", "a.png"):
+        (tmp_path / called).write_bytes(called.encode())
+    name, _ = packed_source.pack_photos([tmp_path / "z.png", tmp_path / "a.png"], tmp_path, keep=False)
+    first, second = (tmp_path / name).read_text().splitlines()
+    assert first.startswith("photo_00.png: 5 bytes, sha256 ") and hashlib.sha256(b"z.png").hexdigest() in first
+    assert second.startswith("photo_01.png") and hashlib.sha256(b"a.png").hexdigest() in second
+
+
 def test_an_input_that_is_gone_or_became_a_pipe_is_unreadable(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"^unreadable: a\.obj: cannot be opened"):
         packed(tmp_path / "a.obj", tmp_path / "kept")

@@ -17,38 +17,48 @@ from manitwin.formats.source_files import side_files
 
 MAX_KEPT_BYTES = 4 << 30
 """An input of more bytes is told and not kept: readers refuse it, and a sparse file would fill the disk."""
+REFERENCE = "source.txt"
+"""What stands for an input that is not kept."""
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest date of a ZIP entry: equal inputs give equal archives
 _BLOCK_BYTES = 1 << 20
 
 
-def pack_source(path: Path, folder: Path, beside: Iterable[Path] = ()) -> tuple[str, str]:
+def pack_source(path: Path, folder: Path, beside: Iterable[Path] = (), *, keep: bool = True) -> tuple[str, str]:
     """Write into a folder what a twin keeps of its input; return the name there and its sha256.
 
     A single file is kept byte for byte; a mesh with side files, or with others ``beside`` it in its folder, as an archive of
-    all of them, uncompressed, undated. Of more than ``MAX_KEPT_BYTES`` a text says the names and sizes. Raises InputError
-    ``unreadable`` for a file that is gone or no regular one.
+    all of them, uncompressed, undated. Of more than ``MAX_KEPT_BYTES`` a text says the names and sizes; so it does without
+    ``keep``, with the digest of each file. Raises InputError ``unreadable`` for a file that is gone or no regular one.
     """
     others = sorted({*side_files(path), *(other.resolve() for other in beside)})
     root = path.parent.resolve()
     files = {_name_in(root, file, path.name): file for file in (path.resolve(), *others)}
-    return _packed(files, folder, path if not others else None)
+    return _packed(files, folder, path if not others else None, keep)
 
 
-def pack_photos(paths: Sequence[Path], folder: Path) -> tuple[str, str]:
+def pack_photos(paths: Sequence[Path], folder: Path, *, keep: bool = True) -> tuple[str, str]:
     """Write photos of one thing into a folder as ``source.zip``, numbered in their order; return its name and sha256.
 
-    Of more than ``MAX_KEPT_BYTES`` a text says the names and sizes. Raises InputError ``unreadable`` for a file that is gone.
+    Of more than ``MAX_KEPT_BYTES``, or without ``keep``, a text stands for them as for other inputs. Raises InputError
+    ``unreadable`` for a file that is gone.
     """
     files = {f"photo_{number:02d}{path.suffix.lower()}": path for number, path in enumerate(paths)}
-    return _packed(files, folder, None)
+    return _packed(files, folder, None, keep)
 
 
-def _packed(files: Mapping[str, Path], folder: Path, single: Path | None) -> tuple[str, str]:
+def _packed(files: Mapping[str, Path], folder: Path, single: Path | None, keep: bool) -> tuple[str, str]:
     """Keep files by their names in an archive, or one byte for byte."""
     sizes = {called: _size(file) for called, file in files.items()}
     if sum(sizes.values()) > MAX_KEPT_BYTES:
-        name = "source.txt"
+        name = REFERENCE
         lines = [f"{printable_line(called)}: {size} bytes, not kept\n" for called, size in sizes.items()]
+        (folder / name).write_text("".join(lines), encoding="utf-8")
+    elif not keep:
+        name = REFERENCE
+        lines = [
+            f"{printable_line(called)}: {sizes[called]} bytes, sha256 {_sha256(file)}, not kept\n"
+            for called, file in files.items()
+        ]
         (folder / name).write_text("".join(lines), encoding="utf-8")
     elif single is not None:
         name = f"source{single.suffix.lower()}"
@@ -72,6 +82,14 @@ def _add(archive: zipfile.ZipFile, file: Path, name: str) -> None:
 
 
 _opened = partial(open_regular, refuse=partial(InputError, "unreadable"))
+
+
+def _sha256(file: Path) -> str:
+    digest = hashlib.sha256()
+    with _opened(file) as stream:
+        while block := stream.read(_BLOCK_BYTES):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 def _size(file: Path) -> int:

@@ -7,7 +7,7 @@ held against the limit by their own headers, and texts by their lengths before t
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -90,6 +90,7 @@ def open_parquet(
     *,
     schema: pa.Schema | None = None,
     columns: Sequence[str] | None = None,
+    optional: Collection[str] = (),
     remedy: str,
     max_rows: int = MAX_ROWS,
     max_bytes: int = MAX_BYTES,
@@ -98,8 +99,9 @@ def open_parquet(
 ) -> Iterator[ParquetTable]:
     """Open a regular Parquet file, or a stream of one; what of it is read later is bounded.
 
-    With ``schema`` it has all these columns, of these types; more are let be. Only ``columns`` (None: those of the schema, or
-    all) are looked at, and may be read. Raises what ``refuse`` makes of one line, which ends in the remedy.
+    With ``schema`` it has all these columns but for ``optional`` ones, of these types; more are let be. Only ``columns`` (None:
+    those of the schema, or all) are looked at, and may be read. Raises what ``refuse`` makes of one line, which ends in the
+    remedy.
     """
     called = name or str(path)
     stream = (
@@ -110,6 +112,9 @@ def open_parquet(
         with unreadable.failures():
             footer = footer_of(stream)
             wanted = columns if columns is not None else None if schema is None else schema.names
+            if wanted is not None and optional:
+                there = {leaf.column for leaf in footer.leaves}
+                wanted = [name for name in wanted if name in there or name not in optional]
             _check_footer(footer, wanted, unreadable, max_rows)
             _check_pages(stream, footer, wanted, unreadable, max_bytes)
             stream.seek(0)

@@ -198,7 +198,8 @@ class _Compact:
         number = 0
         while (kind := self._byte()) != _STOP:
             number = number + (kind >> 4) if kind >> 4 else self._zigzag()
-            fields[number] = self._value(kind & 15, depth, in_list=False)
+            kind &= 15
+            fields[number] = self._zigzag() if kind in _INTEGERS else self._value(kind, depth, in_list=False)
         return fields
 
     def _byte(self) -> int:
@@ -208,6 +209,9 @@ class _Compact:
         return self.content[self.place - 1]
 
     def _varint(self) -> int:
+        if self.place < len(self.content) and (byte := self.content[self.place]) < 128:  # most are that short
+            self.place += 1
+            return byte
         value = shift = 0
         while True:
             byte = self._byte()

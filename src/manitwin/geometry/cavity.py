@@ -10,6 +10,7 @@ import trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from manitwin.geometry.hulls.reduction import hull_volume
+from manitwin.geometry.kept import kept
 from manitwin.geometry.poses import rotation_between
 
 # Measured on 25 real meshes: the shallowest vessel (a plate) has depth 4.4 % of the longest side and the smallest (a
@@ -56,7 +57,12 @@ def find_opening(mesh: trimesh.Trimesh, cells: int = 64) -> Opening | None:
     outside: at least 4 % of the longest side deep and 5 % of the convex hull's volume large, 10 % where it does not
     open upward. Walls thinner than a cell of the grid hold by their edges; a drain in the floor (2 % of the outline's rectangle
     at most) counts as closed. Source: depressions filled as by priority flood (Barnes, Lehman and Mulla 2014).
+    Many ask about one mesh; it is looked at once.
     """
+    return kept(mesh, f"opening {cells}", lambda: _found_opening(mesh, cells))
+
+
+def _found_opening(mesh: trimesh.Trimesh, cells: int) -> Opening | None:
     if hull_volume(np.asarray(mesh.vertices)) == 0:
         return None
     hull = mesh.convex_hull

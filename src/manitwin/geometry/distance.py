@@ -6,6 +6,8 @@ import numpy as np
 import trimesh
 from scipy.spatial import cKDTree
 
+from manitwin.geometry.kept import kept
+
 _LEAF_TRIANGLES = 4
 _PAIRS_PER_CHUNK = 400_000  # (point, node) pairs tested at once: bounds the memory
 _FEATURE_TOLERANCE = 1e-9  # barycentric slack below which a closest point counts as on an edge or a vertex
@@ -102,7 +104,7 @@ class ClosestFaces:
     """A mesh prepared for ``closest_faces``, where it is asked more than once."""
 
     def __init__(self, mesh: trimesh.Trimesh):
-        self._tree = _BoxTree(np.asarray(mesh.triangles, dtype=float))
+        self._tree = kept(mesh, "box tree", lambda: _BoxTree(np.asarray(mesh.triangles, dtype=float)))
 
     def of(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the face index ``(N,)`` closest to each point ``(N, 3)`` and its exact distance ``(N,)`` m."""

@@ -10,6 +10,9 @@ import trimesh
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
+from manitwin.geometry.hulls.reduction import hull_mesh
+from manitwin.geometry.kept import kept
+
 MILLIMETRES = 1000.0  # Embree works in float32 with absolute tolerances: objects of a hand's size want larger units
 
 _START_BELOW_SURFACE_M = 1e-5  # the ray must not meet the face that it starts on
@@ -24,7 +27,7 @@ class RayCaster:
     @classmethod
     def of_hulls(cls, hulls: Sequence[np.ndarray]) -> RayCaster:
         """Return that of the faces of convex hulls, each ``(V, 3)`` m; those inside other hulls are among them."""
-        surfaces = [trimesh.convex.convex_hull(vertices) for vertices in hulls]
+        surfaces = [hull_mesh(vertices) for vertices in hulls]
         vertices, faces = trimesh.util.append_faces([s.vertices for s in surfaces], [s.faces for s in surfaces])
         return cls(trimesh.Trimesh(vertices, faces, process=False))
 
@@ -39,8 +42,7 @@ class RayCaster:
 
     @cached_property
     def _prepared(self) -> tuple[EmbreeScene, TriangleMesh]:
-        scene = EmbreeScene()  # knows of its mesh, but does not keep it
-        return scene, TriangleMesh(scene, (self._mesh.triangles * MILLIMETRES).astype(np.float32))
+        return kept(self._mesh, "rays", lambda: _rays(self._mesh))
 
     def first_hits(self, origins_m: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the distance (m; inf: nothing) and the face (-1: nothing) of each ray's first hit.
@@ -56,6 +58,11 @@ class RayCaster:
         )
         face = hits["primID"].astype(np.int64)
         return np.where(face >= 0, hits["tfar"].astype(float) / MILLIMETRES, np.inf), face
+
+
+def _rays(mesh: trimesh.Trimesh) -> tuple[EmbreeScene, TriangleMesh]:
+    scene = EmbreeScene()  # knows of its mesh, but does not keep it
+    return scene, TriangleMesh(scene, (mesh.triangles * MILLIMETRES).astype(np.float32))
 
 
 def local_thickness(mesh: trimesh.Trimesh, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:

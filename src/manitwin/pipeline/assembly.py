@@ -34,6 +34,7 @@ from manitwin.pipeline.quality import (
 from manitwin.pipeline.suspicious_size import suspicious_size_words
 from manitwin.twin.part_records import FACE_PARTS
 from manitwin.twin.record import REJECTION_REASONS, Rejection, TwinRecord
+from manitwin.twin.shape_file import SHAPE, shape_of, shape_to_json
 from manitwin.twin.store import RUN, canonical_json, seal, write_bytes_atomically
 from manitwin.twin.wholeness import note_sizes
 
@@ -57,13 +58,14 @@ def assemble(
     rejected: Rejected | None,
     rejecting_stage: str | None,
     fresh: Path,
+    keep_source: bool = True,
 ) -> TwinRecord:
     """Write the twin's folder into the empty folder ``fresh``, to be renamed into place; returns its record.
 
     ``stages`` are those that ran, the rejecting one included. Where ``rejected`` is given, only the source and the reason
-    are kept.
+    are kept. Without ``keep_source`` names, sizes and digests stand for the input, and ``run.json`` says where it lay.
     """
-    source = _write_source(draft, kind, fresh)
+    source = _write_source(draft, kind, fresh, keep_source)
     record: dict[str, Any] = {
         "twin_id": draft.item_id,
         "name": object_name(draft),
@@ -83,10 +85,12 @@ def assemble(
     if rejected is None:
         _write_accepted(draft, fresh)
         record |= _accepted_sections(draft)
-    run = {
-        "stages": {name: vars(cost) for name, cost in costs.items()},
-        "host": {"machine": platform.machine(), "system": platform.system(), "python": platform.python_version()},
-    }
+    host: dict[str, Any] = {
+        "machine": platform.machine(), "system": platform.system(), "python": platform.python_version()
+    }  # fmt: skip
+    if not keep_source and draft.payload.file is not None:
+        host["source"] = [str(Path(file).resolve()) for file in draft.payload.files]
+    run = {"stages": {name: vars(cost) for name, cost in costs.items()}, "host": host}
     write_bytes_atomically(fresh / RUN, canonical_json(run).encode())
     sealed = seal(fresh, record)
     note_sizes(fresh)
@@ -115,16 +119,17 @@ def _model(stage: Stage, draft: Draft[Item]) -> str | None:
     return stage.model
 
 
-def _write_source(draft: Draft[Item], kind: str, folder: Path) -> dict[str, Any]:
+def _write_source(draft: Draft[Item], kind: str, folder: Path, keep: bool) -> dict[str, Any]:
     item = draft.payload
     if item.file is None:
         name, content = "prompt.txt", (item.text or "").encode()
         (folder / name).write_bytes(content)
         sha256 = hashlib.sha256(content).hexdigest()
     elif item.views:
-        name, sha256 = pack_photos([Path(file) for file in item.files], folder)
+        name, sha256 = pack_photos([Path(file) for file in item.files], folder, keep=keep)
     else:
-        name, sha256 = pack_source(Path(item.file), folder, [] if item.given is None else [Path(item.given)])
+        beside = [] if item.given is None else [Path(item.given)]
+        name, sha256 = pack_source(Path(item.file), folder, beside, keep=keep)
     return {
         "kind": kind,
         "file": name,
@@ -155,6 +160,7 @@ def _rejection(rejected: Rejected, stage: str | None, draft: Draft[Item]) -> Rej
 def _write_accepted(draft: Draft[Item], folder: Path) -> None:
     for name in ("visual.glb", "grasps.parquet", "card.png"):
         shutil.copyfile(draft.path(name), folder / name)
+    (folder / SHAPE).write_bytes(shape_to_json(shape_of(folder / "visual.glb")))
     if draft.field("parts"):
         with np.load(draft.path(PARTS_FILE)) as arrays:
             (folder / FACE_PARTS).write_bytes(labels_to_npy(arrays["visual"]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -22,11 +24,20 @@ from manitwin.render.cameras import Camera
 from manitwin.twin.grasp_table import JOINTS
 from manitwin.twin.import_record import ImportRecord, read_import_record
 
+_solid: tuple[bytes, int, trimesh.Trimesh] | None = None
+"""The last solid that was loaded, with the digest of its file and its own: one stage after the other wants it."""
+
 
 def load_solid(path: Path) -> trimesh.Trimesh:
-    """Load the watertight mesh of ``solid.npz``."""
-    with np.load(path) as arrays:
-        return trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+    """Load the watertight mesh of ``solid.npz``; what was made of it for another stage (rays, its opening) comes with it."""
+    global _solid
+    content = path.read_bytes()
+    digest = hashlib.blake2b(content, digest_size=16).digest()
+    if _solid is None or _solid[0] != digest or _solid[1] != hash(_solid[2]):  # the last: somebody has changed it
+        with np.load(io.BytesIO(content)) as arrays:
+            mesh = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
+        _solid = digest, hash(mesh), mesh
+    return _solid[2]
 
 
 def load_hulls(path: Path) -> tuple[np.ndarray, ...]:

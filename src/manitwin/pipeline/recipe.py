@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import cast
 
-from manitwin.config import BuildConfig
+from manitwin.config import BuildConfig, SourceConfig
 from manitwin.engine.folder_recipe import FolderRecipe
 from manitwin.engine.recipe import Ending, Identity, Tables
 from manitwin.engine.stage import INPUT, Draft, PaidStage, Stage
@@ -169,6 +169,8 @@ def config_sha256(config: BuildConfig) -> str:
         del decides["matting"]["network"]
     else:
         decides["matting"]["network"] = network.sha256
+    if config.source == SourceConfig():  # as before there was a choice
+        del decides["source"]
     del decides["vlm"]["prompts"]  # their content counts, as part of what each stage is asked with
     return sha256_of_json(decides)
 
@@ -277,6 +279,7 @@ class TwinRecipe(FolderRecipe[TwinRecord]):
             rejected=rejected,
             rejecting_stage=stage,
             fresh=fresh,
+            keep_source=self.config.source.keep == "copy",
         )
 
 

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from manitwin.errors import TwinError
-from manitwin.formats.parquet_file import open_parquet, read_parquet
+from manitwin.formats.parquet_file import open_parquet
 from manitwin.geometry.poses import quaternion_wxyz
 from manitwin.twin.store import REMEDY
 
@@ -102,12 +102,12 @@ def read_grasp_table(path: Path) -> pa.Table:
     """
     if not os.path.lexists(path):
         raise TwinError(f"{path}: missing; {REMEDY}")
-    with open_parquet(path, TwinError, schema=SCHEMA, columns=_OF_VERSION_1, remedy=REMEDY, inside=path.parent) as file:
-        if PART not in file.names:
-            table = file.read(_OF_VERSION_1)
-            place, field = SCHEMA.get_field_index(PART), SCHEMA.field(PART)
-            return table.add_column(place, field, pa.nulls(len(table), field.type))
-    return read_parquet(path, TwinError, schema=SCHEMA, remedy=REMEDY, inside=path.parent)
+    with open_parquet(path, TwinError, schema=SCHEMA, optional=(PART,), remedy=REMEDY, inside=path.parent) as file:
+        if PART in file.names:
+            return file.read(SCHEMA.names)
+        table = file.read(_OF_VERSION_1)
+    place, field = SCHEMA.get_field_index(PART), SCHEMA.field(PART)
+    return table.add_column(place, field, pa.nulls(len(table), field.type))
 
 
 def write_grasp_table(path: Path, parts: list[dict[str, list[Any]]]) -> None:

@@ -11,11 +11,12 @@ import pyarrow as pa
 
 from manitwin.dataset.index.conditions import sql_texts
 from manitwin.dataset.index.query import Index, grasps_of
-from manitwin.dataset.index.rows import VISUAL, surface
+from manitwin.dataset.index.rows import VISUAL
 from manitwin.dataset.index.twins import local_files
 from manitwin.errors import UsageError, choose_from
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz
 from manitwin.geometry.sampling import sample_surface
+from manitwin.twin.shape_file import surface
 
 _COLUMNS = ("twin_id", "gripper", "position_m", "quaternion_wxyz", "verified")
 _USUAL = "NOT retired AND NOT suffix(proposer, ':unfiltered') AND NOT suffix(proposer, ':jittered')"

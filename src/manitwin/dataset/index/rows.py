@@ -9,26 +9,24 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import trimesh
 
 from manitwin.dataset.index.tables import TABLES
 from manitwin.engine.stage_runner import StageCost
 from manitwin.errors import AssetError, TwinError
 from manitwin.formats.json_file import json_number, read_json_object
-from manitwin.geometry.shape_descriptor import ShapeDescriptor, shape_descriptor
+from manitwin.geometry.shape_descriptor import ShapeDescriptor
 from manitwin.pipeline.stage_order import place_in_pipeline
 from manitwin.twin.grasp_summary import GraspSummary
 from manitwin.twin.grasp_table import read_grasp_table
-from manitwin.twin.loaded_twin import read_visual
 from manitwin.twin.point_records import Points
 from manitwin.twin.record import TwinRecord
+from manitwin.twin.shape_file import SHAPE, read_shape, shape_of
 from manitwin.twin.store import RECORD, REMEDY, RUN, read_record
 
 VISUAL, GRASPS = "visual.glb", "grasps.parquet"
-FILES = (RECORD, RUN, VISUAL, GRASPS)
-"""All that is read of a twin's folder; a rejected one has the first two alone."""
+FILES = (RECORD, RUN, SHAPE, VISUAL, GRASPS)
+"""All that is read of a twin's folder; a rejected one has the first two alone. The mesh is read where nothing says its shape."""
 
-_SEED = 0  # every data set describes shapes alike
 _Row = dict[str, Any]
 
 
@@ -44,7 +42,7 @@ def rows_of(folder: Path) -> dict[str, pa.Table]:
     if record.rejection is not None:
         rows["rejections"] = [{**_origin(record, costs), **record.rejection.model_dump()}]
         return _as_tables(rows)
-    rows["twins"] = [_twin(record, costs, _descriptor(folder / VISUAL))]
+    rows["twins"] = [_twin(record, costs, read_shape(folder) or shape_of(folder / VISUAL))]
     rows["points"] = [] if record.points is None else _points(record.twin_id, record.points)
     rows["placements"] = _placements(record)
     tables = _as_tables(rows)
@@ -153,23 +151,6 @@ def _grasp_summary(grasps: GraspSummary) -> _Row:
         "held_in_second_engine_share": second.holds_share if second else None,
         "kappa": second.kappa if second else None,
     }
-
-
-def _descriptor(path: Path) -> ShapeDescriptor:
-    try:
-        return shape_descriptor(surface(path), seed=_SEED)
-    except ValueError as error:
-        raise TwinError(f"{path}: {error}; {REMEDY}") from error
-
-
-def surface(path: Path) -> trimesh.Trimesh:
-    """Return all parts of a twin's ``visual.glb`` as one mesh without texture, in the object frame; raises TwinError."""
-    parts = read_visual(path)
-    if not parts:
-        raise TwinError(f"{path}: has no mesh in it; {REMEDY}")
-    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
-    faces = [np.asarray(part.faces) + start for part, start in zip(parts, starts, strict=False)]
-    return trimesh.Trimesh(np.vstack([part.vertices for part in parts]), np.vstack(faces), process=False)
 
 
 def _points(twin_id: str, points: Points) -> list[_Row]:

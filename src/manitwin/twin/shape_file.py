@@ -1,0 +1,61 @@
+"""The shape descriptor that lies in a twin's folder, so that who compares many twins reads none of their meshes."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from manitwin.errors import AssetError, TwinError
+from manitwin.formats.json_file import json_number, json_vector, read_json_object
+from manitwin.geometry.shape_descriptor import QUANTILES, ShapeDescriptor, shape_descriptor
+from manitwin.twin.loaded_twin import read_visual
+from manitwin.twin.store import REMEDY, canonical_json
+
+SHAPE = "shape.json"
+MAX_SHAPE_BYTES = 16_384
+_LENGTH = 2 * QUANTILES + 2
+_SEED = 0  # every data set describes shapes alike
+
+
+def surface(path: Path) -> trimesh.Trimesh:
+    """Return all parts of a twin's ``visual.glb`` as one mesh without texture, in the object frame; raises TwinError."""
+    parts = read_visual(path)
+    if not parts:
+        raise TwinError(f"{path}: has no mesh in it; {REMEDY}")
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = [np.asarray(part.faces) + start for part, start in zip(parts, starts, strict=False)]
+    return trimesh.Trimesh(np.vstack([part.vertices for part in parts]), np.vstack(faces), process=False)
+
+
+def shape_of(visual: Path) -> ShapeDescriptor:
+    """Describe the shape of a twin's ``visual.glb``; raises TwinError."""
+    try:
+        return shape_descriptor(surface(visual), seed=_SEED)
+    except ValueError as error:
+        raise TwinError(f"{visual}: {error}; {REMEDY}") from error
+
+
+def shape_to_json(shape: ShapeDescriptor) -> bytes:
+    """Return the content of ``shape.json``; equal shapes give equal bytes."""
+    values = {"descriptor": shape.values.astype(float).tolist(), "radius_of_gyration_m": shape.radius_of_gyration_m}
+    return canonical_json(values).encode()
+
+
+def read_shape(folder: Path) -> ShapeDescriptor | None:
+    """Return what ``shape.json`` in a twin's folder says; None where there is none, as in twins of earlier versions.
+
+    Raises TwinError where it is damaged.
+    """
+    path = folder / SHAPE
+    if not os.path.lexists(path):
+        return None
+    said = read_json_object(path, TwinError, limit_bytes=MAX_SHAPE_BYTES, inside=folder, name=str(path), remedy=REMEDY)
+    try:
+        values = json_vector(said.get("descriptor"), _LENGTH, "descriptor")
+        radius_m = json_number(said.get("radius_of_gyration_m"), "radius_of_gyration_m")
+    except AssetError as error:
+        raise TwinError(f"{path}: {error}; {REMEDY}") from error
+    return ShapeDescriptor(values.astype(np.float32), radius_m)
