@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from manitwin.dataset.evaluation.annotation_scores import wilson_interval
 from manitwin.dataset.evaluation.input_likeness import partners
 from manitwin.dataset.evaluation.source_picture import Source, best_outline, look
 from manitwin.dataset.evaluation.thirty_views import FOV_Y_DEG, thirty_views
@@ -22,6 +21,7 @@ from manitwin.models.embedders.looks import GREY
 from manitwin.render.cameras import framing_camera
 from manitwin.render.renderer import shared_renderer
 from manitwin.twin.loaded_twin import Twin, TwinSource
+from manitwin.twin.shares import wilson_interval
 
 ELEVATIONS_DEG = (15.0, 60.0)
 PICTURE_PX = 320

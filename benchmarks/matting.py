@@ -27,12 +27,12 @@ from composites import Composite, composite
 from scipy.stats import spearmanr
 
 from manitwin.config import MattingConfig
-from manitwin.dataset.evaluation.annotation_scores import wilson_interval
 from manitwin.errors import Rejected
 from manitwin.formats.image_file import read_image
 from manitwin.models.matting import matte_photo
 from manitwin.models.matting.learned import Network, find_network
 from manitwin.models.matting.matte import decided, study_photo
+from manitwin.twin.shares import wilson_interval
 
 RIGHT_IOU = 0.95
 TILE_PX = 460

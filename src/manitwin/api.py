@@ -72,8 +72,9 @@ def build(
     ``flags`` are said on top of it: ``seed``; ``grippers``, names or .toml files, the first one's grasps are the twin's own;
     ``vlm``, ``generator`` and ``grasper`` choose backends (docs/backends.md); once services
     have charged ``max_cost_usd``, items that would cost more are left unfinished; ``record`` is a file that a VLM's answers are
-    added to; ``require_agreement`` verifies only what a second engine holds too; ``quick`` leaves out second engine and
-    robustness. ``executor`` is local (``jobs`` processes), ray (a cluster at ``address``), or inline, in this process.
+    added to; ``require_agreement`` verifies only what a second engine holds too; ``second_opinion`` "sample" tries 20 of
+    the held grasps there instead of all; ``quick`` leaves out second engine and robustness.
+    ``executor`` is local (``jobs`` processes), ray (a cluster at ``address``), or inline, in this process.
 
     Raises UsageError for wrong arguments, and where another build is at work there; what happens to one item is in the report
     and never raised.

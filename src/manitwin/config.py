@@ -155,9 +155,14 @@ class VerifyConfig(Section):
 
 
 class SecondOpinionConfig(Section):
-    """The same grasps in a second engine: all that held, a share of those that failed, and jittered ones as controls."""
+    """The same grasps in a second engine: all that held, a share of those that failed, and jittered ones as controls.
+
+    ``sample_of_held`` grasps that held, spread evenly over the directions of approach, stand for all of them (none: all are
+    tried); the twin then says how far their share may be off.
+    """
 
     enabled: bool = True
+    sample_of_held: int | None = Field(default=None, ge=5)
     share_of_failed: float = Field(default=0.5, ge=0, le=1)
     jittered: int = Field(default=20, ge=0)
     jitter_deg: float = Field(default=20.0, ge=0)

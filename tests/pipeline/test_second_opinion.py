@@ -8,10 +8,20 @@ import numpy as np
 import pytest
 
 from grasp_drafts import PANDA, Scripted, number_of, proposed_draft, run_all
-from manitwin.config import SecondOpinionConfig, VerifyConfig
+from manitwin.config import BuildConfig, SecondOpinionConfig, VerifyConfig
 from manitwin.engine.stage import Draft
+from manitwin.errors import UsageError
+from manitwin.geometry.grasp_diversity import approach_octants
+from manitwin.pipeline.quality import agreement_checks
+from manitwin.pipeline.recipe import check_names, config_sha256
 from manitwin.pipeline.second_opinion import FAILS, HOLDS, NOT_TRIED, SecondOpinionStage
+from manitwin.pipeline.settings import SAMPLE_OF_HELD, Flags, with_flags
 from manitwin.twin.grasp_summary import SecondOpinion
+
+
+def held_always(pose: np.ndarray, settings: object) -> str:
+    return "held"
+
 
 OUTCOMES = ["held", "held", "slips", "held", "drops", "slips", "held", "slips", "held", "drops"]
 HELD, FAILED = [0, 1, 3, 6], [2, 4, 5, 7]  # the last two are the unfiltered sample
@@ -108,3 +118,46 @@ def test_key_knows_both_engines_and_the_trial(tmp_path: Path) -> None:
         SecondOpinionStage(SETTINGS, strong, one, other, PANDA),
     ]
     assert len({(stage.backend, stage.model) for stage in stages}) == 3
+
+
+def test_a_sample_of_the_held_has_its_share_of_each_octant(tmp_path: Path) -> None:
+    count, rng = 200, np.random.default_rng(3)
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, :3, 2] = rng.normal([0.7, 0, -1.5], 1.0, (count, 3))  # mostly one side
+    stage = SecondOpinionStage(
+        SecondOpinionConfig(sample_of_held=20), VerifyConfig(), Scripted(held_always), Scripted(held_always), PANDA
+    )
+    held = np.arange(0, count, 2)
+    chosen = stage._sample(held, poses, np.random.default_rng(0))
+    assert len(set(chosen)) == 20 and set(chosen) <= set(held) and sorted(chosen) == chosen.tolist()
+    octants = approach_octants(poses)
+    for octant in range(8):
+        share = 20 * np.mean(octants[held] == octant)
+        assert abs((octants[chosen] == octant).sum() - share) < 1 + 1e-9
+    assert chosen.tolist() == stage._sample(held, poses, np.random.default_rng(0)).tolist()
+    assert stage._sample(held[:20], poses, np.random.default_rng(0)).tolist() == held[:20].tolist()
+
+
+def test_what_was_not_drawn_is_not_tried_and_the_check_says_how_sure_it_is(tmp_path: Path) -> None:
+    settings = SecondOpinionConfig(jittered=0, share_of_failed=0.0, sample_of_held=5)
+    draft = proposed_draft(tmp_path, ["held"] * 9, unfiltered=0)
+    second = Scripted(lambda pose, settings: "held")
+    run_all(draft, tmp_path, SecondOpinionStage(settings, VerifyConfig(), Scripted(held_always), second, PANDA))
+    assert second.asked == 5
+    assert sorted(np.load(draft.path("second_opinion.npz"))["holds"].tolist()) == [NOT_TRIED] * 4 + [HOLDS] * 5
+    (check,) = agreement_checks({"second_opinion": draft.field("second_opinion"), "verified": 9})
+    assert check.passed and check.message == "a sample of 5 of 9: 57 to 100 % (95 %)"
+    (whole,) = agreement_checks({"second_opinion": draft.field("second_opinion"), "verified": 5})
+    assert whole.message == ""
+
+
+def test_agreement_of_every_grasp_cannot_be_had_from_a_sample() -> None:
+    flags = Flags(second_opinion="sample", require_agreement=True)
+    with pytest.raises(UsageError, match="tries a sample"):
+        check_names(with_flags(BuildConfig(), flags))
+    with pytest.raises(UsageError, match="quick leaves"):
+        with_flags(BuildConfig(), Flags(second_opinion="sample", quick=True))
+    assert with_flags(BuildConfig(), Flags(second_opinion="sample")).second_opinion.sample_of_held == SAMPLE_OF_HELD
+    sampled = BuildConfig(second_opinion=SecondOpinionConfig(sample_of_held=20))
+    assert with_flags(sampled, Flags(second_opinion="all")) == BuildConfig()
+    assert config_sha256(sampled) != config_sha256(BuildConfig())

@@ -92,6 +92,7 @@ def _shipped(*folders: str) -> Callable[[], Iterable[str]]:
 UNITS = Choices("units", _of("m", "cm", "mm", "auto"))
 EVALUATIONS = Choices("evaluation", _of("annotations", "generation", "grasps"))
 UP = Choices("up", _of("y", "z", "auto"))
+SECOND_OPINIONS = Choices("second opinion", _of("all", "sample"))
 EXECUTORS = Choices("executor", _of("local", "ray", "inline"))
 ANNOTATORS = Choices("annotator", _backends("annotator"), spec=True)
 PROPOSERS = Choices("model", _of("none", "openai", "anthropic", "replay"), spec=True)

@@ -242,7 +242,7 @@ def _folder(listing: FolderListing) -> Document:
 
 def annotations_document(report: AnnotationReport) -> Document:
     """Return the scores of annotations: shares by dimension with their intervals, and every question."""
-    from manitwin.dataset.evaluation.annotation_scores import wilson_interval
+    from manitwin.twin.shares import wilson_interval
 
     return {
         "twins": report.twins,

@@ -80,6 +80,12 @@ MaxCost = Annotated[
 RequireAgreement = Annotated[
     bool, typer.Option("--require-agreement", help="Verify only grasps that both engines hold.")
 ]
+SecondOpinion = Annotated[
+    str | None,
+    choices.SECOND_OPINIONS.option(
+        "--second-opinion", help="The second engine tries all grasps that held, or a sample of 20 of them."
+    ),
+]
 Quick = Annotated[
     bool, typer.Option("--quick", help="One engine, one trial a grasp: no second opinion, no robustness.")
 ]
@@ -120,7 +126,7 @@ OF_INPUTS: dict[str, tuple[Any, Any]] = {
 FLAGS: dict[str, tuple[Any, Any]] = {
     "seed": (Seed, None), "grippers": (Grippers, None), "vlm": (Vlm, None), "generator": (Generator, None),
     "grasper": (Grasper, None), "matting": (Matting, None), "max_cost_usd": (MaxCost, None), "record": (Record, None),
-    "require_agreement": (RequireAgreement, False), "quick": (Quick, False),
+    "require_agreement": (RequireAgreement, False), "second_opinion": (SecondOpinion, None), "quick": (Quick, False),
 }  # fmt: skip
 """What is said on top of the configuration: the options of ``pipeline.settings.Flags``, by its names."""
 

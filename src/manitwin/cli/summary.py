@@ -14,6 +14,7 @@ from manitwin.twin.point_records import FunctionalPoint
 from manitwin.twin.record import TwinRecord
 from manitwin.twin.record_values import Estimate
 from manitwin.twin.resting import RestingPose, resting_poses
+from manitwin.twin.shares import wilson_interval
 
 
 def estimate_text(estimate: Estimate, unit: str = "") -> str:
@@ -110,7 +111,7 @@ def _grasp_rows(grasps: GraspSummary) -> list[tuple[str, str]]:
         median = "none tried" if again.median is None else f"median {again.median:.2f}"
         rows.append(("robustness", f"{again.robust} hold in {share} of their perturbed trials, {median}"))
     if grasps.second_opinion is not None:
-        rows.append(("second engine", _opinion(grasps.second_opinion)))
+        rows.append(("second engine", _opinion(grasps.second_opinion, grasps.verified)))
     for name, other in grasps.other_grippers.items():
         rows.append((f"with {name}", _other_gripper(other)))
     return rows
@@ -121,8 +122,11 @@ def _held(outcomes: dict[str, int]) -> str:
     return f"{outcomes.get('held', 0)} of {sum(outcomes.values())}" + (f" ({others})" if others else "")
 
 
-def _opinion(opinion: SecondOpinion) -> str:
+def _opinion(opinion: SecondOpinion, verified: int) -> str:
     holds = "nothing held to try" if opinion.holds_share is None else f"holds {100 * opinion.holds_share:.0f} % of them"
+    if opinion.holds_share is not None and opinion.held_tried < verified:
+        low, high = wilson_interval(round(opinion.holds_share * opinion.held_tried), opinion.held_tried)
+        holds += f" ({100 * low:.0f} to {100 * high:.0f} %, by a sample of {opinion.held_tried})"
     kappa = "undefined" if opinion.kappa is None else f"{opinion.kappa:.2f}"
     return f"{opinion.engine} {holds}; kappa {kappa} over {opinion.jittered} jittered"
 

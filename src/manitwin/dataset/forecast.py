@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from manitwin.dataset.evaluation.annotation_scores import wilson_interval
 from manitwin.dataset.index.query import Index
 from manitwin.errors import TwinError, UsageError
 from manitwin.formats.printable import printable_line
 from manitwin.twin.dataset_root import DatasetRoot
+from manitwin.twin.shares import wilson_interval
 
 LEAST_INPUTS = 5
 """Of fewer, one that is out of the ordinary decides everything."""

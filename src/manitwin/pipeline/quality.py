@@ -8,6 +8,7 @@ from typing import Any, cast
 from manitwin.engine.stage import Draft
 from manitwin.pipeline.grasps import GRASP_POINTS
 from manitwin.twin.record_values import Check
+from manitwin.twin.shares import wilson_interval
 
 UNCOVERED_LIMIT_M = 0.002
 """Of the surface that no collision hull covers: more would let fingers sink in (measured on real meshes: docs/measured.md)."""
@@ -273,6 +274,10 @@ def agreement_checks(grasps: dict[str, Any]) -> list[Check]:
         return []
     share = second["holds_share"]
     message = "" if share >= AGREEMENT_LIMIT else f"share of the verified grasps that hold in {second['engine']} too"
+    if second["held_tried"] < grasps["verified"]:
+        low, high = wilson_interval(round(share * second["held_tried"]), second["held_tried"])
+        message += f"{'; ' if message else ''}a sample of {second['held_tried']} of {grasps['verified']}: "
+        message += f"{100 * low:.0f} to {100 * high:.0f} % (95 %)"
     return [
         Check(
             name="holds_in_second_engine",

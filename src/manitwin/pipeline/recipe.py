@@ -79,6 +79,10 @@ def _check_agreement(grippers: list[Gripper], config: BuildConfig) -> None:
     """Raise UsageError where agreement is asked for and nobody could give it: what is not judged is not accepted."""
     if not config.second_opinion.enabled:
         raise UsageError("second_opinion requires agreement and is not enabled; enable it, or require none")
+    if config.second_opinion.sample_of_held is not None:
+        raise UsageError(
+            "second_opinion requires agreement of every grasp and tries a sample; try all, or require none"
+        )
     alone = [gripper.name for gripper in grippers if KINDS[gripper.kind].second_simulator(config) is None]
     if alone:
         raise UsageError(
@@ -171,6 +175,8 @@ def config_sha256(config: BuildConfig) -> str:
         decides["matting"]["network"] = network.sha256
     if config.source == SourceConfig():  # as before there was a choice
         del decides["source"]
+    if config.second_opinion.sample_of_held is None:
+        del decides["second_opinion"]["sample_of_held"]
     del decides["vlm"]["prompts"]  # their content counts, as part of what each stage is asked with
     return sha256_of_json(decides)
 

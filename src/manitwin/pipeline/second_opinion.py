@@ -9,6 +9,7 @@ import numpy as np
 
 from manitwin.config import Resource, SecondOpinionConfig, VerifyConfig
 from manitwin.engine.stage import Draft
+from manitwin.geometry.grasp_diversity import approach_octants
 from manitwin.physics.robustness import jittered
 from manitwin.physics.trial import GraspTrial, TrialResult
 from manitwin.pipeline.grasps import UNFILTERED
@@ -21,11 +22,12 @@ from manitwin.twin.grasp_summary import SecondOpinion as SecondOpinionRecord
 SECOND_OPINION = "second_opinion{}.npz"
 AGREEMENT = "second_opinion{}"
 NOT_TRIED, FAILS, HOLDS = -1, 0, 1
+SAMPLE_STREAM = 8
 JITTER_STREAM = 7  # keeps the draws apart from those of other stages with the same seed
 
 
 class SecondOpinionStage:
-    """Try the held grasps, a share of the failed ones, and jittered ones again.
+    """Try the held grasps or a sample of them, a share of the failed ones, and jittered ones again.
 
     Writes ``holds (N,) int8`` and ``outcome (N,)`` of the second engine, one for each proposal, and the jittered grasps
     with both engines' verdicts.
@@ -64,13 +66,14 @@ class SecondOpinionStage:
         joints = joints_of(proposals, np.arange(len(poses)))
         rng = np.random.default_rng([draft.seed, JITTER_STREAM])
         good, bad = np.flatnonzero(held & chosen), np.flatnonzero(~held & chosen)
+        some_good = self._sample(good, poses, np.random.default_rng([draft.seed, SAMPLE_STREAM]))
         some_bad = np.sort(rng.permutation(bad)[: round(self.settings.share_of_failed * len(bad))])
         of = np.sort(rng.permutation(good)[: self.settings.jittered])
         moved = jittered(
             poses[of], depth_m[of], rng, sigma_deg=self.settings.jitter_deg, sigma_m=self.settings.jitter_m
         )
         body, settings = load_body(draft), trial_settings(self.verify, self.gripper)
-        tried = np.concatenate([good, some_bad])
+        tried = np.concatenate([some_good, some_bad])
         again = self.second.run(
             body,
             self.gripper,
@@ -96,8 +99,21 @@ class SecondOpinionStage:
             jittered_rotation_rad=np.array([result.rotation_rad for result in first], float),
             jittered_holds=second.astype(np.int8),
         )
-        record = _agreement(self.second.name, holds[good], holds[some_bad], first, second)
+        record = _agreement(self.second.name, holds[some_good], holds[some_bad], first, second)
         return {self.field: record.model_dump(mode="json")}
+
+    def _sample(self, held: np.ndarray, poses: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return the held grasps that are tried: all, or every so-manieth of them in the order of their approach's octants.
+
+        So each octant has its share of the sample (systematic sampling with a random start; Cochran 1977, 8.1 and 5.4).
+        """
+        count = self.settings.sample_of_held
+        if count is None or len(held) <= count:
+            return held
+        shuffled = rng.permutation(held)
+        ordered = shuffled[np.argsort(approach_octants(poses[shuffled]), kind="stable")]
+        places = (np.arange(count) + rng.random()) * len(held) / count
+        return np.sort(ordered[places.astype(int)])
 
 
 def _agreement(

@@ -10,10 +10,11 @@ from typer.testing import CliRunner
 
 from json_documents import check_keys
 from manitwin.cli.main import app
-from manitwin.dataset.evaluation.annotation_scores import matches, wilson_interval
+from manitwin.dataset.evaluation.annotation_scores import matches
 from manitwin.dataset.evaluation.annotations import AnnotationReport, evaluate_annotations
 from manitwin.dataset.evaluation.labels import read_labels
 from manitwin.errors import UsageError
+from manitwin.twin.shares import wilson_interval
 from twin_folders import write_set
 
 TRUE = {

@@ -14,11 +14,11 @@ from typer.testing import CliRunner, Result
 from json_documents import check_keys
 from manitwin.api import write_index
 from manitwin.cli.main import app
-from manitwin.dataset.evaluation.annotation_scores import wilson_interval
 from manitwin.dataset.review.report import review_report
 from manitwin.dataset.review.store import ReviewStore
 from manitwin.dataset.review.verdicts import DIMENSIONS
 from manitwin.twin.dataset_root import twin_name
+from manitwin.twin.shares import wilson_interval
 from manitwin.twin.store import RECORD, read_record, seal
 from twin_folders import twin_id, write_accepted, write_set
 

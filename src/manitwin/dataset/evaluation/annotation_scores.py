@@ -7,8 +7,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
-import numpy as np
-
 from manitwin.dataset.evaluation.labels import Interval, Label
 from manitwin.models.annotators.priors import normalised
 from manitwin.twin.record import TwinRecord
@@ -103,13 +101,3 @@ def _words(text: str) -> frozenset[str]:
 
 def _text(truth: Interval | tuple[str, ...]) -> str:
     return f"{truth.low:.3g} to {truth.high:.3g}" if isinstance(truth, Interval) else "; ".join(truth)
-
-
-def wilson_interval(right: int, of: int, z: float = 1.959963984540054) -> tuple[float, float]:
-    """Return the 95 % interval of a share (Wilson 1927, eq. 4): (0, 1) of nothing."""
-    if of == 0:
-        return 0.0, 1.0
-    share, square = right / of, z * z / of
-    middle = (share + square / 2) / (1 + square)
-    half = z * float(np.sqrt(share * (1 - share) / of + square / (4 * of))) / (1 + square)
-    return max(0.0, middle - half), min(1.0, middle + half)

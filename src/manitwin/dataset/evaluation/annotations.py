@@ -15,7 +15,6 @@ from manitwin.dataset.evaluation.annotation_scores import (
     Score,
     matches,
     scores_of,
-    wilson_interval,
 )
 from manitwin.dataset.evaluation.labels import read_labels
 from manitwin.engine.ledger.location import local_ledger
@@ -24,6 +23,7 @@ from manitwin.errors import UsageError
 from manitwin.formats.json_file import parse_json_object
 from manitwin.twin.dataset_root import DatasetRoot
 from manitwin.twin.loaded_twin import Twin, TwinSource
+from manitwin.twin.shares import wilson_interval
 
 SHOWN = 5
 
