@@ -133,13 +133,13 @@ def _timed_steps() -> Iterator[list[float]]:
 
 @contextmanager
 def _plain_trials() -> Iterator[None]:
-    """Keep all hulls and repeat all slides."""
-    margin, share = sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE
-    sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE = 10.0, 0.0
+    """Keep all hulls, close for the whole time and repeat all slides."""
+    margin, share, rest = sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE, trial_phases.CLOSED_SPEED_M_S
+    sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE, trial_phases.CLOSED_SPEED_M_S = 10.0, 0.0, 0.0
     try:
         yield
     finally:
-        sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE = margin, share
+        sapien_trial.REACH_MARGIN_M, trial_phases.SURE_SHARE, trial_phases.CLOSED_SPEED_M_S = margin, share, rest
 
 
 def _compare(folders: list[Path], count: int) -> None:
