@@ -48,7 +48,7 @@ class GraspsStage:
     rejects the object; another one is left with no proposals and the reason.
     """
 
-    version = "5"
+    version = "6"
     reads: tuple[str, ...] = ("solid.npz", "hulls.npz", "points", "physical", "placements", "geometry?")
 
     def __init__(self, settings: GraspConfig, grasper: Grasper, gripper: Gripper, suffix: str = ""):

@@ -60,7 +60,7 @@ class PlacementStage:
     settings: PlacementConfig
 
     name: ClassVar[str] = "placement"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = ("hulls.npz", "solid.npz", "physical")
     writes: ClassVar[tuple[str, ...]] = ("placements",)
     needs: ClassVar[Resource] = "cpu"
