@@ -138,7 +138,8 @@ def test_nobody_asked_means_nobody_answers(tmp_path: Path, least: int) -> None:
 
 def test_object_on_which_the_engines_disagree_has_a_failed_check() -> None:
     def check(share: float | None) -> list[bool]:
-        return [c.passed for c in agreement_checks({"second_opinion": {"engine": "mujoco", "holds_share": share}})]
+        opinion = {"engine": "mujoco", "holds_share": share, "held_tried": 50}
+        return [c.passed for c in agreement_checks({"second_opinion": opinion, "verified": 50})]
 
     assert (check(0.78), check(0.9), check(None), agreement_checks({"second_opinion": None})) == (
         [False],
