@@ -111,7 +111,7 @@ SPOILT = [
     (('<parent link="upper"/>', ""), "joint 'lift' has no parent link; name one of base, upper, flange", ALL),
     (('<parent link="upper"/>', "<parent/>"), "joint 'lift' has no parent link; name one of", ALL),
     (('<child link="flange"/>', ""), "joint 'lift' has no child link; name one of", ALL),
-    (('<parent link="upper"/>', '<parent link="uper"/>'), "parent of joint 'lift' is an unknown link 'uper'; did you mean", SIMULATED),
+    (('<parent link="upper"/>', '<parent link="uper"/>'), "joint 'lift' is an unknown link 'uper'; did you mean", SIMULATED),
     (('<child link="flange"/>', '<child link="upper"/>'), "link 'upper' hangs from two joints, 'turn' and .* remove", ALL),
     (('<parent link="base"/>', '<parent link="flange"/>'), "joints of upper, flange go in a circle; .* remove", ALL),
     (('<parent link="upper"/>', '<parent link="flange"/>'), "joints of flange go in a circle; .* remove", ALL),
