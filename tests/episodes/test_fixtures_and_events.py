@@ -66,7 +66,9 @@ def test_a_strike_is_as_fast_as_the_fall_that_led_to_it(height_m: float) -> None
             watch.look(world.contacts, world.contacts.read(), step * STEP_S)
     first = watch.events[0]
     fallen_m = 9.81 * STEP_S**2 * np.cumsum(np.arange(1, 30))  # after each step
-    free = int((fallen_m < height_m).sum())  # a touch is seen ahead: the step that would end below is no free fall any more
+    free = int(
+        (fallen_m < height_m).sum()
+    )  # a touch is seen ahead: the step that would end below is no free fall any more
     assert first.values["speed_m_s"] == pytest.approx(9.81 * STEP_S * free, abs=0.005)
     assert first.values["angle_rad"] < 0.02
     assert first.values["off_m"] < 0.002
