@@ -10,7 +10,7 @@ import typer
 from manitwin.cli import choices, options
 from manitwin.cli.console import error_console
 from manitwin.cli.documents import Json, print_document
-from manitwin.cli.located import print_frames, print_grasps, print_layout, print_size, print_thing
+from manitwin.cli.location_lines import print_frames, print_grasps, print_layout, print_size, print_thing
 
 if TYPE_CHECKING:
     import numpy as np

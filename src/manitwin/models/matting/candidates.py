@@ -24,6 +24,7 @@ SURE = 0.9
 """Share of object of a pixel that a network calls certain; below one less that, it is certain of the ground."""
 LEAST_PIXELS = 30
 LEAST_ADDED = 0.003
+"""Of a network's mask: what rules add beyond that makes a mask of its own."""
 UNLIKE_GROUND = 4.0
 """Of ``Background.distance``: what nine in ten pixels of a border are below."""
 
