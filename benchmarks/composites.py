@@ -15,8 +15,10 @@ import numpy as np
 from composite_grounds import draw_ground
 from composite_shadows import draw_lamp, light_left
 from composite_things import HEIGHT_PX, WIDTH_PX, Kind, Part, draw_thing, overlaps, place_of
+from composite_variants import Variant, labelled, small
 
 SEEDS: dict[Part, int] = {"tuning": 0, "held-out": 1, "calibration": 2, "training": 3}
+LABEL_SEED = 7
 
 
 @dataclass(frozen=True)
@@ -33,8 +35,8 @@ class Composite:
     setting: str
 
 
-def composite(part: Part, number: int) -> Composite:
-    """Make a picture of one of the parts by its number."""
+def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
+    """Make a picture of one of the parts by its number, with a label on its main thing or small on request."""
     rng = np.random.default_rng([number, SEEDS[part]])
     drawn = rng.random()
     kind: Kind = "single" if drawn < 0.72 else "cut" if drawn < 0.86 else "several"
@@ -51,6 +53,8 @@ def composite(part: Part, number: int) -> Composite:
                 placements.append(apart[0])
         kind = "several" if len(things) > 1 else "single"
     ground, setting = draw_ground(rng, part, main, placements[0])
+    if variant == "labelled":
+        things[0] = labelled(np.random.default_rng([number, SEEDS[part], LABEL_SEED]), main)
     light = ground.copy()
     lamp = draw_lamp(rng)
     for thing, placement in zip(things, placements, strict=True):
@@ -66,7 +70,10 @@ def composite(part: Part, number: int) -> Composite:
         truth |= coverage > 0.5
     if main.clear:
         setting += ", clear"
-    return Composite(_photographed(rng, light), truth, kind, main.category, setting)
+    rgb = _photographed(rng, light)
+    if variant == "small":
+        rgb, truth = small(rgb, truth)
+    return Composite(rgb, truth, kind, main.category, setting)
 
 
 def _over(

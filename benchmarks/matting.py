@@ -1,7 +1,7 @@
 """Cut the object out of composites whose mask is known, and print what was accepted, how right it is, and what it cost.
 
     python benchmarks/matting.py [--part held-out|tuning|calibration] [--first 0] [--count 300] [--jobs 1] [--network isnet]
-                                 [--photos FOLDER] [--sheet PNG]
+                                 [--variant plain|labelled|small] [--photos FOLDER] [--sheet PNG]
 
 The pictures are made here (``composites.py``), of templates on grounds of the project's own making; the held-out part has other
 seeds and other grounds than the part that thresholds were set on. A composite of one whole thing is to be accepted; one that
@@ -23,6 +23,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 from composite_things import Part
+from composite_variants import VARIANTS, Variant
 from composites import Composite, composite
 from scipy.stats import spearmanr
 
@@ -50,10 +51,10 @@ class Judged:
     cpu_s: float
 
 
-def judged_by_number(part: Part, number: int, network: str | None) -> Judged:
+def judged_by_number(part: Part, number: int, variant: Variant, network: str | None) -> Judged:
     """Make one composite and cut it out, in whatever process."""
     cv2.setNumThreads(1)
-    return judge(composite(part, number), find_network(network) if network else None)
+    return judge(composite(part, number, variant), find_network(network) if network else None)
 
 
 def judge(picture: Composite, network: Network | None) -> Judged:
@@ -158,6 +159,7 @@ def main() -> None:
         "--first", type=int, default=0, help="number of the first composite: others than were measured before"
     )
     parser.add_argument("--count", type=int, default=300)
+    parser.add_argument("--variant", choices=VARIANTS, default="plain", help="with a label, or small and compressed")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--network", help="isnet or an ONNX file, as --matting of manitwin build")
     parser.add_argument("--photos", type=Path)
@@ -167,7 +169,7 @@ def main() -> None:
     network = find_network(given.network) if given.network else None
     if given.count:
         with ProcessPoolExecutor(given.jobs, mp_context=get_context("spawn")) as pool:
-            work = partial(judged_by_number, given.part, network=given.network)
+            work = partial(judged_by_number, given.part, variant=given.variant, network=given.network)
             report(list(pool.map(work, range(given.first, given.first + given.count), chunksize=4)))
     if given.photos is not None:
         photos(given.photos, network, given.sheet)

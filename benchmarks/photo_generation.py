@@ -4,7 +4,7 @@
 
 Photos are rendered (``template_photos``) at three elevations of the camera over plain and patterned ground, and go through the
 stages of a build from matting to true size, one process. OUT gets photos, meshes (GLB) and ``results.csv``. Seeds from 0 are
-for tuning; ``--held-out`` takes those from 1100. ``--nameless`` gives no name. ``--truth-matte`` gives the true outline, to see
+for tuning; ``--held-out`` takes those from 1200. ``--nameless`` gives no name. ``--truth-matte`` gives the true outline, to see
 the shape by itself. ``shape_agreement`` says how meshes are compared. ``--docs`` writes docs/photo_benchmark.md from OUT.
 """
 
@@ -36,7 +36,7 @@ from manitwin.pipeline.item import Item, twin_id
 from manitwin.pipeline.object_state import load_solid, object_name
 from manitwin.pipeline.recipe import stages_for
 
-HELD_OUT_FROM = 1100  # those before were looked at
+HELD_OUT_FROM = 1200  # those before were looked at
 LAST_STAGE = "physical"
 OWN_STAGES = ("mesh", "views", "gate", "physical")  # what comes after the shape: not counted in its CPU-s
 # in steps of three through the list of templates: 42 of 127, of all groups

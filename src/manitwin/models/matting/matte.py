@@ -14,6 +14,7 @@ from manitwin.errors import Rejected
 from manitwin.models.matting.belief import WHOLE, doubts_of, features, probability
 from manitwin.models.matting.candidates import NETWORKS, Candidate, alike, at_size, candidates, completed
 from manitwin.models.matting.confidence import MatteScores, frame_cause
+from manitwin.models.matting.enlarged import enlarged
 from manitwin.models.matting.fine_outline import fine_outline
 from manitwin.models.matting.learned import Network, learned_alpha
 from manitwin.models.matting.object_network import in_two_looks, object_share
@@ -133,14 +134,16 @@ def judged_candidates(
 ) -> tuple[Segmentation, list[Judged], list[np.ndarray]]:
     """Return what the rules found, every candidate with its features, and each network's share of object, as ``study_photo``.
 
-    Of two networks the one counts that speaks better for a candidate.
+    Of two networks the one counts that speaks better for a candidate. A photo smaller than ``working_side_px`` is ``enlarged``.
     """
+    photo_side_px = max(rgb.shape[:2])
+    rgb = enlarged(rgb, working_side_px)
     found = segment(_scaled(rgb, working_side_px))
     if _longest_side(found.mask) < 0.5 * max(found.mask.shape) and max(rgb.shape[:2]) > 1.2 * working_side_px:
         found = segment(_scaled(rgb, 2 * working_side_px))  # a small thing is looked at again, closer
     asked = (None,) if network is None else (network, None)
     shares = [completed(network_share(rgb, max(found.mask.shape), each), found) for each in asked]
-    made = candidates(found, shares, zoom=max(rgb.shape[:2]) / max(found.mask.shape))
+    made = candidates(found, shares, zoom=photo_side_px / max(found.mask.shape))
     judged = []
     for each in made:
         others = [other for other in made if other is not each and other.independent]
@@ -158,10 +161,11 @@ def network_share(rgb: np.ndarray, side_px: int, network: Network | None) -> np.
 
 def drawn(rgb: np.ndarray, mask: np.ndarray, working_side_px: int = 512) -> np.ndarray:
     """Return the largest piece of a mask (any size) as alpha (H, W) uint8 at the size of ``rgb``, with a soft outline."""
-    alpha = fine_outline(rgb, _largest(mask))
-    if max(rgb.shape[:2]) <= 2 * working_side_px:  # of larger photos the first look is finer than is needed
-        alpha = fine_outline(rgb, alpha > 127)
-    return alpha
+    seen = enlarged(rgb, working_side_px)
+    alpha = fine_outline(seen, _largest(mask))
+    if max(seen.shape[:2]) <= 2 * working_side_px:  # of larger photos the first look is finer than is needed
+        alpha = fine_outline(seen, alpha > 127)
+    return alpha if seen is rgb else cv2.resize(alpha, rgb.shape[1::-1], interpolation=cv2.INTER_AREA)
 
 
 def matte_photo(

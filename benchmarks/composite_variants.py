@@ -1,0 +1,59 @@
+"""Variants of composites: things with a printed label, and pictures as small and as strongly compressed as many on the web."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Literal
+
+import cv2
+import numpy as np
+from composite_things import Thing
+
+Variant = Literal["plain", "labelled", "small"]
+VARIANTS: tuple[Variant, ...] = ("plain", "labelled", "small")
+
+SMALL_PX = 256
+SMALL_QUALITY = 65  # of JPEG; colours have half the resolution (4:2:0)
+LABEL_SHARE = (0.15, 0.55)  # of the thing's area
+LEAST_LABEL_PX = 12
+
+
+def labelled(rng: np.random.Generator, thing: Thing) -> Thing:
+    """Return a thing with a label printed on it: a patch of another colour within its outline, with bars as of letters.
+
+    The light on the thing stays: the label's colours are multiplied by how bright the thing is there. A clear thing, and one
+    too thin for a label, is returned as it is.
+    """
+    inside = thing.coverage > 0.99
+    depth = cv2.distanceTransform(inside.astype(np.uint8), cv2.DIST_L2, 5)
+    if thing.clear or depth.max() < LEAST_LABEL_PX:
+        return thing
+    row, column = np.unravel_index(int(depth.argmax()), depth.shape)
+    area = float(rng.uniform(*LABEL_SHARE)) * inside.sum()
+    ratio = float(np.exp(rng.uniform(-0.6, 0.6)))
+    half = np.array([np.sqrt(area * ratio), np.sqrt(area / ratio)]) / 2
+    turn = float(rng.uniform(-0.3, 0.3))
+    rows, columns = np.mgrid[: depth.shape[0], : depth.shape[1]]
+    along = np.cos(turn) * (columns - column) + np.sin(turn) * (rows - row)
+    across = -np.sin(turn) * (columns - column) + np.cos(turn) * (rows - row)
+    margin = max(2.0, 0.08 * float(depth.max()))
+    patch = (abs(along) < half[0]) & (abs(across) < half[1]) & (depth > margin)
+    paint = np.broadcast_to(rng.uniform(0.02, 0.9, 3), (*depth.shape, 3)).copy()
+    for _ in range(int(rng.integers(2, 7))):
+        middle = rng.uniform(-0.9, 0.9, 2) * half
+        size = rng.uniform([0.1, 0.04], [0.6, 0.25]) * half
+        paint[(abs(along - middle[0]) < size[0]) & (abs(across - middle[1]) < size[1])] = rng.uniform(0.02, 0.9, 3)
+    body = thing.rgb.mean(2)
+    usual = max(float(np.median(body[inside])), 1e-3)
+    lit = paint * np.clip(body / usual, 0, 1.5)[..., None] * min(max(usual, 0.2), 0.8) / 0.6
+    soft = cv2.GaussianBlur(patch.astype(np.float32), (0, 0), 0.7)[..., None]
+    return dataclasses.replace(thing, rgb=(thing.rgb * (1 - soft) + lit * soft).astype(thing.rgb.dtype))
+
+
+def small(rgb: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return a picture (H, W, 3) uint8 and its truth (H, W) at ``SMALL_PX``, compressed as ``SMALL_QUALITY``."""
+    scale = SMALL_PX / max(rgb.shape[:2])
+    reduced = cv2.resize(rgb, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
+    encoded = cv2.imencode(".jpg", reduced[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, SMALL_QUALITY])[1]
+    share = cv2.resize(truth.astype(np.float32), reduced.shape[1::-1], interpolation=cv2.INTER_AREA)
+    return np.ascontiguousarray(cv2.imdecode(encoded, cv2.IMREAD_COLOR)[..., ::-1]), share > 0.5
