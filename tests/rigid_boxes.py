@@ -31,6 +31,21 @@ def box(
     return RigidBody((hull,), mass_kg, np.array(center_m, float), inertia, friction, friction)
 
 
+def annulus(outer_m: float, inner_m: float, height_m: float, sections: int, mass_kg: float) -> RigidBody:
+    """A flat ring about Z, a hull for each of its sections."""
+    angles = np.linspace(0, 2 * np.pi, sections + 1)
+    corners = [[(r * np.cos(a), r * np.sin(a)) for r in (inner_m, outer_m)] for a in angles]
+    hulls = tuple(
+        np.array(
+            [(*corner, z) for side in corners[at : at + 2] for corner in side for z in (-height_m / 2, height_m / 2)]
+        )
+        for at in range(sections)
+    )
+    across = mass_kg / 12 * (3 * (outer_m**2 + inner_m**2) + height_m**2)
+    inertia = np.diag([across, across, mass_kg / 2 * (outer_m**2 + inner_m**2)])
+    return RigidBody(hulls, mass_kg, np.zeros(3), inertia, 0.5, 0.5)
+
+
 def block(low_m: list[float], high_m: list[float]) -> np.ndarray:
     """The corners of a box between two corners."""
     return np.array(trimesh.creation.box(bounds=[low_m, high_m]).vertices)

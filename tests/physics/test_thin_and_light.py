@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from manitwin.physics.mujoco.body import STIFF_SOLREF
 from manitwin.physics.mujoco.trial import FINGER_MASS_KG, SINK_M, MujocoTrial, even_impedance
 from manitwin.physics.sapien.trial import SapienTrial
-from rigid_boxes import above, box, try_one
+from rigid_boxes import SETTINGS, SLIDE_PEAK_M_S2, above, annulus, box, try_one
 
 SHEETS_M = [[0.005, 0.04, 0.04], [0.001, 0.04, 0.04], [0.0005, 0.04, 0.04]]
 BAR_M = [0.005, 0.2, 0.005]
@@ -42,3 +43,30 @@ def test_light_box_off_the_middle_is_pushed_there_and_not_kicked_away(off_m: flo
     result = try_one(MujocoTrial(), box([0.04, 0.04, 0.04], 0.02), above([off_m, 0.006, 0.004]))
     assert result.outcome == "held"
     assert result.rotation_rad < 0.05
+
+
+@pytest.mark.parametrize("mass_kg", [0.003, 0.012, 0.1, 0.4])
+@pytest.mark.parametrize("sections", [12, 24])
+def test_faces_of_many_hulls_are_pressed_with_the_closing_force(mass_kg: float, sections: int) -> None:
+    # flat on flat with every hull at once: at a step of 2 ms the pads pressed with 0 to 70 N and lost half of the rings
+    ring = annulus(0.01, 0.0045, 0.009, sections, mass_kg)
+    across_faces = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, 0.0], [-1.0, 0.0, 0.0]])
+    result = try_one(MujocoTrial(), ring, above([0.005, 0.0, 0.0], across_faces))
+    assert result.outcome == "held"
+    assert result.finger_forces_n == pytest.approx((50.0, 50.0), rel=0.05)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
+@pytest.mark.parametrize("mass_kg", [0.1, 0.5, 1.0])
+def test_load_beside_the_pads_below_the_limit_of_friction_does_not_creep_in_mujoco(
+    mass_kg: float, share: float
+) -> None:
+    # four corners of each pad, 13 mm from its middle, carry a moment of 0.95 Nm; below it nothing gives but the fingers' drives
+    moment_nm = 2 * 0.75 * 50.0 * float(np.hypot(0.00875, 0.00925))
+    lever_m = min(0.12, share * moment_nm / (mass_kg * (9.81 + SLIDE_PEAK_M_S2)))
+    body = box([0.03, 0.26, 0.03], mass_kg, center_m=(0, lever_m, 0))
+    result = try_one(MujocoTrial(), body, above([0, 0, 0]))
+    drives_give_m = mass_kg * SLIDE_PEAK_M_S2 / (2 * SETTINGS.finger_stiffness_n_m)
+    assert result.outcome == "held"
+    assert result.displacement_m == pytest.approx(drives_give_m, rel=0.15, abs=5e-6)
+    assert result.rotation_rad < 0.003

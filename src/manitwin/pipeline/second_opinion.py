@@ -33,7 +33,7 @@ class SecondOpinionStage:
     with both engines' verdicts.
     """
 
-    version = "4"
+    version = "5"
     needs: Resource = "cpu"
 
     def __init__(
