@@ -1,6 +1,6 @@
 """Score the points that ``rules`` chooses against the parts of templates, which are known by construction.
 
-    python benchmarks/points.py [--seeds N] [--every K] [--held-out] [--plain]
+    python benchmarks/points.py [--first SEED] [--seeds N] [--every K] [--held-out] [--plain]
 
 The annotator gets the mesh and the category's name, 42 candidates of which all count as seen, and none of the known points. A
 point is right where its candidate lies where its label says, by the template's parts and frame (``known_places``). Labels that
@@ -40,6 +40,7 @@ MAX_OPENING_M = 0.08
 def main() -> None:
     """Print the score, and what went wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--every", type=int, default=1, help="every Kth category")
     parser.add_argument("--held-out", action="store_true")
@@ -53,7 +54,7 @@ def main() -> None:
     away: list[float] = []
     whole, started = set(categories), time.process_time()
     for category in categories:
-        for seed in range(arguments.seeds):
+        for seed in range(arguments.first, arguments.first + arguments.seeds):
             for label, part, verdict, off_m in verdicts(category, seed, arguments.plain):
                 away += [off_m] if off_m is not None else []
                 skipped[f"{category}: {label}"] += verdict is None

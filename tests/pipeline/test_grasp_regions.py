@@ -15,7 +15,7 @@ from manitwin.models.generators.templates.made import make
 from manitwin.models.generators.templates.text import read_text
 from manitwin.pipeline.grasp_regions import PartedSolid, region_columns
 
-DEPTH_M = 0.1
+DEPTH_M, OPENING_M = 0.1, 0.08
 DOWN, SIDE = np.array([0.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
 
 
@@ -24,7 +24,7 @@ def solid_of(category: str) -> tuple[PartedSolid, tuple[str, ...]]:
     made = make(templates[category], read_text(category, templates), np.random.default_rng(0))
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
     ids = tuple(f"p{place}" for place in range(len(made.mesh.names)))
-    return PartedSolid(solid, RayCaster(solid), made.mesh.part.astype(np.uint8), ids, 0.03), made.mesh.names
+    return PartedSolid(solid, RayCaster(solid), made.mesh.part.astype(np.uint8), ids, 0.03, OPENING_M), made.mesh.names
 
 
 def grasp_at(
@@ -101,7 +101,7 @@ def bar(told: bool) -> PartedSolid:
         if told
         else np.full(len(solid.faces), 255, np.uint8)
     )
-    return PartedSolid(solid, RayCaster(solid), labels, ("p0", "p1") if told else (), 0.03)
+    return PartedSolid(solid, RayCaster(solid), labels, ("p0", "p1") if told else (), 0.03, OPENING_M)
 
 
 ON_BAR = {"id": "g0", "position_m": [0.01, 0.01, 0.0]}
@@ -131,7 +131,7 @@ def test_grasp_across_a_border_is_of_the_part_that_more_of_the_pads_touch() -> N
 def test_hand_turned_by_half_a_turn_holds_the_same_part(closing: np.ndarray) -> None:
     held = bar(True)
     sides = np.where(held.solid.triangles_center[:, 1] > 0, 1, 0).astype(np.uint8)  # one fingertip on each
-    across = PartedSolid(held.solid, held.surface, sides, held.part_ids, held.radius_m)
+    across = PartedSolid(held.solid, held.surface, sides, held.part_ids, held.radius_m, OPENING_M)
     assert row(across, grasp_at(np.array([0.02, 0, 0]), closing, 0.02), [])["part_id"] == "p0"
 
 
@@ -141,9 +141,16 @@ def test_fingertips_that_end_away_from_the_surface_touch_nothing(width_m: float)
     assert (found["part_id"], found["grasp_point_id"]) == ("", "")
 
 
+@pytest.mark.parametrize("beside_m", [-0.025, -0.012, 0.012, 0.025])
+def test_what_one_fingertip_meets_first_and_pushes_to_the_other_is_held(beside_m: float) -> None:
+    # a fifth of a clamp's grasps have the thing beside the middle of the open hand
+    found = row(bar(True), grasp_at(np.array([0.02, beside_m, 0]), SIDE, 0.02), [ON_BAR])
+    assert (found["part_id"], found["grasp_point_id"]) == ("p1", "g0")
+
+
 def test_a_hand_without_two_pads_touches_what_is_nearest() -> None:
     held = bar(True)
-    hand = PartedSolid(held.solid, held.surface, held.labels, held.part_ids, held.radius_m, by_rays=False)
+    hand = PartedSolid(held.solid, held.surface, held.labels, held.part_ids, held.radius_m, opening_m=None)
     found = row(hand, grasp_at(np.array([0.02, 0, 0]), SIDE, 0.05), [ON_BAR])
     assert (found["part_id"], found["grasp_point_id"]) == ("p1", "g0")
 

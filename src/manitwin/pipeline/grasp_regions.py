@@ -66,7 +66,8 @@ class Contacts:
 class PartedSolid:
     """A closed solid whose faces are of parts ``labels (F,) uint8`` called ``part_ids``: none are told where these are empty.
 
-    ``by_rays``: fingertips close on a line; those of other hands are taken to touch what is nearest to them.
+    ``opening_m`` is how far apart the pads of a parallel gripper are before they close on a line; None for other hands, whose
+    fingertips are taken to touch what is nearest to them.
     """
 
     solid: trimesh.Trimesh
@@ -74,7 +75,7 @@ class PartedSolid:
     labels: np.ndarray
     part_ids: tuple[str, ...]
     radius_m: float
-    by_rays: bool = True
+    opening_m: float | None = None
 
     @classmethod
     def read(cls, draft: Draft, gripper: Gripper, radius_m: float) -> PartedSolid:
@@ -83,15 +84,48 @@ class PartedSolid:
         with np.load(draft.path(PARTS_FILE)) as arrays:
             labels = arrays["solid"]
         ids = tuple(part["id"] for part in draft.field("parts"))
-        return cls(solid, RayCaster(solid), labels, ids, radius_m, isinstance(gripper, ParallelGripper))
+        return cls(solid, RayCaster(solid), labels, ids, radius_m, pads_apart_m(gripper))
 
     def contacts(self, gripper_to_object: np.ndarray, depth_m: np.ndarray, width_m: np.ndarray) -> Contacts:
-        """Return where grasps ``(N, 4, 4)`` touch; with rays nothing that is farther than their reach from where it should be."""
+        """Return where grasps ``(N, 4, 4)`` touch; with rays nothing that is farther than their reach from where it should be.
+
+        What lies beside the middle of an open hand is met by one fingertip first, and pushed to the other.
+        """
         middle = fingertips(gripper_to_object, depth_m)
-        half = (width_m / 2)[:, None] * gripper_to_object[:, :3, 0]
-        find = self._by_rays if self.by_rays else self._nearest
-        sides = [find(middle + sign * half, gripper_to_object, sign) for sign in (1.0, -1.0)]
-        return Contacts(*(np.stack(values, axis=1) for values in zip(*sides, strict=True)))
+        found = self._contacts(middle, width_m / 2, width_m / 2, gripper_to_object)
+        if self.opening_m is None or found.touches.all():
+            return found
+        lost = np.flatnonzero(~found.touches.all(1))
+        plus_m, minus_m = self._met(middle[lost], gripper_to_object[lost], self.opening_m)
+        beside = np.abs(plus_m + minus_m - width_m[lost]) <= REACH_M  # as wide as it was said to be, and elsewhere
+        lost = lost[beside]
+        again = self._contacts(middle[lost], plus_m[beside], minus_m[beside], gripper_to_object[lost])
+        for field in fields(Contacts):
+            getattr(found, field.name)[lost] = getattr(again, field.name)
+        return found
+
+    def _contacts(
+        self, middle_m: np.ndarray, plus_m: np.ndarray, minus_m: np.ndarray, gripper_to_object: np.ndarray
+    ) -> Contacts:
+        """Return where fingertips touch that end ``plus_m (N,)`` and ``minus_m (N,)`` from the middle along +X and -X."""
+        find, closing = self._nearest if self.opening_m is None else self._by_rays, gripper_to_object[:, :3, 0]
+        plus = find(middle_m + plus_m[:, None] * closing, gripper_to_object, 1.0)
+        minus = find(middle_m - minus_m[:, None] * closing, gripper_to_object, -1.0)
+        return Contacts(*(np.stack(values, axis=1) for values in zip(plus, minus, strict=True)))
+
+    def _met(
+        self, middle_m: np.ndarray, gripper_to_object: np.ndarray, opening_m: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return how far from the middle ``(N,)`` along +X and -X the fingertips of an open hand meet the surface, if they do."""
+        found = []
+        for sign in (1.0, -1.0):
+            starts, inward = _grid(
+                middle_m + sign * opening_m / 2 * gripper_to_object[:, :3, 0], gripper_to_object, sign
+            )
+            distance, _ = self.surface.first_hits(starts.reshape(-1, 3), inward)
+            first_m = distance.reshape(starts.shape[:2]).min(1)
+            found.append(opening_m / 2 - first_m)
+        return found[0], found[1]
 
     def regions(self, contacts: Contacts) -> np.ndarray:
         """Return the id of the part ``(N,)`` that more of the fingertips touches, at a tie the first of the table; '' for none.
@@ -160,17 +194,14 @@ class PartedSolid:
         self, place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Send rays along the closing axis from around each contact's place into the object."""
-        closing, across, approach = (gripper_to_object[:, :3, k] for k in range(3))
-        steps = np.linspace(-PAD_HALF_M, PAD_HALF_M, 3)
-        offsets = np.stack([u * across + v * approach for u in steps for v in steps], axis=1)
-        inward = np.repeat(-sign * closing, offsets.shape[1], axis=0)
-        starts = (place_m[:, None] + sign * REACH_M * closing[:, None] + offsets).reshape(-1, 3)
+        grid, inward = _grid(place_m + sign * REACH_M * gripper_to_object[:, :3, 0], gripper_to_object, sign)
+        starts = grid.reshape(-1, 3)
         distance, face = self.surface.first_hits(starts, inward)
         met = face >= 0
         face = np.maximum(face, 0)
         met &= (distance <= 2 * REACH_M) & (np.einsum("ij,ij->i", self.surface.face_normals[face], inward) < 0)
-        hits = (starts + np.where(met, distance, 0.0)[:, None] * inward).reshape(*offsets.shape)
-        met, part = met.reshape(offsets.shape[:2]), self.labels[face].reshape(offsets.shape[:2])
+        hits = (starts + np.where(met, distance, 0.0)[:, None] * inward).reshape(grid.shape)
+        met, part = met.reshape(grid.shape[:2]), self.labels[face].reshape(grid.shape[:2])
         names = np.unique(self.labels)
         on = met[:, :, None] & (part[:, :, None] == names)
         best = on.sum(1).argmax(1)
@@ -178,7 +209,7 @@ class PartedSolid:
         count = mine.sum(1)
         center = (hits * mine[:, :, None]).sum(1) / np.maximum(count, 1)[:, None]
         positions = np.where((count > 0)[:, None], center, place_m)
-        return positions, count > 0, np.where(count > 0, names[best], NO_PART), count / offsets.shape[1]
+        return positions, count > 0, np.where(count > 0, names[best], NO_PART), count / grid.shape[1]
 
     def _nearest(
         self, place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float
@@ -188,6 +219,19 @@ class PartedSolid:
         face, _ = self._closest.of(place_m)
         positions, _ = closest_points_on_triangles(place_m, np.asarray(self.solid.triangles)[face])
         return positions, np.ones(len(face), bool), self.labels[face], np.ones(len(face))
+
+
+def pads_apart_m(gripper: Gripper) -> float | None:
+    """Return how far apart the pads of a parallel gripper are before they close; None for other hands."""
+    return gripper.opening_m if isinstance(gripper, ParallelGripper) else None
+
+
+def _grid(place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return three by three starts ``(N, 9, 3)`` over a fingertip at each place, and the way inward of each ``(9 N, 3)``."""
+    closing, across, approach = (gripper_to_object[:, :3, k] for k in range(3))
+    steps = np.linspace(-PAD_HALF_M, PAD_HALF_M, 3)
+    offsets = np.stack([u * across + v * approach for u in steps for v in steps], axis=1)
+    return place_m[:, None] + offsets, np.repeat(-sign * closing, offsets.shape[1], axis=0)
 
 
 def region_columns(

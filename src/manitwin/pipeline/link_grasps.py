@@ -12,11 +12,10 @@ from manitwin.errors import Rejected, choose_from
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
 from manitwin.models.graspers.protocol import GraspProposals, GraspRequest, Screen, Screened
-from manitwin.pipeline.grasp_regions import PartedSolid
+from manitwin.pipeline.grasp_regions import PartedSolid, pads_apart_m
 from manitwin.pipeline.links import face_links, read_articulation
 from manitwin.pipeline.object_state import load_solid
 from manitwin.robots.grippers.gripper import Gripper
-from manitwin.robots.grippers.parallel import ParallelGripper
 
 ON_LINK = "on_link"
 """The filter's name in the counts of what was left."""
@@ -72,8 +71,7 @@ class ChosenLink:
             raise Rejected("no_proposal", said, stage="grasps")
         solid = load_solid(draft.path("solid.npz"))
         labels = face_links(draft, articulation, solid)
-        by_rays = isinstance(gripper, ParallelGripper)
-        return cls(PartedSolid(solid, RayCaster(solid), labels, names, 0.0, by_rays), link)
+        return cls(PartedSolid(solid, RayCaster(solid), labels, names, 0.0, pads_apart_m(gripper)), link)
 
     def focused(self, request: GraspRequest) -> GraspRequest:
         """Return the request with places all over the link in the place of the selected points: few of these may lie on it."""

@@ -226,7 +226,7 @@ def test_grasps_of_real_objects_hold(
     draft = box_draft(tmp_path, [0.04, 0.04, 0.25], mesh.vertices[:: len(mesh.vertices) // 3][:3].tolist())
     np.savez(tmp_path / "solid.npz", vertices=mesh.vertices, faces=mesh.faces)
     draft.fields["physical"]["center_of_mass_m"] = mesh.center_mass.tolist()
-    draft.fields["geometry"] = {}
+    draft.fields["geometry"], draft.paths["canonical.npz"] = {}, tmp_path / "solid.npz"
     run_all(draft, tmp_path, CollisionStage(CollisionConfig()))
     with fake_class() as fake:
         grasper = grasper_class.from_spec(f"@{fake.url}", CONFIG)
