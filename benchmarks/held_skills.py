@@ -23,12 +23,14 @@ from manitwin.episodes.episode import run_episode
 from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
+from manitwin.episodes.room_for_hand import begins_with_room
 from manitwin.episodes.setting import table_setting
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import load_skill
+from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.target_grasps import shuffled, usable_grasps
 from manitwin.robots.load import load_robot
-from manitwin.scenes.layouts.pool import PoolTwin, pool_of
+from manitwin.scenes.layouts.pool import PoolTwin, StandingPose, pool_of
 from manitwin.scenes.loaded_scene import furniture_boxes
 from manitwin.twin.loaded_twin import TwinSource
 
@@ -52,7 +54,8 @@ class Bench:
     def attempt(self, skill_name: str, target: PoolTwin, seed: int, wrong: str = "") -> tuple[str, float]:
         """Return the outcome of an episode, or of its negative control of a kind, and its CPU seconds."""
         began, rng, skill = time.process_time(), np.random.default_rng(seed), load_skill(skill_name)
-        setting = table_setting(skill, target, self.pool, self._placeable, 0, self.robot.workspace, rng)
+        area = self.robot.workspace
+        setting = table_setting(skill, target, self.pool, self._placeable, 0, area, rng, self._begins)
         if setting is None or setting.skill_goal is None:
             return "no_room", time.process_time() - began
         goal = setting.skill_goal
@@ -79,7 +82,7 @@ class Bench:
         for twin in self.pool.twins:
             partners = [each for each in self.pool.twins if each is not twin] if skill.has_partner else [None]
             asked_for = not categories or twin.category in categories
-            if asked_for and any(skill.suits(self.pool, twin, each) for each in partners):
+            if asked_for and self._begins(skill, twin) and any(skill.suits(self.pool, twin, each) for each in partners):
                 found.append(twin)
         return found
 
@@ -91,6 +94,15 @@ class Bench:
             if sum(outcomes[each] for each in JUDGED) == count:
                 break
         return outcomes
+
+    def _begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
+        begins, ends = skill.begins_in(target), skill.ends_in(target)
+        if not ends:
+            return begins
+        grasps = [each.grasp for each in usable_grasps(self.source.twin(target.twin_id), self.robot.gripper)]
+        return begins_with_room(
+            begins, ends, target.poses, grasps, self.robot.gripper, self.pool.body(target.twin_id).body
+        )
 
     def _placeable(self, twin: PoolTwin) -> Placeable:
         return Placeable.of(self.pool, twin)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.episodes.planning.problem import Grasp
-from manitwin.episodes.room_for_hand import placement_with_room
+from manitwin.episodes.room_for_hand import begins_with_room, placement_with_room
 from manitwin.geometry.poses import transform
 from manitwin.robots.grippers.gripper import load_gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.scenes.layouts.pool import StandingPose
+from rigid_boxes import box
 
 HALF_M = np.array([0.045, 0.05, 0.015])
 ON_EDGE = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # the slab's Y is up
@@ -47,3 +48,38 @@ def test_the_likeliest_placement_with_room_is_taken_and_rare_ones_are_not() -> N
     assert placement_with_room([LYING, STANDING, likelier], [DOWN_THE_SLAB], hand()) is likelier
     assert placement_with_room([LYING, rare], [DOWN_THE_SLAB], hand()) is None
     assert placement_with_room([LYING, STANDING], [], hand()) is None
+
+
+JAWS, LONG_M, WIDE_M = load_gripper("panda"), 0.13, 0.05
+X_UP = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])
+BAR = box([LONG_M, WIDE_M, WIDE_M], 0.2, 0.6)
+FLAT = StandingPose(0, transform(None, np.array([0, 0, WIDE_M / 2])), 0.4, 0.05, upright=True)
+ON_SIDE = StandingPose(1, transform(ON_EDGE, np.array([0, 0, WIDE_M / 2])), 0.4, 0.05)
+ON_END = StandingPose(2, transform(X_UP, np.array([0, 0, LONG_M / 2])), 0.2, 0.05)
+
+
+def jaws(approach: list[float], closing: list[float], x_m: float = 0.045) -> Grasp:
+    """A grasp of the bar near its +X end, of which a hand beside the bar has room over the table when that end is up."""
+    along, across = np.array(approach), np.array(closing)
+    rotation = np.column_stack([across, np.cross(along, across), along])
+    return Grasp("jaws", transform(rotation, np.array([x_m, 0, 0]) - JAWS.tip_depth_m * along), WIDE_M)
+
+
+FROM_Y, FROM_Z = jaws([0, -1, 0], [0, 0, 1]), jaws([0, 0, -1], [0, 1, 0])
+
+
+def test_a_bar_begins_where_a_grasp_leads_to_its_end_at_once_or_by_another_placement() -> None:
+    def begins(*ways: StandingPose, grasps: tuple[Grasp, ...] = (FROM_Y, FROM_Z)) -> list[StandingPose]:
+        return begins_with_room([ON_SIDE], [FLAT], ways, grasps, JAWS, BAR)
+
+    assert begins(FLAT) == []  # from +Y it is lifted, from +Z it is laid flat: no grasp does both
+    assert begins(FLAT, ON_END) == [ON_SIDE]
+    assert begins(ON_END, grasps=(FROM_Y,)) == []
+    assert begins_with_room([ON_END], [FLAT], (), (FROM_Y, FROM_Z), JAWS, BAR) == [ON_END]
+
+
+def test_what_is_too_heavy_for_a_grasp_at_its_end_does_not_begin_lying() -> None:
+    heavy = box([LONG_M, WIDE_M, WIDE_M], 2.0, 0.6)
+    both = ([ON_SIDE], [ON_END], (), (FROM_Y,), JAWS)
+    assert begins_with_room(*both, BAR) == [ON_SIDE]
+    assert begins_with_room(*both, heavy) == []

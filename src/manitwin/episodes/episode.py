@@ -17,6 +17,7 @@ from manitwin.episodes.outcome import moved_m, turned_rad
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.planning.two_arms import TwoArmPlanner
 from manitwin.episodes.recording import Recording
+from manitwin.episodes.second_grasp import carry_out
 from manitwin.episodes.sequence import GoalSequence, course_of, later_courses
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.skill import SkillGoal
@@ -49,13 +50,11 @@ def run_episode(
             facts.outcome = "reached_already"
         elif (course := _first_course(start, facts, sequence)).plan():
             execution = Execution(world, robot, closing, *tip_poses_of(planner))
-            execution.watches = list(course.watches(world))
             execution.literal = None if sequence is None else 0
             try:
-                course.execute(execution)
-                for course in () if sequence is None else later_courses(sequence, start, world, execution, facts):
-                    execution.watches += course.watches(world)
-                    course.execute(execution)
+                course = carry_out(course, world, execution)
+                for later in () if sequence is None else later_courses(sequence, start, world, execution, facts):
+                    course = carry_out(later, world, execution)
                 judge(start, course.goal_object_to_world, facts, world, execution)
             except Ended as end:
                 facts.outcome = str(end)

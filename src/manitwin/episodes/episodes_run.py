@@ -23,6 +23,7 @@ from manitwin.episodes.batch import BATCH_RECORD, BATCH_SCHEMA_VERSION, Batch, B
 from manitwin.episodes.configuration import read_configuration
 from manitwin.episodes.episodes_stage import EPISODES, EpisodesStage
 from manitwin.episodes.retirement import Retirement, find_retirements, retire
+from manitwin.episodes.setting import Begins
 from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.skills.hands import check_hand
 from manitwin.episodes.skills.registry import load_skill
@@ -215,7 +216,8 @@ def make_episodes(
             ids = [task.task_id for task in tasks]
             deal = batches(robot.name, count, config.batch, task_ids=ids, there=there)
         elif source.scenes is None:
-            twin_ids = _twins_for(skill, pool_of(source.dataset))
+            stage = EpisodesStage(config, source.dataset, None)
+            twin_ids = twins_for(skill, pool_of(source.dataset), stage.begins)
             deal = batches(robot.name, count, config.batch, twin_ids=twin_ids, there=there)
         else:
             deal = batches(robot.name, count, config.batch, scene_ids=scene_ids(Path(source.scenes)), there=there)
@@ -233,10 +235,11 @@ def make_episodes(
     return report
 
 
-def _twins_for(skill: Skill | None, pool: Pool) -> list[str]:
+def twins_for(skill: Skill | None, pool: Pool, begins: Begins) -> list[str]:
     """Return the ids of the twins that episodes are of: all, but of a skill those that it suits, with some partner if it has one.
 
-    Partners are asked about in small pools alone: they are pairs, and each asks for the shapes of two twins.
+    And those that can be brought where it ends, from some placement. Partners and grasps are asked about in small pools alone:
+    they are pairs, each of which asks for the shapes of two twins, and tables.
     """
     if skill is None or (skill.has_partner and len(pool.twins) > MOST_PAIRED):
         return [twin.twin_id for twin in pool.twins]
@@ -245,7 +248,8 @@ def _twins_for(skill: Skill | None, pool: Pool) -> list[str]:
         partners = [each for each in pool.twins if each is not target] if skill.has_partner else [None]
         return any(skill.suits(pool, target, partner) for partner in partners)
 
-    found = [twin.twin_id for twin in pool.twins if suits(twin)]
+    asks_for_grasps = len(pool.twins) <= MOST_PAIRED
+    found = [twin.twin_id for twin in pool.twins if suits(twin) and (not asks_for_grasps or begins(skill, twin))]
     if not found:
         raise UsageError(
             f"none of {len(pool.twins)} twins can be used to {skill.name}; docs/skills.md says what it takes"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -25,11 +25,12 @@ from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.planning.two_arms import planner_of
-from manitwin.episodes.room_for_hand import placement_with_room
+from manitwin.episodes.room_for_hand import begins_with_room, placement_with_room
 from manitwin.episodes.sealing_surface import with_surface
 from manitwin.episodes.setting import Setting, scene_setting, table_setting
 from manitwin.episodes.settings import TrajectoriesConfig
 from manitwin.episodes.skills.registry import load_skill
+from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.stored_episode import RecordedObject, StoredEpisode, recorded_robot
 from manitwin.episodes.target_grasps import TargetGrasp, shuffled, usable_grasps
 from manitwin.episodes.tasks.task_files import read_tasks
@@ -39,7 +40,7 @@ from manitwin.errors import UsageError
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.robots.load import load_robot
 from manitwin.robots.robot import Robot
-from manitwin.scenes.layouts.pool import Pool, PoolTwin, pool_of
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose, pool_of
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
 from manitwin.scenes.scene_files import scene_name
 from manitwin.twin.loaded_twin import Twin, TwinSource
@@ -52,7 +53,7 @@ class EpisodesStage:
     """Make the episodes of a batch. Each draws from a generator of its own, by the run's seed and its number in the whole."""
 
     name = "episodes"
-    version = "3"
+    version = "4"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (EPISODES, ATTEMPTS, "batch")
     needs: Resource = "cpu"
@@ -156,13 +157,25 @@ class EpisodesStage:
         workspace, skill = self._robot.workspace, load_skill(self.settings.skill)
         if batch.twin_id is not None:
             target = self._pool.twin(batch.twin_id)
-            return table_setting(skill, target, self._pool, self._placeable_of, self.settings.others, workspace, rng)
+            return table_setting(
+                skill, target, self._pool, self._placeable_of, self.settings.others, workspace, rng, self.begins
+            )
         assert batch.scene_id is not None and self.scenes is not None
         scene = Scene.read(Path(self.scenes) / scene_name(batch.scene_id), self.dataset)
         return scene_setting(skill, scene, lambda: self._pool, self._is_graspable, workspace, rng)
 
     def _placeable_of(self, twin: PoolTwin) -> Placeable:
         return self._placeable(twin.twin_id)
+
+    def begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
+        """Return the placements that a target may begin in: where one is to be reached, those that a grasp leads there from."""
+        begins, ends = skill.begins_in(target), skill.ends_in(target)
+        if not ends:
+            return begins
+        grasps = [each.grasp for each in self._grasps(target.twin_id).values()]
+        return begins_with_room(
+            begins, ends, target.poses, grasps, self._robot.gripper, self._pool.body(target.twin_id).body
+        )
 
     def _is_graspable(self, twin_id: str) -> bool:
         return self._twin(twin_id).record.grasps is not None

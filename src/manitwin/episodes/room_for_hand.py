@@ -1,15 +1,18 @@
-"""In which placement a thing begins that a hand with joints is to pick: one in which its fingers have room over the table."""
+"""In which placement a thing begins that is to be picked: one in which a hand has room over what it stands on."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 
 import numpy as np
 
 from manitwin.episodes.planning.grasp_candidates import CLOSED
 from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.steady_grasps import bears_weight
 from manitwin.geometry.boxes import box_corners
+from manitwin.geometry.rigid_body import PlacedObject, RigidBody
+from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
 from manitwin.scenes.layouts.pool import StandingPose
 
@@ -24,19 +27,57 @@ def placement_with_room(
 
     None: no placement is so; those that hardly ever occur are not asked.
     """
-    corners_of = cache(lambda number: _corners(gripper, grasps[number]))
+    has_room = _room_over_plane(grasps, gripper)
     likely = [pose for pose in placements if pose.probability >= LEAST_LIKELY]
     for placement in sorted(likely, key=lambda pose: (pose.upright, pose.probability), reverse=True):
-        for number, grasp in enumerate(grasps):
-            up = (placement.object_to_plane @ grasp.gripper_to_object)[2]
-            if up[3] > 0 and float((corners_of(number) @ up[:3]).min() + up[3]) >= CLEARANCE_M:
-                return placement
+        if any(has_room(placement, number) for number in range(len(grasps))):
+            return placement
     return None
 
 
-def _corners(gripper: MultiFingerGripper, grasp: Grasp) -> np.ndarray:
+def begins_with_room(
+    begins: Sequence[StandingPose],
+    ends: Sequence[StandingPose],
+    ways: Sequence[StandingPose],
+    grasps: Sequence[Grasp],
+    gripper: Gripper,
+    body: RigidBody,
+) -> list[StandingPose]:
+    """Return those of some placements from which a thing can be brought to one of ``ends``.
+
+    A grasp has room in both, and bears the weight of the ``body`` as it is lifted; or two grasps do so with one of ``ways``
+    between them. The plane is all that is asked about, not the arm.
+    """
+    has_room = _room_over_plane(grasps, gripper)
+
+    def put_down(placement: StandingPose) -> set[int]:
+        return {number for number in range(len(grasps)) if has_room(placement, number)}
+
+    def lifted(placement: StandingPose) -> set[int]:
+        there = PlacedObject("", "", body, placement.object_to_plane)
+        return {number for number in put_down(placement) if bears_weight(grasps[number], there, gripper)}
+
+    at_ends = set[int]().union(*map(put_down, ends))
+    half_way = set[int]().union(*(put_down(way) for way in ways if lifted(way) & at_ends))
+    return [begin for begin in begins if lifted(begin) & (at_ends | half_way)]
+
+
+def _room_over_plane(grasps: Sequence[Grasp], gripper: Gripper) -> Callable[[StandingPose, int], bool]:
+    """Return what tells whether the hand of a grasp, by its number, is above the plane of a placement."""
+    corners_of = cache(lambda number: _corners(gripper, grasps[number]))
+
+    def has_room(placement: StandingPose, number: int) -> bool:
+        up = (placement.object_to_plane @ grasps[number].gripper_to_object)[2]
+        return bool(up[3] > 0 and float((corners_of(number) @ up[:3]).min() + up[3]) >= CLEARANCE_M)
+
+    return has_room
+
+
+def _corners(gripper: Gripper, grasp: Grasp) -> np.ndarray:
     """Return the corners ``(N, 3)`` of all that a hand covers before it closes and on its way, in the grasp frame."""
-    assert grasp.joints_rad is not None
-    before, to = grasp.joints_rad
-    boxes = [box for closed in (0.0, *CLOSED) for box in gripper.boxes_at(before + closed * (to - before))]
+    boxes = gripper.boxes(gripper.opening_m)
+    if isinstance(gripper, MultiFingerGripper):
+        assert grasp.joints_rad is not None
+        before, to = grasp.joints_rad
+        boxes = [box for closed in (0.0, *CLOSED) for box in gripper.boxes_at(before + closed * (to - before))]
     return np.concatenate([box_corners(half, pose) for pose, half in boxes])

@@ -18,12 +18,13 @@ from manitwin.episodes.pick_place_tasks import (
 )
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
 from manitwin.robots.robot import Workspace
-from manitwin.scenes.layouts.pool import Pool, PoolTwin
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 from manitwin.scenes.layouts.surroundings import make_furniture, make_lights
 from manitwin.scenes.loaded_scene import Scene, furniture_boxes
 from manitwin.scenes.scene import Furniture, Light
 
 PARTNERS_TRIED, STARTS_TRIED = 40, 6
+Begins = Callable[[Skill, PoolTwin], Sequence[StandingPose]]
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,12 @@ def table_setting(
     others: int,
     workspace: Workspace,
     rng: np.random.Generator,
+    begins: Begins = lambda skill, target: skill.begins_in(target),
 ) -> Setting | None:
-    """Draw a table with a target, the partner that the skill wants, and so many others; None: there is no room, or no partner."""
+    """Draw a table with a target, the partner that the skill wants, and so many others; None: there is no room, or no partner.
+
+    ``begins`` gives the placements that the target may begin in with a skill.
+    """
 
     def other() -> Placeable:
         while True:
@@ -66,7 +71,7 @@ def table_setting(
         task = sample_task(placeable(target), other, others, area, rng)
         return None if task is None else Setting(task, furniture, ambient, lights)
     for _ in range(STARTS_TRIED):
-        taking_part = _taking_part(skill, target, pool, placeable, rng)
+        taking_part = _taking_part(skill, target, pool, placeable, begins(skill, target), rng)
         objects = None if taking_part is None else sample_objects(taking_part, other, others, area, rng)
         if objects is None:
             return None
@@ -120,11 +125,11 @@ def _taking_part(
     target: PoolTwin,
     pool: Pool,
     placeable: Callable[[PoolTwin], Placeable],
+    begins: Sequence[StandingPose],
     rng: np.random.Generator,
 ) -> list[Placeable] | None:
-    if not skill.has_partner and not skill.suits(pool, target, None):
+    if not begins or (not skill.has_partner and not skill.suits(pool, target, None)):
         return None
-    begins = skill.begins_in(target)
     first = Placeable.in_pose(pool, target, begins[int(rng.integers(len(begins)))])
     if not skill.has_partner:
         return [first]

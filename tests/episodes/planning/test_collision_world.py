@@ -1,5 +1,7 @@
 """What is free, by coal with bounding boxes first, against every single distance in MuJoCo."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from mujoco_witness import Witness
@@ -95,3 +97,21 @@ def test_what_stands_between_open_and_closed_jaws_is_in_the_way_of_what_they_hol
         assert world.is_hand_free(Phase.RETREAT, there)
         assert world.is_hand_free(Phase.LOWER, there) is is_free
         assert world.is_hand_free(Phase.CARRY, standing(0.5, -0.1, z_m=0.1) @ grasp)
+
+
+def test_what_is_lifted_stays_a_centimetre_from_the_arm(arm):
+    """A plate beside the hand reaches up to the wrist, farther and farther away from it."""
+    offsets_m = np.arange(0.04, 0.2, 0.002)
+
+    def first_free_m(phase: Phase) -> float:
+        for off_m in offsets_m:
+            plate = body(box_hull((0.002, 0.03, 0.15), (off_m, 0, 0.15)))
+            lying = PlacedObject("object_00", "ef" * 8, plate, standing(0.5, 0.1))
+            world = world_of(arm, replace(problem(standing(0.5, 0.1), standing(0.5, -0.1)), target=lying))
+            world.hold(above(0.02))
+            world.arm.enter(phase, SETTINGS.clearance_m)
+            if world.arm.is_free(arm.home):
+                return float(off_m)
+        raise AssertionError("never free")
+
+    assert first_free_m(Phase.LIFT) - first_free_m(Phase.CARRY) == pytest.approx(0.009, abs=0.0031)

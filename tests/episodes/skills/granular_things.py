@@ -71,6 +71,26 @@ def mixing_bowl() -> tuple[RigidBody, tuple[TwinFrame, ...]]:
     return bowl().body(), ()
 
 
+def plate() -> tuple[RigidBody, tuple[TwinFrame, ...]]:
+    """The bowl pressed flat: as wide, and 2 cm high."""
+    body = bowl().body()
+    flat = np.array([1.0, 1.0, 0.02 / np.concatenate(body.hulls)[:, 2].max()])
+    return replace(body, hulls=tuple(hull * flat for hull in body.hulls)), ()
+
+
+def deep_pot(depth_m: float, radius_m: float) -> tuple[RigidBody, tuple[TwinFrame, ...]]:
+    """A pot of twelve upright walls 4 mm thick on a floor as thick."""
+    around = np.linspace(0, 2 * np.pi, 13)
+    rings = {r: np.column_stack([r * np.cos(around), r * np.sin(around)]) for r in (radius_m, radius_m + 0.004)}
+    floor = np.array([[x, y, z] for x, y in rings[radius_m + 0.004][:12] for z in (0, 0.004)])
+    walls = [
+        np.array([[*rings[r][i], z] for i in pair for r in rings for z in (0.004, depth_m + 0.004)])
+        for pair in pairwise(range(13))
+    ]
+    body = box([2 * radius_m, 2 * radius_m, depth_m], 0.6, center_m=(0, 0, depth_m / 2))
+    return replace(body, hulls=(floor, *walls)), ()
+
+
 def with_fewer(goal: SkillGoal, count: int = 20) -> SkillGoal:
     """The goal with the first granules alone: a step costs what there is."""
     assert goal.granules is not None

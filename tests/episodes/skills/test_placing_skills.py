@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from granular_things import deep_pot
 from placing_skills import AREA, GRASPS, LYING, POOL, around, attempt, goal_of, placed, pool_with_lying_can
 
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.registry import PICK_PLACE, SKILLS, load_skill, skill_names
 from manitwin.episodes.skills.skill import FoundPoses
+from manitwin.episodes.skills.within_rim import LET_GO_M
 from manitwin.errors import UsageError
-from manitwin.geometry.poses import transform_points
+from manitwin.geometry.poses import transform, transform_points
+from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
 from rigid_boxes import above
+from twin_folders import twin_id
 
 DICE = (GRASPS["dice"],)
 CASES = {
@@ -87,6 +92,21 @@ def test_only_what_fits_goes_into_a_vessel() -> None:
     assert not SKILLS["stack"].suits(POOL, dice, box)
     assert SKILLS["place_on"].suits(POOL, dice, board)
     assert not SKILLS["place_on"].suits(POOL, dice, bowl)  # a vessel has only a rim
+
+
+def test_into_a_deep_vessel_things_are_also_let_go_at_its_rim() -> None:
+    body, _ = deep_pot(0.16, 0.06)
+    pot = PoolTwin(twin_id(90), "0", "pot", (StandingPose(0, np.eye(4), 1.0, 0.07, True),), True, ())
+    bodies = {twin.twin_id: POOL.body(twin.twin_id).body for twin in POOL.twins} | {pot.twin_id: body}
+    pool = Pool([*POOL.twins, pot], bodies.__getitem__)
+    standing = PlacedObject("object_01", pot.twin_id, body, transform(None, np.array([0.5, 0.1, 0])))
+    surroundings = around(placed(0, "dice", 0.45, -0.2), standing, pool=pool)
+    goal = goal_of("place_in", surroundings)
+    assert goal is not None
+    dice = np.concatenate(surroundings.objects[0].body.hulls)
+    low_m = np.array([transform_points(pose, dice)[:, 2].min() for pose in goal.poses])
+    assert (low_m < 0.03).any()  # where it comes to rest
+    assert (low_m > 0.16 + 0.004 - LET_GO_M - 0.01).any()  # where a hand that is wider than the pot can let it go
 
 
 def test_the_same_seed_gives_the_same_poses() -> None:

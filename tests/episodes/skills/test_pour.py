@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from granular_things import cup, mixing_bowl, two_things, with_fewer
+from granular_things import cup, mixing_bowl, plate, two_things, with_fewer
 from held_skills import attempt, beside
 
 from manitwin.episodes.planning.problem import Grasp
@@ -62,6 +62,9 @@ def test_only_vessels_with_a_lip_pour_and_only_into_wider_ones_that_hold_it() ->
     assert not pour.suits(pool, small, small)
     assert not pour.suits(pool, small, None)
     assert not pour.suits(pool, replace(small, frames=()), large)
+    dish = two_things((BODY, FRAMES), plate(), ((0.5, -0.2), (0.5, 0.12)))
+    assert dish.body(1).opening is not None
+    assert not pour.suits(dish.pool, dish.twin(0), dish.twin(1))  # grains roll off a plate
     turned = replace(FRAMES[0], roll_free=True)
     assert not pour.suits(pool, replace(small, frames=(turned,)), large)
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from brick_episodes import TABLE, panda
 from held_skills import AREA
 
 from manitwin.episodes.episode import run_episode
 from manitwin.episodes.episode_facts import EpisodeFacts
+from manitwin.episodes.episodes_run import twins_for
 from manitwin.episodes.planning.problem import Grasp, PickPlaceProblem
+from manitwin.episodes.room_for_hand import begins_with_room
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import SKILLS
-from manitwin.episodes.skills.skill import Surroundings
+from manitwin.episodes.skills.skill import Skill, Surroundings
+from manitwin.errors import UsageError
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.scenes.layouts.pool import Pool, PoolTwin, StandingPose
@@ -74,3 +78,17 @@ def test_the_ways_are_placements_in_which_it_does_not_stand() -> None:
     assert len(first) == len(second) > 4
     assert all(np.array_equal(one, other) for one, other in zip(first, second, strict=True))
     assert all(abs(pose[2, 2]) < 1e-6 for pose in first)
+
+
+def test_episodes_are_only_of_twins_that_a_grasp_brings_there() -> None:
+    twins = [PoolTwin(twin_id(n), "0", "bar", PLACEMENTS, False, ()) for n in (0, 1)]
+    pool, upright = Pool(twins, lambda _: BODY), SKILLS["upright"]
+
+    def begins(skill: Skill, twin: PoolTwin) -> list[StandingPose]:
+        grasps = (FROM_Y, FROM_Z) if twin is twins[1] else (FROM_Y,)
+        ends, gripper = skill.ends_in(twin), panda()[0].gripper
+        return begins_with_room(skill.begins_in(twin), ends, twin.poses, grasps, gripper, BODY)
+
+    assert twins_for(upright, pool, begins) == [twins[1].twin_id]
+    with pytest.raises(UsageError, match="can be used to upright"):
+        twins_for(upright, pool, lambda skill, twin: [])

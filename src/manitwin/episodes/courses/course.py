@@ -5,26 +5,46 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
-from manitwin.episodes.outcome import moved_m
-from manitwin.episodes.planning.problem import Grasped, Motion, PickPlacePlan, PickPlaceProblem, PlanReport
+from manitwin.episodes.outcome import moved_m, turned_rad
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.problem import Grasp, Grasped, Motion, PickPlaceProblem, PlanReport
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.skill import SkillGoal
+from manitwin.episodes.steady_grasps import steady_tiers
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.world import RobotWorld
 
+_Chosen = TypeVar("_Chosen")
+
+ANOTHER_GRASP = "another_grasp"
+TURNED_M, TURNED_RAD = 0.01, np.radians(10.0)  # in the hand: what was planned with another pose there hardly serves
 LEAST_LIFT_SHARE = 0.5  # of what the hand rose: less, and the object was left behind
+
+
+def without_last(grasps: Sequence[_Chosen]) -> tuple[Sequence[_Chosen], Sequence[_Chosen]]:
+    """Return the first three quarters of grasps, and the rest.
+
+    Their order is drawn, good ones tend to come sooner (``target_grasps.shuffled``): what is asked of grasps beside that they
+    hold is asked of the rest last, or the one at the end of a handle would be taken again and again that hardly holds.
+    """
+    count = int(np.ceil(0.75 * len(grasps)))
+    return grasps[:count], grasps[count:]
 
 
 class Ended(Exception):
     """The episode ends here, with its outcome."""
+
+
+class NotTaken(Ended):
+    """The episode ends here unless the target, which stands again without the hand, is taken by another grasp."""
 
 
 class Planner(Protocol):
@@ -35,7 +55,7 @@ class Planner(Protocol):
         ...
 
     def plan_place(
-        self, problem: PickPlaceProblem, plan: PickPlacePlan, joint_positions_rad: np.ndarray,
+        self, problem: PickPlaceProblem, plan: Grasped, joint_positions_rad: np.ndarray,
         gripper_to_object_measured: np.ndarray, goal: np.ndarray, with_carry: bool,
     ) -> tuple[Motion | None, Motion, Motion] | None:  # fmt: skip
         """Plan carry, lower and retreat again."""
@@ -62,6 +82,14 @@ class Start:
     granules_in: Mapping[str, int] = field(default_factory=dict)
     moved: frozenset[str] = frozenset()
     partners: frozenset[str] = frozenset()
+
+
+def tiers_of(start: Start) -> list[tuple[Grasp, ...]]:
+    """Return the grasps that can be planned with, those first in which the target bears to be lifted where it is."""
+    problem = start.problem
+    if not isinstance(start.planner, PickPlacePlanner):
+        return [problem.grasps]
+    return steady_tiers(problem.grasps, problem.target, start.planner.robot.gripper)
 
 
 class Course(ABC):
@@ -91,7 +119,7 @@ class Course(ABC):
         return ()
 
     def grasp_and_lift(self, execution: Execution, reach: Motion, approach: Motion, lift: Motion) -> None:
-        """Reach, approach, close and lift; raises Ended where the object is left behind."""
+        """Reach, approach, close and lift; raises NotTaken where the object is left behind."""
         tip_pose = self.start.planner.tip_pose
         execution.shape(self.facts.grasp)
         execution.follow(reach)
@@ -102,7 +130,33 @@ class Course(ABC):
         execution.follow(lift)
         rise_m = tip_pose(execution.commanded_rad)[2, 3] - hand_height_m
         if self.height_m(execution) - closed_height_m < LEAST_LIFT_SHARE * rise_m:
-            raise Ended("not_lifted")
+            raise NotTaken("not_lifted")
+
+    def set_down_again(self, plan: Grasped, execution: Execution) -> None:
+        """Set the target down where it was, which has turned so far in the hand that what was planned does not serve.
+
+        Raises NotTaken once it stands. Nothing happens where it has turned little or cannot be set down, and to what has been
+        taken by another grasp already.
+        """
+        planned, measured = inverse(plan.gripper_to_object), inverse(execution.gripper_to_object())
+        center = self.problem.target.body.center_of_mass_m
+        is_as_planned = moved_m(planned, measured, center) < TURNED_M and turned_rad(planned, measured) < TURNED_RAD
+        if self.facts.replans[ANOTHER_GRASP] or is_as_planned:
+            return
+        goal = self.problem.target.object_to_world.copy()
+        goal[2, 3] += self.start.settings.release_height_m
+        found = self.start.planner.plan_place(
+            self.problem, plan, execution.commanded_rad, execution.gripper_to_object(), goal, True
+        )
+        if found is None:
+            return
+        carry, lower, retreat = found
+        if carry is not None:
+            execution.follow(carry)
+        execution.follow(lower)
+        execution.open()
+        execution.follow(retreat)
+        raise NotTaken("replan_failed")
 
     def height_m(self, execution: Execution) -> float:
         """Return how high the target's centre of mass is."""

@@ -8,8 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.courses.course import Course, Ended, Start
+from manitwin.episodes.courses.course import Course, Ended, Start, tiers_of, without_last
 from manitwin.episodes.courses.regulated import Admittance, with_heights
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
@@ -18,16 +19,18 @@ from manitwin.episodes.planning.closed_hand import fingertip_corners
 from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner, HeldPlan
 from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.planning.problem import Motion, Phase
+from manitwin.episodes.planning.problem import Grasp, Motion, Phase
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask, Regulated
-from manitwin.geometry.poses import transform
+from manitwin.geometry.poses import transform, transform_points
+from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.contacts import MeantContacts
 from manitwin.physics.sapien.world import RobotWorld
 
 BACK_S = 1.2
 YIELDED_S, PRESSED_S = 0.1, 0.2  # after the touch of a blow, and of a press
 RISEN_M = (0.01, 0.03)  # straight up, before the way back
+PUT_BACK_RAD = np.radians([0.0, 45, -45, 90, -90, 135, -135, 180])  # what has turned in the hand comes back as it can
 PEAK_OF_QUINTIC = 1.875  # its largest by its mean speed
 
 
@@ -79,7 +82,7 @@ class HeldCourse(Course):
         return () if self._watch is None else (self._watch,)
 
     def plan(self) -> bool:
-        """Plan with the grasps that leave the function free, those that do so best first."""
+        """Plan with the grasps that leave the function free."""
         task = self.task
         if task.empty:
             found = self._planner.plan_empty(self.problem, task.paths, longest_s=task.longest_s)
@@ -88,10 +91,8 @@ class HeldCourse(Course):
                 return False
             self._reach, self._held, self._joints = found
             return True
-        ranks = [(task.rank(grasp), grasp) for grasp in self.problem.grasps]
-        free = [(rank, grasp) for rank, grasp in ranks if rank is not None]
-        grasps = tuple(grasp for _, grasp in sorted(free, key=lambda each: each[0]))
-        blocking = len(ranks) - len(free)
+        grasps = tuple(grasp for tier in tiers_of(self.start) for grasp in self._ranked(tier))
+        blocking = len(self.problem.grasps) - len(grasps)
         self.problem = replace(self.problem, grasps=grasps)
         plan, report = self._planner.plan(self.problem, task.paths, as_hulls=task.as_hulls, longest_s=task.longest_s)
         self.facts.grasps_tried = report.tried + blocking
@@ -103,6 +104,12 @@ class HeldCourse(Course):
         self._plan, self._held, self._joints = plan, plan.held, plan.joints
         self.facts.grasp = plan.grasp
         return True
+
+    def _ranked(self, grasps: Sequence[Grasp]) -> list[Grasp]:
+        """Return the grasps that leave the function free, those first that do so best, but for the last quarter."""
+        ranks = [(self.task.rank(grasp), grasp) for grasp in grasps]
+        free = [(rank, grasp) for rank, grasp in ranks if rank is not None]
+        return [grasp for part in without_last(free) for _, grasp in sorted(part, key=lambda each: each[0])]
 
     def execute(self, execution: Execution) -> None:
         """Grasp and lift (or close the hand), carry, follow the path, and end as the task says."""
@@ -142,6 +149,8 @@ class HeldCourse(Course):
             carry, self._held, self._joints = found
             self._grasp_now = measured
         self.facts.replans["after_lift" if found is not None else "after_lift_failed"] += 1
+        if found is None:
+            self.set_down_again(plan, execution)
         execution.meant = MeantContacts(target=frozenset())
         execution.follow(carry)
         self.measure_slip(plan, execution)
@@ -254,18 +263,28 @@ class HeldCourse(Course):
         execution.follow(self._planner.timed(joints, BACK_S, Phase.RETURN))
 
     def _put_back(self, execution: Execution) -> None:
-        """Set the target down where it was; raises Ended where that cannot be planned."""
+        """Set the target down where it was, else turned about the upright there; raises Ended where that cannot be planned."""
         execution.meant = MeantContacts()
-        goal = self.problem.target.object_to_world.copy()
-        goal[2, 3] += self.start.settings.release_height_m
-        found = self._own.plan_place(
-            self.problem, self._plan, execution.commanded_rad, execution.gripper_to_object(), goal, True
-        )
-        if found is None:
+        here, measured = execution.commanded_rad, execution.gripper_to_object()
+        for angle_rad in PUT_BACK_RAD:
+            goal = turned_in_place(self.problem.target, angle_rad)
+            goal[2, 3] += self.start.settings.release_height_m
+            found = self._own.plan_place(self.problem, self._plan, here, measured, goal, True)
+            if found is not None:
+                break
+        else:
             raise Ended("replan_failed")
+        self.facts.replans["put_back" if angle_rad == 0 else "put_back_turned"] += 1
         carry, lower, retreat = found
         assert isinstance(carry, Motion)
         execution.follow(carry)
         execution.follow(lower)
         execution.open()
         execution.follow(retreat)
+
+
+def turned_in_place(placed: PlacedObject, angle_rad: float) -> np.ndarray:
+    """Return the pose ``(4, 4)`` of an object turned about the vertical through its centre of mass."""
+    center = transform_points(placed.object_to_world, placed.body.center_of_mass_m[None])[0]
+    turn = Rotation.from_euler("z", angle_rad).as_matrix()
+    return np.asarray(transform(None, center) @ transform(turn) @ transform(None, -center) @ placed.object_to_world)

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Course, Ended
+from manitwin.episodes.courses.course import Course, Ended, tiers_of
 from manitwin.episodes.events import ContactWatch, EventWatch
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.outcome import moved_m, turned_rad
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.planning.problem import Motion, Phase, PickPlacePlan
+from manitwin.episodes.planning.problem import Grasp, Motion, Phase, PickPlacePlan
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.geometry.poses import inverse
 from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
@@ -51,11 +51,15 @@ class PickPlaceCourse(Course):
 
     def plan(self) -> bool:
         """Plan for the first goal pose that can be reached; the problem becomes that of this pose."""
+        return any(self.plan_with(grasps) for grasps in tiers_of(self.start))
+
+    def plan_with(self, grasps: Sequence[Grasp]) -> bool:
+        """Plan with some of the grasps."""
         facts, start = self.facts, self.start
         poses = (self.goal_object_to_world,) if start.skill_goal is None else start.skill_goal.poses
         for pose in poses:
             above = raised(pose, start.settings.release_height_m)
-            problem = replace(start.problem, goal_object_to_world=above)
+            problem = replace(start.problem, goal_object_to_world=above, grasps=tuple(grasps))
             report = start.planner.plan(problem)
             facts.grasps_tried += report.tried
             facts.plan_failures += report.failures
@@ -71,8 +75,11 @@ class PickPlaceCourse(Course):
         plan = self._plan
         self.grasp_and_lift(execution, plan.reach, plan.approach, plan.lift)
         placement = _Placement(plan.gripper_to_object, plan.carry, plan.lower, plan.retreat)
-        placement = self._placed_anew(plan, execution, with_carry=True) or placement
-        self.facts.replans["after_lift" if placement.carry is not plan.carry else "after_lift_failed"] += 1
+        anew = self._placed_anew(plan, execution, with_carry=True)
+        self.facts.replans["after_lift" if anew is not None else "after_lift_failed"] += 1
+        if anew is None:
+            self.set_down_again(plan, execution)
+        placement = anew or placement
         if placement.carry is not None:
             execution.follow(placement.carry)
         self.check_held(execution)

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 
-from manitwin.episodes.courses.course import Ended
+from manitwin.episodes.courses.course import Ended, tiers_of
 from manitwin.episodes.courses.pick_place import PickPlaceCourse, raised
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.planning.problem import PickPlacePlan, PickPlaceProblem
+from manitwin.episodes.planning.problem import Grasp, PickPlacePlan, PickPlaceProblem
 from manitwin.physics.sapien.contacts import NONE_MEANT
 
 WAYS, GOALS = 8, 3  # so many poses on the way are planned for, with so many of the goal's
@@ -24,16 +25,19 @@ class RegraspCourse(PickPlaceCourse):
 
     def plan(self) -> bool:
         """Plan at once; else to a pose on the way: the goal from there, then the way there."""
-        if super().plan():
-            return True
+        return any(self.plan_with(grasps) or self._plan_by_a_way(grasps) for grasps in tiers_of(self.start))
+
+    def _plan_by_a_way(self, grasps: Sequence[Grasp]) -> bool:
         start = self.start
         goal = start.skill_goal
         for way in islice(() if goal is None or goal.ways is None else goal.ways, WAYS):
             there = replace(start.problem, target=replace(start.problem.target, object_to_world=way))
-            reached = self._goal_from(there)
+            tiers = tiers_of(replace(start, problem=there))
+            reached = self._goal_from(replace(there, grasps=sum(tiers, ())))
             if reached is None:
                 continue
-            problem = replace(start.problem, goal_object_to_world=raised(way, start.settings.release_height_m))
+            goal_to_world = raised(way, start.settings.release_height_m)
+            problem = replace(start.problem, goal_object_to_world=goal_to_world, grasps=tuple(grasps))
             report = start.planner.plan(problem)
             self.facts.grasps_tried += report.tried
             self.facts.plan_failures += report.failures

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import chain, zip_longest
 
 import numpy as np
@@ -19,7 +19,8 @@ from manitwin.scenes.layouts.stacking import Mouth, mouth_of, open_poses, put_in
 LEAST_DEPTH_M = 0.025  # of a vessel: what is put on a plate lies on it, and rolls off
 LEANING_FALL_M = 0.004  # above where a drop ended
 AS_IT_IS_TRIED, LYING_TRIED, ON_END_TRIED = 3, 4, 12
-ROUNDS = 2  # of tries; the second is only made where no pose of the first can be planned for
+ROUNDS = 5  # of tries; the next is only made where no pose of those before can be planned for
+RESTS_FIRST = 8  # of where drops ended, before the poses that they began in
 PERTURBED, OFF_M, OFF_RAD = 3, 0.005, np.radians(3)
 FAR_FALL_M = (
     0.03  # what moves farther as it falls meets the opening hand on its way: twice as many drops, twice as far beside
@@ -29,7 +30,7 @@ FAR_FALL_M = (
 class PlaceIn(Skill):
     """Put the target into its partner, a vessel that opens upward."""
 
-    name, predicate, has_partner, most_poses = "place_in", "in", True, 16
+    name, predicate, has_partner, most_poses = "place_in", "in", True, 32
     lets_fall = True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
@@ -49,7 +50,8 @@ class PlaceIn(Skill):
         Those from which it comes to rest in the vessel when it is let go there in physics, also when that is a little beside:
         a banana that balances on the rim of a bowl is no goal. Where a drop ended is one, and comes before where it began: a fork
         on end in a bowl falls to any side, over the rim or against the hand. Of those that lie, some as the target lies now, and
-        those on end, by turns, the ones come first that move the least: the hand may meet the rim for all of one kind.
+        those on end, by turns, the ones come first that move the least: the hand may meet the rim for all of one kind. Where
+        a hand has no room in a deep vessel things are let go at its rim: after the first rests come the poses before the drop.
         """
         assert partner is not None
         mouth = mouth_of(around.body(partner), around.objects[partner].object_to_world)
@@ -72,13 +74,25 @@ class PlaceIn(Skill):
             as_now = tries(lambda: as_it_is(body, standing, vessel, mouth, rng), AS_IT_IS_TRIED)
             by_turns = zip_longest(steadiest(chain(as_now, lying)), steadiest(ends))
             pairs = [pair for both in by_turns for pair in both if pair is not None]
-            for rest, _ in pairs:
-                if self._is_steady(around, target, partner, _nearby(rest, rng)):
-                    yield rest
+            yield from self._steady(around, target, partner, [rest for rest, _ in pairs[:RESTS_FIRST]], rng)
             for rest, begun in pairs:
                 falls_far = _farthest_m(body.parts.whole, begun, rest) > FAR_FALL_M
-                if self._is_steady(around, target, partner, _nearby(begun, rng, 2 if falls_far else 1)):
-                    yield begun
+                yield from self._steady(around, target, partner, [begun], rng, 2 if falls_far else 1)
+            yield from self._steady(around, target, partner, [rest for rest, _ in pairs[RESTS_FIRST:]], rng)
+
+    def _steady(
+        self,
+        around: Surroundings,
+        target: int,
+        partner: int,
+        poses: Sequence[np.ndarray],
+        rng: np.random.Generator,
+        scale: int = 1,
+    ) -> Iterator[np.ndarray]:
+        """Yield those of some poses from which the goal is reached also a little beside."""
+        for pose in poses:
+            if self._is_steady(around, target, partner, _nearby(pose, rng, scale)):
+                yield pose
 
     def _is_steady(self, around: Surroundings, target: int, partner: int, poses: Iterator[np.ndarray]) -> bool:
         goal = self.goal(around.objects[target], around.objects[partner])

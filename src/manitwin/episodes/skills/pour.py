@@ -32,11 +32,12 @@ DEEP, DEEP_TILT_RAD = 3.0, np.radians(135)  # rim radii: what lies in a belly be
 AZIMUTHS = 8
 POURS_S, LASTS_S, LONGEST_S = 2.5, 0.5, 4.0
 MOST_SHARE = 0.8  # of the vessel that is poured into
-LEAST_RIM_M, RIM_SHARE = 0.03, 0.8  # of that vessel; the other's rim by its
+LEAST_DEPTH_M = 0.025  # of that vessel: grains roll off a plate
+LEAST_RIM_M, RIM_SHARE = 0.03, 2 / 3  # of that vessel; the other's rim by its: a stream spreads as it falls
 LIP_BAND_M, LIP_RAD = 0.008, np.radians(20)
 FINGER_M = 0.006  # half of what a finger is thick
 INSIDE_M = 0.002  # a fingertip deeper than this below the rim is inside
-BESIDE_LIP_RAD = np.radians(60)
+BESIDE_LIP_RAD, AWAY_STEP_RAD = np.radians(60), np.radians(30)
 
 
 class Pour(HeldSkill):
@@ -45,7 +46,7 @@ class Pour(HeldSkill):
     name, predicate, has_partner = "pour", "poured", True
 
     def suits(self, pool: Pool, target: PoolTwin, partner: PoolTwin | None) -> bool:
-        """Accept vessels that open upward, the partner's rim 3 cm and wider than the target's, room for all in it."""
+        """Accept vessels that open upward, the partner deeper than a plate, its rim 3 cm and wider than the target's."""
         if partner is None or not (target.vessel and partner.vessel) or lip_frame(target) is None:
             return False
         first, second = (pool.body(twin.twin_id) for twin in (target, partner))
@@ -53,7 +54,8 @@ class Pour(HeldSkill):
         if source is None or vessel is None or not (open_poses(target, first) and open_poses(partner, second)):
             return False
         holds = FILL_SHARE * source.volume_m3 <= MOST_SHARE * vessel.volume_m3
-        return holds and vessel.rim_radius_m >= max(LEAST_RIM_M, source.rim_radius_m / RIM_SHARE)
+        deep = vessel.depth_m >= LEAST_DEPTH_M
+        return holds and deep and vessel.rim_radius_m >= max(LEAST_RIM_M, source.rim_radius_m / RIM_SHARE)
 
     def goal(self, target: PlacedObject, partner: PlacedObject | None) -> Goal:
         """Return: poured, the target upright again and the partner where it was."""
@@ -131,7 +133,10 @@ def pouring_paths(
 
 
 def grasp_rank(grasp: Grasp, opening: Opening, lip: np.ndarray, tip_depth_m: float) -> float | None:
-    """Order grasps: none with a finger inside beside the lip, those with one elsewhere inside last, far from the lip first."""
+    """Order grasps: none with a finger inside beside the lip, those with one elsewhere inside last, far from the lip first.
+
+    By steps: of a handle that is far from the lip any place serves that holds.
+    """
     side = grasp.width_m / 2 + FINGER_M
     tips = transform_points(grasp.gripper_to_object, np.array([[s, 0.0, tip_depth_m] for s in (-side, 0.0, side)]))
     from_rim = tips - opening.center_m
@@ -141,4 +146,5 @@ def grasp_rank(grasp: Grasp, opening: Opening, lip: np.ndarray, tip_depth_m: flo
     towards = float(np.arctan2(across[1] @ lip[:3, 1], across[1] @ lip[:3, 0]))
     if inside[[0, 2]].any() and abs(towards) < BESIDE_LIP_RAD:
         return None
-    return (np.pi - abs(towards)) + (2 * np.pi if inside[[0, 2]].any() else 0.0)
+    away = float(np.floor((np.pi - abs(towards)) / AWAY_STEP_RAD))
+    return away + (2 * np.pi / AWAY_STEP_RAD if inside[[0, 2]].any() else 0.0)

@@ -139,6 +139,10 @@ class Skill(ABC):
         """Return the placements that the target may begin in: its likeliest one, upright where it has such."""
         return [max(target.poses, key=lambda pose: (pose.upright, pose.probability))]
 
+    def ends_in(self, target: PoolTwin) -> Sequence[StandingPose]:
+        """Return the placements that the target is to be brought to; none: its goal asks for no placement."""
+        return ()
+
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> SkillGoal | None:

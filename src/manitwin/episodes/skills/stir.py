@@ -22,17 +22,17 @@ from manitwin.scenes.layouts.stacking import open_poses
 
 SLENDER = 4.0  # length by width of what stirs
 LEAST_LENGTH_M, LEAST_DEPTH_M, LEAST_RIM_M = 0.12, 0.03, 0.03
-CIRCLE_SHARE, ASIDE_SHARE = (
-    0.4,
-    0.15,
-)  # of the rim's radius; from the middle to where the end points: the rim is in the way
+CIRCLE_SHARE, ASIDE_SHARE = 0.4, 0.15  # of the rim's radius; to where the end points: the rim is in the way
+FLOORS = 4  # circles at which the floor is looked for: it rises to the wall of a bowl
 FLOOR_M, HEAD_M = 0.006, 0.012  # the lowest corner above the floor, half of what a head is wide
 TURN_RAD, KNOTS = np.radians(1120), 44  # three times around and a little more, nearer and nearer to the middle
 INNER = 0.4  # of the first circle, at the end
+RIM_M = 0.004  # between the rim and what leans over it
 ABOVE_M = 0.03  # the end above the rim, before and after
-LEANS_RAD = np.radians([45.0, 55, 35])
+LEANS_RAD = np.radians([45.0, 55, 35, 25, 15])  # those for which the rim leaves room
 AZIMUTHS = 8
 FREE_END = 0.45  # of the length from the end: no fingers there
+FAR_END, HAND_M = 0.9, 0.035  # of the length, where it is held at most; from there to the rim: a hand stays above it
 STIRS_S, LONGEST_S = 6.0, 12.0
 
 
@@ -51,7 +51,10 @@ class Stir(HeldSkill):
         points = pool.body(target.twin_id).parts.whole
         extents = np.sort(np.ptp(points @ np.linalg.eigh(np.cov(points.T))[1], axis=0))
         narrow = extents[1] < (1 - CIRCLE_SHARE) * 2 * opening.rim_radius_m
-        return bool(extents[2] >= max(LEAST_LENGTH_M, SLENDER * extents[1]) and narrow)
+        leans = leans_rad(opening.rim_radius_m, opening.depth_m, extents[0])
+        inside_m = min((opening.depth_m / np.cos(lean) for lean in leans), default=np.inf)
+        long_m = max(LEAST_LENGTH_M, SLENDER * extents[1], (inside_m + HAND_M) / FAR_END)
+        return bool(extents[2] >= long_m and narrow)
 
     def set_goal(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
@@ -74,18 +77,20 @@ class Stir(HeldSkill):
         points = transform_points(inverse(stick), np.concatenate(target.body.hulls))
         length_m = float(-points[:, 2].min())
         center = transform_points(vessel.object_to_world, opening.center_m[None])[0]
-        floor_m = center[2] + floor_below_rim(
-            vessel.body.hulls, opening, (CIRCLE_SHARE + ASIDE_SHARE) * opening.rim_radius_m + HEAD_M
-        )
+        outs_m = np.linspace(0, CIRCLE_SHARE + ASIDE_SHARE, FLOORS) * opening.rim_radius_m
+        floors_m = [center[2] + floor_below_rim(vessel.body.hulls, opening, out + HEAD_M) for out in outs_m]
         paths = []
-        for lean in LEANS_RAD:
+        thick_m = float(np.ptp(points[:, :2], axis=0).min())
+        for lean in leans_rad(opening.rim_radius_m, center[2] - floors_m[0], thick_m):
             for azimuth in scene.rng.uniform(-np.pi, np.pi) + np.arange(AZIMUTHS) * 2 * np.pi / AZIMUTHS:
                 side = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
                 down = np.sin(lean) * side - np.array([0.0, 0.0, np.cos(lean)])
                 turn = rotation_of(down, UP)  # the side that was up, where the hand is, stays up
-                low_m = float((points @ turn.T)[:, 2].min())
-                at_m = floor_m + FLOOR_M - low_m
-                paths.append(HeldPath(_round(turn, center, opening.rim_radius_m, at_m, side) @ inverse(stick)))
+                above_m = FLOOR_M - float((points @ turn.T)[:, 2].min())
+                round_m = _round(center, opening.rim_radius_m, side)
+                out_m = np.linalg.norm(round_m[:, :2] - center[:2], axis=1)
+                round_m[:, 2] = np.interp(out_m, outs_m, floors_m) + above_m
+                paths.append(HeldPath(_in_and_out(turn, center, round_m) @ inverse(stick)))
 
         def rank(grasp: Grasp) -> float | None:
             tips = transform_points(grasp.gripper_to_object, np.array([[0.0, 0, scene.tip_depth_m]]))
@@ -116,14 +121,26 @@ class Stir(HeldSkill):
         )
 
 
-def _round(turn: np.ndarray, center: np.ndarray, rim_radius_m: float, low_m: float, side: np.ndarray) -> np.ndarray:
-    """Return poses of the end: into the vessel from above its middle, around, and out again."""
-    middle = np.array([*center[:2], low_m]) + ASIDE_SHARE * rim_radius_m * side
-    above = np.array([*middle[:2], center[2] + ABOVE_M])
-    start = float(np.arctan2(side[1], side[0]))
-    poses = [transform(turn, above), transform(turn, (above + middle) / 2)]
+def leans_rad(rim_radius_m: float, depth_m: float, thick_m: float) -> list[float]:
+    """Return the leans at which what goes around at a depth, leaning to one side, stays clear of the rim."""
+    room_m = (1 - CIRCLE_SHARE + ASIDE_SHARE) * rim_radius_m - thick_m / 2 - RIM_M
+    return [float(lean) for lean in LEANS_RAD if depth_m * np.tan(lean) <= room_m]
+
+
+def _round(center_m: np.ndarray, rim_radius_m: float, side: np.ndarray) -> np.ndarray:
+    """Return places ``(K, 3)`` of the end, around and nearer and nearer to the middle, at the rim's height."""
+    start, places = float(np.arctan2(side[1], side[0])), []
     for share in np.linspace(0, 1, KNOTS):
         angle, out_m = start + share * TURN_RAD, CIRCLE_SHARE * rim_radius_m * min(1.0, 12 * share, 8 * (1 - share))
         out_m *= 1 - (1 - INNER) * share
-        poses.append(transform(turn, middle + out_m * np.array([np.cos(angle), np.sin(angle), 0.0])))
-    return np.array([*poses, poses[1], poses[0]])
+        places.append(
+            center_m + ASIDE_SHARE * rim_radius_m * side + out_m * np.array([np.cos(angle), np.sin(angle), 0.0])
+        )
+    return np.array(places)
+
+
+def _in_and_out(turn: np.ndarray, center_m: np.ndarray, round_m: np.ndarray) -> np.ndarray:
+    """Return poses ``(K, 4, 4)`` of the end: into the vessel from above, around through places ``(K, 3)``, and out again."""
+    above = np.array([*round_m[0, :2], center_m[2] + ABOVE_M])
+    halfway = (above + round_m[0]) / 2
+    return np.array([transform(turn, at) for at in (above, halfway, *round_m, halfway, above)])

@@ -29,6 +29,10 @@ class Upright(Skill):
         """Return the placements on its side."""
         return lying_poses(target)
 
+    def ends_in(self, target: PoolTwin) -> Sequence[StandingPose]:
+        """Return the upright placements."""
+        return standing_poses(target)
+
     def poses(
         self, around: Surroundings, target: int, partner: int | None, rng: np.random.Generator
     ) -> Iterator[np.ndarray]:

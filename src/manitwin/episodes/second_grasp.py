@@ -1,0 +1,67 @@
+"""A second grasp: what was left behind, or set down again, is taken once more by another one from where it has come to lie."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from manitwin.episodes.courses.course import ANOTHER_GRASP, Course, NotTaken
+from manitwin.episodes.execution import Execution
+from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.withdrawal import plan_withdrawal
+from manitwin.episodes.sequence import course_of, problem_of
+from manitwin.physics.sapien.contacts import NONE_MEANT
+from manitwin.physics.sapien.world import RobotWorld
+
+
+def carry_out(course: Course, world: RobotWorld, execution: Execution) -> Course:
+    """Carry a planned course out with its watches, once more with other grasps where its own does not hold the target.
+
+    Returns the course that was carried out last. Raises Ended where it cannot go on; the outcome is that of the first grasp
+    where nothing can be planned with another one.
+    """
+    before = list(execution.watches)
+    execution.watches = [*before, *course.watches(world)]
+    try:
+        course.execute(execution)
+    except NotTaken:
+        again = _taken_anew(course, world, execution)
+        if again is None:
+            raise
+    else:
+        return course
+    execution.watches = [*before, *again.watches(world)]
+    again.execute(execution)
+    return again
+
+
+def _taken_anew(course: Course, world: RobotWorld, execution: Execution) -> Course | None:
+    """Bring the open hand home and plan from what is there with the grasps that have not been tried; None: there is no way."""
+    start, facts = course.start, course.facts
+    if facts.grasp is None or not isinstance(start.planner, PickPlacePlanner):
+        return None
+    planner, settings, missed = start.planner, start.settings, facts.grasp.grasp_id
+    execution.meant = NONE_MEANT
+    execution.open()
+    away = plan_withdrawal(
+        planner.parts, start.problem, execution.target_to_world(), execution.commanded_rad, blind=False
+    )
+    if away is not None:
+        execution.follow(away)
+    execution.rest(round(settings.max_rest_s / settings.timestep_s))
+    objects = tuple(
+        replace(placed, object_to_world=world.object_to_world(number)) for number, placed in enumerate(world.placed)
+    )
+    others = tuple(each for each in start.problem.grasps if each.grasp_id != missed)
+    problem = replace(
+        problem_of(start.problem, objects, world.target, others),
+        goal_object_to_world=start.problem.goal_object_to_world,
+    )
+    home = planner.plan_way_home(problem, execution.commanded_rad)
+    if home is None:
+        return None
+    execution.follow(home)
+    again = course_of(replace(start, problem=problem, objects=objects), facts)
+    if not again.plan():
+        return None
+    facts.replans[ANOTHER_GRASP] += 1
+    return again
