@@ -1,11 +1,13 @@
 """Print how skills do with the twins of a data set: attempts, executed, kept, and of their negative controls.
 
     python benchmarks/held_skills.py DATASET --skills hang,press,strike --seeds 40 --controls 10
+    python benchmarks/held_skills.py DATASET --skills all --attempts 42 --first 81000 --controls 0
     python benchmarks/held_skills.py DATASET --skills all --seeds 0 --controls 40
 
-One row a twin that can be used so, its partners drawn. A negative control is the same episode, judged against what was asked for,
-gone about wrongly (``wrong_goals.CONTROLS``): of each kind so many are judged with a skill, over its twins in turn, or as
-many as four times as many attempts give; none may be kept. CPU seconds are those of an attempt, setting and planning included.
+One row a twin that can be used so, its partners drawn; with ``--attempts`` one row a skill, over its twins in turn. A negative
+control is the same episode, judged against what was asked for, gone about wrongly (``wrong_goals.CONTROLS``): of each kind so
+many are judged with a skill, over its twins in turn, or as many as four times as many attempts give; none may be kept. CPU
+seconds are those of an attempt, setting and planning included.
 """
 
 from __future__ import annotations
@@ -95,6 +97,13 @@ class Bench:
                 break
         return outcomes
 
+    def in_turn(self, skill_name: str, twins: Sequence[PoolTwin], first: int, count: int) -> list[tuple[str, float]]:
+        """Return the outcomes and CPU seconds of so many attempts, each twin in turn, in an order that is drawn anew."""
+        rng, order = np.random.default_rng(first), list[PoolTwin]()
+        while len(order) < count:
+            order += [twins[int(number)] for number in rng.permutation(len(twins))]
+        return [self.attempt(skill_name, twin, first + number) for number, twin in enumerate(order[:count])]
+
     def _begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
         begins, ends = skill.begins_in(target), skill.ends_in(target)
         if not ends:
@@ -108,12 +117,23 @@ class Bench:
         return Placeable.of(self.pool, twin)
 
 
+def row(name: str, ran: Sequence[tuple[str, float]]) -> str:
+    """Return a row: attempts, executed, kept, and what became of the others."""
+    outcomes = Counter(outcome for outcome, _ in ran)
+    executed = sum(count for outcome, count in outcomes.items() if outcome in EXECUTED)
+    seconds = float(np.median([each for _, each in ran]))
+    said = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.most_common())
+    kept = f"{executed} of {len(ran)} executed, {outcomes['kept']} kept ({outcomes['kept'] / max(1, executed):.1%}; {said})"
+    return f"{name}: {kept}; {seconds:.2f} CPU-s an attempt"
+
+
 def main() -> None:
     """Print a row for each twin and skill, and one of the controls of each skill."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("dataset")
     parser.add_argument("--skills", default="hang,press,strike")
     parser.add_argument("--seeds", type=int, default=40)
+    parser.add_argument("--attempts", type=int, default=0, help="of a skill, over its twins in turn; instead of seeds")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--controls", type=int, default=10)
     parser.add_argument("--categories", default="", help="only twins of these")
@@ -122,17 +142,12 @@ def main() -> None:
     bench = Bench(asked.dataset, asked.robot)
     for name in CONTROLS if asked.skills == "all" else asked.skills.split(","):
         twins = bench.twins_of(name, asked.categories.split(",") if asked.categories else [])
-        for twin in twins if asked.seeds else ():
+        if asked.attempts and twins:
+            ran = bench.in_turn(name, twins, asked.first, asked.attempts)
+            print(row(f"{name}, {len({twin.twin_id for twin in twins})} twins", ran), flush=True)
+        for twin in twins if asked.seeds and not asked.attempts else ():
             ran = [bench.attempt(name, twin, asked.first + seed) for seed in range(asked.seeds)]
-            outcomes = Counter(outcome for outcome, _ in ran)
-            executed = sum(count for outcome, count in outcomes.items() if outcome in EXECUTED)
-            seconds = float(np.median([each for _, each in ran]))
-            said = ", ".join(f"{count} {outcome}" for outcome, count in outcomes.most_common())
-            print(
-                f"{name} {twin.category} {twin.twin_id[:4]}: {executed} of {len(ran)} executed, {outcomes['kept']} kept"
-                f" ({said}); {seconds:.2f} CPU-s an attempt",
-                flush=True,
-            )
+            print(row(f"{name} {twin.category} {twin.twin_id[:4]}", ran), flush=True)
         for kind in CONTROLS[name] if asked.controls else ():
             outcomes = bench.controls(name, kind, twins, asked.first, asked.controls)
             judged = sum(count for outcome, count in outcomes.items() if outcome in JUDGED)
