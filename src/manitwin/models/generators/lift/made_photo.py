@@ -85,11 +85,24 @@ def fitted_or_lifted(fitted: Fitted | None, rgba: np.ndarray, name: str | None) 
             " makes has this outline; check the name and the cut-out, or take the photo from the side",
             "generate",
         )
+    if fitted is not None and _merely_as_wide(lifted) and not _is_round(fitted):
+        raise Rejected(
+            "generator_failed",
+            f"a round thing would have its outline, but a {fitted.category} is not round, and no {fitted.category} that the"
+            " template makes has it; check the name and the cut-out, or take the photo from higher up",
+            "generate",
+        )
     flat = lifted.notes["primitive"] == "inflation"  # knows nothing of the back
     if fitted is not None and flat and fitted.confidence >= LEAST_AGAINST_INFLATION:
         return from_fit(fitted, rgba, name)
     notes = lifted.notes if fitted is None else lifted.notes | {"poor_fit": notes_of(fitted)}
     return Job(write_glb([textured_part(lifted)]), notes, unseen_share(lifted.surface))
+
+
+def _merely_as_wide(lifted: Lifted) -> bool:
+    """Whether it is a body of revolution of which no rim was seen from above and nothing sticks out: a box may look so too."""
+    notes = lifted.notes
+    return notes["primitive"] == "revolution" and not notes.get("handles") and not notes.get("elevation_deg")
 
 
 def _is_round(fitted: Fitted) -> bool:

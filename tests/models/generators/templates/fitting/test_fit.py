@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 import trimesh
+from scipy import ndimage
 
 from manitwin.errors import Rejected
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.models.generators.lift import LiftGenerator
 from manitwin.models.generators.lift.lifting import hint_from_name, lift
+from manitwin.models.generators.lift.made_photo import fitted_or_lifted
 from manitwin.models.generators.lift.several import from_views
 from manitwin.models.generators.protocol import Generated, GenerationRequest, PhotoView
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.fitting.drawing import edges_between, seen_faces, silhouette, to_pixels
 from manitwin.models.generators.templates.fitting.fit import (
     LEAST_CONFIDENCE,
+    MOST_OUTLINE,
+    confidence_of,
     fit,
     kinds_of,
     template_for,
@@ -217,6 +222,26 @@ def test_body_with_loops_beside_it_is_no_can(tmp_path: Path) -> None:
     assert notes["primitive"] == "revolution" and notes["handles"] == 2
     with pytest.raises(Rejected, match="something sticks out beside the body, which no can has"):
         _generated(rgba, "can", tmp_path)
+
+
+def test_outline_of_a_box_is_no_round_thing_where_the_name_says_that_it_is_not_round() -> None:
+    rgba = photo_of("basket", View(0.0, np.radians(8), 0.0, 0.15), {})
+    rgba[..., 3] = np.where(ndimage.binary_fill_holes(rgba[..., 3] > 127), 255, 0)
+    assert lift(rgba, hint_from_name("basket")).notes["primitive"] == "revolution"  # explains the outline as well
+    residual = replace(fit("basket", rgba).residual, outline=3 * MOST_OUTLINE)
+    doubtful = replace(fit("basket", rgba), residual=residual, confidence=confidence_of(residual))
+    with pytest.raises(Rejected, match="a basket is not round"):
+        fitted_or_lifted(doubtful, rgba, "basket")
+    assert fitted_or_lifted(None, rgba, "basket").notes["primitive"] == "revolution"
+
+
+@pytest.mark.parametrize(
+    ("name", "category"),
+    [("pink storage tray", "serving tray"), ("storage tray", "serving tray"), ("red ceramic mug", "mug"), ("a", None)],
+)
+def test_template_is_that_of_the_last_words_of_a_name(name: str, category: str | None) -> None:
+    template = template_for(name)
+    assert (None if template is None else template.category) == category
 
 
 def _generated(rgba: np.ndarray, name: str, folder: Path) -> Generated:

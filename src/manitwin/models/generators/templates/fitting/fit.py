@@ -49,14 +49,19 @@ class Fitted:
 
 
 def template_for(name: str | None) -> Template | None:
-    """Return the template of what a thing is called, by its own names and by those of the priors; None where there is none."""
+    """Return the template of what a thing is called, by its own names and by those of the priors; None where there is none.
+
+    Of a longer name its last words count where they are such a name of two words and more: a pink storage tray is a storage tray.
+    """
     templates = load_templates()
     words = " ".join((name or "").lower().replace("_", " ").replace("-", " ").split())
     if not words:
         return None
     by_name = {other: template for template in templates.values() for other in (template.category, *template.names)}
-    if words in by_name:
-        return by_name[words]
+    each = words.split()
+    for first in range(max(len(each) - 1, 1)):
+        if (last_words := " ".join(each[first:])) in by_name:
+            return by_name[last_words]
     prior = named(words) or lookup(words)
     return None if prior is None else templates.get(prior.category)
 
