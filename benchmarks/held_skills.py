@@ -25,7 +25,7 @@ from manitwin.episodes.episode import run_episode
 from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
-from manitwin.episodes.room_for_hand import begins_with_room
+from manitwin.episodes.room_for_hand import begins_that_lead_there
 from manitwin.episodes.setting import table_setting
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.registry import load_skill
@@ -105,12 +105,12 @@ class Bench:
         return [self.attempt(skill_name, twin, first + number) for number, twin in enumerate(order[:count])]
 
     def _begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
-        begins, ends = skill.begins_in(target), skill.ends_in(target)
-        if not ends:
-            return begins
-        grasps = [each.grasp for each in usable_grasps(self.source.twin(target.twin_id), self.robot.gripper)]
-        return begins_with_room(
-            begins, ends, target.poses, grasps, self.robot.gripper, self.pool.body(target.twin_id).body
+        return begins_that_lead_there(
+            skill,
+            target,
+            self.pool.body(target.twin_id).body,
+            lambda: [each.grasp for each in usable_grasps(self.source.twin(target.twin_id), self.robot.gripper)],
+            self.robot.gripper,
         )
 
     def _placeable(self, twin: PoolTwin) -> Placeable:

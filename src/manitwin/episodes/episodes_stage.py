@@ -25,7 +25,7 @@ from manitwin.episodes.pick_place_tasks import Placeable
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import PickPlaceProblem
 from manitwin.episodes.planning.two_arms import planner_of
-from manitwin.episodes.room_for_hand import begins_with_room, placement_with_room
+from manitwin.episodes.room_for_hand import begins_that_lead_there, placement_with_room
 from manitwin.episodes.sealing_surface import with_surface
 from manitwin.episodes.setting import Setting, scene_setting, table_setting
 from manitwin.episodes.settings import TrajectoriesConfig
@@ -169,12 +169,12 @@ class EpisodesStage:
 
     def begins(self, skill: Skill, target: PoolTwin) -> Sequence[StandingPose]:
         """Return the placements that a target may begin in: where one is to be reached, those that a grasp leads there from."""
-        begins, ends = skill.begins_in(target), skill.ends_in(target)
-        if not ends:
-            return begins
-        grasps = [each.grasp for each in self._grasps(target.twin_id).values()]
-        return begins_with_room(
-            begins, ends, target.poses, grasps, self._robot.gripper, self._pool.body(target.twin_id).body
+        return begins_that_lead_there(
+            skill,
+            target,
+            self._pool.body(target.twin_id).body,
+            lambda: [each.grasp for each in self._grasps(target.twin_id).values()],
+            self._robot.gripper,
         )
 
     def _is_graspable(self, twin_id: str) -> bool:

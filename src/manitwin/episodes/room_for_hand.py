@@ -9,12 +9,13 @@ import numpy as np
 
 from manitwin.episodes.planning.grasp_candidates import CLOSED
 from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.skills.skill import Skill
 from manitwin.episodes.steady_grasps import bears_weight
 from manitwin.geometry.boxes import box_corners
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.multi_finger import MultiFingerGripper
-from manitwin.scenes.layouts.pool import StandingPose
+from manitwin.scenes.layouts.pool import PoolTwin, StandingPose
 
 CLEARANCE_M = 0.002
 LEAST_LIKELY = 0.03
@@ -33,6 +34,17 @@ def placement_with_room(
         if any(has_room(placement, number) for number in range(len(grasps))):
             return placement
     return None
+
+
+def begins_that_lead_there(
+    skill: Skill, target: PoolTwin, body: RigidBody, grasps: Callable[[], Sequence[Grasp]], gripper: Gripper
+) -> Sequence[StandingPose]:
+    """Return the placements that a target may begin in with a skill; where it ends in a placement, ``begins_with_room``.
+
+    ``grasps`` are only asked for then.
+    """
+    begins, ends = skill.begins_in(target), skill.ends_in(target)
+    return begins_with_room(begins, ends, target.poses, grasps(), gripper, body) if ends else begins
 
 
 def begins_with_room(

@@ -9,10 +9,9 @@ import numpy as np
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.geometry.poses import transform_points
 from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
-
-GRAVITY_M_S2 = 9.81
 
 
 def steady_tiers(grasps: Sequence[Grasp], target: PlacedObject, gripper: Gripper) -> list[tuple[Grasp, ...]]:

@@ -26,16 +26,17 @@ _Chosen = TypeVar("_Chosen")
 
 ANOTHER_GRASP = "another_grasp"
 TURNED_M, TURNED_RAD = 0.01, np.radians(10.0)  # in the hand: what was planned with another pose there hardly serves
+FIRST_SHARE = 0.75  # of grasps: those that tend to be good
 LEAST_LIFT_SHARE = 0.5  # of what the hand rose: less, and the object was left behind
 
 
-def without_last(grasps: Sequence[_Chosen]) -> tuple[Sequence[_Chosen], Sequence[_Chosen]]:
+def first_and_last(grasps: Sequence[_Chosen]) -> tuple[Sequence[_Chosen], Sequence[_Chosen]]:
     """Return the first three quarters of grasps, and the rest.
 
     Their order is drawn, good ones tend to come sooner (``target_grasps.shuffled``): what is asked of grasps beside that they
     hold is asked of the rest last, or the one at the end of a handle would be taken again and again that hardly holds.
     """
-    count = int(np.ceil(0.75 * len(grasps)))
+    count = int(np.ceil(FIRST_SHARE * len(grasps)))
     return grasps[:count], grasps[count:]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.courses.course import Course, Ended, Start, tiers_of, without_last
+from manitwin.episodes.courses.course import Course, Ended, Start, first_and_last, tiers_of
 from manitwin.episodes.courses.regulated import Admittance, with_heights
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
@@ -109,7 +109,7 @@ class HeldCourse(Course):
         """Return the grasps that leave the function free, those first that do so best, but for the last quarter."""
         ranks = [(self.task.rank(grasp), grasp) for grasp in grasps]
         free = [(rank, grasp) for rank, grasp in ranks if rank is not None]
-        return [grasp for part in without_last(free) for _, grasp in sorted(part, key=lambda each: each[0])]
+        return [grasp for part in first_and_last(free) for _, grasp in sorted(part, key=lambda each: each[0])]
 
     def execute(self, execution: Execution) -> None:
         """Grasp and lift (or close the hand), carry, follow the path, and end as the task says."""

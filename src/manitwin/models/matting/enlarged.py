@@ -5,6 +5,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from manitwin.models.matting.guided_filter import guided_filter
+
 GUIDE_PX = 4
 EPSILON = 1e-4
 
@@ -22,19 +24,9 @@ def enlarged(rgb: np.ndarray, side_px: int) -> np.ndarray:
 
 
 def colours_along_light(rgb: np.ndarray) -> np.ndarray:
-    """Return a photo (H, W, 3) uint8 whose colour difference channels follow the edges of its luma.
-
-    Guided filter (He, Sun, Tang 2010, eq. 5, 6 and 8) of both with the luma as the guide.
-    """
+    """Return a photo (H, W, 3) uint8 whose colour difference channels follow the edges of its luma."""
     channels = cv2.cvtColor(rgb, cv2.COLOR_RGB2YCrCb).astype(np.float32) / 255
-    size = (2 * GUIDE_PX + 1, 2 * GUIDE_PX + 1)
     luma = channels[..., 0].copy()
-    mean_luma = cv2.blur(luma, size)
-    spread = cv2.blur(luma * luma, size) - mean_luma**2 + EPSILON
     for channel in (1, 2):
-        colour = channels[..., channel].copy()
-        mean = cv2.blur(colour, size)
-        slope = (cv2.blur(luma * colour, size) - mean_luma * mean) / spread
-        offset = mean - slope * mean_luma
-        channels[..., channel] = cv2.blur(slope, size) * luma + cv2.blur(offset, size)
+        channels[..., channel] = guided_filter(luma, channels[..., channel].copy(), GUIDE_PX, EPSILON)
     return cv2.cvtColor(np.rint(np.clip(channels, 0, 1) * 255).astype(np.uint8), cv2.COLOR_YCrCb2RGB)
