@@ -90,9 +90,19 @@ def _way_m(
             return float(np.copysign(np.linalg.norm(beside), beside[0])) * goal.fixtures[0].frame_to_world[:3, 1]
         if skill in AT_PARTNERS:
             away = _center_m(objects[0], goal.poses[0]) - _center_m(objects[1], None)
-            return FAR_M * np.array([*away[:2], 0.0]) / max(float(np.linalg.norm(away[:2])), 1e-9)
+            way = np.array([*away[:2], 0.0]) / max(float(np.linalg.norm(away[:2])), 1e-9)
+            return (_far_out_m(objects[1], away, way) if skill == "place_in" else FAR_M) * way
         return beside
     return np.array([0.0, 0, {"raised": RAISED_M, "low": -LOWERED_M}.get(kind, 0.0)])
+
+
+def _far_out_m(vessel: PlacedObject, away_m: np.ndarray, way: np.ndarray) -> float:
+    """Return how far along a unit way what is at ``away_m`` from a vessel's centre goes to be 15 cm beside the vessel.
+
+    Fifteen centimetres from a place in a pan are still in the pan.
+    """
+    points = transform_points(vessel.object_to_world, np.concatenate(vessel.body.hulls)) - _center_m(vessel, None)
+    return float((points @ way).max()) + FAR_M - float(away_m @ way)
 
 
 def _beside_m(far_m: float, rng: np.random.Generator) -> np.ndarray:
