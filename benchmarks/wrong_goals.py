@@ -10,7 +10,7 @@ from unittest import mock
 import numpy as np
 
 from manitwin.episodes.courses import push as push_course
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.episodes.skills.push import strokes
 from manitwin.episodes.skills.skill import SkillGoal

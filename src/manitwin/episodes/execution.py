@@ -119,13 +119,15 @@ class Execution:
         until: Callable[[], bool] | None = None,
         adjusted: Callable[[int], np.ndarray] | None = None,
         *,
+        until_row: Callable[[], bool] | None = None,
         yields: bool = False,
     ) -> bool:
         """Move the arm along a motion and wait until it has come to rest.
 
         A guarded move ends as soon as ``until`` is true, which is asked after every step, and the arm stays where it then is
-        told to be, or, where it ``yields``, where it is. ``adjusted`` gives what is added to a sample's positions ``(n,)``; it
-        is asked for all samples of a row as that begins. Returns whether it went all the way.
+        told to be, or, where it ``yields``, where it is; or at the end of a row, where ``until_row`` is true. ``adjusted``
+        gives what is added to a sample's positions ``(n,)``; it is asked for all samples of a row as that begins. Returns
+        whether it went all the way.
         """
         samples = motion.positions_rad
         for first in range(0, len(samples), self._steps_per_row):
@@ -135,6 +137,8 @@ class Execution:
                 target_rad = target_rad + [adjusted(sample) for sample in range(first, last + 1)][-1]
             self._arm.commanded_rad = target_rad
             if not self._carry_out_row(motion.phase, until, yields=yields):
+                return False
+            if until_row is not None and until_row():
                 return False
         self.wait_s(motion.phase, TRACKING_S)
         return True

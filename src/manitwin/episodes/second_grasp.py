@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from manitwin.episodes.courses.course import ANOTHER_GRASP, Course, NotTaken
+from manitwin.episodes.courses.course import ANOTHER_GRASP, Course, NotTaken, Turned
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
@@ -23,8 +23,8 @@ def carry_out(course: Course, world: RobotWorld, execution: Execution) -> Course
     execution.watches = [*before, *course.watches(world)]
     try:
         course.execute(execution)
-    except NotTaken:
-        again = _taken_anew(course, world, execution)
+    except NotTaken as end:
+        again = _taken_anew(course, world, execution, with_same=isinstance(end, Turned))
         if again is None:
             raise
     else:
@@ -34,8 +34,11 @@ def carry_out(course: Course, world: RobotWorld, execution: Execution) -> Course
     return again
 
 
-def _taken_anew(course: Course, world: RobotWorld, execution: Execution) -> Course | None:
-    """Bring the open hand home and plan from what is there with the grasps that have not been tried; None: there is no way."""
+def _taken_anew(course: Course, world: RobotWorld, execution: Execution, *, with_same: bool) -> Course | None:
+    """Bring the open hand home and plan from what is there with the grasps that have not been tried; None: there is no way.
+
+    ``with_same``: where there is no way with those, with all.
+    """
     start, facts = course.start, course.facts
     if facts.grasp is None or not isinstance(start.planner, PickPlacePlanner):
         return None
@@ -60,8 +63,9 @@ def _taken_anew(course: Course, world: RobotWorld, execution: Execution) -> Cour
     if home is None:
         return None
     execution.follow(home)
-    again = course_of(replace(start, problem=problem, objects=objects), facts)
-    if not again.plan():
-        return None
-    facts.replans[ANOTHER_GRASP] += 1
-    return again
+    for grasps in (others, start.problem.grasps) if with_same else (others,):
+        again = course_of(replace(start, problem=replace(problem, grasps=grasps), objects=objects), facts)
+        if again.plan():
+            facts.replans[ANOTHER_GRASP] += 1
+            return again
+    return None

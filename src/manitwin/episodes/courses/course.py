@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol, TypeVar
+from typing import ClassVar, Protocol, TypeVar
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.outcome import moved_m, turned_rad
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.planning.problem import Grasp, Grasped, Motion, PickPlaceProblem, PlanReport
+from manitwin.episodes.planning.problem import Grasp, Grasped, Motion, Phase, PickPlaceProblem, PlanReport
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.episodes.skills.skill import SkillGoal
 from manitwin.episodes.steady_grasps import steady_tiers
@@ -46,6 +46,10 @@ class Ended(Exception):
 
 class NotTaken(Ended):
     """The episode ends here unless the target, which stands again without the hand, is taken by another grasp."""
+
+
+class Turned(NotTaken):
+    """The target turned in the hand as it was lifted, and has been put back: the same grasp serves where no other does."""
 
 
 class Planner(Protocol):
@@ -94,7 +98,12 @@ def tiers_of(start: Start) -> list[tuple[Grasp, ...]]:
 
 
 class Course(ABC):
-    """What the robot does; ``facts`` are filled in on the way."""
+    """What the robot does; ``facts`` are filled in on the way.
+
+    ``lifts_steadily``: what turns in the hand as it is lifted does not serve, if another grasp does.
+    """
+
+    lifts_steadily: ClassVar[bool] = False
 
     def __init__(self, start: Start, facts: EpisodeFacts):
         """Take where the episode starts from."""
@@ -120,7 +129,7 @@ class Course(ABC):
         return ()
 
     def grasp_and_lift(self, execution: Execution, reach: Motion, approach: Motion, lift: Motion) -> None:
-        """Reach, approach, close and lift; raises NotTaken where the object is left behind."""
+        """Reach, approach, close and lift; raises NotTaken where the object is left behind, Turned where it has been put back."""
         tip_pose = self.start.planner.tip_pose
         execution.shape(self.facts.grasp)
         execution.follow(reach)
@@ -128,10 +137,29 @@ class Course(ABC):
         execution.close()
         closed_height_m = self.height_m(execution)
         hand_height_m = tip_pose(execution.commanded_rad)[2, 3]
-        execution.follow(lift)
+        self._lift(lift, execution)
         rise_m = tip_pose(execution.commanded_rad)[2, 3] - hand_height_m
         if self.height_m(execution) - closed_height_m < LEAST_LIFT_SHARE * rise_m:
             raise NotTaken("not_lifted")
+
+    def _lift(self, lift: Motion, execution: Execution) -> None:
+        """Lift; what turns far in the hand is let down as it was lifted and let go of, and then Turned is raised.
+
+        So the arm is not hit by what turns. What has been taken by another grasp already is lifted as it turns.
+        """
+        closed = execution.gripper_to_object()
+        guarded = self.lifts_steadily and not self.facts.replans[ANOTHER_GRASP]
+
+        def turns() -> bool:
+            return guarded and turned_rad(closed, execution.gripper_to_object()) > TURNED_RAD
+
+        if execution.follow(lift, until_row=turns):
+            return
+        ways_rad = np.linalg.norm(lift.positions_rad - execution.commanded_rad, axis=1)
+        been = slice(int(ways_rad.argmin()), None, -1)
+        execution.follow(Motion(Phase.LOWER, lift.positions_rad[been], -lift.velocities_rad_s[been]))
+        execution.open()
+        raise Turned("not_lifted")
 
     def set_down_again(self, plan: Grasped, execution: Execution) -> None:
         """Set the target down where it was, which has turned so far in the hand that what was planned does not serve.

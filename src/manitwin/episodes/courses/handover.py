@@ -13,7 +13,8 @@ from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.handover_watch import HandoverWatch
-from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner
+from manitwin.episodes.planning.held_knots import HeldPath
+from manitwin.episodes.planning.held_path import HeldPathPlanner
 from manitwin.episodes.planning.placement import Placement
 from manitwin.episodes.planning.problem import Phase
 from manitwin.episodes.planning.put_down import Held, put_down_poses
@@ -35,6 +36,8 @@ BOTH_HOLD_S, HOLD_S = 0.2, 0.5
 
 class HandoverCourse(Course):
     """Gives with the first arm, takes with the second, which puts the target down on its side of the table."""
+
+    lifts_steadily = True
 
     def __init__(self, start: Start, facts: EpisodeFacts):
         """Draw where the arms may meet, and where the target may be put down."""

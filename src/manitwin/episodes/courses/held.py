@@ -10,13 +10,15 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.courses.course import Course, Ended, Start, first_and_last, tiers_of
+from manitwin.episodes.courses.course import TURNED_RAD, Course, Ended, Start, first_and_last, tiers_of
 from manitwin.episodes.courses.regulated import Admittance, with_heights
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
+from manitwin.episodes.outcome import turned_rad
 from manitwin.episodes.planning.closed_hand import fingertip_corners
-from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner, HeldPlan
+from manitwin.episodes.planning.held_knots import HeldPath
+from manitwin.episodes.planning.held_path import HeldPathPlanner, HeldPlan
 from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase
@@ -36,6 +38,8 @@ PEAK_OF_QUINTIC = 1.875  # its largest by its mean speed
 
 class HeldCourse(Course):
     """Follows a skill's held path; where nothing can be planned anew, what was planned before is followed."""
+
+    lifts_steadily = True
 
     def __init__(self, start: Start, facts: EpisodeFacts):
         """Ask the skill for its task."""
@@ -65,6 +69,7 @@ class HeldCourse(Course):
             planner.closed if self.task.empty else planner.parts,
             empty=self.task.empty,
             lets_go=self.task.ending == "let_go",
+            level_rad=self.task.level_rad,
         )
         self._watch: EventWatch | None = None
 
@@ -131,30 +136,42 @@ class HeldCourse(Course):
             self._put_back(execution)
 
     def _take(self, plan: HeldPlan, execution: Execution) -> None:
-        """Grasp, lift, measure the object in the hand, plan carry and path anew, and carry."""
+        """Grasp, lift, measure the object in the hand, plan carry and path anew, and carry; again if it has turned meanwhile."""
         self.grasp_and_lift(execution, plan.reach, plan.approach, plan.lift)
+        self._grasp_now = plan.gripper_to_object
+        carry = self._plan_again(plan.held, plan.joints, execution)
+        self.facts.replans["after_lift" if carry is not None else "after_lift_failed"] += 1
+        if carry is None:
+            self.set_down_again(plan, execution)
         measured = execution.gripper_to_object()
-        others = [path for path in self.task.paths if path is not plan.held]
+        execution.meant = MeantContacts(target=frozenset())
+        execution.follow(plan.carry if carry is None else carry)
+        self.measure_slip(plan, execution)
+        self.check_held(execution)
+        if carry is not None and turned_rad(measured, execution.gripper_to_object()) > TURNED_RAD:
+            carry = self._plan_again(self._held, self._joints, execution)
+            self.facts.replans["after_carry" if carry is not None else "after_carry_failed"] += 1
+            if carry is not None:
+                execution.follow(carry)
+                self.check_held(execution)
+
+    def _plan_again(self, held: HeldPath, joints: CubicSpline, execution: Execution) -> Motion | None:
+        """Plan path and carry from here with the pose in the hand that is measured, this path before all others; None: no way."""
+        measured = execution.gripper_to_object()
         found = self._planner.again(
             self.problem,
-            [plan.held, *others],
+            [held, *(path for path in self.task.paths if path is not held)],
             measured,
             execution.commanded_rad,
-            plan.joints(0.0),
+            joints(0.0),
             as_hulls=self.task.as_hulls,
             longest_s=self.task.longest_s,
         )
-        self._grasp_now, carry = plan.gripper_to_object, plan.carry
-        if found is not None:
-            carry, self._held, self._joints = found
-            self._grasp_now = measured
-        self.facts.replans["after_lift" if found is not None else "after_lift_failed"] += 1
         if found is None:
-            self.set_down_again(plan, execution)
-        execution.meant = MeantContacts(target=frozenset())
-        execution.follow(carry)
-        self.measure_slip(plan, execution)
-        self.check_held(execution)
+            return None
+        carry, self._held, self._joints = found
+        self._grasp_now = measured
+        return carry
 
     def _act(self, execution: Execution) -> list[np.ndarray]:
         """Follow the path; returns the joint positions ``(n,)`` that it went through, for the way back."""

@@ -13,7 +13,8 @@ from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.planning.closed_hand import fingertip_corners
-from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner
+from manitwin.episodes.planning.held_knots import HeldPath
+from manitwin.episodes.planning.held_path import HeldPathPlanner
 from manitwin.episodes.planning.path_timing import joint_spline
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Motion, Phase

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,6 +18,18 @@ from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem, P
 STANDING = "target"
 """The name of the target's shapes where it stands."""
 TURNS_M = 0.01  # between what is lifted and the arm: as its weight comes on the jaws it turns in them
+
+
+class FreeSpace(Protocol):
+    """The protocol of what is free for free motions, phase by phase: a collision world, or a narrower one."""
+
+    def enter(self, phase: Phase, margin_m: float | None = None) -> None:
+        """Test from now on what a phase forbids."""
+        ...
+
+    def is_free(self, configuration: np.ndarray) -> bool:
+        """Tell whether a configuration ``(n,)`` is free."""
+        ...
 
 
 class CollisionWorld:
@@ -47,7 +59,7 @@ class CollisionWorld:
         self._geometry.setCollisionPairs(self._pairs.ever(), True)
         self._collision = self._geometry.createData()
         self._manager = broad_phase(self._model, self._geometry, self._collision)
-        self._entered: tuple[Phase, float, frozenset[str]] | None = None
+        self._entered: tuple[Phase, float, frozenset[str], float] | None = None
 
     def _add(self, name: str, joint: int, pose: Any, shape: Any) -> int:
         return int(self._geometry.addGeometryObject(pin.GeometryObject(name, joint, pose, shape)))
@@ -63,23 +75,32 @@ class CollisionWorld:
         for index, placement in placements.items():
             self._geometry.geometryObjects[index].placement = placement
 
-    def enter(self, phase: Phase, margin_m: float | None = None, meant: frozenset[str] = frozenset()) -> None:
+    def enter(
+        self,
+        phase: Phase,
+        margin_m: float | None = None,
+        meant: frozenset[str] = frozenset(),
+        spare_m: float = 0.0,
+    ) -> None:
         """Test from now on what a phase forbids, with its own margin or with another.
 
-        Of the things named ``meant`` (the target where it stands: ``STANDING``) nothing is tested against what is held, and
-        against the fingers where nothing is: pair by pair, all else keeps its clearance.
+        The body itself stays ``spare_m`` farther away from what stands around. Of the things named ``meant`` (the target where
+        it stands: ``STANDING``) nothing is tested against what is held, and against the fingers where nothing is: pair by pair,
+        all else keeps its clearance.
         """
         if margin_m is None:
             margin_m = self._margin_m if phase in (Phase.REACH, Phase.CARRY) else self._clearance_m
-        if self._entered == (phase, margin_m, meant):
+        if self._entered == (phase, margin_m, meant, spare_m):
             return
-        self._entered = (phase, margin_m, meant)
+        self._entered = (phase, margin_m, meant, spare_m)
         stands_at = self._obstacles.goal if phase is Phase.RETREAT else self._obstacles.start
         for index in self._standing:
             self._geometry.geometryObjects[index].placement = stands_at
         active, margins = self._pairs.of(phase, margin_m, self._obstacles)
         if meant:
             active = active & ~self._pairs.meant(meant, empty=phase is Phase.REACH)
+        if spare_m:
+            margins = margins + spare_m * self._pairs.of_body
         self._collision.setActiveCollisionPairs(self._geometry, active, True)
         self._collision.setSecurityMargins(self._geometry, margins, True, True)
 
@@ -126,7 +147,7 @@ class _Pairs:
         self._own = np.zeros((count, count), dtype=bool)
         for pair in body.geometry.collisionPairs:
             self._own[pair.first, pair.second] = True
-        robot_statics = between(moving, statics)
+        self.of_body = robot_statics = between(moving, statics)
         hand_target = between(sorted(body.touching), standing)
         rest_target = between([i for i in rest if joints[i] > 0], [whole])
         held_all = between(statics, held) | between(clear_of_held, held) | between(sorted(body.sweeps), statics)

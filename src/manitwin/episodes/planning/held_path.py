@@ -1,9 +1,9 @@
 """Held paths: an object in the hand, or the closed hand itself, goes through poses one after another.
 
 A skill gives ``HeldPath``s, ``object_to_world`` poses from its frames (one for each choice of what is free), and ranks grasps.
-``plan`` finds the first grasp and path that can be reached, lifted and followed; after the lift ``again`` plans carry and path
-from what was measured in the hand; ``onward`` the rest from wherever the arm is; ``timed`` makes a motion. What cannot be
-planned anew is no reason to give up: the path from before serves. Each knot is sought where the last two lead.
+``plan`` finds the first grasp and path that can be reached, lifted and followed, with room to spare where there is; after the
+lift ``again`` plans carry and path from what was measured in the hand; ``onward`` the rest from wherever the arm is; ``timed``
+makes a motion. What cannot be planned anew is no reason to give up: the path from before serves.
 """
 
 from __future__ import annotations
@@ -15,34 +15,18 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from manitwin.episodes.planning.arm_planning import ArmPlanning
-from manitwin.episodes.planning.collision_world import STANDING, ProblemWorld
+from manitwin.episodes.planning.collision_world import FreeSpace, ProblemWorld
 from manitwin.episodes.planning.grasp_tally import GraspTally
+from manitwin.episodes.planning.held_knots import HeldKnots, HeldPath
+from manitwin.episodes.planning.level_space import LevelSpace
 from manitwin.episodes.planning.path_timing import joint_spline, time_quintic
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase, PickPlaceProblem, PlanFailure, PlanReport, later
 from manitwin.geometry.poses import transform
 
-STARTS = 4  # known configurations from which the first pose is looked for
-LARGEST_KNOT_RAD, FROM_WHERE_IT_IS_RAD = 0.6, 0.9  # a larger change between knots is a jump to another branch
-ITERATIONS = 30
+FROM_WHERE_IT_IS_RAD = 0.9  # to the first knot from where the arm has come to
 WITHDRAWN_M = 0.05
 MOST_PAIRS = 400  # of a grasp and a path, 1 to 5 ms each
-SAME_RAD = 0.05
-
-
-@dataclass(frozen=True)
-class HeldPath:
-    """Poses ``(K, 4, 4)`` in the world: of the object that is held, of the grasp frame where the hand is closed and empty.
-
-    From knot ``meant_from`` on the bodies named ``meant`` may be touched: by what is held, by the fingers of an empty hand.
-    """
-
-    poses: np.ndarray
-    meant: frozenset[str] = frozenset()
-    meant_from: int = 0
-
-    def part(self, first: int, end: int) -> HeldPath:
-        """Return the path from a knot to before another one."""
-        return replace(self, poses=self.poses[first:end], meant_from=max(0, self.meant_from - first))
+SPARE_M = 0.015  # things move by as much as the jaws close on them, and as their weight comes on the jaws
 
 
 Accepts = Callable[[Grasp, HeldPath, np.ndarray], bool]
@@ -71,41 +55,62 @@ class HeldPathPlanner:
     """
 
     def __init__(
-        self, parts: ArmPlanning, *, empty: bool = False, lets_go: bool = False, accepts: Accepts | None = None
+        self,
+        parts: ArmPlanning,
+        *,
+        empty: bool = False,
+        lets_go: bool = False,
+        level_rad: float | None = None,
+        accepts: Accepts | None = None,
     ):
         """Take the models and single motions of an arm; ``empty``: its hand holds nothing, and must not touch the target.
 
-        ``lets_go``: what is held is let go at the path's end, where the hand must have room to go back. ``accepts`` is asked
-        whether another arm can take the object at the path's end; without it nobody takes it.
+        ``lets_go``: what is held is let go at the path's end, where the hand must have room to go back. ``level_rad``: it is
+        tilted by no more than that from how it stood on its way to the path. ``accepts`` is asked whether another arm can take
+        the object at the path's end; without it nobody takes it.
         """
         self._accepts = accepts
-        self.parts, self._lets_go, self._phase = parts, lets_go, Phase.REACH if empty else Phase.CARRY
+        self.parts, self._lets_go, self._level_rad = parts, lets_go, level_rad
+        self._knots = HeldKnots(parts, Phase.REACH if empty else Phase.CARRY)
 
     def plan(
         self, problem: PickPlaceProblem, paths: Sequence[HeldPath], *, as_hulls: bool, longest_s: float
     ) -> tuple[HeldPlan | None, PlanReport]:
         """Plan with the first of ``problem.grasps``, itself or turned by 180 degrees, and the first path that it can follow.
 
+        Followed with ``SPARE_M`` around the arm, as the target is never quite where it was to be in the hand; else without.
         The report has no plan of its own, only what was tried and what it failed of.
         """
         world = self.parts.world_of(problem, problem.target.object_to_world, as_hulls=as_hulls)
         rng, tally, pairs = np.random.default_rng(problem.seed), GraspTally(), 0
+        tight = list[tuple[int, np.ndarray, HeldPath]]()
         for candidate in self.parts.candidates.of(world):
             failure: PlanFailure | None = candidate.failure
             if failure is None and self._accepts is not None:
                 failure = self._look_at_lift(world, candidate.gripper_to_object)
             for path in paths if failure is None else ():
                 pairs += 1
-                outcome = self._plan_pair(world, candidate.index, candidate.gripper_to_object, path, longest_s, rng)
+                pair = candidate.index, candidate.gripper_to_object, path
+                outcome = self._plan_pair(world, *pair, longest_s, rng, SPARE_M)
                 if isinstance(outcome, HeldPlan):
                     tally.succeed(candidate.index)
                     return outcome, PlanReport(None, tally.count_tried, tally.reasons)
+                if outcome is None:
+                    tight.append(pair)
+                    outcome = "path_blocked"
                 failure = outcome if failure is None else later(failure, outcome)
                 if pairs == MOST_PAIRS:
                     break
             tally.count(candidate.index, failure or "path_unreachable")
             if pairs == MOST_PAIRS:
                 break
+        for index, gripper_to_object, path in tight:
+            world.shape_hand(problem.grasps[index])
+            outcome = self._plan_pair(world, index, gripper_to_object, path, longest_s, rng)
+            if isinstance(outcome, HeldPlan):
+                tally.succeed(index)
+                return outcome, PlanReport(None, tally.count_tried, tally.reasons)
+            tally.count(index, outcome or "path_blocked")
         return None, PlanReport(None, tally.count_tried, tally.reasons)
 
     def plan_empty(
@@ -129,7 +134,7 @@ class HeldPathPlanner:
         rng, failures = np.random.default_rng(problem.seed), list[PlanFailure]()
         for path in paths:
             world = self.parts.world_of(pushed, pushed.target.object_to_world)
-            joints = self._follow(world, path, np.eye(4), start)
+            joints = self._knots.follow(world, path, np.eye(4), start)
             if isinstance(joints, CubicSpline):
                 if self._shortest_s(joints) > longest_s:
                     failures.append("path_slow")
@@ -162,10 +167,11 @@ class HeldPathPlanner:
         world.hold(gripper_to_object)
         rng = np.random.default_rng((problem.seed, 2))
         for path in paths:
-            joints = self._follow(world, path, gripper_to_object, near_rad)
+            joints = self._knots.follow(world, path, gripper_to_object, near_rad)
             if not isinstance(joints, CubicSpline) or self._drawback(world, joints, longest_s):
                 continue
-            carry = self.parts.motions.free(world.arm, Phase.CARRY, np.asarray(joints_rad, float), joints(0.0), rng)
+            start, level = np.asarray(joints_rad, float), self._level(world, gripper_to_object)
+            carry = self.parts.motions.free(level, Phase.CARRY, start, joints(0.0), rng)
             if isinstance(carry, Motion):
                 return carry, path, joints
         return None
@@ -184,7 +190,7 @@ class HeldPathPlanner:
         world.hold(gripper_to_object)
         hands = path.poses @ gripper_to_object
         here = np.asarray(joints_rad, float)
-        knots = self._continue(world, path, hands, [here], largest_rad=FROM_WHERE_IT_IS_RAD)
+        knots = self._knots.onward(world, path, hands, [here], largest_rad=FROM_WHERE_IT_IS_RAD)
         return joint_spline(knots) if isinstance(knots, np.ndarray) else None
 
     def timed(self, joints: CubicSpline, duration_s: float, phase: Phase, *, beyond: float = 1.0) -> Motion:
@@ -201,13 +207,18 @@ class HeldPathPlanner:
         path: HeldPath,
         longest_s: float,
         rng: np.random.Generator,
-    ) -> HeldPlan | PlanFailure:
-        """Plan one pose of a grasp with one path, cheapest first: path, approach, lift, carry, reach."""
+        spare_m: float = 0.0,
+    ) -> HeldPlan | PlanFailure | None:
+        """Plan one pose of a grasp with one path, cheapest first: path, approach, lift, carry, reach; None: no spare room."""
         parts = self.parts
         world.hold(gripper_to_object)
-        joints = self._follow(world, path, gripper_to_object, parts.arm.home)
+        joints = self._knots.follow(world, path, gripper_to_object, parts.arm.home)
         if not isinstance(joints, CubicSpline):
             return joints
+        if spare_m:
+            joints = self._knots.follow(world, path, gripper_to_object, parts.arm.home, spare_m)
+            if not isinstance(joints, CubicSpline):
+                return None
         drawback = self._drawback(world, joints, longest_s)
         if drawback is not None:
             return drawback
@@ -227,7 +238,8 @@ class HeldPathPlanner:
                 failure = later(failure, "lift_blocked")
                 continue
             lifted = parts.motions.timed(Phase.LIFT, lift)
-            carry = parts.motions.free(world.arm, Phase.CARRY, lifted.positions_rad[-1], joints(0.0), rng)
+            level = self._level(world, gripper_to_object)
+            carry = parts.motions.free(level, Phase.CARRY, lifted.positions_rad[-1], joints(0.0), rng)
             if not isinstance(carry, Motion):
                 failure = later(failure, carry)
                 continue
@@ -253,66 +265,12 @@ class HeldPathPlanner:
             failure = later(failure, "lift_blocked")
         return failure
 
-    def _follow(
-        self,
-        world: ProblemWorld,
-        path: HeldPath,
-        gripper_to_object: np.ndarray,
-        near_rad: np.ndarray,
-    ) -> CubicSpline | PlanFailure:
-        """Return the joints' path, begun at the solution nearest to a configuration or at known ones; or why there is none."""
-        hands = path.poses @ gripper_to_object
-        if any(self.parts.known.out_of_reach(hands[k]) for k in (0, len(hands) // 2, -1)):
-            return "path_unreachable"
-        failure: PlanFailure = "path_unreachable"
-        seen: list[np.ndarray] = []
-        for start in (near_rad, *self.parts.known.nearest(hands[0], STARTS)):
-            first = self.parts.arm.inverse(hands[0], start)
-            if first is None or any(np.abs(first - other).max() < SAME_RAD for other in seen):
-                continue
-            seen.append(first)
-            knots = self._begin(world, path, hands, first)
-            if isinstance(knots, np.ndarray):
-                return joint_spline(knots)
-            failure = later(failure, knots)
-        return failure
-
-    def _begin(
-        self, world: ProblemWorld, path: HeldPath, hands: np.ndarray, first_rad: np.ndarray
-    ) -> np.ndarray | PlanFailure:
-        """Return free knots ``(K, n)``, the first of which is given."""
-        self._enter(world, path, 0)
-        if not world.arm.is_free(first_rad):
-            return "path_blocked"
-        return self._continue(world, path.part(1, len(path.poses)), hands[1:], [first_rad])
-
-    def _continue(
-        self,
-        world: ProblemWorld,
-        path: HeldPath,
-        hands: np.ndarray,
-        knots: list[np.ndarray],
-        largest_rad: float = LARGEST_KNOT_RAD,
-    ) -> np.ndarray | PlanFailure:
-        """Return knots that go on from where the last of ``knots`` is; every new one is free, and the middle before it."""
-        arm, knots = self.parts.arm, list(knots)
-        for number, hand in enumerate(hands):
-            guess = knots[-1] if len(knots) == 1 else np.clip(2 * knots[-1] - knots[-2], arm.lower, arm.upper)
-            knot = arm.inverse(hand, guess, ITERATIONS)
-            if knot is None or np.abs(knot - knots[-1]).max() > largest_rad:
-                return "path_unreachable"
-            self._enter(world, path, number)
-            middle_counts = len(knots) > 1 or largest_rad == LARGEST_KNOT_RAD
-            if not world.arm.is_free(knot) or (middle_counts and not world.arm.is_free((knot + knots[-1]) / 2)):
-                return "path_blocked"
-            knots.append(knot)
-        return np.array(knots)
-
-    def _enter(self, world: ProblemWorld, path: HeldPath, number: int) -> None:
-        meant = path.meant if number >= path.meant_from else frozenset[str]()
-        if world.problem.target.name in meant:
-            meant = meant | {STANDING}
-        world.arm.enter(self._phase, self.parts.settings.clearance_m, meant)
+    def _level(self, world: ProblemWorld, gripper_to_object: np.ndarray) -> FreeSpace:
+        """Return what is free for the arm with the target in its hand, where it is also level if it is to be so."""
+        if self._level_rad is None:
+            return world.arm
+        arm, upright = self.parts.arm, world.problem.target.object_to_world[:3, :3]
+        return LevelSpace(world.arm, arm.gripper_pose, upright @ gripper_to_object[:3, :3], self._level_rad)
 
     def _drawback(self, world: ProblemWorld, joints: CubicSpline, longest_s: float) -> PlanFailure | None:
         """Return why a path is not taken that could be followed: too slow, or no room for the hand's way back from its end."""

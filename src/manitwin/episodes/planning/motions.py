@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from manitwin.episodes.planning.arm_kinematics import ArmKinematics
-from manitwin.episodes.planning.collision_world import CollisionWorld, is_path_free
+from manitwin.episodes.planning.collision_world import CollisionWorld, FreeSpace, is_path_free
 from manitwin.episodes.planning.joint_paths import JointPath, JointSegment, is_segment_free, round_corners, shortcut
 from manitwin.episodes.planning.problem import Motion, Phase, PlanFailure, PlannerSettings
 from manitwin.episodes.planning.rrt_connect import rrt_connect
@@ -53,7 +53,7 @@ class Motions:
         return Motion(phase, positions, velocities)
 
     def free(
-        self, world: CollisionWorld, phase: Phase, start: np.ndarray, goal: np.ndarray, rng: np.random.Generator
+        self, world: FreeSpace, phase: Phase, start: np.ndarray, goal: np.ndarray, rng: np.random.Generator
     ) -> Motion | PlanFailure:
         """Return a motion around things with the largest margin that start and goal allow, or why there is none."""
         margin_m = self._largest_margin_m(world, phase, start, goal)
@@ -84,9 +84,7 @@ class Motions:
         world.enter(phase, max(margin_m / 2, min(margin_m, self._settings.clearance_m)))
         return self._smooth(world, phase, waypoints) or "no_time_parameterization"
 
-    def _largest_margin_m(
-        self, world: CollisionWorld, phase: Phase, start: np.ndarray, goal: np.ndarray
-    ) -> float | None:
+    def _largest_margin_m(self, world: FreeSpace, phase: Phase, start: np.ndarray, goal: np.ndarray) -> float | None:
         clearance_m = self._settings.clearance_m
         for margin_m in (self._settings.margin_m, (self._settings.margin_m + clearance_m) / 2, clearance_m, 0.0):
             world.enter(phase, margin_m)
@@ -94,7 +92,7 @@ class Motions:
                 return margin_m
         return None
 
-    def _smooth(self, world: CollisionWorld, phase: Phase, waypoints: np.ndarray) -> Motion | None:
+    def _smooth(self, world: FreeSpace, phase: Phase, waypoints: np.ndarray) -> Motion | None:
         """Return the motion with the widest corners that is free, stopping at the waypoints where none is."""
         step_rad = self._settings.check_step_rad
         for radius_rad in CORNER_RADII_RAD if len(waypoints) > 2 else ():
@@ -113,7 +111,7 @@ class Motions:
         return Motion(phase, np.concatenate(positions), np.concatenate(velocities))
 
 
-def _is_free(world: CollisionWorld, positions: np.ndarray, step_rad: float) -> bool:
+def _is_free(world: FreeSpace, positions: np.ndarray, step_rad: float) -> bool:
     """Tell whether a sampled motion ``(T, n)`` is free, looked at every ``step_rad`` of its way."""
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
     looked_at = np.unique(np.searchsorted(way, np.arange(0, way[-1] + step_rad, step_rad)).clip(max=len(way) - 1))

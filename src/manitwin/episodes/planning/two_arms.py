@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 
 from manitwin.episodes.planning.arm_obstacles import ArmObstacles
-from manitwin.episodes.planning.held_path import HeldPath, HeldPathPlanner, HeldPlan
+from manitwin.episodes.planning.held_knots import HeldPath
+from manitwin.episodes.planning.held_path import HeldPathPlanner, HeldPlan
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import (
     Grasp,

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.goals.tool_use import AIMED_S
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.fixtures import PEG_HEIGHT_M, PEG_LENGTH_M, PEG_RADIUS_M, Fixture, peg_stand
 from manitwin.episodes.goals.goal import Goal, Literal
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill, hole_frame_of
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask

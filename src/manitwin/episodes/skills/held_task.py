@@ -10,7 +10,7 @@ import numpy as np
 
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.fixtures import Fixture
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.geometry.cavity import Opening
 from manitwin.geometry.rigid_body import PlacedObject
@@ -78,8 +78,8 @@ class HeldTask:
     nothing is grasped. ``as_hulls``: the target is carried as its hulls, and may go into the objects that it ``enters``. The
     path takes ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
     ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or
-    put back where it was. One that ``rises`` goes straight up first, and from there to the path's beginning. ``watch`` makes
-    what latches events, and what a guard asks for the force.
+    put back where it was. One that ``rises`` goes straight up first, and from there to the path's beginning. ``level_rad``: the
+    target is tilted by no more on its way to the path. ``watch`` makes what latches events, and what a guard asks for the force.
     """
 
     paths: tuple[HeldPath, ...]
@@ -95,4 +95,5 @@ class HeldTask:
     guard: Guard | None = None
     regulated: Regulated | None = None
     rises: bool = False
+    level_rad: float | None = None
     watch: Callable[[RobotWorld], EventWatch] | None = None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from manitwin.episodes.goals.goal import Goal, Literal
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
 from manitwin.geometry.poses import transform

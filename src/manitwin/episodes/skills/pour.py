@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.goals.goal import Goal, Literal
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill, frames_of
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask
@@ -23,11 +23,9 @@ from manitwin.scenes.layouts.twin_frames import TwinFrame
 
 SHORT_OF_MIDDLE = 0.45  # rim radii of the vessel that is poured into, from the lip to its middle
 CLEAR_M = 0.015  # of the lowest corner above that vessel's rim
-ABOVE_M, LOW_FROM_RAD = (
-    0.05,
-    np.radians(50),
-)  # it begins higher: what has turned in the hand is measured on the way down
+ABOVE_M, LOW_FROM_RAD = 0.05, np.radians(50)  # it begins higher: what has turned in the hand is measured on the way
 TILT_RAD, TILTS = np.radians(115), 13
+LEVEL_RAD = np.radians(40)  # a vessel that is a sixth full begins to spill at about 60 degrees, sooner as it is swung
 DEEP, DEEP_TILT_RAD = 3.0, np.radians(135)  # rim radii: what lies in a belly below a neck runs out later
 AZIMUTHS = 8
 POURS_S, LASTS_S, LONGEST_S = 2.5, 0.5, 4.0
@@ -87,6 +85,7 @@ class Pour(HeldSkill):
             longest_s=LONGEST_S,
             hold_s=LASTS_S,
             ending="put_back",
+            level_rad=LEVEL_RAD,
         )
 
 

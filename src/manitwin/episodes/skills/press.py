@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from manitwin.episodes.events import PressWatch
 from manitwin.episodes.goals.goal import SIGNATURES, Goal, Literal
 from manitwin.episodes.planning.closed_hand import first_corner
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask
 from manitwin.geometry.poses import transform

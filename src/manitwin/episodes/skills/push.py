@@ -10,7 +10,7 @@ import numpy as np
 from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprint_at
 from manitwin.episodes.planning.collision_world import STANDING
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.skills.skill import Skill, SkillGoal, Surroundings
 from manitwin.geometry.boxes import footprint, separation_m
 from manitwin.geometry.poses import transform, transform_points

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill, stick_frame
 from manitwin.episodes.skills.held_task import HeldScene, HeldTask

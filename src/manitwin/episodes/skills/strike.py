@@ -9,7 +9,7 @@ from manitwin.episodes.events import StrikeWatch
 from manitwin.episodes.fixtures import Fixture, block
 from manitwin.episodes.goals.goal import Goal, Literal
 from manitwin.episodes.planning.closed_hand import open_fingertips
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill
 from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask

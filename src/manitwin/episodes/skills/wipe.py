@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from manitwin.episodes.fixtures import Fixture
 from manitwin.episodes.goals.goal import Goal, Literal
-from manitwin.episodes.planning.held_path import HeldPath
+from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.skills.held_skill import HeldSkill, board_in_reach
 from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask, Regulated

@@ -1,0 +1,109 @@
+"""Held paths knot by knot: joints at which the arm has what it holds at the poses of a path, each sought where the last lead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from manitwin.episodes.planning.arm_planning import ArmPlanning
+from manitwin.episodes.planning.collision_world import STANDING, ProblemWorld
+from manitwin.episodes.planning.path_timing import joint_spline
+from manitwin.episodes.planning.problem import Phase, PlanFailure, later
+
+STARTS = 4  # known configurations from which the first pose is looked for
+LARGEST_KNOT_RAD = 0.6  # a larger change between knots is a jump to another branch
+ITERATIONS = 30
+SAME_RAD = 0.05
+
+
+@dataclass(frozen=True)
+class HeldPath:
+    """Poses ``(K, 4, 4)`` in the world: of the object that is held, of the grasp frame where the hand is closed and empty.
+
+    From knot ``meant_from`` on the bodies named ``meant`` may be touched: by what is held, by the fingers of an empty hand.
+    """
+
+    poses: np.ndarray
+    meant: frozenset[str] = frozenset()
+    meant_from: int = 0
+
+    def part(self, first: int, end: int) -> HeldPath:
+        """Return the path from a knot to before another one."""
+        return replace(self, poses=self.poses[first:end], meant_from=max(0, self.meant_from - first))
+
+
+class HeldKnots:
+    """Finds the joints of held paths for one arm; the world holds the target, or nothing."""
+
+    def __init__(self, parts: ArmPlanning, phase: Phase):
+        """Take the models of an arm, and the phase that says what may touch: CARRY, or REACH of an empty hand."""
+        self._parts, self._phase = parts, phase
+
+    def follow(
+        self,
+        world: ProblemWorld,
+        path: HeldPath,
+        gripper_to_object: np.ndarray,
+        near_rad: np.ndarray,
+        spare_m: float = 0.0,
+    ) -> CubicSpline | PlanFailure:
+        """Return the joints' path, begun at the solution nearest to a configuration or at known ones; or why there is none.
+
+        The arm stays ``spare_m`` farther away from all around than it must.
+        """
+        parts, hands = self._parts, path.poses @ gripper_to_object
+        if any(parts.known.out_of_reach(hands[k]) for k in (0, len(hands) // 2, -1)):
+            return "path_unreachable"
+        failure: PlanFailure = "path_unreachable"
+        seen: list[np.ndarray] = []
+        for start in (near_rad, *parts.known.nearest(hands[0], STARTS)):
+            first = parts.arm.inverse(hands[0], start)
+            if first is None or any(np.abs(first - other).max() < SAME_RAD for other in seen):
+                continue
+            seen.append(first)
+            knots = self._begin(world, path, hands, first, spare_m)
+            if isinstance(knots, np.ndarray):
+                return joint_spline(knots)
+            failure = later(failure, knots)
+        return failure
+
+    def onward(
+        self,
+        world: ProblemWorld,
+        path: HeldPath,
+        hands: np.ndarray,
+        knots: list[np.ndarray],
+        *,
+        largest_rad: float = LARGEST_KNOT_RAD,
+        spare_m: float = 0.0,
+    ) -> np.ndarray | PlanFailure:
+        """Return knots that go on from where the last of ``knots`` is; every new one is free, and the middle before it."""
+        arm, knots = self._parts.arm, list(knots)
+        for number, hand in enumerate(hands):
+            guess = knots[-1] if len(knots) == 1 else np.clip(2 * knots[-1] - knots[-2], arm.lower, arm.upper)
+            knot = arm.inverse(hand, guess, ITERATIONS)
+            if knot is None or np.abs(knot - knots[-1]).max() > largest_rad:
+                return "path_unreachable"
+            self._enter(world, path, number, spare_m)
+            middle_counts = len(knots) > 1 or largest_rad == LARGEST_KNOT_RAD
+            if not world.arm.is_free(knot) or (middle_counts and not world.arm.is_free((knot + knots[-1]) / 2)):
+                return "path_blocked"
+            knots.append(knot)
+        return np.array(knots)
+
+    def _begin(
+        self, world: ProblemWorld, path: HeldPath, hands: np.ndarray, first_rad: np.ndarray, spare_m: float
+    ) -> np.ndarray | PlanFailure:
+        """Return free knots ``(K, n)``, the first of which is given."""
+        self._enter(world, path, 0, spare_m)
+        if not world.arm.is_free(first_rad):
+            return "path_blocked"
+        return self.onward(world, path.part(1, len(path.poses)), hands[1:], [first_rad], spare_m=spare_m)
+
+    def _enter(self, world: ProblemWorld, path: HeldPath, number: int, spare_m: float) -> None:
+        meant = path.meant if number >= path.meant_from else frozenset[str]()
+        if world.problem.target.name in meant:
+            meant = meant | {STANDING}
+        world.arm.enter(self._phase, self._parts.settings.clearance_m, meant, spare_m)

@@ -1,0 +1,65 @@
+"""Carrying something level: what is tilted is not free, and free motions stay level where there is a way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from planning_problems import TABLE, above, problem, standing, wall
+
+from manitwin.episodes.planning.arm_kinematics import ArmKinematics
+from manitwin.episodes.planning.collision_world import ProblemWorld
+from manitwin.episodes.planning.convex_shapes import ShapeStore
+from manitwin.episodes.planning.kinematic_body import floating_hand_of
+from manitwin.episodes.planning.level_space import LevelSpace
+from manitwin.episodes.planning.motions import Motions
+from manitwin.episodes.planning.problem import Motion, Phase, PlannerSettings
+from manitwin.geometry.poses import inverse
+from manitwin.robots.load import load_robot
+
+SETTINGS = PlannerSettings()
+MOST_RAD = np.radians(20)
+
+
+@pytest.fixture(scope="module")
+def carried():
+    """A brick that is carried over a wall of 32 cm, from one side of the arm to the other: arm, world, level space, ends."""
+    robot = load_robot("panda")
+    arm, grasp = ArmKinematics(robot), above(0.08)
+    some = problem(standing(0.45, 0.35), standing(0.45, -0.35), boxes=(TABLE, wall(0.5, 0, (0.15, 0.01, 0.16))))
+    world = ProblemWorld(some, some.goal_object_to_world, arm.body, floating_hand_of(arm.body), ShapeStore(), SETTINGS)
+    world.hold(grasp)
+    space = LevelSpace(world.arm, arm.gripper_pose, some.target.object_to_world[:3, :3] @ grasp[:3, :3], MOST_RAD)
+    ends = [arm.inverse(standing(0.45, y, z_m=0.12) @ grasp, arm.home) for y in (0.35, -0.35)]
+    return Motions(robot, arm, 1 / 120, SETTINGS), arm, world.arm, space, ends, grasp
+
+
+def tilts_rad(arm: ArmKinematics, positions: np.ndarray, grasp: np.ndarray) -> np.ndarray:
+    """How far the brick's +Z is from the vertical."""
+    return np.array([np.arccos(np.clip((arm.gripper_pose(q) @ inverse(grasp))[2, 2], -1, 1)) for q in positions])
+
+
+def test_what_is_tilted_too_far_is_not_level_whatever_its_heading(carried) -> None:
+    _, arm, world, space, (start, _), grasp = carried
+    space.enter(Phase.CARRY, 0.0)
+    assert space.is_free(start)
+    for joint, turned_rad, level in ((6, -0.5, True), (5, MOST_RAD - 0.05, True), (5, MOST_RAD + 0.05, False)):
+        turned = start.copy()
+        turned[joint] += turned_rad  # the last joint turns about the vertical, the one before tilts
+        assert tilts_rad(arm, turned[None], grasp)[0] == pytest.approx(turned_rad if joint == 5 else 0.0, abs=0.02)
+        assert space.is_level(turned) == level
+        world.enter(Phase.CARRY, 0.0)
+        assert world.is_free(turned)
+        assert space.is_free(turned) == level
+
+
+def test_a_motion_through_it_stays_level_where_another_one_does_not(carried) -> None:
+    motions, arm, world, space, (start, goal), grasp = carried
+    tilted = 0
+    for seed in range(6):
+        free = motions.free(world, Phase.CARRY, start, goal, np.random.default_rng(seed))
+        level = motions.free(space, Phase.CARRY, start, goal, np.random.default_rng(seed))
+        assert isinstance(free, Motion)
+        assert isinstance(level, Motion), level
+        tilted += tilts_rad(arm, free.positions_rad, grasp).max() > MOST_RAD
+        assert tilts_rad(arm, level.positions_rad, grasp).max() <= MOST_RAD + np.radians(1)
+    assert tilted
