@@ -15,6 +15,7 @@ from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase
 from manitwin.episodes.settings import EpisodeSettings
 from manitwin.geometry.poses import transform
+from manitwin.physics.sapien.contacts import NONE_MEANT, MeantContacts
 from rigid_boxes import above
 
 IN_THE_AIR = tuple(Grasp(f"air{i}", above([0, 0.005 * i, 0.066]), 0.04) for i in range(3))
@@ -51,6 +52,7 @@ class Held:
 
     def __init__(self, gripper_to_object: np.ndarray, turned_rad: float):
         self.done: list[str] = []
+        self.meant = MeantContacts(target=frozenset())
         self.commanded_rad = np.zeros(7)
         self._measured = gripper_to_object @ transform(Rotation.from_euler("x", turned_rad).as_matrix())
 
@@ -83,4 +85,5 @@ def test_what_has_turned_far_is_set_down_where_it_was_once(turned_deg: float, tr
     with pytest.raises(NotTaken, match="replan_failed"):
         course.set_down_again(plan, execution)  # type: ignore[arg-type]
     assert execution.done == ["CARRY", "LOWER", "OPEN", "RETREAT"]
+    assert execution.meant == NONE_MEANT  # it may touch the table again
     assert grasp.grasp_id == plan.grasp.grasp_id

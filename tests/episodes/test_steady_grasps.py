@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from manitwin.episodes.planning.problem import Grasp
-from manitwin.episodes.steady_grasps import bears_weight, steady_tiers, torsion_limits_nm, weight_torque_nm
+from manitwin.episodes.steady_grasps import (
+    bears_weight,
+    by_largest_torque,
+    steady_tiers,
+    torsion_limits_nm,
+    touch_narrowly,
+    weight_torque_nm,
+)
 from manitwin.geometry.poses import transform
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.robots.grippers.gripper import load_gripper
@@ -72,3 +79,20 @@ def test_other_grippers_keep_the_order_of_their_grasps() -> None:
         assert steady_tiers(grasps, bar(2.0), load_gripper(name)) == [tuple(grasps)]
         assert bears_weight(grasps[0], bar(2.0), load_gripper(name))
         assert steady_tiers([], bar(2.0), load_gripper(name)) == []
+
+
+def test_of_what_is_held_any_way_up_grasps_near_the_middle_and_broad_ones_come_first() -> None:
+    heavy = bar(2.0).body
+    x_m = (0.12, 0.0, 0.1, 0.03)
+    grasps = [held_at(x) for x in x_m]
+    assert [each.grasp_id for each in by_largest_torque(grasps, heavy, HAND)] == ["0.0", "0.03", "0.1", "0.12"]
+    upright = Grasp("upright", above([0.12, 0, 0.0]), 0.04)  # its closing axis leads through the middle
+    assert by_largest_torque([grasps[0], upright], heavy, HAND) == [upright, grasps[0]]
+    light = bar(0.03).body
+    assert by_largest_torque(grasps, light, HAND) == grasps
+    low = replace(
+        held_at(0.0), gripper_to_object=held_at(0.0).gripper_to_object @ transform(None, np.array([0, 0, -0.026]))
+    )
+    assert touch_narrowly([*grasps, low], light, HAND) == [False] * 4 + [True]  # the last row of the pads alone
+    assert by_largest_torque([low, *grasps], light, HAND) == [*grasps, low]
+    assert touch_narrowly(grasps, heavy, load_gripper("suction")) == [False] * 4

@@ -7,6 +7,7 @@ from dataclasses import replace
 from manitwin.episodes.courses.course import ANOTHER_GRASP, Course, NotTaken, Turned
 from manitwin.episodes.execution import Execution
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
+from manitwin.episodes.planning.two_arms import alone
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.episodes.sequence import course_of, problem_of
 from manitwin.physics.sapien.contacts import NONE_MEANT
@@ -42,7 +43,7 @@ def _taken_anew(course: Course, world: RobotWorld, execution: Execution, *, with
     start, facts = course.start, course.facts
     if facts.grasp is None or not isinstance(start.planner, PickPlacePlanner):
         return None
-    planner, settings, missed = start.planner, start.settings, facts.grasp.grasp_id
+    planner, settings, missed = alone(start.planner), start.settings, facts.grasp.grasp_id
     execution.meant = NONE_MEANT
     execution.open()
     away = plan_withdrawal(

@@ -12,6 +12,8 @@ from manitwin.geometry.ray_caster import RayCaster
 
 FURNITURE_FRICTION = 0.5
 """Static and dynamic, of every piece of furniture."""
+LEAST_TABLE_M = 0.3
+"""Half of what a table is wide, at the least."""
 
 
 @dataclass(frozen=True)
@@ -62,3 +64,15 @@ class StaticBox:
     name: str
     half_extents_m: np.ndarray
     box_to_world: np.ndarray
+
+
+def stands_for_a_plane(box: StaticBox) -> bool:
+    """Tell whether a box's top is the plane that the robot stands on, and so large that nothing is to go beside it.
+
+    It is a plane in physics, and for planners: between PhysX's boxes and hulls contacts persist from step to step, and a tall
+    box that is set down rocks by a degree or two for ever. Of six boxes of cereals let go with up to 3 degrees of tilt, one had
+    come to rest after 3 s on a box, and all on a plane.
+    """
+    top = box.box_to_world[:3, 2] * box.half_extents_m[2] + box.box_to_world[:3, 3]
+    upright = box.box_to_world[2, 2] > 1 - 1e-9
+    return bool(upright and abs(top[2]) < 1e-6 and box.half_extents_m[:2].min() >= LEAST_TABLE_M)

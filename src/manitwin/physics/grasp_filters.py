@@ -19,6 +19,7 @@ from manitwin.robots.grippers.hand_clearance import HandCollision
 from manitwin.robots.grippers.parallel import ParallelGripper
 
 ACROSS, ALONG = 3, 5  # cells of a pad
+PAD_CELLS = ACROSS * ALONG
 INSET = 0.87  # the outermost rays lie inside the pad's edge
 SAME_CONTACT_M = 0.0015  # cells this close behind the first one touch too, as soft pads do
 # The pad filter: two cells of fifteen, contact centres at most 6 mm apart, normals inside the narrowed friction cone.

@@ -140,6 +140,43 @@ def test_a_second_arm_15_cm_beside_takes_nothing() -> None:
     assert recording.object_positions_m[-1, 0, 2] < 0.1, "it fell"
 
 
+class Once(TwoArmPlanner):
+    """Finds no way to the bar where the first arm has brought it."""
+
+    asked = 0
+
+    def plan_take(self, problem, object_to_world, giver_rad, opening_m, giver_to_object, put_down, first=()):
+        self.asked += bool(first)
+        if self.asked == 1 and first:
+            return None
+        return super().plan_take(problem, object_to_world, giver_rad, opening_m, giver_to_object, put_down, first)
+
+
+def test_where_the_second_arm_does_not_come_to_they_meet_elsewhere() -> None:
+    facts, recording = attempt(Once(load_robot("two_pandas")))
+    assert facts.replans["take_failed"] == 1
+    assert facts.replans["elsewhere"] == 1
+    assert facts.outcome == "kept", (facts.evaluation, facts.unplanned, facts.replans)
+    assert recording is not None
+    acts = (recording.phase[1:] == Phase.ACT) & (recording.phase[:-1] != Phase.ACT)
+    assert acts.sum() == 2
+
+
+class Never(TwoArmPlanner):
+    """Finds no way to the bar once it is in the first hand."""
+
+    def plan_take(self, problem, object_to_world, giver_rad, opening_m, giver_to_object, put_down, first=()):
+        if first:
+            return None
+        return super().plan_take(problem, object_to_world, giver_rad, opening_m, giver_to_object, put_down, first)
+
+
+def test_what_cannot_be_taken_anywhere_is_not_handed_over() -> None:
+    facts, _ = attempt(Never(load_robot("two_pandas")))
+    assert facts.outcome == "replan_failed"
+    assert not facts.replans["elsewhere"]
+
+
 def test_a_second_arm_that_does_not_close_takes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     close = Execution.close
     monkeypatch.setattr(Execution, "close", lambda self: close(self) if self.used == GIVER else None)

@@ -9,7 +9,10 @@ import pytest
 from granular_things import cup, mixing_bowl, plate, two_things, with_fewer
 from held_skills import attempt, beside
 
-from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.courses.held import HeldCourse
+from manitwin.episodes.execution import Execution
+from manitwin.episodes.planning.held_path import HeldPathPlanner
+from manitwin.episodes.planning.problem import Grasp, Phase
 from manitwin.episodes.skills.pour import grasp_rank
 from manitwin.episodes.skills.registry import SKILLS
 from manitwin.episodes.skills.skill import SkillGoal
@@ -36,6 +39,25 @@ def test_a_cup_is_emptied_into_a_bowl_and_put_back() -> None:
     assert recording.granules_in_objects[0].tolist() == [20, 0]
     assert recording.granules_in_objects[-1, 1] >= 18
     assert recording.object_positions_m[-1, 0] == pytest.approx(recording.object_positions_m[0, 0], abs=0.02)
+
+
+def test_where_no_way_back_is_found_the_arm_goes_back_as_it_came(monkeypatch: pytest.MonkeyPatch) -> None:
+    go_back = HeldCourse._go_back
+
+    def without_a_plan(course: HeldCourse, execution: Execution, been: list[np.ndarray]) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(HeldPathPlanner, "onward", lambda *_, **__: None)
+            go_back(course, execution, been)
+
+    monkeypatch.setattr(HeldCourse, "_go_back", without_a_plan)
+    facts, recording = attempt(SPOT, poured_goal(), GRASPS)
+    assert facts.replans["back_as_it_came"] == 1
+    assert facts.outcome == "kept", (facts.evaluation, facts.unplanned)
+    assert recording is not None
+    went, came = (recording.joint_positions_rad[1:][recording.phase == phase] for phase in (Phase.ACT, Phase.RETURN))
+    between = went[:-1, None] + np.linspace(0, 1, 9)[None, :, None] * np.diff(went, axis=0)[:, None]
+    away_rad = np.abs(came[:, None] - between.reshape(1, -1, went.shape[1])).max(2).min(1)
+    assert away_rad.max() < 0.03
 
 
 @pytest.mark.slow

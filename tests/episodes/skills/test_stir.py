@@ -10,7 +10,7 @@ from granular_things import deep_pot, mixing_bowl, two_things, with_fewer
 from held_skills import attempt, beside
 
 from manitwin.episodes.courses.held import turned_in_place
-from manitwin.episodes.planning.problem import Grasp
+from manitwin.episodes.planning.problem import Grasp, Phase
 from manitwin.episodes.skills.held_skill import stick_frame
 from manitwin.episodes.skills.held_task import HeldScene
 from manitwin.episodes.skills.registry import SKILLS
@@ -46,6 +46,7 @@ def test_a_stick_goes_around_in_a_bowl_and_is_laid_back() -> None:
     assert facts.outcome == "kept", (facts.evaluation, facts.unplanned)
     assert recording is not None
     assert recording.object_positions_m[-1, 0] == pytest.approx(recording.object_positions_m[0, 0], abs=0.02)
+    assert Phase.RETURN not in recording.phase  # it has come out of the bowl: it does not go around backwards
 
 
 @pytest.mark.slow

@@ -18,13 +18,15 @@ BODY, FRAMES, HELD_WELL = mallet()
 
 
 def ridge(side: int) -> np.ndarray:
-    """An edge along Z on the handle's side, 2 mm high, 6 cm from where the head begins: pads touch it along that edge alone."""
-    x, y = side * 0.012, 0.02
+    """An edge along Z on the handle's side, 2 mm high: pads touch it along that edge alone."""
+    x, y = side * 0.012, 0.03
     return np.array([[x, y + s * 0.002, z] for s in (-1, 1) for z in (0.018, 0.022)] + [[x + side * 0.002, y, 0.02]])
 
 
 KNOBBED = replace(BODY, hulls=(*BODY.hulls, ridge(1), ridge(-1)), mass_kg=0.4)
-ON_THE_KNOBS = Grasp("knobs", above([0, 0.02, 0.02]), 0.028)
+ON_THE_KNOBS = Grasp("knobs", above([0, 0.03, 0.02]), 0.028)
+FARTHER = tuple(Grasp(f"farther{i}", above([0, -0.01 * i, 0.02]), 0.024) for i in range(3))
+"""From the head: where the lever tells, they come later."""
 SPOT = around(KNOBBED, FRAMES, 0.5, 0.05)
 
 
@@ -35,7 +37,7 @@ def closings(recording: object) -> int:
 
 
 def test_what_turns_as_it_is_lifted_is_taken_by_another_grasp() -> None:
-    facts, recording = attempt(SPOT, goal_of("strike", SPOT), (ON_THE_KNOBS, *HELD_WELL))
+    facts, recording = attempt(SPOT, goal_of("strike", SPOT), (ON_THE_KNOBS, *FARTHER))
     assert facts.replans["another_grasp"] == 1
     assert facts.grasp is not None and facts.grasp.grasp_id != "knobs"
     assert facts.outcome == "kept", (facts.evaluation, facts.unplanned, facts.replans)

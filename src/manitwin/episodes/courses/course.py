@@ -20,6 +20,7 @@ from manitwin.episodes.skills.skill import SkillGoal
 from manitwin.episodes.steady_grasps import steady_tiers
 from manitwin.geometry.poses import inverse, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
+from manitwin.physics.sapien.contacts import NONE_MEANT
 from manitwin.physics.sapien.world import RobotWorld
 
 _Chosen = TypeVar("_Chosen")
@@ -124,6 +125,11 @@ class Course(ABC):
         """Where the plan leaves the target ``(4, 4)``; None: in the hand."""
         return self.goal_object_to_world
 
+    @property
+    def putting_back(self) -> Planner:
+        """The planner of how the target is put back."""
+        return self.start.planner
+
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
         """Return what is to be watched for events."""
         return ()
@@ -174,12 +180,13 @@ class Course(ABC):
             return
         goal = self.problem.target.object_to_world.copy()
         goal[2, 3] += self.start.settings.release_height_m
-        found = self.start.planner.plan_place(
+        found = self.putting_back.plan_place(
             self.problem, plan, execution.commanded_rad, execution.gripper_to_object(), goal, True
         )
         if found is None:
             return
         carry, lower, retreat = found
+        execution.meant = NONE_MEANT
         if carry is not None:
             execution.follow(carry)
         execution.follow(lower)

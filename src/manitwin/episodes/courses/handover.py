@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from manitwin.episodes.courses.course import Course, Ended, Start
+from manitwin.episodes.courses.course import Course, Ended, Planner, Start
 from manitwin.episodes.episode_facts import EpisodeFacts
 from manitwin.episodes.events import EventWatch
 from manitwin.episodes.execution import Execution
@@ -16,7 +16,7 @@ from manitwin.episodes.handover_watch import HandoverWatch
 from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.held_path import HeldPathPlanner
 from manitwin.episodes.planning.placement import Placement
-from manitwin.episodes.planning.problem import Phase
+from manitwin.episodes.planning.problem import Grasp, Phase
 from manitwin.episodes.planning.put_down import Held, put_down_poses
 from manitwin.episodes.planning.two_arms import HandoverPlan, Take, TwoArmPlanner
 from manitwin.geometry.poses import transform, transform_points
@@ -27,6 +27,7 @@ from manitwin.robots.two_arms import base_to_world
 
 GIVER, TAKER = 0, 1
 MEETINGS = 24
+OTHER_MEETINGS = 12  # that are tried with what has turned in the first hand
 HEIGHTS_M, ASIDE_M, ALONG_M = (0.35, 0.55), 0.15, 0.08  # of the middle of the object, about half way between the bases
 TILTED_SHARE, TILT_RAD = 0.7, np.radians(100)
 RISEN_M = 0.03  # over which the meeting place is come up to
@@ -64,6 +65,11 @@ class HandoverCourse(Course):
         """Where the second arm is to put it down."""
         return self._goal
 
+    @property
+    def putting_back(self) -> Planner:
+        """The planner of the first arm alone, the second one at home."""
+        return self._arms.alone
+
     def watches(self, world: RobotWorld) -> Sequence[EventWatch]:
         """Return the watch of who holds the target."""
         target = self.problem.target
@@ -92,19 +98,11 @@ class HandoverCourse(Course):
         """Give, take, let go, withdraw, hold, and put down; raises Ended where a hand loses the target, or there is no way."""
         execution.use(GIVER)
         self._bring(self._plan, execution)
-        here, giver_to_object = execution.target_to_world(), execution.gripper_to_object()
-        giver_rad = execution.commanded_rad
-        take = self._arms.plan_take(
-            self.problem,
-            here,
-            giver_rad,
-            self._plan.give.grasp.width_m,
-            giver_to_object,
-            self._put_down,
-            first=(self._plan.take.grasp,),
-        )
+        take = self._take_from(execution, self._plan.take.grasp)
         self.facts.replans["take" if take is not None else "take_failed"] += 1
+        take = take or self._meet_elsewhere(execution)
         if take is None:
+            self.set_down_again(self._plan.give, execution)
             raise Ended("replan_failed")
         self.facts.taker_grasp = take.grasp
         execution.use(TAKER)
@@ -118,6 +116,41 @@ class HandoverCourse(Course):
         execution.wait_s(Phase.HOLD, HOLD_S)
         self.check_held(execution)
         self._set_down(take, execution)
+
+    def _take_from(self, execution: Execution, first: Grasp) -> Take | None:
+        """Plan how the second arm takes the target from where the first one holds it now, by ``first`` if it can."""
+        width_m, there = self._plan.give.grasp.width_m, execution.target_to_world()
+        return self._arms.plan_take(
+            self.problem,
+            there,
+            execution.commanded_rad,
+            width_m,
+            execution.gripper_to_object(),
+            self._put_down,
+            first=(first,),
+        )
+
+    def _meet_elsewhere(self, execution: Execution) -> Take | None:
+        """Bring the target, as it is in the first hand now, to another meeting place where the second arm can take it."""
+        held, give, measured = HeldPathPlanner(self._arms.parts), self._plan.give, execution.gripper_to_object()
+        asked = self._arms.with_taker_at(self.problem, self._arms.taker.arm.home, None)
+        for meeting in [each for each in self._meetings if each is not give.held][:OTHER_MEETINGS]:
+            here, width_m = execution.commanded_rad, give.grasp.width_m
+            found = held.again(asked, [meeting], measured, here, here, as_hulls=False, longest_s=LONGEST_S)
+            if found is None:
+                continue
+            carry, path, joints = found
+            where = self.problem, path.poses[-1], joints(1.0), width_m, measured, self._put_down
+            take = self._arms.plan_take(*where, first=(self._plan.take.grasp,))
+            if take is None:
+                continue
+            execution.follow(carry)
+            execution.follow(held.timed(joints, MEET_S, Phase.ACT))
+            self.check_held(execution)
+            take = self._take_from(execution, take.grasp)
+            self.facts.replans["elsewhere" if take is not None else "elsewhere_failed"] += 1
+            return take
+        return None
 
     def _set_down(self, take: Take, execution: Execution) -> None:
         """Carry the target to the table before the second arm, let go and go home; raises Ended where there is no way."""

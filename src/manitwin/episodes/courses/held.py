@@ -24,6 +24,7 @@ from manitwin.episodes.planning.pick_place import PickPlacePlanner
 from manitwin.episodes.planning.problem import Grasp, Motion, Phase
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
 from manitwin.episodes.skills.held_task import Guard, HeldScene, HeldTask, Regulated
+from manitwin.episodes.steady_grasps import touch_narrowly
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
 from manitwin.physics.sapien.contacts import MeantContacts
@@ -111,10 +112,14 @@ class HeldCourse(Course):
         return True
 
     def _ranked(self, grasps: Sequence[Grasp]) -> list[Grasp]:
-        """Return the grasps that leave the function free, those first that do so best, but for the last quarter."""
-        ranks = [(self.task.rank(grasp), grasp) for grasp in grasps]
-        free = [(rank, grasp) for rank, grasp in ranks if rank is not None]
-        return [grasp for part in first_and_last(free) for _, grasp in sorted(part, key=lambda each: each[0])]
+        """Return the grasps that leave the function free, but for the last quarter those first that do so best.
+
+        Of equal ones those go first whose pads touch broadly.
+        """
+        narrow = touch_narrowly(grasps, self.problem.target.body, self._own.robot.gripper)
+        ranks = [(self.task.rank(grasp), late, grasp) for grasp, late in zip(grasps, narrow, strict=True)]
+        free = [(rank, late, grasp) for rank, late, grasp in ranks if rank is not None]
+        return [grasp for part in first_and_last(free) for *_, grasp in sorted(part, key=lambda each: each[:2])]
 
     def execute(self, execution: Execution) -> None:
         """Grasp and lift (or close the hand), carry, follow the path, and end as the task says."""
@@ -129,7 +134,8 @@ class HeldCourse(Course):
         if self.task.ending == "let_go":
             self._let_go(execution)
             return
-        self._go_back(execution, been)
+        if not self.task.comes_out:
+            self._go_back(execution, been)
         if not self.task.empty:
             self.check_held(execution)
         if self.task.ending == "put_back":
@@ -151,7 +157,9 @@ class HeldCourse(Course):
         if carry is not None and turned_rad(measured, execution.gripper_to_object()) > TURNED_RAD:
             carry = self._plan_again(self._held, self._joints, execution)
             self.facts.replans["after_carry" if carry is not None else "after_carry_failed"] += 1
-            if carry is not None:
+            if carry is None:
+                self.set_down_again(plan, execution)
+            else:
                 execution.follow(carry)
                 self.check_held(execution)
 
@@ -184,7 +192,7 @@ class HeldCourse(Course):
         for first, end in pairwise(cuts):
             joints = self._onward(self._held.part(first, end), execution, (end - 1) / (count - 1))
             execution.follow(self._planner.timed(joints, task.duration_s / parts, Phase.ACT))
-            been.append(execution.commanded_rad)
+            been += [*joints(np.linspace(0, 1, end - first + 1)[1:-1]), execution.commanded_rad]
         regulated = task.regulated
         if task.guard is not None:
             end = count if regulated is None else regulated.first

@@ -31,6 +31,8 @@ SPARE_M = 0.015  # things move by as much as the jaws close on them, and as thei
 
 Accepts = Callable[[Grasp, HeldPath, np.ndarray], bool]
 """Tells of a grasp as it is used, a path and the arm's joints ``(n,)`` at its end whether they serve."""
+Serves = Callable[[Grasp], bool]
+"""Tells of a grasp as it is used whether it can serve, wherever a path ends."""
 
 
 @dataclass(frozen=True)
@@ -62,14 +64,15 @@ class HeldPathPlanner:
         lets_go: bool = False,
         level_rad: float | None = None,
         accepts: Accepts | None = None,
+        serves: Serves | None = None,
     ):
         """Take the models and single motions of an arm; ``empty``: its hand holds nothing, and must not touch the target.
 
         ``lets_go``: what is held is let go at the path's end, where the hand must have room to go back. ``level_rad``: it is
         tilted by no more than that from how it stood on its way to the path. ``accepts`` is asked whether another arm can take
-        the object at the path's end; without it nobody takes it.
+        the object at the path's end, ``serves`` beforehand whether it could anywhere; without them nobody takes it.
         """
-        self._accepts = accepts
+        self._accepts, self._serves = accepts, serves
         self.parts, self._lets_go, self._level_rad = parts, lets_go, level_rad
         self._knots = HeldKnots(parts, Phase.REACH if empty else Phase.CARRY)
 
@@ -88,6 +91,9 @@ class HeldPathPlanner:
             failure: PlanFailure | None = candidate.failure
             if failure is None and self._accepts is not None:
                 failure = self._look_at_lift(world, candidate.gripper_to_object)
+            if failure is None and self._serves is not None:
+                used = replace(problem.grasps[candidate.index], gripper_to_object=candidate.gripper_to_object)
+                failure = None if self._serves(used) else "taker_blocked"
             for path in paths if failure is None else ():
                 pairs += 1
                 pair = candidate.index, candidate.gripper_to_object, path

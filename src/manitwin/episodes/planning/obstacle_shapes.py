@@ -10,9 +10,11 @@ import numpy as np
 from manitwin.episodes.planning.convex_shapes import ConvexBody, ShapeStore
 from manitwin.episodes.planning.libraries import coal, pin
 from manitwin.episodes.planning.problem import PickPlaceProblem
+from manitwin.geometry.rigid_body import stands_for_a_plane
 
 BEARING_GAP_M = 0.003  # what is no further than this, and overlaps by no more, bears the target: they touch on purpose
 SINK_M = 0.002  # by how much deeper than it stands the target may go while it is lifted off or set down
+PLANE_M = 3.0  # half of the box that stands for the plane: beside a table an arm meets it as well
 HAND_REACH_M = 0.06  # what is nearer to the target than this comes between hand and target
 
 
@@ -59,7 +61,10 @@ def obstacle_shapes(
     start, goal = pose_of(problem.target.object_to_world), pose_of(goal_object_to_world)
     placed: list[tuple[str, Any, Any]] = []
     for box in (*problem.static_boxes, *problem.fixtures):
-        shape = coal.Box(2 * np.asarray(box.half_extents_m, float))
+        half_m = np.asarray(box.half_extents_m, float)
+        if stands_for_a_plane(box):
+            half_m = np.array([*np.maximum(half_m[:2], PLANE_M), half_m[2]])
+        shape = coal.Box(2 * half_m)
         shape.computeLocalAABB()
         placed.append((box.name, shape, pose_of(box.box_to_world)))
     for obstacle in problem.obstacles:

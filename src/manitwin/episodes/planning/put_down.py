@@ -10,7 +10,7 @@ import numpy as np
 
 from manitwin.episodes.pick_place_tasks import MIN_GAP_M, footprint_at
 from manitwin.episodes.planning.pick_place import PickPlacePlanner
-from manitwin.episodes.planning.placement import Placement
+from manitwin.episodes.planning.placement import Placement, goals_after_slip
 from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem
 from manitwin.geometry.boxes import separation_m
 from manitwin.geometry.poses import inverse, transform, transform_points
@@ -58,18 +58,23 @@ class PutDown:
         return None
 
     def _with_room(self, problem: PickPlaceProblem, held: Held, gripper_to_object: np.ndarray) -> Iterator[np.ndarray]:
-        """Yield the goals at which the hand alone is free: where it lets go, above it, and after it has drawn back."""
-        parts = self._arm.parts
+        """Yield the goals at which the hand alone is free: where it lets go, above it, and after it has drawn back.
+
+        Of what has turned in the hand: where it lets go as it may then (``goals_after_slip``).
+        """
+        parts, body = self._arm.parts, problem.target.body
         for goal in self._goals:
-            there = goal @ gripper_to_object
-            if parts.known.out_of_reach(there):
+            if parts.known.out_of_reach(goal @ gripper_to_object):
                 continue
             world = parts.world_of(problem, goal)
             world.shape_hand(held.grasp)
             world.hold(gripper_to_object)
-            lowers = world.is_hand_free(Phase.LOWER, there, parts.ends.above(there))
-            if lowers and world.is_hand_free(Phase.RETREAT, there, parts.ends.before(there)):
-                yield goal
+            for let_go in goals_after_slip(body, goal, held.gripper_to_object, gripper_to_object):
+                there = let_go @ gripper_to_object
+                lowers = world.is_hand_free(Phase.LOWER, there, parts.ends.above(there))
+                if lowers and world.is_hand_free(Phase.RETREAT, there, parts.ends.before(there)):
+                    yield goal
+                    break
 
 
 def put_down_poses(

@@ -25,12 +25,11 @@ from manitwin.episodes.planning.problem import (
     PlannerSettings,
     PlanReport,
 )
-from manitwin.episodes.planning.put_down import Held, PutDown
+from manitwin.episodes.planning.put_down import PutDown
+from manitwin.episodes.planning.two_hands import TwoHands
 from manitwin.episodes.planning.withdrawal import plan_withdrawal
-from manitwin.geometry.poses import transform_points
 from manitwin.robots.robot import Robot
 
-APART_M = 0.06  # of the pads of two hands: less, and they have no room beside one another
 MOST_TAKEN, MOST_RETAKEN = (
     6,
     24,
@@ -70,7 +69,7 @@ class TwoArmPlanner(PickPlacePlanner):
         super().__init__(giver, timestep_s, settings)
         self.taker = PickPlacePlanner(taker, timestep_s, settings)
         self._giver_shapes, self._taker_shapes = ArmObstacles(giver), ArmObstacles(taker)
-        self._tip_m = np.array([[0.0, 0, giver.gripper.tip_depth_m]])
+        self._hands = TwoHands(self.parts, self.taker.parts, self._giver_shapes)
 
     @cached_property
     def alone(self) -> PickPlacePlanner:
@@ -87,7 +86,7 @@ class TwoArmPlanner(PickPlacePlanner):
 
         The report has no plan of its own, only what was tried and what it failed of.
         """
-        grasps = self._with_room_for_another(problem.grasps)
+        grasps = self._hands.givers(problem)
         asked = replace(self.with_taker_at(problem, self.taker.arm.home, None), grasps=grasps)
         found: list[Take] = []
 
@@ -98,7 +97,11 @@ class TwoArmPlanner(PickPlacePlanner):
             found.append(take)
             return True
 
-        held = HeldPathPlanner(self.parts, accepts=can_be_taken)
+        def can_be_taken_somewhere(grasp: Grasp) -> bool:
+            others = self._hands.beside(problem, grasp.gripper_to_object)
+            return any(put_down.goal_of(other) is not None for other in others)
+
+        held = HeldPathPlanner(self.parts, accepts=can_be_taken, serves=can_be_taken_somewhere)
         give, report = held.plan(asked, meetings, as_hulls=False, longest_s=longest_s)
         return (None if give is None else HandoverPlan(give, found[-1])), report
 
@@ -120,33 +123,28 @@ class TwoArmPlanner(PickPlacePlanner):
         parts, ends = self.taker.parts, self.taker.parts.ends
         asked = self._at_meeting(problem, object_to_world, giver_rad, opening_m)
         world, rng = parts.world_of(asked, object_to_world), np.random.default_rng((problem.seed, 6))
-        order = [*first, *(grasp for grasp in problem.grasps if all(grasp is not other for other in first))]
         tried, most = 0, MOST_RETAKEN if first else MOST_TAKEN
-        for grasp in order:
-            if not self._are_apart(grasp.gripper_to_object, giver_to_object):
+        for other in (*self._hands.turned(first, giver_to_object), *self._hands.beside(problem, giver_to_object)):
+            if parts.candidates.look_at_approach(world, other.gripper_to_object) is not None:
                 continue
-            for turn in parts.candidates.turns:
-                gripper_to_object = grasp.gripper_to_object @ turn
-                if parts.candidates.look_at_approach(world, gripper_to_object) is not None:
+            if put_down.goal_of(other) is None:
+                continue
+            tried += 1
+            there = object_to_world @ other.gripper_to_object
+            solutions, _ = parts.solutions.of(world.arm, Phase.APPROACH, there, parts.arm.home)
+            for at_grasp in solutions:
+                line = parts.motions.line(world.arm, Phase.APPROACH, at_grasp, ends.before(there))
+                if line is None:
                     continue
-                if put_down.goal_of(Held(grasp, gripper_to_object)) is None:
+                approach = parts.motions.timed(Phase.APPROACH, line, backwards=True)
+                if self.plan_withdrawal(problem, object_to_world, giver_rad, at_grasp, other.grasp) is None:
                     continue
-                tried += 1
-                there = object_to_world @ gripper_to_object
-                solutions, _ = parts.solutions.of(world.arm, Phase.APPROACH, there, parts.arm.home)
-                for at_grasp in solutions:
-                    line = parts.motions.line(world.arm, Phase.APPROACH, at_grasp, ends.before(there))
-                    if line is None:
-                        continue
-                    approach = parts.motions.timed(Phase.APPROACH, line, backwards=True)
-                    if self.plan_withdrawal(problem, object_to_world, giver_rad, at_grasp, grasp) is None:
-                        continue
-                    start = approach.positions_rad[0]
-                    reach = parts.motions.free(world.arm, Phase.REACH, parts.arm.home, start, rng)
-                    if isinstance(reach, Motion):
-                        return Take(grasp, gripper_to_object, reach, approach)
-                if tried == most:
-                    return None
+                start = approach.positions_rad[0]
+                reach = parts.motions.free(world.arm, Phase.REACH, parts.arm.home, start, rng)
+                if isinstance(reach, Motion):
+                    return Take(other.grasp, other.gripper_to_object, reach, approach)
+            if tried == most:
+                return None
         return None
 
     def plan_withdrawal(
@@ -227,16 +225,6 @@ class TwoArmPlanner(PickPlacePlanner):
     @property
     def _open_m(self) -> float:
         return float(self.robot.gripper.opening_m)
-
-    def _with_room_for_another(self, grasps: Sequence[Grasp]) -> tuple[Grasp, ...]:
-        """Return the grasps that another one is far enough away from, those first that a quarter of them are, in their order."""
-        counts = [sum(self._are_apart(a.gripper_to_object, b.gripper_to_object) for b in grasps) for a in grasps]
-        ranked = [(count < len(grasps) / 4, place) for place, count in enumerate(counts) if count]
-        return tuple(grasps[place] for _, place in sorted(ranked))
-
-    def _are_apart(self, first: np.ndarray, second: np.ndarray) -> bool:
-        tips = [transform_points(pose, self._tip_m)[0] for pose in (first, second)]
-        return float(np.linalg.norm(tips[0] - tips[1])) >= APART_M
 
 
 def planner_of(robot: Robot, timestep_s: float) -> PickPlacePlanner:

@@ -78,7 +78,8 @@ class HeldTask:
     nothing is grasped. ``as_hulls``: the target is carried as its hulls, and may go into the objects that it ``enters``. The
     path takes ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
     ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or
-    put back where it was. One that ``rises`` goes straight up first, and from there to the path's beginning. ``level_rad``: the
+    put back where it was. One that ``rises`` goes straight up first, and from there to the path's beginning; one that
+    ``comes_out`` ends where it began, and does not go back. ``level_rad``: the
     target is tilted by no more on its way to the path. ``watch`` makes what latches events, and what a guard asks for the force.
     """
 
@@ -95,5 +96,6 @@ class HeldTask:
     guard: Guard | None = None
     regulated: Regulated | None = None
     rises: bool = False
+    comes_out: bool = False
     level_rad: float | None = None
     watch: Callable[[RobotWorld], EventWatch] | None = None

@@ -117,6 +117,7 @@ class Stir(HeldSkill):
             duration_s=STIRS_S,
             longest_s=LONGEST_S,
             ending="put_back",
+            comes_out=True,
             watch=watch,
         )
 

@@ -14,7 +14,7 @@ import numpy as np
 import sapien
 from sapien import physx
 
-from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, StaticBox
+from manitwin.geometry.rigid_body import FURNITURE_FRICTION, PlacedObject, StaticBox, stands_for_a_plane
 from manitwin.physics.sapien.body import entity_at, graspable_component, static_box, static_plane
 from manitwin.physics.sapien.contacts import ContactReader, Role
 from manitwin.physics.sapien.falling import Falling
@@ -28,7 +28,6 @@ from manitwin.robots.robot import Robot
 # Velocities, and twice as high ones as elsewhere, end the waiting here; whether a start or a placement stays is judged by poses.
 # Judged by the way between looks, 50 of 50 episodes had the same outcome, and rested up to 0.25 s sooner or later.
 RESTS = RestLimits(speed_m_s=2e-3, turn_rad_s=2e-2, looks=2, by_velocity=True)
-LEAST_TABLE_M = 0.3
 
 
 class RobotWorld:
@@ -178,7 +177,7 @@ class RobotWorld:
         offset_m = self._contact_offset_m
         entity = (
             static_plane(friction, friction, contact_offset_m=offset_m, name=box.name)
-            if _is_the_table(box)
+            if stands_for_a_plane(box)
             else static_box(box, contact_offset_m=offset_m, friction=friction)
         )
         self._scene.add_entity(entity)
@@ -211,16 +210,3 @@ class RobotWorld:
                 hand = Role.HAND if name in each.robot.hand_links else Role.ARM
                 roles.append((link, name, hand if side is None else Role(side)))
         return roles
-
-
-def _is_the_table(box: StaticBox) -> bool:
-    """Tell whether a box's top is the plane that the robot stands on, and so large that nothing is to go beside it.
-
-    It is a plane in physics: between PhysX's boxes and hulls contacts persist from step to step, and a tall box that is set
-    down rocks by a degree or two for ever. Of six boxes of cereals let go with up to 3 degrees of tilt, one had come to rest
-    after 3 s on a box, and all on a plane.
-    """
-    top = box.box_to_world[:3, 2] * box.half_extents_m[2] + box.box_to_world[:3, 3]
-    return bool(
-        box.box_to_world[2, 2] > 1 - 1e-9 and abs(top[2]) < 1e-6 and box.half_extents_m[:2].min() >= LEAST_TABLE_M
-    )

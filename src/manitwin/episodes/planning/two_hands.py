@@ -1,0 +1,79 @@
+"""Which grasps of one object leave room for two hands, wherever the arms bring them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from manitwin.episodes.planning.arm_obstacles import ArmObstacles
+from manitwin.episodes.planning.arm_planning import ArmPlanning
+from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem
+from manitwin.episodes.planning.put_down import Held
+from manitwin.episodes.steady_grasps import by_largest_torque, largest_torques
+from manitwin.geometry.poses import inverse, transform_points
+
+APART_M, LEAST_APART_M = 0.06, 0.04  # of the pads of two hands: nearer, they have room where they come from two sides
+
+
+class TwoHands:
+    """The open hands of a giver and of a taker around one object; what was found of a problem is kept."""
+
+    def __init__(self, giver: ArmPlanning, taker: ArmPlanning, giver_shapes: ArmObstacles):
+        """Take the models of both arms, and the giver's links as obstacles."""
+        self._gripper, self._taker = giver.robot.gripper, taker
+        self._tip_m = np.array([[0.0, 0, self._gripper.tip_depth_m]])
+        open_m = (float(giver.robot.gripper.opening_m),)
+        at_home = giver_shapes.at(giver.arm.home, open_m)
+        self._hand = tuple(each for each in at_home if each.name in giver.hand.links)
+        self._to_gripper = inverse(giver.arm.gripper_pose(giver.arm.home))
+        self._problem: PickPlaceProblem | None = None
+        self._found: dict[bytes, tuple[Held, ...]] = {}
+
+    def givers(self, problem: PickPlaceProblem) -> tuple[Grasp, ...]:
+        """Return the grasps that another one is apart from, those first that a quarter of them are well apart from.
+
+        Of these first those in which, and in some other one apart from them, the weight turns the target least.
+        """
+        grasps, ranked = problem.grasps, []
+        torques = largest_torques(grasps, problem.target.body, self._gripper)
+        for place, grasp in enumerate(grasps):
+            apart_m = self._apart_m(grasp.gripper_to_object, grasps)
+            others = [torques[other] for other in np.flatnonzero(apart_m >= LEAST_APART_M)]
+            if others:
+                crowded = int((apart_m >= APART_M).sum()) < len(grasps) / 4
+                ranked.append((crowded, max(torques[place], min(others)), place))
+        return tuple(grasps[place] for *_, place in sorted(ranked))
+
+    def turned(self, grasps: Sequence[Grasp], giver_to_object: np.ndarray) -> list[Held]:
+        """Return grasps that are apart from the first hand, each in all its turns."""
+        apart_m = self._apart_m(giver_to_object, grasps)
+        apart = [each for each, m in zip(grasps, apart_m, strict=True) if m >= LEAST_APART_M]
+        return [Held(each, each.gripper_to_object @ turn) for each in apart for turn in self._taker.candidates.turns]
+
+    def beside(self, problem: PickPlaceProblem, giver_to_object: np.ndarray) -> tuple[Held, ...]:
+        """Return the second hand's grasps that it can approach past the open first hand, the least turned first."""
+        if self._problem is not problem:
+            self._problem, self._found = problem, {}
+        key = giver_to_object.tobytes()
+        if key not in self._found:
+            to_object, here = giver_to_object @ self._to_gripper, np.eye(4)
+            hand = tuple(replace(each, object_to_world=to_object @ each.object_to_world) for each in self._hand)
+            target = replace(problem.target, object_to_world=here)
+            alone = replace(
+                problem, target=target, goal_object_to_world=here, obstacles=hand, static_boxes=(), fixtures=()
+            )
+            world, before = self._taker.world_of(alone, here), self._taker.ends.before
+            grasps = by_largest_torque(problem.grasps, problem.target.body, self._gripper)
+            self._found[key] = tuple(
+                held
+                for held in self.turned(grasps, giver_to_object)
+                if world.is_hand_free(Phase.APPROACH, held.gripper_to_object, before(held.gripper_to_object))
+            )
+        return self._found[key]
+
+    def _apart_m(self, gripper_to_object: np.ndarray, others: Sequence[Grasp]) -> np.ndarray:
+        """Return how far apart the pads are from those of other grasps ``(N,)``."""
+        tips = np.array([transform_points(each.gripper_to_object, self._tip_m)[0] for each in others]).reshape(-1, 3)
+        return np.asarray(np.linalg.norm(tips - transform_points(gripper_to_object, self._tip_m), axis=1))
