@@ -43,9 +43,10 @@ def wrong_goal(
 ) -> SkillGoal:
     """Return a goal that is asked for and not gone for; the target is the first of ``objects``, its partner the second.
 
-    beside: the whole way in a random direction (across a peg, away from a partner that it is put in, on or beside), of a push
-    the mark (``pushed_beside``); other side: mirrored at the partner; lying: as it lay; low and raised: the way lower by 12 cm,
-    higher by 4 cm; turned: asked of another side of the thing, its frames by 90 degrees about their X; empty: no granules.
+    beside: the whole way in a random direction (across a peg, away from a partner that it is put in, on or beside, across what it
+    points along), of a push the mark (``pushed_beside``); other side: mirrored at the partner; lying: as it lay; low and raised:
+    the way lower by 12 cm, higher by 4 cm; turned: asked of another side of the thing, its frames by 90 degrees about their X;
+    empty: no granules.
     """
     if kind == "empty":
         return replace(goal, granules=None)
@@ -61,7 +62,10 @@ def wrong_goal(
         task = make(scene)
         if kind == "turned":
             return replace(task, watch=make(replace(scene, frames=_turned(scene.frames))).watch)
-        return replace(task, paths=tuple(replace(path, poses=off @ path.poses) for path in task.paths))
+        across = skill == "aim" and kind == "beside"
+        ways = [_across(path.poses, off) if across else off for path in task.paths]
+        paths = zip(task.paths, ways, strict=True)
+        return replace(task, paths=tuple(replace(path, poses=way @ path.poses) for path, way in paths))
 
     return replace(goal, path=another)
 
@@ -94,6 +98,16 @@ def _way_m(
             return (_far_out_m(objects[1], away, way) if skill == "place_in" else FAR_M) * way
         return beside
     return np.array([0.0, 0, {"raised": RAISED_M, "low": -LOWERED_M}.get(kind, 0.0)])
+
+
+def _across(poses: np.ndarray, off: np.ndarray) -> np.ndarray:
+    """Return a shift as far as ``off``, level and across the way of poses ``(K, 4, 4)`` to the side where that goes.
+
+    Fifteen centimetres along the way that it points a nozzle still points there, from farther away.
+    """
+    side = np.cross([0.0, 0, 1], poses[-1, :3, 3] - poses[0, :3, 3])
+    way_m = np.linalg.norm(off[:3, 3]) * side / max(float(np.linalg.norm(side)), 1e-9)
+    return transform(translation=np.copysign(1.0, float(way_m @ off[:3, 3])) * way_m)
 
 
 def _far_out_m(vessel: PlacedObject, away_m: np.ndarray, way: np.ndarray) -> float:
