@@ -1,4 +1,4 @@
-"""Variants of composites: things with a printed label, and pictures as small and as strongly compressed as many on the web."""
+"""Variants of composites: things with a label or a part of the ground's colour, and small, strongly compressed pictures."""
 
 from __future__ import annotations
 
@@ -9,13 +9,14 @@ import cv2
 import numpy as np
 from composite_things import Thing
 
-Variant = Literal["plain", "labelled", "small"]
-VARIANTS: tuple[Variant, ...] = ("plain", "labelled", "small")
+Variant = Literal["plain", "labelled", "matched", "small"]
+VARIANTS: tuple[Variant, ...] = ("plain", "labelled", "matched", "small")
 
 SMALL_PX = 256
 SMALL_QUALITY = 65  # of JPEG; colours have half the resolution (4:2:0)
 LABEL_SHARE = (0.15, 0.55)  # of the thing's area
 LEAST_LABEL_PX = 12
+MATCHED_SHARE = (0.15, 1.0)  # of the thing's area
 
 
 def labelled(rng: np.random.Generator, thing: Thing) -> Thing:
@@ -47,6 +48,27 @@ def labelled(rng: np.random.Generator, thing: Thing) -> Thing:
     usual = max(float(np.median(body[inside])), 1e-3)
     lit = paint * np.clip(body / usual, 0, 1.5)[..., None] * min(max(usual, 0.2), 0.8) / 0.6
     soft = cv2.GaussianBlur(patch.astype(np.float32), (0, 0), 0.7)[..., None]
+    return dataclasses.replace(thing, rgb=(thing.rgb * (1 - soft) + lit * soft).astype(thing.rgb.dtype))
+
+
+def matched(rng: np.random.Generator, thing: Thing, ground: np.ndarray) -> Thing:
+    """Return a thing a part of which, beyond a line across it, has nearly the colour ``ground (3,)`` (linear light) around it.
+
+    A white cap on a white table: the light on the part stays. A clear thing is returned as it is.
+    """
+    rows, columns = np.nonzero(thing.coverage > 0.5)
+    if thing.clear or not len(rows):
+        return thing
+    turn = float(rng.uniform(-np.pi, np.pi))
+    place = np.cos(turn) * columns + np.sin(turn) * rows
+    line = float(np.quantile(place, 1 - rng.uniform(*MATCHED_SHARE)))
+    near = ground * np.exp(rng.normal(0, 0.06, 3) + rng.normal(0, 0.12))
+    grid_rows, grid_columns = np.mgrid[: thing.rgb.shape[0], : thing.rgb.shape[1]]
+    beyond = np.cos(turn) * grid_columns + np.sin(turn) * grid_rows > line
+    body = thing.rgb.mean(2) / np.maximum(thing.coverage, 1e-3)
+    usual = max(float(np.median(body[beyond & (thing.coverage > 0.5)])), 1e-3)
+    lit = near * np.clip(body / usual, 0, 2)[..., None] * thing.coverage[..., None]
+    soft = cv2.GaussianBlur(beyond.astype(np.float32), (0, 0), 0.7)[..., None]
     return dataclasses.replace(thing, rgb=(thing.rgb * (1 - soft) + lit * soft).astype(thing.rgb.dtype))
 
 

@@ -15,10 +15,10 @@ import numpy as np
 from composite_grounds import draw_ground
 from composite_shadows import draw_lamp, light_left
 from composite_things import HEIGHT_PX, WIDTH_PX, Kind, Part, draw_thing, overlaps, place_of
-from composite_variants import Variant, labelled, small
+from composite_variants import Variant, labelled, matched, small
 
 SEEDS: dict[Part, int] = {"tuning": 0, "held-out": 1, "calibration": 2, "training": 3}
-LABEL_SEED = 7
+VARIANT_SEED = 7
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Composite:
 
 
 def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
-    """Make a picture of one of the parts by its number, with a label on its main thing or small on request."""
+    """Make a picture of one of the parts by its number, in a variant of it on request."""
     rng = np.random.default_rng([number, SEEDS[part]])
     drawn = rng.random()
     kind: Kind = "single" if drawn < 0.72 else "cut" if drawn < 0.86 else "several"
@@ -53,8 +53,12 @@ def composite(part: Part, number: int, variant: Variant = "plain") -> Composite:
                 placements.append(apart[0])
         kind = "several" if len(things) > 1 else "single"
     ground, setting = draw_ground(rng, part, main, placements[0])
+    own_rng = np.random.default_rng([number, SEEDS[part], VARIANT_SEED])
     if variant == "labelled":
-        things[0] = labelled(np.random.default_rng([number, SEEDS[part], LABEL_SEED]), main)
+        things[0] = labelled(own_rng, main)
+    elif variant == "matched":
+        under = cv2.warpAffine(main.coverage, placements[0], (WIDTH_PX, HEIGHT_PX)) > 0.5
+        things[0] = matched(own_rng, main, ground[under].mean(0) if under.any() else ground.mean((0, 1)))
     light = ground.copy()
     lamp = draw_lamp(rng)
     for thing, placement in zip(things, placements, strict=True):

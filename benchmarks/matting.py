@@ -1,7 +1,7 @@
 """Cut the object out of composites whose mask is known, and print what was accepted, how right it is, and what it cost.
 
     python benchmarks/matting.py [--part held-out|tuning|calibration] [--first 0] [--count 300] [--jobs 1] [--network isnet]
-                                 [--variant plain|labelled|small] [--photos FOLDER] [--sheet PNG]
+                                 [--variant plain|labelled|matched|small] [--photos FOLDER] [--sheet PNG]
 
 The pictures are made here (``composites.py``), of templates on grounds of the project's own making; the held-out part has other
 seeds and other grounds than the part that thresholds were set on. A composite of one whole thing is to be accepted; one that
@@ -159,7 +159,12 @@ def main() -> None:
         "--first", type=int, default=0, help="number of the first composite: others than were measured before"
     )
     parser.add_argument("--count", type=int, default=300)
-    parser.add_argument("--variant", choices=VARIANTS, default="plain", help="with a label, or small and compressed")
+    parser.add_argument(
+        "--variant",
+        choices=VARIANTS,
+        default="plain",
+        help="with a label, partly of the ground's colour, or small and compressed",
+    )
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--network", help="isnet or an ONNX file, as --matting of manitwin build")
     parser.add_argument("--photos", type=Path)

@@ -22,6 +22,8 @@ AGREEING = 0.98
 """Likeness of two masks beyond which rules and a network have found the same thing."""
 SURE = 0.9
 """Share of object of a pixel that a network calls certain; below one less that, it is certain of the ground."""
+ENCLOSING = 0.2
+"""Share of object of an outline that encloses something, though the network be unsure of it."""
 LEAST_PIXELS = 30
 LEAST_ADDED = 0.003
 """Of a network's mask: what rules add beyond that makes a mask of its own."""
@@ -84,13 +86,12 @@ def _has_outline(mask: np.ndarray) -> bool:
 def completed(share: np.ndarray, found: Segmentation) -> np.ndarray:
     """Return a network's share of object (any size) at the size of the mask that the rules ``found``, filled within its outline.
 
-    A large plain or printed surface tells a network little, so what it leaves out within its own outline is object where the
-    rules say so and the colours are neither the ground's nor its shade's. What is seen through a hole has the ground's
-    colours, and stays out.
+    A large plain or printed surface tells a network little, so what it leaves out within its own outline, as far as that is
+    ``ENCLOSING``, is object where the rules say so and the colours are neither the ground's nor its shade's. What is seen
+    through a hole has the ground's colours, and stays out.
     """
     share = at_size(share, found.mask.shape)
-    mask = share > 0.5
-    within = eroded(ndimage.binary_fill_holes(mask), 2)
+    within = eroded(ndimage.binary_fill_holes(share > ENCLOSING), 2)
     told = opened(within & found.mask & found.colours.certain, 1)
     return np.asarray(np.where(told, 1.0, share), np.float32)
 

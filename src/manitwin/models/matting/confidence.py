@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -50,22 +50,6 @@ class MatteScores:
     unshaded: float
     solid: float
     thick: float
-
-    @property
-    def confidence(self) -> float:
-        """The product: one bad score is enough to doubt."""
-        return float(np.prod(list(asdict(self).values())))
-
-    @property
-    def confidence_of_pieces(self) -> float:
-        """The confidence that what was found is no background, be it one piece or several."""
-        return float(np.prod([value for name, value in asdict(self).items() if name != "whole"]))
-
-    @property
-    def worst(self) -> str:
-        """The name of the lowest score."""
-        values = asdict(self)
-        return min(values, key=lambda name: values[name])
 
 
 def score(segmentation: Segmentation, *, zoom: float = 1.0, share: np.ndarray | None = None) -> MatteScores:

@@ -11,8 +11,9 @@ from scipy import ndimage
 
 from manitwin.config import MattingConfig
 from manitwin.errors import Rejected
-from manitwin.models.matting.belief import WHOLE, doubts_of, features, probability
+from manitwin.models.matting.belief import WHOLE, features, probability
 from manitwin.models.matting.candidates import NETWORKS, Candidate, alike, at_size, candidates, completed
+from manitwin.models.matting.causes import CAUSES, REMEDY, cause_of
 from manitwin.models.matting.confidence import MatteScores, frame_cause
 from manitwin.models.matting.enlarged import enlarged
 from manitwin.models.matting.fine_outline import fine_outline
@@ -25,24 +26,6 @@ TRANSPARENT_SHARE = 0.02
 PLAIN_NOISE_LAB = 4.0
 MIN_CONFIDENCE = MattingConfig().min_confidence
 LIKELY = 0.5  # that pieces are things: the photo is rejected in any case, and that is the cause
-
-_CAUSES = {
-    "on_edges": "its outline does not follow edges of the photo",
-    "crisp": "its outline is blurred, or a shadow hangs on it",
-    "separable": "its colours are too close to the background's",
-    "complete": "other things stand out of the background as much",
-    "uncut": "the image border cuts it off",
-    "stable": "two ways of looking at it do not agree on what it is",
-    "whole": "it falls apart into pieces",
-    "plain": "the background is too cluttered",
-    "unshaded": "part of its outline has the background's colour, dimmed: a shadow may hang on it",
-    "solid": "the ground may be seen through it, or it has parts of the ground's colour inside",
-    "thick": "it is thin for so small a photo, so its outline is a large part of it",
-    "sharply_bounded": "it is as grey as a shadow, and part of its outline as soft as one: a shadow may hang on it",
-    "kept": "a part of it with a sharp outline may be lost, or a hole in it filled",
-    "outermost": "what looks like its shadow has edges as sharp as its outline, so a clear or grey part of it may be lost",
-}
-_REMEDY = "photograph it whole on a plain surface of another colour, or give an image with an alpha channel"
 
 
 @dataclass(frozen=True)
@@ -220,7 +203,7 @@ def decided(
     if not study.judged or study.judged[0].candidate.found.mask.mean() < min_area_share:
         if not study.plain:
             raise Rejected(
-                "low_confidence_matte", f"{name}: {_CAUSES['plain']} to tell an object from it; {_REMEDY}", "generate"
+                "low_confidence_matte", f"{name}: {CAUSES['plain']} to tell an object from it; {REMEDY}", "generate"
             )
         raise Rejected(
             "no_object", f"{name}: nothing stands out of the background; photograph the object larger", "generate"
@@ -260,20 +243,13 @@ def _reject_doubtful(name: str, judged: Judged, min_confidence: float, second_ob
     if judged.of_pieces >= min(min_confidence, LIKELY):
         _reject_several(name, found.mask, second_object_share)
     if judged.confidence < min_confidence:
-        cause = frame_cause(found.background, found.gradient) or _cause(judged)
+        cause = frame_cause(found.background, found.gradient) or cause_of(judged.features, judged.candidate.scores)
         raise Rejected(
             "low_confidence_matte",
             f"{name}: the object cannot be told from the background (confidence {judged.confidence:.2f} <"
-            f" {min_confidence:g}): {_CAUSES[cause]}; {_REMEDY}",
+            f" {min_confidence:g}): {CAUSES[cause]}; {REMEDY}",
             "generate",
         )
-
-
-def _cause(judged: Judged) -> str:
-    """Return the score that costs a mask the most of its confidence; ``stable`` where it is that the opinions differ."""
-    doubts = doubts_of(judged.features)
-    worst = max(doubts, key=lambda name: doubts[name])
-    return worst if worst in _CAUSES else "stable"
 
 
 def _reject_several(name: str, mask: np.ndarray, second_object_share: float) -> None:
