@@ -79,8 +79,8 @@ class HeldTask:
     path takes ``duration_s``, is not taken where the joints need more than ``longest_s``, and is measured and planned anew
     ``measured`` times. After ``hold_s`` there the target is let go, or kept in the hand, which goes back along the path, or
     put back where it was. One that ``rises`` goes straight up first, and from there to the path's beginning; one that
-    ``comes_out`` ends where it began, and does not go back. ``level_rad``: the
-    target is tilted by no more on its way to the path. ``watch`` makes what latches events, and what a guard asks for the force.
+    ``comes_out`` ends where it began, and does not go back. ``level_rad``: the target is tilted by no more on its way to the
+    path. ``watch`` makes what latches events, and what a guard asks for the force.
     """
 
     paths: tuple[HeldPath, ...]
