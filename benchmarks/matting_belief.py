@@ -2,7 +2,8 @@
 
     python benchmarks/matting_belief.py [--first 0] [--count 600] [--photo-seeds 0,1] [--jobs 2] [-o belief.json]
 
-The pictures are composites of the calibration part (``composites.py``), which nothing else is set on, and photos of templates of
+The pictures are composites of the calibration part (``composites.py``), which nothing else is set on, every other one also with a
+label, the others also with a part of the ground's colour and also small (``composite_variants.py``), and photos of templates of
 the tuning seeds (``template_photos.py``), every third category; belief.json lies in src/manitwin/models/matting. Logistic
 regression with an L2 penalty and no negative weight; the penalty is chosen by cross-validation over pictures, and the table is of
 predictions for pictures that were left out. ``matting.py`` measures what comes out on the held-out part.
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from composite_variants import Variant
 from composites import Composite, composite
 from matting import RIGHT_IOU
 from scipy.optimize import minimize
@@ -35,20 +37,41 @@ PENALTIES = (0.00003, 0.0001, 0.0003, 0.001, 0.003, 0.01)
 LIMITS = (0.5, 0.6, 0.7, 0.75, 0.8, 0.85, 0.9, 0.95)
 
 
+VARIANTS: tuple[tuple[Variant, int, int], ...] = (
+    ("plain", 0, 1),
+    ("labelled", 0, 2),
+    ("matched", 1, 2),
+    ("small", 1, 2),
+)
+"""Of composites: from which of them on one of how many is drawn so."""
+
+
 @dataclass(frozen=True)
 class Example:
-    """A candidate mask of a picture: its ``features``, whether it is ``right``, whether the picture shows one whole thing."""
+    """A candidate mask of a picture: its ``features``, whether it is ``right``, whether the picture shows one whole thing.
+
+    ``number`` is the picture's, ``group`` that of all that is never parted in cross-validation, ``source`` says what it is.
+    """
 
     number: int
+    group: int
+    source: str
     features: np.ndarray
     right: bool
     whole: bool
 
 
 def examples(number: int) -> list[Example]:
-    """Make one composite; return its candidates."""
+    """Make one composite in its variants; return their candidates."""
     cv2.setNumThreads(1)
-    return examples_of(number, composite("calibration", number))
+    return [
+        each
+        for place, (variant, first, every) in enumerate(VARIANTS)
+        if number % every == first
+        for each in examples_of(
+            len(VARIANTS) * number + place, number, variant, composite("calibration", number, variant)
+        )
+    ]
 
 
 def photo_examples(thing: tuple[int, str, int]) -> list[Example]:
@@ -57,10 +80,10 @@ def photo_examples(thing: tuple[int, str, int]) -> list[Example]:
     number, category, seed = thing
     photos = photograph(category, seed)
     first = PHOTOS_FROM + number * len(photos)
-    return [each for k, photo in enumerate(photos) for each in examples_of(first + k, photo)]
+    return [each for k, photo in enumerate(photos) for each in examples_of(first + k, first + k, "photo", photo)]
 
 
-def examples_of(number: int, picture: Composite | TemplatePhoto) -> list[Example]:
+def examples_of(number: int, group: int, source: str, picture: Composite | TemplatePhoto) -> list[Example]:
     """Return the candidates of a picture, each with its truth."""
     made = []
     truth = picture.truth if isinstance(picture, Composite) else picture.mask
@@ -68,7 +91,7 @@ def examples_of(number: int, picture: Composite | TemplatePhoto) -> list[Example
     for judged in judged_candidates(picture.rgb)[1]:
         found = drawn(picture.rgb, judged.candidate.found.mask) > 127
         iou = (found & truth).sum() / max(int((found | truth).sum()), 1)
-        made.append(Example(number, judged.features, bool(whole and iou > RIGHT_IOU), whole))
+        made.append(Example(number, group, source, judged.features, bool(whole and iou > RIGHT_IOU), whole))
     return made
 
 
@@ -89,9 +112,9 @@ def fitted(features: np.ndarray, right: np.ndarray, penalty: float) -> tuple[flo
     return float(found[0] - weights @ belief.BEST), weights
 
 
-def predicted(features: np.ndarray, right: np.ndarray, numbers: np.ndarray, penalty: float) -> np.ndarray:
+def predicted(features: np.ndarray, right: np.ndarray, groups: np.ndarray, penalty: float) -> np.ndarray:
     """Return the probability (N,) of each example from fits to the pictures of other folds."""
-    fold = np.random.default_rng(SEED).integers(0, FOLDS, int(numbers.max()) + 1)[numbers]
+    fold = np.random.default_rng(SEED).integers(0, FOLDS, int(groups.max()) + 1)[groups]
     out = np.zeros(len(features))
     for each in range(FOLDS):
         bias, weights = fitted(features[fold != each], right[fold != each], penalty)
@@ -104,30 +127,34 @@ def report(made: list[Example]) -> tuple[float, np.ndarray]:
     features = np.array([each.features for each in made])
     right = np.array([each.right for each in made])
     numbers = np.array([each.number for each in made])
+    groups = np.array([each.group for each in made])
     losses = {}
     for penalty in PENALTIES:
-        likely = np.clip(predicted(features, right, numbers, penalty), 1e-6, 1 - 1e-6)
+        likely = np.clip(predicted(features, right, groups, penalty), 1e-6, 1 - 1e-6)
         losses[penalty] = float(-np.where(right, np.log(likely), np.log(1 - likely)).mean())
     best = min(losses, key=lambda penalty: losses[penalty])
     print("cross-validated loss by penalty: " + ", ".join(f"{key:g}: {value:.4f}" for key, value in losses.items()))
-    likely = predicted(features, right, numbers, best)
-    chosen = {number: np.flatnonzero(numbers == number) for number in np.unique(numbers)}
-    first = np.array([some[np.argmax(likely[some])] for some in chosen.values()])
-    whole = {each.number for each in made if each.whole}
-    print(f"{len(chosen)} pictures with a candidate, {len(whole)} of one whole thing; a right one in", end=" ")
-    print(f"{len({each.number for each in made if each.right})}, chosen in {int(right[first].sum())}")
-    for limit in LIMITS:
-        taken = first[likely[first] >= limit]
-        print(
-            f"  at {limit:4.2f}: accepted {sum(numbers[k] in whole for k in taken)} of {len(whole)}, and"
-            f" {sum(numbers[k] not in whole for k in taken)} others; right {int(right[taken].sum())}"
-        )
+    likely = predicted(features, right, groups, best) * np.array([belief.unfitted(values) for values in features])
+    for source in sorted({each.source for each in made}):
+        some = np.flatnonzero([each.source == source for each in made])
+        chosen = [some[numbers[some] == number] for number in np.unique(numbers[some])]
+        first = np.array([masks[np.argmax(likely[masks])] for masks in chosen])
+        whole = np.array([made[k].whole for k in first])
+        possible = sum(bool(right[masks].any()) for masks in chosen)
+        print(f"{source}: {len(chosen)} pictures with a candidate, {int(whole.sum())} of one whole thing;", end=" ")
+        print(f"a right one in {possible}, chosen in {int(right[first].sum())}")
+        for limit in LIMITS:
+            taken = likely[first] >= limit
+            print(
+                f"  at {limit:4.2f}: accepted {int((taken & whole).sum())}, and {int((taken & ~whole).sum())} others;"
+                f" right {int(right[first[taken]].sum())}"
+            )
     return fitted(features, right, best)
 
 
 def write(path: Path, bias: float, weights: np.ndarray, made: list[Example]) -> None:
     """Write bias and weights, and what they were fitted to."""
-    numbers = sorted({each.number for each in made if each.number < PHOTOS_FROM})
+    numbers = sorted({each.group for each in made if each.group < PHOTOS_FROM})
     photos = len({each.number for each in made if each.number >= PHOTOS_FROM})
     composites = f"calibration composites {numbers[0]} to {numbers[-1]}" if numbers else "no composites"
     content = {

@@ -90,7 +90,6 @@ def test_hard_shadow_is_left_out(
     [
         (0.45, 0.16, "a shadow may hang on it"),  # it is darker than its shadow
         pytest.param(0.45, 0.3, "a shadow may hang on it", marks=pytest.mark.slow),
-        pytest.param(0.7, 0.16, "a shadow may hang on it", marks=pytest.mark.slow),
         (0.7, 0.3, "a shadow may hang on it"),
     ],
 )
@@ -99,6 +98,12 @@ def test_object_as_grey_as_its_hard_shadow_is_rejected_for_it(light: float, grey
     with pytest.raises(Rejected, match=cause) as caught:
         matte_photo(_photo(scene), "x.png")
     assert caught.value.reason == "low_confidence_matte"
+
+
+@pytest.mark.slow
+def test_object_much_darker_than_its_hard_shadow_is_told_from_it() -> None:
+    scene = _painted(_plain(0) * _shadow(BODY, (0.7, 0.7, 0.7)), BODY, (0.18, 0.16, 0.14))
+    assert _overlap(_photo(scene), BODY) > 0.97
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,7 @@ def test_object_on_an_unevenly_lit_wall_is_cut_out_exactly() -> None:
     scene, truth = _scene(), _blob((200, 150), (80, 50))
     scene[truth] = (40, 90, 160)
     matte = matte_photo(_photo(scene), "x.png")
-    assert matte.method == "network" and matte.confidence > 0.9
+    assert matte.method in ("network", "flat_border") and matte.confidence > 0.9
     assert _overlap(matte.rgba, truth) > 0.97
 
 
@@ -57,10 +57,12 @@ def test_soft_shadow_is_not_part_of_the_object() -> None:
 
 
 @pytest.mark.parametrize(
-    ("light", "believed"), [(1.1, False), (0.8, True)], ids=["paler than the ground", "dimmer than the ground"]
+    ("light", "believed"),
+    [(1.1, False), (0.8, False), (0.7, True), (0.5, True)],
+    ids=["paler than the ground", "as dim as a faint shadow", "dimmer", "half as light"],
 )
 def test_cap_of_the_ground_s_colour_with_an_outline_in_focus_is_no_shadow(light: float, believed: bool) -> None:
-    """Both are found whole; of the paler one the network knows too little for the cut-out to be believed."""
+    """All are found whole; of the paler one and the faintest the network knows too little for the cut-out to be believed."""
     scene, body = _scene(), _blob((200, 190), (75, 60))
     cap = np.zeros(SIZE, bool)
     cap[90:150, 155:245] = True

@@ -17,6 +17,7 @@ from manitwin.models.matting.object_network import (
     MIXES,
     SIDE_PX,
     WAYS,
+    WEIGHTS_FILES,
     decoder_weights,
     in_two_looks,
     network_bytes,
@@ -56,11 +57,12 @@ def test_a_picture_is_looked_at_in_each_way_and_a_mirrored_look_is_turned_back(m
     assert np.allclose(object_share(photo), sum(one_way.values()) / len(WAYS), atol=1e-6)
 
 
-def test_the_layers_are_those_of_a_feature_pyramid() -> None:
+@pytest.mark.parametrize("file", WEIGHTS_FILES)
+def test_the_layers_are_those_of_a_feature_pyramid(file: str) -> None:
     """Encoder values as OpenCV has them; the decoder after them in SciPy, layer by layer."""
     picture = np.random.default_rng(1).integers(0, 256, (SIDE_PX, SIDE_PX, 3)).astype(np.float32)
     blob = ((picture - MEAN) / DEVIATION).transpose(2, 0, 1)[None].copy()
-    weights = {name: value.astype(np.float32) for name, value in decoder_weights().items()}
+    weights = {name: value.astype(np.float32) for name, value in decoder_weights(file).items()}
 
     def run(content: bytes) -> np.ndarray:
         network = cv2.dnn.readNetFromONNX(np.frombuffer(content, np.uint8))
@@ -99,8 +101,25 @@ def test_the_layers_are_those_of_a_feature_pyramid() -> None:
             y = convolved(f"mix{level}.{mix}", y)
     quarters = convolved("answer", y, active=False)
     logits = quarters.reshape(2, 2, SIDE_PX // 2, SIDE_PX // 2).transpose(2, 0, 3, 1).reshape(SIDE_PX, SIDE_PX)
-    share = run(network_bytes(load_weights(), decoder_weights()))[0]
+    share = run(network_bytes(load_weights(), [decoder_weights(file)]))[0]
     assert np.abs(1 / (1 + np.exp(-logits)) - share).max() < 1e-3
+
+
+def test_the_share_is_the_mean_of_the_decoders() -> None:
+    photo, _ = _scene((200, 150), (90, 60))
+    blob = (
+        ((cv2.resize(photo, (SIDE_PX, SIDE_PX)).astype(np.float32) - MEAN) / DEVIATION).transpose(2, 0, 1)[None].copy()
+    )
+
+    def run(files: tuple[str, ...]) -> np.ndarray:
+        content = network_bytes(load_weights(), [decoder_weights(name) for name in files])
+        network = cv2.dnn.readNetFromONNX(np.frombuffer(content, np.uint8))
+        network.setInput(blob)
+        return np.array(network.forward()[0])
+
+    each = [run((name,)) for name in WEIGHTS_FILES]
+    assert np.abs(each[0] - each[1]).max() > 0.01
+    assert np.allclose(run(WEIGHTS_FILES), np.mean(each, axis=0), atol=1e-5)
 
 
 def test_what_is_small_is_looked_at_again_closer() -> None:
@@ -127,5 +146,6 @@ def test_nothing_is_not_looked_at_again() -> None:
 
 
 def test_its_weights_are_small_enough_to_come_along() -> None:
-    assert len((files("manitwin.models.matting") / object_network.WEIGHTS_FILE).read_bytes()) < 1_000_000
+    for name in WEIGHTS_FILES:
+        assert len((files("manitwin.models.matting") / name).read_bytes()) < 1_000_000
     assert object_network.built_in_model().startswith("object-network sha256:")

@@ -78,12 +78,19 @@ def _difference(share: float) -> float:
 def probability(values: np.ndarray) -> float:
     """Return how likely a mask with these ``features`` is right, in [0, 1].
 
-    Two doubts count besides the fitted ones, since composites hardly show them: a part in focus that may be lost, or a hole
-    that may be filled (``kept``), and ground that may be seen through the mask (``solid``).
+    The fitted doubts count, and those of ``unfitted``.
     """
     bias, weights = _weights()
-    kept = (1 + values[FEATURES.index("kept")]) * np.exp(values[FEATURES.index("solid")])
-    return float(kept / (1 + np.exp(-np.clip(bias + weights @ values, -30, 30))))
+    return float(unfitted(values) / (1 + np.exp(-np.clip(bias + weights @ values, -30, 30))))
+
+
+def unfitted(values: np.ndarray) -> float:
+    """Return by what factor in [0, 1] two doubts lower the probability that composites hardly show.
+
+    A part in focus that may be lost, or a hole that may be filled (``kept``), and ground that may be seen through the mask
+    (``solid``).
+    """
+    return float((1 + values[FEATURES.index("kept")]) * np.exp(values[FEATURES.index("solid")]))
 
 
 def doubts_of(values: np.ndarray) -> dict[str, float]:

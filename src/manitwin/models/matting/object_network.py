@@ -1,27 +1,30 @@
-"""The built-in network that tells a thing from its ground: a decoder of the project's own over EfficientNet-Lite0's features.
+"""The built-in network that tells a thing from its ground: two decoders of the project's own over EfficientNet-Lite0's features.
 
-The encoder knows real photos (ImageNet) and is not trained further; the decoder (a feature pyramid, Lin et al. 2017, of 0.28
-million weights) learned from composites that ``benchmarks/train_object_network.py`` draws of templates. It looks twice: at the
-whole picture, then at the thing with its surroundings, larger; and it does so at two sizes and mirrored. Their mean errs less
-than each, and is unsure where they differ.
+The encoder knows real photos (ImageNet) and is not trained further; the decoders (feature pyramids, Lin et al. 2017, of 0.28
+million weights) learned from composites that ``benchmarks/train_object_network.py`` draws of templates, the second from more
+varied ones: it keeps parts of the ground's colour and leaves hard shadows, and may take a dark part for a shadow where the first
+does not. The network looks twice: at the whole picture, then at the thing with its surroundings, larger; and it does so at two
+sizes and mirrored. The mean of all errs less than each, and is unsure where they differ.
 """
 
 from __future__ import annotations
 
 import hashlib
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from importlib.resources import files
 
 import cv2
 import numpy as np
 
+from manitwin.formats.onnx_graph import OnnxGraph
 from manitwin.models.classifiers.efficientnet_lite import DEVIATION, MEAN, WEIGHTS_SHA256, load_weights, trunk
 from manitwin.models.classifiers.efficientnet_lite import NAME as ENCODER
 
 NAME = "object-network"
-WEIGHTS_FILE = "object_network.npz"
+WEIGHTS_FILES = ("object_network.npz", "object_network_varied.npz")
+"""Of the decoders."""
 SIDE_PX = 288
 """Of the pictures that the decoder learned from."""
 WAYS = ((288, False), (384, False), (384, True))
@@ -79,43 +82,57 @@ def _seen(rgb: np.ndarray, side_px: int, mirrored: bool) -> np.ndarray:
 
 @cache
 def _network(side_px: int) -> cv2.dnn.Net:
-    content = network_bytes(load_weights(), decoder_weights(), side_px)
+    content = network_bytes(load_weights(), [decoder_weights(name) for name in WEIGHTS_FILES], side_px)
     return cv2.dnn.readNetFromONNX(np.frombuffer(content, np.uint8))
 
 
 def built_in_model() -> str:
-    """Return what a twin's provenance calls the network: both files by their digests."""
-    return (
-        f"{NAME} sha256:{hashlib.sha256(_decoder_file()).hexdigest()[:12]} over {ENCODER} sha256:{WEIGHTS_SHA256[:12]}"
-    )
+    """Return what a twin's provenance calls the network: its files by their digests."""
+    decoders = "+".join(hashlib.sha256(_decoder_file(name)).hexdigest()[:12] for name in WEIGHTS_FILES)
+    return f"{NAME} sha256:{decoders} over {ENCODER} sha256:{WEIGHTS_SHA256[:12]}"
 
 
-def decoder_weights() -> dict[str, np.ndarray]:
-    """Return the decoder's weights, float16, by the names of its layers."""
-    with np.load(io.BytesIO(_decoder_file())) as arrays:
+def decoder_weights(name: str) -> dict[str, np.ndarray]:
+    """Return the weights of one of the ``WEIGHTS_FILES``, float16, by the names of its layers."""
+    with np.load(io.BytesIO(_decoder_file(name))) as arrays:
         return dict(arrays)
 
 
-def _decoder_file() -> bytes:
-    return (files("manitwin.models.matting") / WEIGHTS_FILE).read_bytes()
+def _decoder_file(name: str) -> bytes:
+    return (files("manitwin.models.matting") / name).read_bytes()
 
 
-def network_bytes(encoder: dict[str, np.ndarray], decoder: dict[str, np.ndarray], side_px: int = SIDE_PX) -> bytes:
-    """Return encoder and decoder as ONNX: input ``(1, 3, side_px, side_px)`` as the encoder's, output the share of object.
+def network_bytes(
+    encoder: dict[str, np.ndarray], decoders: Sequence[dict[str, np.ndarray]], side_px: int = SIDE_PX
+) -> bytes:
+    """Return encoder and decoders as ONNX: input ``(1, 3, side_px, side_px)`` as the encoder's, output the mean share of object.
 
     ``side_px`` is a multiple of 32.
     """
     graph, values = trunk(encoder, side_px)
+    shares = [_decoded(graph, values, decoder, f"decoder{place}", side_px) for place, decoder in enumerate(decoders)]
+    weight = graph.weight("mean.weight", np.float32(1 / len(shares)).reshape(1))
+    parts = [graph.node("Mul", [share, weight], f"mean.part{place}") for place, share in enumerate(shares)]
+    total = parts[0]
+    for place, part in enumerate(parts[1:]):
+        total = graph.node("Add", [total, part], f"mean.sum{place}")
+    return graph.to_bytes(total, (1, 1, side_px, side_px))
+
+
+def _decoded(
+    graph: OnnxGraph, values: dict[str, str], decoder: dict[str, np.ndarray], prefix: str, side_px: int
+) -> str:
+    """Add a decoder over the encoder's ``values`` to the graph; return the name of its share of object."""
     sides = [side_px // 2 ** (level + 1) for level in range(len(BLOCKS))]
 
     def convolved(name: str, value: str, *, active: bool = True) -> str:
         kernel = decoder[f"{name}.weight"].astype(np.float32)
         weights = [
-            graph.weight(f"decoder.{name}.weight", kernel),
-            graph.weight(f"decoder.{name}.bias", decoder[f"{name}.bias"].astype(np.float32)),
+            graph.weight(f"{prefix}.{name}.weight", kernel),
+            graph.weight(f"{prefix}.{name}.bias", decoder[f"{name}.bias"].astype(np.float32)),
         ]
         side = kernel.shape[-1]
-        output = f"decoder.{name}"
+        output = f"{prefix}.{name}"
         graph.node("Conv", [value, *weights], f"{output}.sum", kernel_shape=[side, side], pads=[side // 2] * 4)
         return graph.node("Relu", [f"{output}.sum"], output) if active else f"{output}.sum"
 
@@ -129,10 +146,10 @@ def network_bytes(encoder: dict[str, np.ndarray], decoder: dict[str, np.ndarray]
     value = convolved("top", laterals[-1])
     for level in reversed(range(len(BLOCKS) - 1)):
         narrowed = convolved(f"narrow{level}", value, active=False)
-        larger = resized(f"level{level}", narrowed, CHANNELS[level], sides[level])
-        value = graph.node("Add", [larger, laterals[level]], f"level{level}.joined")
+        larger = resized(f"{prefix}.level{level}", narrowed, CHANNELS[level], sides[level])
+        value = graph.node("Add", [larger, laterals[level]], f"{prefix}.level{level}.joined")
         for mix in range(MIXES):
             value = convolved(f"mix{level}.{mix}", value)
     quarters = convolved("answer", value, active=False)
-    share = graph.node("Sigmoid", [graph.node("DepthToSpace", [quarters], "whole", blocksize=2, mode="CRD")], "share")
-    return graph.to_bytes(share, (1, 1, side_px, side_px))
+    whole = graph.node("DepthToSpace", [quarters], f"{prefix}.whole", blocksize=2, mode="CRD")
+    return graph.node("Sigmoid", [whole], f"{prefix}.share")

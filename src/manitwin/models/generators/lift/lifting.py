@@ -23,6 +23,9 @@ Primitive = Literal["revolution", "box", "inflation"]
 LEAST_IOU = 0.8
 """Overlap with the outline below which a solid does not explain it; set on rendered templates, which reach 0.93 and more."""
 
+DISC_ELLIPSE_IOU, DISC_ELONGATION = 0.965, 1.15
+"""From here on an outline is an ellipse that is no circle: of rendered templates all that have one are discs seen at an angle."""
+
 
 @dataclass(frozen=True)
 class Lifted:
@@ -42,8 +45,8 @@ class Lifted:
 def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
     """Lift the object in ``rgba`` (H, W, 4) uint8, whose alpha is its mask, to a solid.
 
-    Raises Rejected ``generator_failed`` for an open container whose hollow cannot be told, and where no solid explains
-    the outline.
+    Raises Rejected ``generator_failed`` for an open container whose hollow cannot be told, where no solid explains the
+    outline, and where nothing is known of a thing whose outline is an ellipse.
     """
     crop = crop_object(rgba, CROP_SIDE_PX)
     height, width = crop.mask.shape
@@ -66,6 +69,13 @@ def lift(rgba: np.ndarray, hint: ShapeHint) -> Lifted:
 
 def _explaining(view: View, hint: ShapeHint) -> tuple[Primitive, Made]:
     """Return the simplest solid that explains the outline; raises Rejected where none does."""
+    if hint == ShapeHint() and _is_ellipse(view.silhouette):
+        raise Rejected(
+            "generator_failed",
+            "the outline is an ellipse: a disc seen at an angle has it as well as an egg; say what it is with --name, or take the"
+            " photo from the side",
+            "generate",
+        )
     turned = standing_turned(view, hint, plain=choose_primitive(view.silhouette, hint) == "revolution")
     if turned is not None:
         return "revolution", turned
@@ -86,6 +96,10 @@ def _explaining(view: View, hint: ShapeHint) -> tuple[Primitive, Made]:
             "generate",
         )
     return primitive, made
+
+
+def _is_ellipse(silhouette: Silhouette) -> bool:
+    return silhouette.ellipse_iou >= DISC_ELLIPSE_IOU and silhouette.elongation >= DISC_ELONGATION
 
 
 def choose_primitive(silhouette: Silhouette, hint: ShapeHint) -> Primitive:

@@ -12,7 +12,9 @@ from trimesh.visual import TextureVisuals
 from manitwin.errors import Rejected
 from manitwin.formats.glb import write_glb
 from manitwin.geometry.poses import GLTF_TO_OBJECT
-from manitwin.models.generators.lift.lifting import Lifted, hint_from_name, lift
+from manitwin.models.generators.lift.hint import ShapeHint, hint_from_name
+from manitwin.models.generators.lift.lifting import Lifted, lift
+from manitwin.models.generators.lift.seen_corners import box_from_corner
 from manitwin.models.generators.lift.surface import unseen_share
 from manitwin.models.generators.lift.texture import beside
 from manitwin.models.generators.photo_material import photo_material
@@ -52,9 +54,15 @@ class Job:
 def from_photo(rgba: np.ndarray, name: str | None, focal_mm: float | None = None) -> Job:
     """Return the template that the name means where its fit explains the photo, else the photo lifted; raises Rejected.
 
+    What has no template, and no name or that of a box, is a box where its outline is that of one seen from a corner.
     ``focal_mm`` is the lens as 35 mm equivalent, where it is known.
     """
     template = template_for(name)
+    hint = hint_from_name(name)
+    if template is None and (hint == ShapeHint() or hint.boxy):
+        box = box_from_corner(rgba, focal_mm)
+        if box is not None:
+            return _unnamed_box(box, rgba)
     fitted = (
         None if template is None else fit(template.category, rgba, or_of=kinds_of(template.category), focal_mm=focal_mm)
     )
@@ -116,6 +124,14 @@ def from_fit(fitted: Fitted, rgba: np.ndarray, name: str | None) -> Job:
     surface = texture_of([fitted], [rgba])
     known = known_of_fitted(fitted, name or fitted.category, surface)
     return Job(write_glb([visual_part(surface)]), notes_of(fitted), surface.unseen_share, known)
+
+
+def _unnamed_box(fitted: Fitted, rgba: np.ndarray) -> Job:
+    """Return the solid alone: a thing with a box's shape is not called a box."""
+    surface = texture_of([fitted], [rgba])
+    notes = notes_of(fitted) | {"primitive": "box", "source": "the outline's six corners", "rests": "standing"}
+    del notes["category"]
+    return Job(write_glb([visual_part(surface)]), notes, surface.unseen_share)
 
 
 def textured_part(lifted: Lifted) -> trimesh.Trimesh:

@@ -12,6 +12,7 @@ import numpy as np
 
 CROP_SIDE_PX = 384
 _SEARCH_SIDE_PX = 192
+_ELLIPSE_BITS = 4  # of a fraction of a pixel
 
 
 @dataclass(frozen=True)
@@ -20,8 +21,9 @@ class Silhouette:
 
     ``axis_tilt_deg`` and ``axis_column_px`` are the best mirror axis (of the mask turned upright by ``-axis_tilt_deg`` about
     its centre); ``mirror_iou`` how well the halves agree; ``row_fill`` the filled share of rows across it; ``solidity``
-    area over that of the convex hull; ``rectangle_iou`` agreement with the rectangle ``corners`` (4, 2) (x, y);
-    ``elongation`` length over width; ``typical_radius_px`` median radius along the medial axis; ``largest_radius_px``.
+    area over that of the convex hull; ``rectangle_iou`` agreement with the rectangle ``corners`` (4, 2) (x, y), ``ellipse_iou``
+    with the ellipse of its moments; ``elongation`` length over width; ``typical_radius_px`` median radius along the medial
+    axis; ``largest_radius_px``.
     """
 
     mask: np.ndarray
@@ -31,6 +33,7 @@ class Silhouette:
     row_fill: float
     solidity: float
     rectangle_iou: float
+    ellipse_iou: float
     corners: np.ndarray
     elongation: float
     typical_radius_px: float
@@ -39,7 +42,7 @@ class Silhouette:
 
     def scores(self) -> dict[str, float]:
         """Return the measures that decide about the primitive, rounded."""
-        names = ("mirror_iou", "row_fill", "solidity", "rectangle_iou", "elongation", "axis_tilt_deg")
+        names = ("mirror_iou", "row_fill", "solidity", "rectangle_iou", "ellipse_iou", "elongation", "axis_tilt_deg")
         return {name: round(float(getattr(self, name)), 3) for name in names} | {"holes": float(self.holes)}
 
 
@@ -69,6 +72,7 @@ def analyse_silhouette(mask: np.ndarray) -> Silhouette:
         row_fill=_row_fill(turned),
         solidity=float(mask.sum() / max(hull_area, 1.0)),
         rectangle_iou=float((filled.astype(bool) & mask).sum() / (filled.astype(bool) | mask).sum()),
+        ellipse_iou=_ellipse_iou(mask),
         corners=rectangle,
         elongation=max(elongation, float(sides.max() / max(sides.min(), 1.0))),
         typical_radius_px=float(np.median(radius[ridge])) if ridge.any() else float(radius.max()),
@@ -109,6 +113,18 @@ def _principal_axis(mask: np.ndarray) -> tuple[float, float]:
     if y < 0:
         x, y = -x, -y
     return float(np.degrees(np.arctan2(x, y))), float(np.sqrt(values[1] / max(values[0], 1e-9)))
+
+
+def _ellipse_iou(mask: np.ndarray) -> float:
+    """Return the overlap with the full ellipse that has the mask's centre and second moments."""
+    places = np.stack(np.nonzero(mask)[::-1]).astype(float)
+    values, vectors = np.linalg.eigh(np.cov(places))
+    x, y = vectors[:, 1]
+    half = 2 * np.sqrt(np.maximum(values, 0))
+    drawn = np.zeros(mask.shape, np.uint8)
+    middle, axes = (np.rint(each * 2**_ELLIPSE_BITS).astype(int).tolist() for each in (places.mean(axis=1), half[::-1]))
+    cv2.ellipse(drawn, middle, axes, float(np.degrees(np.arctan2(y, x))), 0, 360, 1, -1, shift=_ELLIPSE_BITS)
+    return float((mask & (drawn > 0)).sum() / (mask | (drawn > 0)).sum())
 
 
 def _mirror_axis(mask: np.ndarray, long_tilt: float) -> tuple[float, float]:
