@@ -20,6 +20,7 @@ import trimesh
 from known_places import Known
 
 from manitwin.geometry.candidate_sampling import sample_candidates
+from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.frames.feature import FramedMesh
 from manitwin.geometry.sampling import farthest_point_sampling, sample_surface
 from manitwin.models.annotators.protocol import PointsRequest, Subject
@@ -88,7 +89,10 @@ def verdicts(category: str, seed: int, plain: bool) -> list[tuple[str, str, bool
     made = make(templates[category], read_text(category, templates), np.random.default_rng(seed))
     solid = trimesh.Trimesh(made.mesh.vertices, made.mesh.faces, process=False)
     points, normals, faces = sample_surface(solid, SAMPLES, np.random.default_rng(seed))
-    chosen = farthest_point_sampling(points, CANDIDATES, 0) if plain else sample_candidates(points, normals, CANDIDATES)
+    if plain:
+        chosen = farthest_point_sampling(points, CANDIDATES, 0)
+    else:
+        chosen = sample_candidates(points, normals, CANDIDATES, find_opening(solid))
     subject = Subject(
         name=category, solid=solid, parts=tuple(visual_parts(made)), metric=True, views=(), cameras=(), seed=seed
     )

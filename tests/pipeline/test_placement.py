@@ -127,6 +127,19 @@ def test_a_tall_can_stands_though_its_centre_moves_as_it_falls_back_from_a_tilt(
     assert any(p["upright"] and p["settled"] for p in found)
 
 
+@pytest.mark.parametrize(("foot_m", "stays"), [(0.0018, True), (0.0010, False)])
+def test_upright_pose_on_a_narrow_foot_counts_where_it_falls_back_from_tilts(
+    foot_m: float, stays: bool, tmp_path: Path
+) -> None:
+    """A bar that is wide above and narrow below, as a spoon on its bowl: it lies firmly the other way up."""
+    section = [(-foot_m / 2, 0.0), (foot_m / 2, 0.0), (0.01, 0.01), (-0.01, 0.01)]
+    corners = np.array([(x, y, z) for x in (-0.06, 0.06) for y, z in section])
+    bar = trimesh.convex.convex_hull(corners)
+    found = _placements(_draft(tmp_path, bar, 0.04, [corners]), tmp_path)
+    assert any(p["settled"] and not p["upright"] for p in found)
+    assert any(p["settled"] and p["upright"] for p in found) == stays
+
+
 def _lying_prism(sides: int) -> trimesh.Trimesh:
     """Return a marker: a regular prism along x, 19 mm across its corners and 12 cm long, on one of its facets."""
     angle = (np.arange(sides) + 0.5) * 2 * np.pi / sides

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
+from manitwin.geometry.cavity import Opening
+
 _NEIGHBOURS = 16
 _OTHER_SIDE = -0.5  # cosine of normals: a neighbour through a thin wall says nothing of how the surface bends
 _BEND = 0.06  # of the mean normal's length: a right-angled edge has 0.29, a cylinder of 20 neighbour distances 0.003
@@ -16,6 +18,9 @@ _FLAT = 0.985  # length of the mean normal: a quarter of a cylinder has 0.90, a 
 _SMALL_SHARE = 0.06  # of the longest side: the half width of what may be a button
 _APART_SHARE = 0.06  # of the longest side: middles and ends nearer to each other than this are one place
 _RESTING_SHARE, _RESTING_COSINE = 0.015, -0.8  # of the longest side above the lowest place; normal that looks down
+_FLOOR_DEPTH, _FLOOR_COSINE = 0.5, 0.5  # of the depth below the rim; normal along the opening's axis
+_UPWARD = 0.9  # cosine: a lid's hollow has no floor on which things lie
+_FLOOR_SHARE = 0.5  # of the rim's radius: of a deep vessel no view shows the very middle
 MOST_RESTING = 0.2
 """The share of candidates that may lie on the underside on which a thing rests."""
 
@@ -28,12 +33,15 @@ class _Bends:
     inner_m: np.ndarray
 
 
-def sample_candidates(points_m: np.ndarray, normals: np.ndarray, count: int) -> np.ndarray:
+def sample_candidates(
+    points_m: np.ndarray, normals: np.ndarray, count: int, opening: Opening | None = None
+) -> np.ndarray:
     """Return the indices of ``count`` of the samples ``(N, 3)`` m of a surface with outward normals ``(N, 3)``.
 
-    First the middles of flat parts, tops of bumps and outermost ends, then by farthest point sampling (paper, eq. 1) of
-    distances that count up to twice where the surface bends: rims, edges, tips. At most a fifth lies on the underside that it
-    rests on. Returns all indices where there are no more than ``count``.
+    First the middles of the floor and the underside of what has an ``opening``, the middles of flat parts, tops of bumps and
+    outermost ends, then by farthest point sampling (paper, eq. 1) of distances that count up to twice where the surface bends:
+    rims, edges, tips. At most a fifth lies on the underside that it rests on. Returns all indices where there are no more than
+    ``count``.
     """
     if len(points_m) <= count:
         return np.arange(len(points_m))
@@ -43,7 +51,8 @@ def sample_candidates(points_m: np.ndarray, normals: np.ndarray, count: int) -> 
     resting = _resting(points_m, normals, size_m)
     room = max(1, int(MOST_RESTING * count))
     chosen: list[int] = []
-    for index in _places(tree, points_m, normals, bends, size_m):
+    floor = [] if opening is None else _floor(points_m, normals, opening)
+    for index in _places(tree, points_m, normals, bends, size_m, floor):
         if len(chosen) < count and not (resting[index] and resting[chosen].sum() >= room):
             chosen.append(index)
     if not chosen:
@@ -57,6 +66,19 @@ def sample_candidates(points_m: np.ndarray, normals: np.ndarray, count: int) -> 
         chosen.append(index)
         far = np.minimum(far, np.linalg.norm(points_m - points_m[index], axis=1))
     return np.array(chosen)
+
+
+def _floor(points_m: np.ndarray, normals: np.ndarray, opening: Opening) -> list[int]:
+    """Return the samples in the middle of a vessel's floor and of its underside, none of what has no floor, as a funnel."""
+    if opening.axis[2] < _UPWARD:
+        return []
+    offset, up = points_m - opening.center_m, normals @ opening.axis
+    above = offset @ opening.axis
+    off_axis = np.linalg.norm(offset - above[:, None] * opening.axis, axis=1)
+    floor = (above < -_FLOOR_DEPTH * opening.depth_m) & (up > _FLOOR_COSINE)
+    underside = (above < -opening.depth_m) & (up < -_FLOOR_COSINE)
+    middles = [int(np.where(side, off_axis, np.inf).argmin()) for side in (floor, underside) if side.any()]
+    return [index for index in middles if off_axis[index] < _FLOOR_SHARE * opening.rim_radius_m] if floor.any() else []
 
 
 def _bends(tree: cKDTree, points_m: np.ndarray, normals: np.ndarray) -> _Bends:
@@ -76,12 +98,14 @@ def _resting(points_m: np.ndarray, normals: np.ndarray, size_m: float) -> np.nda
     return np.asarray((lowest < _RESTING_SHARE * size_m) & (normals[:, 2] < _RESTING_COSINE))
 
 
-def _places(tree: cKDTree, points_m: np.ndarray, normals: np.ndarray, bends: _Bends, size_m: float) -> list[int]:
-    """Return samples at the middles of flat parts, on bumps and at outermost ends, none of them near another."""
+def _places(
+    tree: cKDTree, points_m: np.ndarray, normals: np.ndarray, bends: _Bends, size_m: float, floor: list[int]
+) -> list[int]:
+    """Return ``floor``, and samples at the middles of flat parts, on bumps and at outermost ends, none of them near another."""
     spacing = float(np.median(tree.query(points_m[:500], 2)[0][:, 1]))
     middles, bumps = _middles(tree, points_m, normals, bends, size_m, 2.5 * spacing)
     found: list[int] = []
-    for group in (_ends(points_m, size_m), middles, bumps):
+    for group in (floor, _ends(points_m, size_m), middles, bumps):
         for index in group:
             apart = np.linalg.norm(points_m[found] - points_m[index], axis=1) if found else np.array([np.inf])
             near = _APART_SHARE * size_m

@@ -15,6 +15,7 @@ from manitwin.engine.stage import Draft
 from manitwin.errors import Rejected
 from manitwin.formats.glb import read_glb
 from manitwin.geometry.candidate_sampling import sample_candidates
+from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.sampling import sample_surface
 from manitwin.pipeline.object_state import load_solid, pictures
@@ -37,7 +38,7 @@ class CandidatesStage:
     settings: CandidatesConfig
 
     name: ClassVar[str] = "candidates"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = ("solid.npz", "visual.glb", "views/", "cameras", "physical")
     writes: ClassVar[tuple[str, ...]] = ("marked/", "candidates", "visible_candidates")
     needs: ClassVar[Resource] = "cpu"
@@ -88,8 +89,8 @@ def choose_candidates(
 ) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
     """Return positions ``(count, 3)`` m, outward normals ``(count, 3)``, and for each camera the ids that it sees.
 
-    They are far from each other (paper, eq. 1), denser where the surface bends, and a fifth at most on the underside
-    (``sample_candidates``). Raises Rejected where fewer than ``count`` samples are seen.
+    They are far from each other (paper, eq. 1), denser where the surface bends, a fifth at most on the underside, and one in the
+    middle of a vessel's floor (``sample_candidates``). Raises Rejected where fewer than ``count`` samples are seen.
     """
     points, normals, _ = sample_surface(solid, samples, rng)
     tolerance_m = seen_tolerance_m(solid.extents)
@@ -102,5 +103,5 @@ def choose_candidates(
             " close the holes of the mesh",
             stage="gate",
         )
-    chosen = shown[sample_candidates(points[shown], normals[shown], count)]
+    chosen = shown[sample_candidates(points[shown], normals[shown], count, find_opening(solid))]
     return points[chosen], normals[chosen], [np.flatnonzero(row[chosen]) for row in seen]

@@ -18,7 +18,7 @@ class CaptionStage:
     """Ask the annotator for words."""
 
     name: ClassVar[str] = "caption"
-    version: ClassVar[str] = "4"
+    version: ClassVar[str] = "5"
     reads: ClassVar[tuple[str, ...]] = (
         "visual.glb",
         "solid.npz",

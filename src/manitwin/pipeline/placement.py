@@ -60,7 +60,7 @@ class PlacementStage:
     settings: PlacementConfig
 
     name: ClassVar[str] = "placement"
-    version: ClassVar[str] = "5"
+    version: ClassVar[str] = "6"
     reads: ClassVar[tuple[str, ...]] = ("hulls.npz", "solid.npz", "physical")
     writes: ClassVar[tuple[str, ...]] = ("placements",)
     needs: ClassVar[Resource] = "cpu"
@@ -79,18 +79,18 @@ def find_rests(body: RigidBody, settings: PlacementConfig) -> list[_Rest]:
     """Return the ways in which a body rests on a plane: those that stay in simulation first, most likely first.
 
     A pose that a slight tilt turns over (a can on its side) does not count as staying. Where no likely pose is firm,
-    the loose ones count that pass the harder trial, else the firm ones that are unlikely (a pencil on its end). What
-    falls over is tried once more from where it came to rest. Raises Rejected where nothing stays.
+    the loose ones count that pass the harder trial, else the firm ones that are unlikely (a pencil on its end). The upright pose
+    always counts where it passes that trial: in it people put down a spoon, which stands on little. What falls over is tried
+    once more from where it came to rest. Raises Rejected where nothing stays.
     """
     shape = _Shape(body, settings)
     guesses, unlikely = shape.guesses()
     firm = [guess for guess in guesses if shape.is_firm(guess.rotation)]
     loose = [guess for guess in guesses if not shape.is_firm(guess.rotation)]
     rests = shape.tried(firm, loosely=False)
-    if any(rest.settled for rest in rests):
-        rests += loose
-    else:
-        rests += shape.tried(loose, loosely=True)
+    proven = any(rest.settled for rest in rests)
+    rests += shape.tried([guess for guess in loose if not proven or _is_upright(guess)], loosely=True)
+    rests += [guess for guess in loose if proven and not _is_upright(guess)]
     if not any(rest.settled for rest in rests):
         rests += shape.tried([guess for guess in unlikely if shape.is_firm(guess.rotation)], loosely=False)
     rests = [rest for rest in rests if rest.settled or rest.probability >= settings.least_probability]

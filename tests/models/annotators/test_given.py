@@ -74,6 +74,17 @@ def test_given_points_snap_to_the_nearest_candidate() -> None:
     assert len({point.candidate for point in selected.functional}) == len(selected.functional)
 
 
+def test_points_are_filled_up_with_others_than_those_that_are_given() -> None:
+    positions, _ = candidates(MUG)
+    own = RulesAnnotator().select_points(request(subject(MUG, "mug"))).functional[0]
+    rim = np.flatnonzero(positions[:, 2] > 0.95 * positions[:, 2].max())
+    other = positions[next(i for i in rim if i != own.candidate)]
+    functional = [{"position_m": other.tolist(), "normal": [0, 0, 1], "label": own.label}]
+    selected = KeepsGiven(RulesAnnotator()).select_points(request(given_subject(functional_points=functional)))
+    labels = [point.label for point in selected.functional]
+    assert labels[0] == own.label and len(set(labels)) == len(labels) == 2, "the second tells another function"
+
+
 def test_point_far_from_the_object_is_a_finding() -> None:
     far = [{"position_m": [1.0, 0, 0]}]
     selected = KeepsGiven(RulesAnnotator()).select_points(request(given_subject(functional_points=far)))

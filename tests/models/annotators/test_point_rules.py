@@ -64,6 +64,20 @@ def test_places_that_are_parts_lie_on_them() -> None:
     assert abs(joint) < 0.03 and min(abs(jaws), abs(handles)) > 0.033 and jaws * handles < 0
 
 
+def test_two_sides_of_a_thin_wall_are_two_places() -> None:
+    """The middle of a saucer's underside is 3 mm from that of its surface, and no less its base."""
+    saucer = trimesh.creation.cylinder(radius=0.07, height=0.003, sections=64)
+    saucer.apply_translation([0, 0, 0.0015])
+    around = 0.06 * np.column_stack([np.cos(np.arange(6)), np.sin(np.arange(6)), np.zeros(6)])
+    above = np.array([0, 0, 0.003])
+    places = np.vstack([above, around + above, np.zeros(3), around])
+    normals = np.repeat([[0.0, 0, 1], [0.0, 0, -1]], 7, axis=0)
+    selected = select(saucer, "saucer", positions_m=places, normals=normals, visible=(tuple(range(14)),))
+    assert np.allclose(labelled(selected, "surface"), [0, 0, 0.003])
+    grasps = [point.candidate for point in selected.grasp]
+    assert np.allclose(labelled(selected, "base"), 0) and len(set(grasps)) == len(grasps)
+
+
 def test_an_empty_middle_is_held_by_the_rim() -> None:
     bowl = cup(radius_m=0.075, height_m=0.07, wall_m=0.004)
     for point in select(bowl, "bowl").grasp:

@@ -39,6 +39,18 @@ def test_mass_stays_in_the_categorys_interval_where_the_volume_says_more() -> No
     assert lookup("mug").mass_kg.low <= estimate.low <= estimate.value <= estimate.high <= lookup("mug").mass_kg.high
 
 
+def test_interval_goes_on_beyond_the_answer_where_size_and_volume_contradict_each_other() -> None:
+    thin = trimesh.creation.box([0.27, 0.1, 0.007])  # as long as a large toy, with the matter of a small one
+    prior = lookup("toy")
+    assert prior.bulk_density_kg_m3 is not None
+    estimate = mass(thin, "toy")
+    assert estimate.value > prior.bulk_density_kg_m3.high * thin.volume
+    assert 1.5 * estimate.value < estimate.high <= prior.mass_kg.high
+    block = trimesh.creation.box([0.2, 0.15, 0.1])
+    agreed = mass(block, "toy")
+    assert agreed.high == min(prior.bulk_density_kg_m3.high * block.volume, prior.mass_kg.high), "the same as before"
+
+
 def test_a_thing_without_a_name_has_a_wide_interval_and_says_so() -> None:
     mesh = cylinder(0.03, 0.1)
     estimate = mass(mesh, None)

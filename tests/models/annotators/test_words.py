@@ -83,7 +83,9 @@ def test_all_categories_give_whole_sentences() -> None:
     ("name", "category"),
     [
         ("coffee mugs", "mug"), ("rubber mallet", "mallet"), ("red sneakers", "sneaker"),
-        ("torx screwdriver", "screwdriver"),
+        ("torx screwdriver", "screwdriver"), ("steel pan", "pan"), ("bread knife", "bread knife"), ("salad bowls", "salad bowl"),
+        ("garbage can", "garbage can"), ("old frying pan", "frying pan"), ("the shaker", "shaker"),
+        ("Cook’s knife", "cook's knife"),
     ],
 )  # fmt: skip
 def test_the_users_word_is_the_category_where_it_is_another_thing(name: str, category: str) -> None:

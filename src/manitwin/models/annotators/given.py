@@ -126,8 +126,9 @@ class GivenPoints:
 
 
 def _filled(given: list[Point], others: tuple[Point, ...], least: int, letter: str) -> list[Point]:
-    filled = list(given)
-    for point in others:
+    """Return what is given and the first of the others, those last that are called the same: a second cap tells nothing."""
+    filled, said = list(given), {point.label for point in given}
+    for point in sorted(others, key=lambda point: point.label is not None and point.label in said):
         if len(filled) < least and point.candidate not in {kept.candidate for kept in given}:
             filled.append(point)
     return [point.model_copy(update={"id": f"{letter}{number}"}) for number, point in enumerate(filled)]

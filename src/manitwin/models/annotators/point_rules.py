@@ -29,6 +29,7 @@ _FINGER_CLEARANCE_M = 0.004  # of the opening: the pads need some play on both s
 _PINCH_M = 0.03  # matter between two fingertips: what is thicker is taken between the pads, with both fingers along it
 _UNSEEN = 0.3  # a candidate in no view can be chosen only where no seen one is near as good
 _TAKEN = 0.35  # a candidate that already stands for another part
+_BEHIND = -0.5  # cosine of normals on the two sides of a wall: a plate's base is no place on its surface
 _ELSEWHERE = 0.3  # a candidate that is not on the part that the place's label is the name of
 
 _GENERIC_FUNCTIONAL: tuple[Feature, ...] = ("top", "end", "base", "front")
@@ -107,16 +108,19 @@ class PointSelection:
         named = [roles.index(role) for role in shown if part_name(role, self.prior, (), shown) == label]
         return np.where(np.isin(self._parts.index[-count:], named) | (not named), 1.0, _ELSEWHERE)
 
-    def _best(self, feature: Feature, weights: np.ndarray, taken: list[int], spread_m: float) -> _Choice | None:
+    def _best(
+        self, feature: Feature, weights: np.ndarray, taken: list[int], spread_m: float, *, through: bool = True
+    ) -> _Choice | None:
+        """Return the best candidate for a feature, away from those taken, ``through`` thin walls too."""
         scores = feature_scores(feature, self.shape, self.points)
         if scores is None:
             return None
         ranked = scores * weights * self._on_own_part(feature)
         if taken:
             ranked[taken] = -1.0
-            near = np.min(
-                np.linalg.norm(self.request.positions_m[:, None] - self.request.positions_m[taken], axis=2), axis=1
-            )
+            apart = np.linalg.norm(self.request.positions_m[:, None] - self.request.positions_m[taken], axis=2)
+            behind = self.request.normals @ self.request.normals[taken].T < _BEHIND
+            near = np.where(behind & (not through), np.inf, apart).min(1)
             ranked = np.where(near < spread_m, _TAKEN * ranked, ranked)
         index = int(ranked.argmax())
         return _Choice(index, float(scores[index])) if scores[index] >= _WEAK and ranked[index] > 0 else None
@@ -132,7 +136,7 @@ class PointSelection:
             least = LEAST if part in generic else MOST_FUNCTIONAL
             if len(found) >= least:
                 continue
-            choice = self._best(part.feature, self._seen(), taken, 0.05 * self.shape.size_m)
+            choice = self._best(part.feature, self._seen(), taken, 0.05 * self.shape.size_m, through=False)
             if choice is not None:
                 taken.append(choice.candidate)
                 found.append(self._functional_point(len(found), part, choice))

@@ -92,18 +92,20 @@ def estimate_physical(subject: Subject, prior: Prior | None) -> PhysicalEstimate
 def _mass(prior: Prior, longest_m: float, volume_m3: float) -> Estimate:
     """Combine what such a thing of this size weighs with bulk density times volume, the narrower one counting more.
 
-    Both are taken as log-normal. The answer stays in the category's interval; its own interval is what both leave open.
+    Both are taken as log-normal. The answer stays in the category's interval; its own interval is what both leave open, and where
+    they contradict each other it reaches as far beyond the answer as both together are unsure.
     """
     by_size = _scaled(prior.mass_kg, (longest_m / prior.longest_axis_m.typical) ** _SIZE_EXPONENT)
     if prior.bulk_density_kg_m3 is None:
-        return _clamped(by_size.typical, by_size, prior.mass_kg, prior.source)
+        return _clamped(by_size.typical, by_size, prior.mass_kg, prior.source, 1.0)
     by_volume = _scaled(prior.bulk_density_kg_m3, volume_m3)
     weight_size = (_SAME_SIZE_SPREAD * _log_spread(by_size)) ** -2
     weight_volume = _log_spread(by_volume) ** -2
     logs = weight_size * np.log(by_size.typical) + weight_volume * np.log(by_volume.typical)
     value = float(np.exp(logs / (weight_size + weight_volume)))
     source = "density*volume" if weight_volume > weight_size else prior.source
-    return _clamped(value, by_volume, prior.mass_kg, source)
+    beyond = float(np.exp(_SPREAD / 2 * (weight_size + weight_volume) ** -0.5))
+    return _clamped(value, by_volume, prior.mass_kg, source, beyond)
 
 
 def _unknown_mass(prior: Prior, volume_m3: float) -> Estimate:
@@ -120,10 +122,15 @@ def _log_spread(interval: Interval) -> float:
     return max(float(np.log(interval.high / interval.low)) / _SPREAD, 0.02)
 
 
-def _clamped(value: float, geometry: Interval, category: Interval, source: str) -> Estimate:
-    """Keep ``value`` in the category's interval, and of that interval what the geometry leaves open around it."""
+def _clamped(value: float, geometry: Interval, category: Interval, source: str, beyond: float) -> Estimate:
+    """Keep ``value`` in the category's interval, and of that interval what the geometry leaves open around it.
+
+    Of a value outside of what the geometry leaves open the interval goes on by the factor ``beyond``.
+    """
+    low = geometry.low if value >= geometry.low else value / beyond
+    high = geometry.high if value <= geometry.high else value * beyond
     value = min(max(value, category.low), category.high)
-    low, high = max(category.low, geometry.low), min(category.high, geometry.high)
+    low, high = max(category.low, low), min(category.high, high)
     return Estimate(value=value, low=min(low, value), high=max(high, value), source=source)
 
 

@@ -62,12 +62,16 @@ def describe(subject: Subject, prior: Prior | None, material: str, extents_m: np
 
 
 def _category(subject: Subject, prior: Prior | None) -> str:
-    """Return what the user calls it: a 'coffee mug' is a mug, but a 'mallet' is none of the hammers that it is weighed as."""
+    """Return what the user calls it: a 'coffee mug' is a mug, but a 'skillet' is called so and a 'pan' is no frying pan."""
     found = found_by(subject.name)
     if prior is None or found is None:
         return normalised(subject.name) or "unknown" if subject.name else "unknown"
-    said = found[1]
-    return prior.category if said.split()[-1] == normalised(prior.category).split()[-1] else said
+    said, category = found[1].split(), normalised(prior.category).split()
+    if said[-len(category) :] == category:
+        return prior.category
+    return next(
+        (alias for alias in prior.aliases if normalised(alias) == found[1]), found[1]
+    )  # a cook's knife as spelt
 
 
 def _color(colors: list[ColorShare]) -> str:
