@@ -148,6 +148,15 @@ def test_what_one_fingertip_meets_first_and_pushes_to_the_other_is_held(beside_m
     assert (found["part_id"], found["grasp_point_id"]) == ("p1", "g0")
 
 
+@pytest.mark.parametrize(("above_m", "told"), [(0.002, "p0"), (0.0085, "p0"), (0.011, "")])
+def test_a_thin_bar_under_the_border_of_the_pads_is_held(above_m: float, told: str) -> None:
+    """Pads are 18 mm high: of a bar of 2 mm they hold what is less than 9 mm from their middle."""
+    bar = trimesh.creation.box([0.2, 0.02, 0.002])
+    held = PartedSolid(bar, RayCaster(bar), np.zeros(len(bar.faces), np.uint8), ("p0",), 0.03, OPENING_M)
+    found = row(held, grasp_at(np.array([0.0, 0.0, above_m]), SIDE, 0.02), [])
+    assert found["part_id"] == told
+
+
 def test_a_hand_without_two_pads_touches_what_is_nearest() -> None:
     held = bar(True)
     hand = PartedSolid(held.solid, held.surface, held.labels, held.part_ids, held.radius_m, opening_m=None)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -34,6 +34,17 @@ REACH_M = 0.008
 """How far from the place that ``width_m`` says a contact may be: real ones lie up to 6 mm off (95 % of them, measured)."""
 PAD_M = 0.009
 """Half of a pad's width: what is as near to a place is under the fingertip that holds it there."""
+_OVER_PAD_M = np.array([(u, v) for u in (-PAD_HALF_M, 0.0, PAD_HALF_M) for v in (-PAD_HALF_M, 0.0, PAD_HALF_M)])
+"""Where over a fingertip rays start, across and along the approach ``(9, 2)``."""
+_ALL_OVER_PAD_M = np.array(
+    [
+        (u, v)
+        for long in np.linspace(-PAD_M, PAD_M, 13)
+        for short in (-PAD_M, 0.0, PAD_M)
+        for u, v in ((long, short), (short, long))
+    ]
+)
+"""As close to each other as 1.5 mm and out to the pad's border ``(78, 2)``: what is thin lies between fewer of them."""
 _NARROW, _BESIDE = (
     0.5,
     0.25,
@@ -55,6 +66,15 @@ class Contacts:
     touches: np.ndarray
     part: np.ndarray
     share: np.ndarray
+
+    def taken(self, rows: np.ndarray) -> Contacts:
+        """Return the contacts of some rows."""
+        return Contacts(*(getattr(self, f.name)[rows] for f in fields(Contacts)))
+
+    def put(self, rows: np.ndarray, others: Contacts) -> None:
+        """Put others in the place of some rows."""
+        for field in fields(Contacts):
+            getattr(self, field.name)[rows] = getattr(others, field.name)
 
     @staticmethod
     def joined(parts: Sequence[Contacts]) -> Contacts:
@@ -89,26 +109,36 @@ class PartedSolid:
     def contacts(self, gripper_to_object: np.ndarray, depth_m: np.ndarray, width_m: np.ndarray) -> Contacts:
         """Return where grasps ``(N, 4, 4)`` touch; with rays nothing that is farther than their reach from where it should be.
 
-        What lies beside the middle of an open hand is met by one fingertip first, and pushed to the other.
+        What is thin may lie between the rays, or be held by the border of the pads alone. What lies beside the middle of an open
+        hand is met by one fingertip first, and pushed to the other.
         """
         middle = fingertips(gripper_to_object, depth_m)
         found = self._contacts(middle, width_m / 2, width_m / 2, gripper_to_object)
         if self.opening_m is None or found.touches.all():
             return found
         lost = np.flatnonzero(~found.touches.all(1))
+        half_m = width_m[lost] / 2
+        wider = self._contacts(middle[lost], half_m, half_m, gripper_to_object[lost], _ALL_OVER_PAD_M)
+        met = np.asarray(wider.touches.all(1))
+        found.put(lost[met], wider.taken(met))
+        lost = lost[~met]
         plus_m, minus_m = self._met(middle[lost], gripper_to_object[lost], self.opening_m)
         beside = np.abs(plus_m + minus_m - width_m[lost]) <= REACH_M  # as wide as it was said to be, and elsewhere
         lost = lost[beside]
-        again = self._contacts(middle[lost], plus_m[beside], minus_m[beside], gripper_to_object[lost])
-        for field in fields(Contacts):
-            getattr(found, field.name)[lost] = getattr(again, field.name)
+        found.put(lost, self._contacts(middle[lost], plus_m[beside], minus_m[beside], gripper_to_object[lost]))
         return found
 
     def _contacts(
-        self, middle_m: np.ndarray, plus_m: np.ndarray, minus_m: np.ndarray, gripper_to_object: np.ndarray
+        self,
+        middle_m: np.ndarray,
+        plus_m: np.ndarray,
+        minus_m: np.ndarray,
+        gripper_to_object: np.ndarray,
+        offsets_m: np.ndarray = _OVER_PAD_M,
     ) -> Contacts:
         """Return where fingertips touch that end ``plus_m (N,)`` and ``minus_m (N,)`` from the middle along +X and -X."""
-        find, closing = self._nearest if self.opening_m is None else self._by_rays, gripper_to_object[:, :3, 0]
+        find = self._nearest if self.opening_m is None else partial(self._by_rays, offsets_m=offsets_m)
+        closing = gripper_to_object[:, :3, 0]
         plus = find(middle_m + plus_m[:, None] * closing, gripper_to_object, 1.0)
         minus = find(middle_m - minus_m[:, None] * closing, gripper_to_object, -1.0)
         return Contacts(*(np.stack(values, axis=1) for values in zip(plus, minus, strict=True)))
@@ -191,10 +221,11 @@ class PartedSolid:
         return self.labels[faces], cKDTree(positions)
 
     def _by_rays(
-        self, place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float
+        self, place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float, offsets_m: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Send rays along the closing axis from around each contact's place into the object."""
-        grid, inward = _grid(place_m + sign * REACH_M * gripper_to_object[:, :3, 0], gripper_to_object, sign)
+        begin_m = place_m + sign * REACH_M * gripper_to_object[:, :3, 0]
+        grid, inward = _grid(begin_m, gripper_to_object, sign, offsets_m)
         starts = grid.reshape(-1, 3)
         distance, face = self.surface.first_hits(starts, inward)
         met = face >= 0
@@ -226,12 +257,13 @@ def pads_apart_m(gripper: Gripper) -> float | None:
     return gripper.opening_m if isinstance(gripper, ParallelGripper) else None
 
 
-def _grid(place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return three by three starts ``(N, 9, 3)`` over a fingertip at each place, and the way inward of each ``(9 N, 3)``."""
+def _grid(
+    place_m: np.ndarray, gripper_to_object: np.ndarray, sign: float, offsets_m: np.ndarray = _OVER_PAD_M
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return starts ``(N, K, 3)`` over a fingertip at each place, and the way inward of each ``(K N, 3)``."""
     closing, across, approach = (gripper_to_object[:, :3, k] for k in range(3))
-    steps = np.linspace(-PAD_HALF_M, PAD_HALF_M, 3)
-    offsets = np.stack([u * across + v * approach for u in steps for v in steps], axis=1)
-    return place_m[:, None] + offsets, np.repeat(-sign * closing, offsets.shape[1], axis=0)
+    starts = place_m[:, None] + offsets_m @ np.stack([across, approach], axis=1)
+    return starts, np.repeat(-sign * closing, len(offsets_m), axis=0)
 
 
 def region_columns(

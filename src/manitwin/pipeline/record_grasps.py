@@ -31,7 +31,7 @@ class RecordGraspsStage:
     """Write ``grasps.parquet`` and the field ``grasps`` for the twin's first gripper and all others."""
 
     name = "record_grasps"
-    version = "5"
+    version = "6"
     writes: tuple[str, ...] = (TABLE, "grasps")
     needs: Resource = "cpu"
     backend = "builtin"
