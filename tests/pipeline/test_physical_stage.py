@@ -252,13 +252,15 @@ def annotated(mesh: trimesh.Trimesh, folder: Path, **fields: object) -> Path:
     return path
 
 
-def run_annotated(mesh: trimesh.Trimesh, folder: Path, given: Path, mass: Estimate | None = None) -> dict[str, Any]:
+def run_annotated(
+    mesh: trimesh.Trimesh, folder: Path, given: Path, mass: Estimate | None = None, name: str | None = None
+) -> dict[str, Any]:
     (folder / "views").mkdir(exist_ok=True)
     (folder / "canonical.glb").write_bytes(write_glb([visual(mesh, baseColorFactor=[200, 10, 10, 255])]))
     np.savez(folder / "canonical.npz", vertices=mesh.vertices, faces=mesh.faces)
     paths = {key: folder / key for key in ("canonical.glb", "canonical.npz", "views/")}
     geometry = {"metric": True, "input_to_object": GLTF_TO_OBJECT.tolist()}
-    draft = Draft("id", Item(file=None, name=None, given=str(given)), 0, {"geometry": geometry, "cameras": []}, paths)
+    draft = Draft("id", Item(file=None, name=name, given=str(given)), 0, {"geometry": geometry, "cameras": []}, paths)
     annotator = KeepsGiven(Says(mass_kg=mass or said(0.2)))
     fields: dict[str, Any] = PhysicalStage(PhysicalConfig(), annotator).run(draft, folder)
     return fields
@@ -274,6 +276,26 @@ def test_an_annotated_center_and_inertia_are_kept(tmp_path: Path) -> None:
     assert physical.center_of_mass_m == pytest.approx([0.002, 0.0, 0.03])
     assert np.allclose(physical.inertia_kg_m2, inertia, rtol=1e-9)
     assert not [finding for finding in fields["physical_findings"] if "moments" in finding]
+
+
+@pytest.mark.parametrize(("kind", "accepted"), [("template", True), ("urdf", False)])
+def test_a_template_weighs_what_its_parts_do(kind: str, accepted: bool, tmp_path: Path) -> None:
+    """A plastic fork of 4 g is lighter than nearly every fork, and right; an asset that says so has mixed its units."""
+    mesh = cylinder(0.003, 0.18)
+    made = solid_mass_properties(mesh, 0.004)
+    given = annotated(
+        mesh, tmp_path, center_of_mass_m=made.center_of_mass_m.tolist(), inertia_kg_m2=made.inertia_kg_m2.tolist()
+    )
+    record = json.loads(given.read_text()) | {"format": kind, "category": "fork", "mass_kg": 0.004}
+    given.write_text(json.dumps(record))
+    if accepted:
+        fields = run_annotated(mesh, tmp_path, given, said(0.04), "fork")
+        assert fields["physical"]["mass_kg"]["value"] == 0.004
+        assert any("mass 0.004 kg" in finding for finding in fields["physical_findings"]), "a finding says so"
+        return
+    with pytest.raises(Rejected, match="a fork weighs") as raised:
+        run_annotated(mesh, tmp_path, given, said(0.04), "fork")
+    assert raised.value.reason == "implausible_mass"
 
 
 def test_an_inertia_far_from_the_shape_is_a_finding(tmp_path: Path) -> None:

@@ -75,7 +75,7 @@ class PhysicalStage:
         solid = trimesh.Trimesh(subject.solid.vertices * scale, subject.solid.faces, process=False)
         mass = mass_estimate(estimates, float(solid.volume))
         self._check_size(object_name(draft), scale * longest, estimates.longest_axis_m)
-        self._check_mass(object_name(draft), mass, float(solid.volume))
+        self._check_mass(None if _known_mass(subject) else object_name(draft), mass, float(solid.volume))
         parts = [bake_transform(part, np.diag([scale, scale, scale, 1.0])) for part in subject.parts]
         _write_meshes(draft, folder, solid, parts, scale, self.settings.max_texture_size)
         properties, uncertainty = spread_mass(solid, mass.value, estimates.wall_thickness_m)
@@ -148,6 +148,7 @@ class PhysicalStage:
             )
 
     def _check_mass(self, name: str | None, mass: Estimate, volume_m3: float) -> None:
+        """Raise Rejected for the mass of no such thing; ``name`` is None of a template, whose mass is that of its parts."""
         if _is_confirmed(mass):
             return
         prior = lookup(name)

@@ -278,3 +278,11 @@ def found_by(name: str | None) -> tuple[Prior, str] | None:
             if candidate in index and index[candidate].category != "unknown":
                 return index[candidate], candidate
     return None
+
+
+def word_for(prior: Prior, said: str) -> str:
+    """Return what a person calls a thing that was found by these words: a 'coffee mug' is a mug, a 'pan' no frying pan."""
+    words, category = said.split(), normalised(prior.category).split()
+    if words[-len(category) :] == category:
+        return prior.category
+    return next((alias for alias in prior.aliases if normalised(alias) == said), said)  # a cook's knife as it is spelt

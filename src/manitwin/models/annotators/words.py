@@ -6,7 +6,7 @@ import numpy as np
 
 from manitwin.geometry.cavity import find_opening
 from manitwin.geometry.parts.overall_shape import overall_shape
-from manitwin.models.annotators.priors import Prior, found_by, normalised
+from manitwin.models.annotators.priors import Prior, found_by, normalised, word_for
 from manitwin.models.annotators.protocol import Subject
 from manitwin.models.annotators.surface_color import UNTEXTURED, ColorShare, measure_colors
 from manitwin.twin.record import Language
@@ -66,12 +66,7 @@ def _category(subject: Subject, prior: Prior | None) -> str:
     found = found_by(subject.name)
     if prior is None or found is None:
         return normalised(subject.name) or "unknown" if subject.name else "unknown"
-    said, category = found[1].split(), normalised(prior.category).split()
-    if said[-len(category) :] == category:
-        return prior.category
-    return next(
-        (alias for alias in prior.aliases if normalised(alias) == found[1]), found[1]
-    )  # a cook's knife as spelt
+    return word_for(prior, found[1])
 
 
 def _color(colors: list[ColorShare]) -> str:

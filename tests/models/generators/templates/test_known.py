@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from manitwin.geometry.solids.shapes import box, cylinder
+from manitwin.models.annotators.priors import lookup
 from manitwin.models.generators.templates.catalog import load_templates
 from manitwin.models.generators.templates.known import known_of, mass_properties, material_words
 from manitwin.models.generators.templates.made import make
@@ -52,6 +53,36 @@ def test_a_thing_is_made_of_what_most_of_its_mass_and_surface_are(text: str, mat
     wanted = read_text(text, TEMPLATES)
     thing = make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0))
     assert set(material_words(thing).split(" and ")) == materials
+
+
+@pytest.mark.parametrize(
+    ("text", "category"),
+    [
+        ("a black skillet, 24 cm", "skillet"), ("a bread knife with a wooden handle", "bread knife"), ("a red coffee mug", "mug"),
+        ("stainless steel frying pan", "frying pan"),
+    ],
+)  # fmt: skip
+def test_a_thing_is_called_as_its_text_does(text: str, category: str) -> None:
+    wanted = read_text(text, TEMPLATES)
+    known = known_of(make(TEMPLATES[wanted.category], wanted, np.random.default_rng(0)), text)
+    assert known.called == category and known.source == f"template:{wanted.category}"
+
+
+@pytest.mark.parametrize(
+    ("text", "part"), [("whisk", "handle"), ("hand mirror", "frame"), ("pet bowl", "body"), ("ladle", "handle")]
+)
+def test_parts_of_sheet_weigh_less_than_their_volume_of_metal_and_as_much_of_other_matter(text: str, part: str) -> None:
+    brass, plastic = (
+        make(TEMPLATES[text], read_text(f"{matter} {text} with a {matter} {part}", TEMPLATES), np.random.default_rng(3))
+        for matter in ("brass", "plastic")
+    )
+    assert brass.masses_kg[part] < 0.6 * 8500 / 1050 * plastic.masses_kg[part], (
+        "hollow: walls follow the matter besides"
+    )
+    usual = lookup(text)
+    assert usual is not None and sum(brass.masses_kg.values()) < usual.mass_kg.high
+    whole = sum(density * float(solid.volume()) for solid, density in brass.solids)
+    assert sum(brass.masses_kg.values()) == pytest.approx(whole), "what the inertia is made of weighs as much"
 
 
 def test_point_of_an_opening_is_on_the_rim() -> None:

@@ -7,6 +7,7 @@ import trimesh
 from manifold3d import Manifold
 
 from manitwin.geometry.mass_properties import solid_mass_properties
+from manitwin.models.annotators.priors import found_by, word_for
 from manitwin.models.generators.templates.known_frames import known_frame
 from manitwin.models.generators.templates.made import Made, face_parts
 from manitwin.models.generators.templates.template import IN_THE_OPEN, KnownPoint
@@ -31,7 +32,7 @@ def known_of(made: Made, text: str) -> ImportRecord:
         format="template",
         file=text,
         name=made.category,
-        category=made.category,
+        category=_called(made.category, text),
         license=None,
         attribution=None,
         asset_to_object=np.eye(4).tolist(),
@@ -60,6 +61,14 @@ def known_of(made: Made, text: str) -> ImportRecord:
         remarks=[],
         parts=face_parts(made),
     )
+
+
+def _called(category: str, text: str) -> str:
+    """Return what a text calls a thing of a category, where the priors have it as a name of the same or of one of its form."""
+    found = found_by(text)
+    if found is None or category not in (found[0].category, found[0].kin_of):
+        return category
+    return word_for(*found)
 
 
 def material_words(made: Made) -> str:

@@ -23,6 +23,9 @@ from manitwin.models.generators.templates.text import Wanted, Wish
 from manitwin.twin.import_record import GivenParts
 
 LEAST_WALL_M = 0.0008
+SHEET_M = 0.0009
+"""The wall of hollow handles and stands of sheet metal: 0.8 to 1 mm of stainless steel."""
+_METALLIC = 0.5
 SIZE_MARGIN = 2.0
 """A stated size beyond the category's interval by more than this factor is taken for a mistake."""
 
@@ -71,18 +74,21 @@ def dressed(
     for part, wish in wishes.items():
         if part in looks and part not in template.slots:
             looks[part] = wish.of(looks[part])
-    densities = {part: template.contents_kg_m3.get(part, look.density_kg_m3) for part, look in looks.items()}
-    solids = [(part, solid.scale((scale, scale, scale))) for part, solid in model.assembly.solids()]
-    masses: dict[str, float] = {}
-    for part, solid in solids:
-        masses[part] = masses.get(part, 0.0) + densities[part] * float(solid.volume())
+    solids, masses = list[tuple[Manifold, float]](), dict[str, float]()
+    for part, built in model.assembly.solids():
+        solid = built.scale((scale, scale, scale))
+        density = template.contents_kg_m3.get(part, looks[part].density_kg_m3)
+        if part in template.of_sheet and looks[part].metallic > _METALLIC:
+            density *= min(1.0, SHEET_M * float(solid.surface_area()) / float(solid.volume()))
+        solids.append((solid, density))
+        masses[part] = masses.get(part, 0.0) + density * float(solid.volume())
     return Made(
         template.category,
         PartedMesh(mesh.vertices * scale, mesh.faces, mesh.part, mesh.names),
         looks,
         tuple(_scaled(point, scale) for point in model.points),
         {name: value * (scale if template.measures[name].unit == "m" else 1.0) for name, value in measures.items()},
-        [(solid, densities[part]) for part, solid in solids],
+        solids,
         masses,
     )
 

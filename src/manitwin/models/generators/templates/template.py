@@ -101,7 +101,7 @@ class Template:
     ``category`` is one of the priors', ``names`` what it is called besides. ``slots`` are the looks by slot, each a list of
     'colour material' or 'material' to draw from; the first slot is what colours and materials without a part's name mean. A
     measure ``wall_m`` is that of ceramic and follows the material. ``contents_kg_m3`` is the mean density of parts that are
-    closed containers, with what is in them.
+    closed containers, with what is in them. ``of_sheet`` are parts that are hollow behind a sheet where they are of metal.
     """
 
     category: str
@@ -111,6 +111,7 @@ class Template:
     build: Builder
     names: tuple[str, ...] = ()
     contents_kg_m3: Mapping[str, float] = field(default_factory=dict)
+    of_sheet: tuple[str, ...] = ()
 
     def drawn(self, rng: np.random.Generator) -> dict[str, float]:
         """Draw all measures."""

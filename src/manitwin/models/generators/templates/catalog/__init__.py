@@ -37,8 +37,8 @@ def _template(category: str, row: dict[str, Any], build: Builder) -> Template:
         name: Measure(low, typical, high, _unit(name)) for name, (low, typical, high) in row["measures"].items()
     }
     slots = {name: tuple(looks) for name, looks in row["slots"].items()}
-    names = tuple(row.get("names", ()))
-    return Template(category, row["group"], measures, slots, build, names, row.get("contents_kg_m3", {}))
+    names, of_sheet = tuple(row.get("names", ())), tuple(row.get("of_sheet", ()))
+    return Template(category, row["group"], measures, slots, build, names, row.get("contents_kg_m3", {}), of_sheet)
 
 
 def _unit(name: str) -> Literal["m", ""]:
