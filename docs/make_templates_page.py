@@ -33,12 +33,14 @@ the right part; their source is `template:CATEGORY`. What is not here is refused
 - **How many**: `--count 20` makes twenty of each text. What the text says holds for all; what it leaves open is drawn anew for
   each: measures, colours and materials. The same seed gives the same twenty.
 - **What it is**: one of the names below, or another word for it that the [priors](priors.md) know. The last noun counts: a mug
-  rack is no mug.
+  rack is no mug. The twin is called as the text calls it (a skillet is a skillet, made by the frying pan's template).
 - **How it looks**: colours and materials before or after the name are those of the whole; behind *with*, of a part:
   `a small blue mug with a wooden handle`. What the text does not say is drawn from the seed.
 - **How large it is**: `9 cm` is the longest extent; `9 cm tall`, `wide`, `long` is that direction. Inches and feet are read
   too. A size that no such thing has is refused. `small` and `large` choose within the usual sizes.
-- **What it is made of** decides the mass: the volume of each part times its density; of a closed container, with its contents.
+- **What it is made of** decides the mass: the volume of each part times its density; of a closed container, with its contents;
+  hollow behind a sheet where a handle or a stand of sheet metal would be. It is no estimate, has no interval, and is not refused
+  for being unlike that of most such things (a plastic fork); a finding says so.
 
 ## A photo gets its template, fitted
 

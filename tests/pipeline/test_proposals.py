@@ -13,9 +13,10 @@ from manitwin.geometry.poses import transform
 from manitwin.models.graspers.protocol import GraspProposals
 from manitwin.models.graspers.surface_sampling import AntipodalGrasper
 from manitwin.physics.grasp_filters import lowest_points_m
+from manitwin.physics.grasp_selection import Merits
 from manitwin.physics.sapien.trial import SapienTrial
-from manitwin.pipeline.grasps import GraspsStage, picked_from
-from manitwin.pipeline.proposals import associate, distances_to_grasps
+from manitwin.pipeline.grasps import GraspsStage, picked_from, support_quotas
+from manitwin.pipeline.proposals import Kept, associate, distances_to_grasps
 from manitwin.pipeline.verify import VERDICTS, VerifyStage
 from manitwin.robots.grippers.parallel import ParallelGripper
 
@@ -62,6 +63,20 @@ def test_a_flat_bar_gets_its_share_of_grasps_that_a_table_leaves_room_for(tmp_pa
     share = round(SETTINGS.on_support_share * SETTINGS.simulated)
     assert clear.sum() >= share
     assert (trials["outcome"][clear] == "held").sum() >= share // 2
+
+
+def test_of_what_pads_cannot_bear_a_few_are_asked_for_that_leave_room_for_a_table() -> None:
+    """A hand from above over a plane at z = 0: fit at the first thirty places, asked for too much at the others."""
+    count, share = 60, 8
+    poses = np.repeat(transform(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 0.2]))[None], count, axis=0)
+    poses[:, 0, 3] = np.arange(count) / 100
+    made = GraspProposals(poses, np.full(count, 0.02), np.full(count, 0.1), np.ones(count))
+    for fit in (np.arange(count) < 30, np.zeros(count, bool)):
+        kept = Kept(made, Merits(fit, ~fit, np.ones(count), 0.05), np.zeros((count, 1)), made, {})
+        settings = SETTINGS.model_copy(update={"simulated": 50})
+        (likely, wanted), (free, few) = support_quotas(kept, np.arange(count), PANDA, [np.eye(4)], settings)
+        assert (likely == fit).all() and wanted == 20
+        assert free.all() and few == share
 
 
 def test_the_placements_to_pick_from_are_the_likeliest_and_the_likeliest_upright_one() -> None:

@@ -6,6 +6,7 @@ and Filtering" (4,000 candidates, 3 cm, 7-DoF farthest point sampling to 100).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from manitwin.physics.grasp_selection import select_likely
 from manitwin.pipeline.gripper_kinds import KINDS
 from manitwin.pipeline.link_grasps import ChosenLink
 from manitwin.pipeline.object_state import JOINTS, load_hulls, load_solid, read_given
+from manitwin.pipeline.point_search import HOPELESS_TRIES
 from manitwin.pipeline.proposals import (
     Kept,
     associate,
@@ -49,7 +51,7 @@ class GraspsStage:
     rejects the object; another one is left with no proposals and the reason.
     """
 
-    version = "6"
+    version = "7"
     reads: tuple[str, ...] = (
         "solid.npz",
         "hulls.npz",
@@ -105,7 +107,7 @@ class GraspsStage:
         )
         near = association.index + len(given)
         at_points = _at_points(kept, near, len(request.grasp_points_m), settings)
-        quotas = [*self._on_support(kept, near, request), *at_points]
+        quotas = [*support_quotas(kept, near, self.gripper, request.supports, settings), *at_points]
         chosen = np.concatenate([np.arange(len(given)), _likely(kept, near, quotas, settings.simulated)])
         self._write(folder / self.file, kept, chosen, given, draft.seed)
         octants = approach_octants(kept.proposals.gripper_to_object)
@@ -125,17 +127,6 @@ class GraspsStage:
                 "octants_available": len(np.unique(octants)),
             }
         }
-
-    def _on_support(self, kept: Kept, near: np.ndarray, request: GraspRequest) -> list[Quota]:
-        """Ask of each support for its share of those near a point that leave room for it."""
-        gripper = self.gripper
-        if not isinstance(gripper, ParallelGripper):
-            return []
-        is_near = np.zeros(len(kept.proposals), bool)
-        is_near[near] = True
-        radius_m = float("inf")  # what is near enough was decided by the association
-        count = round(self.settings.on_support_share * self.settings.simulated)
-        return [(is_near & on_support(kept, gripper, support, radius_m), count) for support in request.supports]
 
     def _write(
         self,
@@ -206,6 +197,25 @@ def picked_from(placements: list[dict[str, Any]]) -> tuple[np.ndarray, ...]:
         transform(rotation_from_quaternion_wxyz(np.array(p["quaternion_wxyz"])), np.array(p["position_m"]))
         for p in first
     )
+
+
+def support_quotas(
+    kept: Kept, near: np.ndarray, gripper: Gripper, supports: Sequence[np.ndarray], settings: GraspConfig
+) -> list[Quota]:
+    """Ask of each support for its share of those near a point that leave room for it and are fit, and for a few of others.
+
+    Under a pan that lies on its rim the handle alone is free, and all that hold it there may drop: trials of many would tell
+    no more than a few.
+    """
+    if not isinstance(gripper, ParallelGripper):
+        return []
+    is_near = np.zeros(len(kept.proposals), bool)
+    is_near[near] = True
+    radius_m = float("inf")  # what is near enough was decided by the association
+    count = round(settings.on_support_share * settings.simulated)
+    members = [is_near & on_support(kept, gripper, support, radius_m) for support in supports]
+    few = min(HOPELESS_TRIES, count)
+    return [quota for free in members for quota in ((free & kept.merits.fit, count), (free, few))]
 
 
 def _at_points(kept: Kept, near: np.ndarray, count: int, settings: GraspConfig) -> list[Quota]:
