@@ -97,7 +97,7 @@ class ImportRecord(Record):
     def source(self) -> str:
         """The source, as an Estimate names it."""
         if self.format == FITTED:
-            return f"template:{self.called}, fitted to the photo"
+            return f"template:{self.name}, fitted to the photo"
         if self.format == FILLED:
             return f"template:{self.name}, filled in by {self.attribution}"
         return f"template:{self.name}" if self.format == TEMPLATE else f"imported:{self.format}"
