@@ -131,9 +131,8 @@ WRONG_USE = """
 import io, json, sys
 from contextlib import redirect_stderr, redirect_stdout
 from manitwin.cli.main import app, main
-import functools, typer
+import typer
 
-typer.main.get_command = functools.cache(typer.main.get_command)  # a program builds it once
 found = {}
 commands = typer.main.get_command(app).commands
 lines = [[], ["--help"], ["--wrong"], ["paint"], *([name, option] for name in commands for option in ("--wrong", "--help"))]

@@ -8,6 +8,7 @@ from typing import Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
+from manitwin.cli.quick_start import import_quick_help
 from manitwin.errors import UsageError
 
 PLACES = frozenset(
@@ -70,9 +71,19 @@ class CheckedCommand(TyperCommand):
                     check_text(_called(parameter), value, place=parameter.name in PLACES)
         return super().parse_args(ctx, args)
 
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help of this command."""
+        import_quick_help()
+        super().format_help(ctx, formatter)
+
 
 class CommandWords(TyperGroup):
     """Commands of which some are called by two words: ``review report`` is one, and so is ``review``."""
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help of all commands."""
+        import_quick_help()
+        super().format_help(ctx, formatter)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command that the first words name, and the arguments behind them."""

@@ -53,6 +53,7 @@ from manitwin.cli.console import error_console, out_console, write_text
 from manitwin.cli.documents import CommandLineError, Json, asked_for_json, print_document, print_failure
 from manitwin.cli.interrupt import Interrupts
 from manitwin.cli.machine_limits import of_machine
+from manitwin.cli.quick_start import only_asked_for
 from manitwin.cli.reporting import LOG, Quiet, Verbose, reported, say_as_told
 from manitwin.cli.run_log import end_log
 from manitwin.cli.terminal import guard_terminal
@@ -187,7 +188,9 @@ def _of_system(error: OSError) -> str:
 def _run() -> int:
     """Run what the command line says and return the exit status; every error is one line."""
     try:
-        status = app(prog_name=PROGRAM, standalone_mode=False)
+        words = sys.argv[1:]
+        asked = app if COMPLETION_VARIABLE in os.environ else only_asked_for(app, words)
+        status = asked(words, prog_name=PROGRAM, standalone_mode=False)
         if status == TYPER_INTERRUPTED:
             raise KeyboardInterrupt
         return int(status or 0)

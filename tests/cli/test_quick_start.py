@@ -1,0 +1,72 @@
+"""What a command line does not ask for is left out, and nobody sees it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from manitwin.cli.main import app
+from manitwin.cli.quick_start import only_asked_for
+
+NAMES = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+PUT_OFF = """
+import sys
+from manitwin.cli.quick_start import import_quick_help
+import_quick_help()
+import typer.rich_utils as drawn
+assert not {"rich.markdown", "rich.traceback", "pygments"} & set(sys.modules)
+markdown = drawn.Markdown("**bold**")
+try:
+    raise ValueError("said")
+except ValueError as error:
+    trace = drawn.Traceback.from_exception(type(error), error, error.__traceback__)
+from rich.markdown import Markdown
+from rich.traceback import Traceback
+assert type(markdown) is Markdown and type(trace) is Traceback
+"""
+HELP = """
+import sys
+from manitwin.cli.main import main
+sys.argv = ["manitwin", "--help"]
+try:
+    main()
+finally:
+    print(sorted({"rich.markdown", "rich.traceback", "pygments", "numpy"} & set(sys.modules)))
+"""
+
+
+def said(application: typer.Typer, words: list[str]) -> tuple[int, str]:
+    """Return the exit status of a command line, and what it prints."""
+    done = CliRunner().invoke(application, words, env={"COLUMNS": "100"}, prog_name="manitwin")
+    return done.exit_code, done.output
+
+
+@pytest.mark.parametrize(
+    "words", [[], ["--help"], ["paint"], ["--wrong"], *([*name.split(), "--help"] for name in NAMES)]
+)
+def test_what_is_said_is_as_with_all_commands(words: list[str]) -> None:
+    assert said(only_asked_for(app, words), words) == said(app, words)
+
+
+def test_other_commands_have_no_parameters_and_the_asked_ones_all() -> None:
+    asked = typer.main.get_command(only_asked_for(app, ["review", "report"])).commands  # type: ignore[attr-defined]
+    whole = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    with_parameters = {name for name, command in asked.items() if command.params}
+    assert with_parameters == {name for name in NAMES if name.split()[0] == "review"}
+    for name in with_parameters:
+        assert [each.name for each in asked[name].params] == [each.name for each in whole[name].params]
+    assert {name: command.hidden for name, command in asked.items()} == {name: whole[name].hidden for name in NAMES}
+
+
+def test_help_imports_neither_markdown_nor_tracebacks() -> None:
+    done = subprocess.run([sys.executable, "-c", HELP], capture_output=True, text=True)
+    assert "Commands" in done.stdout and done.stdout.rstrip().endswith("[]"), done.stderr
+
+
+def test_what_was_put_off_is_imported_when_it_is_called() -> None:
+    done = subprocess.run([sys.executable, "-c", PUT_OFF], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
