@@ -14,7 +14,14 @@ import trimesh
 from boxy_robot import boxy_robot, moving
 from manitwin.episodes.cameras import named_cameras
 from manitwin.episodes.recording import Recording
-from manitwin.episodes.replay_pictures import EpisodeReplay, link_poses, link_visuals
+from manitwin.episodes.replay_pictures import (
+    FINE_PX,
+    EpisodeReplay,
+    link_drawables,
+    link_poses,
+    link_visuals,
+    tolerance_of,
+)
 from manitwin.errors import UsageError
 from manitwin.geometry.poses import rotation_from_quaternion_wxyz, transform, transform_points
 from manitwin.geometry.ray_caster import RayCaster
@@ -174,3 +181,27 @@ def test_granules_are_drawn_where_they_were(robot: Robot, recording: Recording) 
         ids = [made.ids[f"granule_{number:03d}"] for number in range(2)]
     places = [np.argwhere(frame.ids == each).mean(0) for each in ids]
     assert np.linalg.norm(places[1] - places[0]) > 5
+
+
+def test_links_for_small_pictures_have_fewer_triangles_and_look_alike() -> None:
+    panda = load_robot("panda")
+    joints, hand = np.array([0.0, -0.3, 0.0, -2.2, 0.0, 2.0, 0.785]), np.array([0.04])
+    poses = [transform(translation=each) for each in OBJECTS]
+    cameras = named_cameras(["front", "wrist"], panda)
+    pictures = []
+    for picture_px in (FINE_PX, SIZE):
+        with EpisodeReplay(panda, cubes(), picture_px=picture_px) as made:
+            pictures.append(np.stack(made.picture(poses, joints, hand, cameras, size_px=SIZE)).astype(int))
+    fine, lean = pictures
+    assert 0 < np.abs(fine - lean).mean() < 1.0
+    assert (np.abs(fine - lean).max(-1) > 60).mean() < 0.002  # a pixel's width of an edge here and there
+    faces = [
+        sum(len(each.faces) for link in link_drawables(panda.urdf, tolerance_of(px)).values() for each in link.surfaces)
+        for px in (FINE_PX, SIZE)
+    ]
+    assert faces[1] < 0.5 * faces[0]
+
+
+def test_tolerance_grows_with_the_pixels_up_to_a_limit() -> None:
+    assert [tolerance_of(px) for px in (1280, FINE_PX, 256)] == pytest.approx([0.0004, 0.0004, 0.001])
+    assert tolerance_of(64) == tolerance_of(16) == 0.002

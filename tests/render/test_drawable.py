@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 import trimesh
 
 from handmade import mug
@@ -54,3 +55,16 @@ def test_textures_are_no_larger_than_asked_for() -> None:
     parts = [textured_box(np.array([0.1, 0.1, 0.1]), texture)]
     assert drawable(parts).surfaces[0].color_map.shape[:2] == (256, 128)
     assert drawable(parts, most_texture_px=64).surfaces[0].color_map.shape[:2] == (64, 32)
+
+
+def test_creases_of_plain_parts_do_not_keep_their_vertices() -> None:
+    """A box whose sides have normals of their own, cut into 768 triangles, is a box of twelve after it was simplified."""
+    box = trimesh.creation.box([0.1, 0.06, 0.04]).subdivide().subdivide().subdivide()
+    apart = trimesh.Trimesh(box.triangles.reshape(-1, 3), np.arange(3 * len(box.faces)).reshape(-1, 3), process=False)
+    (surface,) = drawable([part(apart)], tolerance_m=0.0004).surfaces
+    assert len(surface.faces) < 0.1 * len(box.faces)
+    corners = surface.vertices[surface.faces].astype(float)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert np.linalg.norm(across, axis=1).sum() / 2 == pytest.approx(box.area, rel=1e-6)
+    across /= np.linalg.norm(across, axis=1)[:, None]
+    np.testing.assert_allclose(surface.normals[surface.faces], np.repeat(across[:, None], 3, 1), atol=1e-5)

@@ -302,3 +302,32 @@ def test_what_was_uploaded_goes_with_the_thing() -> None:
     del thing
     gc.collect()
     assert len(scene_renderer._shapes) < before
+
+
+def test_edge_shows_the_share_of_each_pixel_that_lies_within_it() -> None:
+    """A bright, level square on black, turned by 20 degrees: what its picture adds up to is its area in pixels."""
+    turned = transform(trimesh.transformations.euler_matrix(0, 0, np.deg2rad(20))[:3, :3])
+    square = trimesh.creation.box([0.3, 0.3, 0.002])
+    view = camera([0.0, 0.0, 1.001], [0, 0, 0], size=64, fov=0.5)
+    with SceneRenderer(Lighting(np.full(3, 0.5), ()), surroundings=Surroundings(-50, backdrop=(0, 0, 0))) as made:
+        made.add("square", [plain_part(square, (255, 255, 255), roughness=1.0)], turned)
+        rgb = made.render([view])[0].rgb.astype(float)
+    share = rgb[..., 1] / rgb[32, 32, 1]
+    side_px = 0.3 / 1.0 / np.tan(0.25) * 32
+    assert share.sum() == pytest.approx(side_px**2, rel=0.01)
+    between = share[(share > 0.02) & (share < 0.98)]
+    assert len(np.unique(np.round(4 * between))) == 3  # a quarter, a half and three quarters
+
+
+def test_pixel_of_a_texture_shows_the_mean_of_what_lies_within_it() -> None:
+    """Stripes of a sample's width, half of them black: gamma-encoded they would be darker than the mean of their light."""
+    color = np.zeros((128, 128, 3), np.uint8)
+    color[:, ::2] = 255
+    texture = ProceduralTexture(color, np.full((128, 128), 255, np.uint8), 0.0, 0.5)
+    plain = ProceduralTexture(np.full((128, 128, 3), 188, np.uint8), texture.roughness, 0.0, 0.5)  # half the light
+    shown = []
+    for each in (texture, plain):
+        with SceneRenderer(Lighting(np.full(3, 0.5), ()), surroundings=None) as made:
+            made.add("box", [textured_box(np.array([0.25, 0.25, 0.002]), each)])
+            shown.append(made.render([camera([0, 0, 1.0], [0, 0, 0], size=64, fov=0.5)])[0].rgb[24:40, 28:36].mean())
+    assert shown[0] == pytest.approx(shown[1], rel=0.1)

@@ -81,7 +81,7 @@ class EpisodeFilmsStage:
     """Draw the kept episodes of a batch: one film a camera, all episodes in it, frame t of an episode showing state t."""
 
     name = "films"
-    version = "1"
+    version = "2"
     reads: tuple[str, ...] = ()
     writes: tuple[str, ...] = (FILMS, "first_frames")
     needs: Resource = "cpu"
@@ -121,12 +121,13 @@ class EpisodeFilmsStage:
         pictures: list[list[np.ndarray]] = [[] for _ in cameras]
         with EpisodeReplay(
             self._robot,
-            [twin_drawable(self._source.folder(thing.twin_id)) for thing in episode.objects],
+            [twin_drawable(self._source.folder(thing.twin_id), size) for thing in episode.objects],
             furniture=room.furniture,
             fixtures=room.fixture_boxes,
             granules=granules_of(episode),
             lighting=lighting_of(room.ambient, room.lights),
             seed=episode.attempt.seed % 2**31,
+            picture_px=size,
         ) as replay:
             states = replay.frames(episode.recording, cameras, width_px=size, height_px=size)
             for frames in islice(states, episode.recording.steps):

@@ -20,7 +20,7 @@ from manitwin.geometry.rigid_body import StaticBox
 from manitwin.render.drawable import Drawable, drawable
 from manitwin.render.procedural_textures import procedural_texture, textured_box
 from manitwin.render.scene_lighting import STUDIO, Lighting
-from manitwin.render.scene_renderer import SceneFrame, SceneRenderer
+from manitwin.render.scene_renderer import COARSE_PX, SceneFrame, SceneRenderer, ShadowRegion
 from manitwin.robots.links import links_of_urdf, poses_at
 from manitwin.robots.robot import Robot
 from manitwin.robots.urdf import UrdfTree
@@ -28,7 +28,12 @@ from manitwin.scenes.furniture_pictures import TEXTURE_VARIANTS, add_furniture
 from manitwin.scenes.scene import Furniture, SurfaceBox
 from manitwin.scenes.twin_looks import simplified_twin_looks
 
-TOLERANCE_M = 0.0004  # of simplified surfaces: a third of a pixel's width at 1 m in a picture of 640 pixels
+TOLERANCE_M, FINE_PX = (
+    0.0004,
+    640,
+)  # of simplified surfaces: a third of a pixel's width at 1 m in a picture of so many pixels
+MOST_TOLERANCE_M, MOST_OF_OBJECTS_M = 0.002, 0.0008
+"""Of a robot's links and of objects, which may be thin and are seen from nearby, in pictures of fewer pixels."""
 FIXTURE_MATERIAL = "metal"
 GRANULE_RGBA = (205, 150, 60, 255)  # grains, more or less
 TABLE = Furniture(
@@ -53,9 +58,16 @@ def link_visuals(urdf: str) -> dict[str, tuple[trimesh.Trimesh, ...]]:
 
 
 @lru_cache(maxsize=4)
-def link_drawables(urdf: str, tolerance_m: float) -> dict[str, Drawable]:
-    """Return the links that have visual parts, ready to be drawn, simplified by about a tolerance; kept for the next call."""
-    return {link: drawable(parts, tolerance_m=tolerance_m) for link, parts in link_visuals(urdf).items()}
+def link_drawables(urdf: str, tolerance_m: float, fingers: frozenset[str] = frozenset()) -> dict[str, Drawable]:
+    """Return the links that have visual parts, ready to be drawn, simplified by about a tolerance; kept for the next call.
+
+    Links of ``fingers``, which a camera on the hand sees from nearby, are simplified as objects are.
+    """
+    fine_m = min(tolerance_m, MOST_OF_OBJECTS_M)
+    return {
+        link: drawable(parts, tolerance_m=fine_m if link in fingers else tolerance_m)
+        for link, parts in link_visuals(urdf).items()
+    }
 
 
 def link_poses(robot: Robot, joint_positions_rad: np.ndarray, hand: np.ndarray) -> dict[str, np.ndarray]:
@@ -69,9 +81,14 @@ def link_poses(robot: Robot, joint_positions_rad: np.ndarray, hand: np.ndarray) 
     return poses_at(links_of_urdf(robot.urdf), joints)
 
 
-def twin_drawable(folder: Path) -> Drawable:
-    """Return a twin's looks, simplified for small pictures; kept for the next call. Raises InputError."""
-    return simplified_twin_looks(folder, TOLERANCE_M)
+def tolerance_of(picture_px: int) -> float:
+    """Return how far, m, simplified links may be from what they stand for in pictures of ``picture_px`` a side at most."""
+    return min(max(TOLERANCE_M, TOLERANCE_M * FINE_PX / picture_px), MOST_TOLERANCE_M)
+
+
+def twin_drawable(folder: Path, picture_px: int = FINE_PX) -> Drawable:
+    """Return a twin's looks, simplified for pictures of ``picture_px`` at most; kept for the next call. Raises InputError."""
+    return simplified_twin_looks(folder, min(tolerance_of(picture_px), MOST_OF_OBJECTS_M))
 
 
 class EpisodeReplay:
@@ -91,15 +108,19 @@ class EpisodeReplay:
         granules: tuple[int, float] | None = None,
         lighting: Lighting = STUDIO,
         seed: int = 0,
+        picture_px: int = FINE_PX,
     ) -> None:
-        """Upload everything; ``seed`` chooses the furniture's textures. Raises RendererMissing, AssetError, UsageError."""
+        """Upload everything for pictures of ``picture_px`` a side at most: the fewer, the simpler the links.
+
+        ``seed`` chooses the furniture's textures. Raises RendererMissing, AssetError, UsageError.
+        """
         self._robot = robot
-        self._renderer = SceneRenderer(lighting)
+        self._renderer = SceneRenderer(lighting, shadows=ShadowRegion(coarse=picture_px <= COARSE_PX))
         self._objects = [f"object_{index:02d}" for index in range(len(objects))]
         for name, thing in zip(self._objects, objects, strict=True):
             ready = thing if isinstance(thing, Drawable) else drawable(thing, tolerance_m=TOLERANCE_M)
             self._renderer.add(name, ready)
-        links = link_drawables(robot.urdf, TOLERANCE_M)
+        links = link_drawables(robot.urdf, tolerance_of(picture_px), _moved_by(robot.urdf, robot.finger_joints))
         self._links = list(links)
         for link, visual in links.items():
             self._renderer.add(f"{robot.name}/{link}", visual)
@@ -192,6 +213,15 @@ class EpisodeReplay:
         for link in self._links:
             self._renderer.set_pose(f"{self._robot.name}/{link}", poses[link])
         return poses[self._robot.tip_link] @ self._robot.gripper_to_tip
+
+
+@lru_cache(maxsize=4)
+def _moved_by(urdf: str, joints: tuple[str, ...]) -> frozenset[str]:
+    """Return the links that these joints of a URDF move directly."""
+    tree = UrdfTree.of_text(urdf)
+    return frozenset(
+        joint.find("child").get("link") for joint in tree.element.findall("joint") if joint.get("name") in joints
+    )
 
 
 @lru_cache(maxsize=4)

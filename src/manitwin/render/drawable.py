@@ -48,7 +48,7 @@ def drawable(
     """
     both_sides = shows_back_faces(parts)
     if tolerance_m > 0:
-        parts = [_welded(part) for part in parts]
+        parts = [_welded_and_simplified(part, tolerance_m) for part in parts]
     surfaces = [render_surface(part) if both_sides else front_faces(render_surface(part)) for part in parts]
     if tolerance_m > 0:
         surfaces = [_simplified(each, tolerance_m) for each in surfaces]
@@ -59,13 +59,19 @@ def drawable(
     return Drawable(tuple(surfaces), _shadow_caster(parts, both_sides, tolerance_m))
 
 
-def _welded(part: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return a part without textures with one vertex a place and crease; many files have three for each triangle."""
+def _welded_and_simplified(part: trimesh.Trimesh, tolerance_m: float) -> trimesh.Trimesh:
+    """Return a part without textures with fewer vertices and one a place and crease; another one as it is.
+
+    Many files have three vertices for each triangle. Creases are found again in what is left, so that they need not stay
+    where they are as the seams of textures must.
+    """
     material = material_of(part)
     if material.baseColorTexture is not None or material.metallicRoughnessTexture is not None:
         return part
     vertices, faces = weld_equal(np.asarray(part.vertices), np.asarray(part.faces))
-    return with_creased_normals(make_part(vertices, faces, material=material, name=part.metadata["name"]))
+    used, faces = np.unique(simplified(vertices, faces, tolerance_m), return_inverse=True)
+    lean = make_part(vertices[used], faces.reshape(-1, 3), material=material, name=part.metadata["name"])
+    return with_creased_normals(lean)
 
 
 def _simplified(s: RenderSurface, tolerance_m: float) -> RenderSurface:

@@ -1,10 +1,10 @@
 """Pictures of scenes of many rigid things: colour, depth, normals and ids, from several cameras at once.
 
 Things are uploaded once; from frame to frame only their poses change, and a ``Drawable`` that is shown again, also by another
-renderer, is not uploaded again. Colour is drawn with twice the pixels each way by
-``shaders/scene``, a forward shader with one shadow map a light and a map of heights for ambient occlusion. Depth, normals
-and ids are drawn by ``shaders/geometry`` with one sample a pixel, at its centre: they are those of the rays through the
-pixels' centres, and no mean of two things.
+renderer, is not uploaded again. Colour is drawn by ``shaders/scene``: surfaces with twice the pixels each way, which are lit
+once a pixel where they are smooth and at each of its four samples elsewhere, with one shadow map a light and a map of heights
+for ambient occlusion. Depth, normals and ids are drawn by ``shaders/geometry`` with one sample a pixel, at its centre: they are
+those of the rays through the pixels' centres, and no mean of two things.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 import trimesh
 
@@ -29,10 +28,13 @@ from manitwin.render.scene_lighting import STUDIO, Lighting
 from manitwin.render.surfaces import plain_part, render_surface, triangle_mesh_shape
 
 SHADERS = Path(__file__).parent / "shaders"
-SUPERSAMPLE = 2  # the shader spreads its shadow samples over blocks of 2 x 2
+SUPERSAMPLE = 2  # shaders/scene lights blocks of 2 x 2
 NEAR_M, FAR_M = 0.01, 30.0
 MAX_LIGHTS = 5  # shaders/scene has room for six, of which one looks down for the sky
 SHADOW_MAP_PX, HEIGHT_MAP_PX = 1024, 512
+COARSE_PX = (
+    128  # pictures of so many pixels a side show no shadow's edge that is finer than two texels of half these maps
+)
 PICTURE_FORMATS = {
     "Color": "R8G8B8A8Unorm",
     "Albedo": "R8G8B8A8Unorm",
@@ -53,10 +55,11 @@ class Surroundings:
 
 @dataclass(frozen=True)
 class ShadowRegion:
-    """The ball in which shadows are drawn; the smaller, the sharper. World frame, metres."""
+    """The ball in which shadows are drawn; the smaller, the sharper. World frame, metres. ``coarse``: with half the texels."""
 
     center_m: tuple[float, float, float] = (0.3, 0.0, 0.3)
     radius_m: float = 1.3
+    coarse: bool = False
 
 
 @dataclass(frozen=True)
@@ -167,9 +170,7 @@ class SceneRenderer:
         ]
 
     def _rgb(self, component: Any, camera: Camera) -> np.ndarray:
-        picture = cv2.resize(
-            component.get_picture("Color"), (camera.width_px, camera.height_px), interpolation=cv2.INTER_AREA
-        )
+        picture = component.get_picture("Color")[: camera.height_px, : camera.width_px]  # the rest of it is not drawn
         if picture[..., 3].min() == 255:
             return np.ascontiguousarray(picture[..., :3])
         empty = (1 - picture[..., 3:].astype(np.float32) / 255) * self._backdrop.astype(np.float32)
@@ -226,7 +227,7 @@ class SceneRenderer:
             shadow_scale=region.radius_m,
             shadow_near=-2 * region.radius_m,
             shadow_far=2 * region.radius_m,
-            shadow_map_size=map_px,
+            shadow_map_size=map_px // 2 if region.coarse else map_px,
         )
 
     def _add_floor(self, surroundings: Surroundings) -> None:

@@ -27,10 +27,11 @@ class WorldPainter:
         record = setting.scene.scene.record
         self._replay = EpisodeReplay(
             robot,
-            [twin_drawable(source.folder(each.twin_id)) for each in setting.scene.objects],
+            [twin_drawable(source.folder(each.twin_id), size_px) for each in setting.scene.objects],
             furniture=record.furniture,
             fixtures=setting.problem.fixtures,
             lighting=lighting_of(record.ambient, record.lights),
+            picture_px=size_px,
         )
 
     def paint(self, world: RobotWorld) -> dict[str, np.ndarray]:

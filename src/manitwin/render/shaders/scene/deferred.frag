@@ -2,6 +2,10 @@
 // Surfaces under directional lights and soft surroundings. The first light shines straight down and has no colour: its
 // shadow map is a map of heights, which says how much of the sky a point sees. The second one may throw shadows. Maps are
 // named by constants: lavapipe is much slower where an index is computed.
+//
+// The buffers have two samples a pixel each way, and the picture is the upper left quarter of what is drawn here. A pixel
+// whose four samples lie on one smooth surface is lit once, others at each sample. This is told by how often a loop runs:
+// lavapipe goes through both ways of a condition, and through a loop as often as one of its eight pixels needs it.
 
 
 // SAPIEN sets these by their names, and wants all of them
@@ -72,8 +76,6 @@ layout(set = 2, binding = 0) uniform sampler2D samplerAlbedo;
 layout(set = 2, binding = 1) uniform sampler2D samplerNormal;
 layout(set = 2, binding = 2) uniform sampler2D samplerGbufferDepth;
 
-layout(location = 0) in vec2 inUV;
-
 layout(location = 0) out vec4 outColor;
 
 const float PI = 3.14159265;
@@ -87,20 +89,25 @@ const float SKY_RADIUS = 0.085;     // metres around a point in which it looks f
 const float SKY_BIAS = 0.006;       // metres: more than one texel of the map of heights is wide
 const float SKY_REACH = 0.16;       // metres above it from which on things hide less of the sky
 
-// Points of a disc (Vogel 1979, golden angle). The samples of a pixel, two each way, turn them by eighths of a turn, so
+const float SMOOTH = 0.97;       // cosine between normals of a pixel's samples, up to which they are one surface's
+const float STEP = 1.5;          // of the depths of a plane's samples: so much farther apart they still are one surface's
+const float FLATTEST = 0.02;     // cosine between a plane and the view below which its depths may differ no more
+
+// Points of a disc (Vogel 1979, golden angle). The samples of a pixel, two each way, turn them by sixteenths of a turn, so
 // that a pixel has four times as many.
 const int TAPS = 4;
 const vec2 DISC[TAPS] = vec2[](vec2(0.3536, 0.0000), vec2(-0.4516, 0.4137), vec2(0.0691, -0.7876), vec2(0.5688, 0.7419));
 const vec2 TURNS[4] = vec2[](vec2(1, 0), vec2(0.9239, 0.3827), vec2(0.7071, 0.7071), vec2(0.3827, 0.9239));
 
-mat2 turned() {
-  vec2 turn = TURNS[(int(gl_FragCoord.x) & 1) + 2 * (int(gl_FragCoord.y) & 1)];
+mat2 turned(int number) {
+  vec2 turn = TURNS[number];
   return mat2(turn.x, turn.y, -turn.y, turn.x);
 }
 
 // The share of a light that arrives at p. Depths are compared with the surface's own plane at each texel, so that a plane
-// never shades itself (Isidoro 2006, "Shadow Mapping: GPU-based Tips and Techniques", receiver plane depth bias).
-float lightShare(sampler2D depths, mat4 view, mat4 proj, vec3 p, vec3 n, mat2 turn) {
+// never shades itself (Isidoro 2006, "Shadow Mapping: GPU-based Tips and Techniques", receiver plane depth bias). Where the
+// first turn of the disc finds all lit, or nothing, the others up to the last one are not asked.
+float lightShare(sampler2D depths, mat4 view, mat4 proj, vec3 p, vec3 n, int turn, int last) {
   vec3 scale = vec3(proj[0][0], proj[1][1], proj[2][2]);
   vec3 at = (view * vec4(p, 1)).xyz * scale + proj[3].xyz;
   if (any(greaterThan(abs(at.xy), vec2(0.98))) || at.z > 1) return 1;
@@ -110,30 +117,39 @@ float lightShare(sampler2D depths, mat4 view, mat4 proj, vec3 p, vec3 n, mat2 tu
   vec2 size = vec2(textureSize(depths, 0)), toTexel = 0.5 * size, perTexel = 2 / size;
   vec2 gradient = slope * scale.z / scale.xy;
   float radius = SHADOW_RADIUS * abs(scale.x), lit = 0, base = at.z - SHADOW_BIAS * abs(scale.z) - dot(gradient, at.xy);
-  for (int k = 0; k < TAPS; ++k) {
-    ivec2 texel = ivec2((at.xy + radius * (turn * DISC[k]) + 1) * toTexel);
-    float plane = base + dot(gradient, (vec2(texel) + 0.5) * perTexel - 1);
-    lit += texelFetch(depths, texel, 0).x < plane ? 0 : 1;
+  float asked = 0;
+  for (; turn <= last && (asked == 0 || (lit > 0 && lit < asked)); ++turn) {
+    mat2 turning = turned(turn);
+    for (int k = 0; k < TAPS; ++k) {
+      ivec2 texel = ivec2((at.xy + radius * (turning * DISC[k]) + 1) * toTexel);
+      float plane = base + dot(gradient, (vec2(texel) + 0.5) * perTexel - 1);
+      lit += texelFetch(depths, texel, 0).x < plane ? 0 : 1;
+    }
+    asked += TAPS;
   }
-  return lit / TAPS;
+  return lit / asked;
 }
 
 // The share of the sky that p sees past the heights around it: horizon-based, after Bavoil et al. 2008, with one sample a
 // direction. The map looks straight down on the scene.
-float skyShare(sampler2D heights, mat4 view, mat4 proj, vec3 p, vec3 n, mat2 turn) {
+float skyShare(sampler2D heights, mat4 view, mat4 proj, vec3 p, vec3 n, int turn, int last) {
   p += n * (0.004 + 0.5 * SKY_RADIUS * length(n.xy));
   vec3 at = (view * vec4(p, 1)).xyz * vec3(proj[0][0], proj[1][1], proj[2][2]) + proj[3].xyz;
   if (any(greaterThan(abs(at.xy), vec2(0.9))) || at.z > 1) return 1;
   vec2 toTexel = 0.5 * vec2(textureSize(heights, 0));
-  float radius = SKY_RADIUS * abs(proj[0][0]), toMetres = 1 / abs(proj[2][2]), hidden = 0;
-  for (int k = 0; k < TAPS; ++k) {
-    vec2 way = turn * DISC[k];
-    float top = texelFetch(heights, ivec2((at.xy + radius * way + 1) * toTexel), 0).x;
-    float above = max((at.z - top) * toMetres - SKY_BIAS, 0);
-    float slope = above / (SKY_RADIUS * length(DISC[k]) + 0.004);
-    hidden += slope * inversesqrt(1 + slope * slope) / (1 + above * above / (SKY_REACH * SKY_REACH));
+  float radius = SKY_RADIUS * abs(proj[0][0]), toMetres = 1 / abs(proj[2][2]), hidden = 0, asked = 0;
+  for (; turn <= last; ++turn) {
+    mat2 turning = turned(turn);
+    for (int k = 0; k < TAPS; ++k) {
+      vec2 way = turning * DISC[k];
+      float top = texelFetch(heights, ivec2((at.xy + radius * way + 1) * toTexel), 0).x;
+      float above = max((at.z - top) * toMetres - SKY_BIAS, 0);
+      float slope = above / (SKY_RADIUS * length(DISC[k]) + 0.004);
+      hidden += slope * inversesqrt(1 + slope * slope) / (1 + above * above / (SKY_REACH * SKY_REACH));
+    }
+    asked += TAPS;
   }
-  return 1 - hidden / TAPS;
+  return 1 - hidden / asked;
 }
 
 // Diffuse and specular reflection of a directional light: Lambert, and GGX with Smith's masking as of Karis 2013, "Real
@@ -169,26 +185,23 @@ vec3 exposed(vec3 x) {
   return mix(x, 1 - 0.3 * exp2((0.7 - x) * (1.442695 / 0.3)), step(vec3(0.7), x));
 }
 
-void main() {
-  ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float depth = texelFetch(samplerGbufferDepth, pixel, 0).x;
-  if (depth == 1) {
-    outColor = vec4(0);
-    return;
-  }
-  vec4 stored = texelFetch(samplerAlbedo, pixel, 0), normal = texelFetch(samplerNormal, pixel, 0);
-  vec3 albedo = stored.rgb * stored.rgb;
-  float metallic = stored.a, roughness = abs(normal.w);
-  vec4 inCamera = cameraBuffer.projectionMatrixInverse * vec4(inUV * 2 - 1, depth, 1);
-  vec3 inPosition = (cameraBuffer.viewMatrixInverse * vec4(inCamera.xyz / inCamera.w, 1)).xyz;
+vec3 inWorld(vec2 at, float depth) {
+  vec4 inCamera = cameraBuffer.projectionMatrixInverse * vec4(at / textureSize(samplerGbufferDepth, 0) * 2 - 1, depth, 1);
+  return (cameraBuffer.viewMatrixInverse * vec4(inCamera.xyz / inCamera.w, 1)).xyz;
+}
 
-  vec3 n = normal.xyz, v = normalize(cameraBuffer.viewMatrixInverse[3].xyz - inPosition);
+// Along the viewing axis, metres.
+float distanceOf(float depth) {
+  return cameraBuffer.projectionMatrix[3][2] / (depth + cameraBuffer.projectionMatrix[2][2]);
+}
+
+// A surface as the buffers have it: the colour that it shows, gamma-encoded.
+vec3 shown(vec3 position, vec3 n, vec3 albedo, float metallic, float roughness, int turn, int last) {
+  vec3 v = normalize(cameraBuffer.viewMatrixInverse[3].xyz - position);
   float nv = clamp(dot(n, v), 1e-6, 1);
   vec3 diffuse = albedo * (1 - metallic), fresnel = mix(vec3(0.04), albedo, metallic);
-
-  mat2 turn = turned();
   float sky = skyShare(samplerDirectionalLightDepths[0], shadowBuffer.directionalLightBuffers[0].viewMatrix,
-                       shadowBuffer.directionalLightBuffers[0].projectionMatrix, inPosition, n, turn);
+                       shadowBuffer.directionalLightBuffers[0].projectionMatrix, position, n, turn, last);
   vec2 share = reflected(roughness, nv);
   float mirroredHeight = 2 * dot(n, v) * n.z - v.z;
   vec3 color = glow(n.z, 1) * diffuse + glow(mirroredHeight, roughness) * (fresnel * share.x + share.y);
@@ -199,10 +212,49 @@ void main() {
     float arriving = 0.5 + 0.5 * sky;  // lights without a map of their own
     if (i == 1 && NUM_DIRECTIONAL_LIGHT_SHADOWS > 1) {
       arriving = lightShare(samplerDirectionalLightDepths[1], shadowBuffer.directionalLightBuffers[1].viewMatrix,
-                            shadowBuffer.directionalLightBuffers[1].projectionMatrix, inPosition, n, turn);
+                            shadowBuffer.directionalLightBuffers[1].projectionMatrix, position, n, turn, last);
     }
     color += arriving * sceneBuffer.directionalLights[i].emission.rgb * lit(toLight, n, v, nv, diffuse, fresnel, roughness);
   }
-  float shown = normal.w < 0 ? 1 - smoothstep(FADE_FROM, FADE_TO, length(inPosition.xy)) : 1;
-  outColor = vec4(pow(exposed(color), vec3(1 / 2.2)) * shown, shown);
+  return pow(exposed(color), vec3(1 / 2.2));
+}
+
+void main() {
+  ivec2 first = 2 * ivec2(gl_FragCoord.xy);
+  vec4 depth = vec4(texelFetch(samplerGbufferDepth, first, 0).x, texelFetch(samplerGbufferDepth, first + ivec2(1, 0), 0).x,
+                    texelFetch(samplerGbufferDepth, first + ivec2(0, 1), 0).x,
+                    texelFetch(samplerGbufferDepth, first + ivec2(1, 1), 0).x);
+  vec4 n0 = texelFetch(samplerNormal, first, 0), n1 = texelFetch(samplerNormal, first + ivec2(1, 0), 0);
+  vec4 n2 = texelFetch(samplerNormal, first + ivec2(0, 1), 0), n3 = texelFetch(samplerNormal, first + ivec2(1, 1), 0);
+  float middle = 0.25 * (depth.x + depth.y + depth.z + depth.w);
+  vec3 center = inWorld(vec2(first) + 1, middle);
+
+  vec4 away = vec4(distanceOf(depth.x), distanceOf(depth.y), distanceOf(depth.z), distanceOf(depth.w));
+  float nearest = min(min(away.x, away.y), min(away.z, away.w)), farthest = max(max(away.x, away.y), max(away.z, away.w));
+  float facing = abs(dot(n0.xyz, normalize(cameraBuffer.viewMatrixInverse[3].xyz - center)));
+  float width = 4 * nearest / (abs(cameraBuffer.projectionMatrix[1][1]) * textureSize(samplerGbufferDepth, 0).y);
+  bool even = min(min(dot(n0.xyz, n1.xyz), dot(n0.xyz, n2.xyz)), dot(n0.xyz, n3.xyz)) > SMOOTH &&
+              farthest - nearest < STEP * width / max(facing, FLATTEST) && all(lessThan(depth, vec4(1)));
+  int samples = even ? 1 : all(equal(depth, vec4(1))) ? 0 : 4;
+
+  vec4 sum = vec4(0);
+  for (int i = 0; i < samples; ++i) {
+    ivec2 at = first + ivec2(i & 1, i >> 1);
+    float here = texelFetch(samplerGbufferDepth, at, 0).x;
+    vec4 stored = texelFetch(samplerAlbedo, at, 0), normal = texelFetch(samplerNormal, at, 0);
+    vec4 s1 = texelFetch(samplerAlbedo, first + ivec2(1, 0), 0), s2 = texelFetch(samplerAlbedo, first + ivec2(0, 1), 0);
+    vec4 s3 = texelFetch(samplerAlbedo, first + ivec2(1, 1), 0);
+    vec3 albedo = stored.rgb * stored.rgb, position = even ? center : inWorld(vec2(at) + 0.5, here);
+    vec2 matter = vec2(stored.a, abs(normal.w));
+    vec3 n = normal.xyz;
+    if (even) {
+      albedo = 0.25 * (albedo + s1.rgb * s1.rgb + s2.rgb * s2.rgb + s3.rgb * s3.rgb);
+      matter = 0.25 * (matter + vec2(s1.a + s2.a + s3.a, abs(n1.w) + abs(n2.w) + abs(n3.w)));
+      n = normalize(n0.xyz + n1.xyz + n2.xyz + n3.xyz);
+    }
+    float there = here < 1 ? 1 : 0;
+    if (normal.w < 0) there *= 1 - smoothstep(FADE_FROM, FADE_TO, length(position.xy));
+    sum += vec4(shown(position, n, albedo, matter.x, matter.y, even ? 0 : i, even ? 3 : i), 1) * there;
+  }
+  outColor = sum / max(samples, 1);
 }
