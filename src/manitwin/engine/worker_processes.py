@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import os
 import resource
 import signal
@@ -66,6 +67,20 @@ def limit_memory(gigabytes: float) -> None:
         resource.setrlimit(
             resource.RLIMIT_DATA, (wanted if hard == resource.RLIM_INFINITY else min(wanted, hard), hard)
         )
+
+
+def return_free_memory() -> None:
+    """Give the memory back that this process has freed and its allocator keeps, between jobs of which each has other needs.
+
+    glibc keeps what lies below anything still in use, for a worker of a long run several hundred megabytes; ``malloc_trim(3)``
+    takes 1 to 4 ms. Elsewhere than with glibc nothing is done.
+    """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        gc.collect(
+            1
+        )  # what a job has left in cycles; the oldest generation has all modules in it and takes much longer
+        trim(0)
 
 
 class WorkerContext(SpawnContext):

@@ -26,7 +26,9 @@ from manitwin.render.surfaces import RenderSurface, render_surface, triangle_mes
 
 BACKDROP = (233, 235, 238)  # light enough to be no colour, dark enough that white things stand out
 SUPERSAMPLE = 2  # SAPIEN's edges are not antialiased; twice the size each way removes the steps that are seen
-MOST_CAMERAS = 8  # picture sizes that are kept ready: each holds its pictures' memory
+KEPT_PX = 2_000_000
+"""So many pixels in all have the cameras, one a picture's size, that are kept ready, the last used. Each pixel takes 17 bytes;
+pictures of cards have another size for each object."""
 SHADERS = Path(__file__).parent / "shaders"
 DARKENING_RADIUS = 0.035  # of the picture's height: how far a nearer surface throws its soft shade
 DARKENING_STRENGTH = 2.6
@@ -104,17 +106,15 @@ class Renderer:
         return entity
 
     def _camera(self, width: int, height: int) -> tuple[Any, Any]:
-        if (width, height) not in self._cameras:
-            component, entity = (
-                self._sapien.render.RenderCameraComponent(width, height, str(SHADERS)),
-                self._sapien.Entity(),
-            )
-            entity.add_component(component)
-            self._scene.add_entity(entity)
-            self._cameras[width, height] = component, entity
-            if len(self._cameras) > MOST_CAMERAS:
+        found = self._cameras.pop((width, height), None)
+        if found is None:
+            while self._cameras and width * height + sum(w * h for w, h in self._cameras) > KEPT_PX:
                 self._scene.remove_entity(self._cameras.pop(next(iter(self._cameras)))[1])
-        return self._cameras[width, height]
+            found = self._sapien.render.RenderCameraComponent(width, height, str(SHADERS)), self._sapien.Entity()
+            found[1].add_component(found[0])
+            self._scene.add_entity(found[1])
+        self._cameras[width, height] = found
+        return found
 
     def _shoot(
         self, camera: Camera, center: np.ndarray, scale: float, background: tuple[int, int, int], k: int

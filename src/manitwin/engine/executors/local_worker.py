@@ -13,7 +13,7 @@ from typing import TextIO
 from manitwin.engine.executors.stage_notes import parts_noted
 from manitwin.engine.jobs import Job, Reply, RunStage, WorkerSetup
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import die_with, limit_memory, one_thread_each
+from manitwin.engine.worker_processes import die_with, limit_memory, one_thread_each, return_free_memory
 from manitwin.formats.printable import printable_line
 
 STACK_LINES = 12
@@ -47,8 +47,11 @@ def do(ticket: int, job: Job) -> Reply:
     os.ftruncate(_stack_file.fileno(), 0)  # of the jobs before, which were survived
     if not isinstance(job, RunStage):
         return _worker.do(job)
-    with parts_noted(Path(_stack_file.name).parent, ticket):
-        return _worker.do(job)
+    try:
+        with parts_noted(Path(_stack_file.name).parent, ticket):
+            return _worker.do(job)
+    finally:
+        return_free_memory()
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from manitwin.engine.jobs import Job, Reply, WorkerSetup
 from manitwin.engine.worker import Worker
-from manitwin.engine.worker_processes import limit_memory, one_thread_each
+from manitwin.engine.worker_processes import limit_memory, one_thread_each, return_free_memory
 from manitwin.errors import UsageError
 from manitwin.formats.installation import installed_version
 
@@ -54,6 +54,7 @@ class RayWorker:
             return worker.do(job)
         finally:
             self._idle.put(worker)
+            return_free_memory()
 
 
 def last_words(path: str) -> str:

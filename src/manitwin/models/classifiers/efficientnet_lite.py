@@ -34,9 +34,11 @@ BLOCKS = ((1, 3, 1, 1), (2, 3, 2, 6), (2, 5, 2, 6), (3, 3, 2, 6), (3, 5, 1, 6), 
 _MOST_BYTES = 1 << 26
 
 
-@cache
 def load_weights() -> dict[str, np.ndarray]:
-    """Read the weights from the installed package; raises Unavailable where it is not there, or another file is."""
+    """Read the weights, 19 MB, from the installed package; networks that are made of them are kept, and the weights are not.
+
+    Raises Unavailable where it is not there, or another file is.
+    """
     try:
         path = Path(str(distribution(PACKAGE).locate_file(WEIGHTS_FILE)))
     except PackageNotFoundError as error:

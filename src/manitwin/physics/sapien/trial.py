@@ -1,20 +1,25 @@
-"""The grasp trial of a parallel gripper in SAPIEN 3: two fingers that share one target."""
+"""The grasp trial of a parallel gripper in SAPIEN 3: two fingers that share one target.
+
+The engine is imported by the first trial: who only names this simulator, as the driver of a run does, does not wait for it.
+"""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from manitwin.geometry.poses import inverse
 from manitwin.geometry.rigid_body import RigidBody
-from manitwin.physics.sapien.hand import FixedHand
-from manitwin.physics.sapien.hand_scene import HandScene
-from manitwin.physics.sapien.shapes import COOKED, HullShapes
 from manitwin.physics.trial import TrialResult, TrialSettings
 from manitwin.physics.trial_phases import run_phases
 from manitwin.physics.trial_recording import TrialRecorder, TrialRecording
 from manitwin.robots.grippers.gripper import Gripper, of_kind
 from manitwin.robots.grippers.hand_clearance import HandReach
 from manitwin.robots.grippers.parallel import ParallelGripper
+
+if TYPE_CHECKING:
+    from manitwin.physics.sapien.shapes import HullShapes
 
 REACH_MARGIN_M = 0.015  # hulls farther than this from the closing hand are left out
 # A trial counts only where none of them came this near whenever it was looked: the contact offset of 2 mm, and what the
@@ -36,6 +41,8 @@ class SapienTrial:
         joints_rad: np.ndarray | None = None,
     ) -> list[TrialResult]:
         """Try the grasps ``gripper_to_object (N, 4, 4)`` and return their results in the same order."""
+        from manitwin.physics.sapien.shapes import COOKED
+
         hand, reach = of_kind(gripper, ParallelGripper), HandReach(body.hulls)
         with COOKED.lent([body.hulls]) as (shapes,):
             return [_try_one(body, shapes, reach, hand, inverse(pose), settings) for pose in gripper_to_object]
@@ -49,6 +56,8 @@ class SapienTrial:
         joints_rad: np.ndarray | None = None,
     ) -> TrialRecording:
         """Try one grasp ``gripper_to_object (4, 4)`` as ``run`` does, and return its states."""
+        from manitwin.physics.sapien.shapes import COOKED
+
         hand, reach, recorder = of_kind(gripper, ParallelGripper), HandReach(body.hulls), TrialRecorder()
         object_to_hand = inverse(gripper_to_object)
         with COOKED.lent([body.hulls]) as (shapes,):
@@ -66,6 +75,9 @@ def _try_one(
     recorder: TrialRecorder | None = None,
 ) -> TrialResult:
     """Try a grasp on the hulls that the hand can reach; where the object turned others towards it, on all."""
+    from manitwin.physics.sapien.hand import FixedHand
+    from manitwin.physics.sapien.hand_scene import HandScene
+
     gaps = reach.gaps_m(gripper, object_to_hand[None])[0]
     near = gaps <= REACH_MARGIN_M
     if not near.any():
