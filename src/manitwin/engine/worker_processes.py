@@ -16,6 +16,7 @@ from multiprocessing.synchronize import RLock
 from typing import Any
 
 PR_SET_PDEATHSIG = 1  # prctl(2)
+KEPT_BYTES = 192 << 20  # what a stage may take and give back: to map it again for each costs 2 % of a twin (measured)
 
 
 @contextmanager
@@ -69,18 +70,30 @@ def limit_memory(gigabytes: float) -> None:
         )
 
 
+class _AllocatorState(ctypes.Structure):
+    """``struct mallinfo2`` (mallinfo(3), glibc 2.33 and later); ``fordblks`` are the bytes that are free and kept."""
+
+    _fields_ = tuple(
+        (name, ctypes.c_size_t)
+        for name in (
+            "arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost"
+        )
+    )  # fmt: skip
+
+
 def return_free_memory() -> None:
     """Give the memory back that this process has freed and its allocator keeps, between jobs of which each has other needs.
 
-    glibc keeps what lies below anything still in use, for a worker of a long run several hundred megabytes; ``malloc_trim(3)``
-    takes 1 to 4 ms. Elsewhere than with glibc nothing is done.
+    glibc keeps what lies below anything still in use, for a worker of a long run several hundred megabytes. Less than
+    ``KEPT_BYTES`` stay, for the next job. Elsewhere than with glibc nothing is done.
     """
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
-    if trim is not None:
-        gc.collect(
-            1
-        )  # what a job has left in cycles; the oldest generation has all modules in it and takes much longer
-        trim(0)
+    library = ctypes.CDLL(None)
+    if not hasattr(library, "mallinfo2"):
+        return
+    gc.collect(1)  # what a job has left in cycles; the oldest generation has all modules in it and takes much longer
+    library.mallinfo2.restype = _AllocatorState
+    if library.mallinfo2().fordblks > KEPT_BYTES:
+        library.malloc_trim(ctypes.c_size_t(0))
 
 
 class WorkerContext(SpawnContext):
