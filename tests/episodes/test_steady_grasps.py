@@ -10,7 +10,7 @@ import pytest
 from manitwin.episodes.planning.problem import Grasp
 from manitwin.episodes.steady_grasps import (
     bears_weight,
-    by_largest_torque,
+    loads_any_way_up,
     steady_tiers,
     torsion_limits_nm,
     touch_narrowly,
@@ -81,18 +81,41 @@ def test_other_grippers_keep_the_order_of_their_grasps() -> None:
         assert steady_tiers([], bar(2.0), load_gripper(name)) == []
 
 
-def test_of_what_is_held_any_way_up_grasps_near_the_middle_and_broad_ones_come_first() -> None:
-    heavy = bar(2.0).body
-    x_m = (0.12, 0.0, 0.1, 0.03)
-    grasps = [held_at(x) for x in x_m]
-    assert [each.grasp_id for each in by_largest_torque(grasps, heavy, HAND)] == ["0.0", "0.03", "0.1", "0.12"]
+def raised(grasp: Grasp, by_m: float) -> Grasp:
+    """The same grasp, its pads higher up the bar, so that fewer of their rows touch it."""
+    return replace(grasp, gripper_to_object=grasp.gripper_to_object @ transform(None, np.array([0, 0, -by_m])))
+
+
+def test_what_is_held_any_way_up_loads_a_grasp_by_its_lever_and_by_how_little_of_the_pads_touches() -> None:
+    line_nm, _ = torsion_limits_nm(HAND)
+    body = bar(0.5).body
+    grasps = [held_at(x) for x in (0.06, 0.0, 0.03)]
+    assert loads_any_way_up(grasps, body, HAND) == [int(10 * x * 0.5 * 9.81 / line_nm) for x in (0.06, 0.0, 0.03)]
     upright = Grasp("upright", above([0.12, 0, 0.0]), 0.04)  # its closing axis leads through the middle
-    assert by_largest_torque([grasps[0], upright], heavy, HAND) == [upright, grasps[0]]
-    light = bar(0.03).body
-    assert by_largest_torque(grasps, light, HAND) == grasps
-    low = replace(
-        held_at(0.0), gripper_to_object=held_at(0.0).gripper_to_object @ transform(None, np.array([0, 0, -0.026]))
-    )
-    assert touch_narrowly([*grasps, low], light, HAND) == [False] * 4 + [True]  # the last row of the pads alone
-    assert by_largest_torque([low, *grasps], light, HAND) == [*grasps, low]
-    assert touch_narrowly(grasps, heavy, load_gripper("suction")) == [False] * 4
+    assert loads_any_way_up([upright], body, HAND) == [0]
+    low = raised(held_at(0.06), 0.026)
+    assert touch_narrowly([grasps[0], low], body, HAND) == [False, True]
+    whole, less = loads_any_way_up([grasps[0], low], body, HAND)
+    assert whole is not None
+    assert less is not None
+    assert less >= 5 * whole, "a fifth of the pads touches"
+
+
+def test_a_grasp_does_not_bear_any_way_up_more_than_its_pads_do_on_what_they_touch() -> None:
+    line_nm, face_nm = torsion_limits_nm(HAND)
+    body, weight_n = bar(0.5).body, 0.5 * 9.81
+    line_m, face_m = line_nm / weight_n, face_nm / weight_n
+    between = held_at((line_m + face_m) / 2)
+    assert loads_any_way_up([held_at(1.02 * face_m)], body, HAND) == [None]
+    assert loads_any_way_up([between], body, HAND)[0] is not None
+    assert loads_any_way_up([raised(between, 0.026)], body, HAND) == [None], "narrow pads bear as a line does"
+    assert loads_any_way_up([raised(held_at(0.8 * line_m), 0.026)], body, HAND)[0] is not None
+    assert loads_any_way_up([], body, HAND) == []
+    assert loads_any_way_up([between], body, load_gripper("suction")) == [0]
+
+
+def test_pads_that_touch_by_a_corner_alone_bear_nothing_however_light_it_is() -> None:
+    light = bar(0.01).body
+    by_a_row, by_a_corner = raised(held_at(0.14), 0.026), raised(held_at(0.153), 0.024)
+    a_fifth_nm = torsion_limits_nm(HAND)[0] / 5
+    assert loads_any_way_up([by_a_row, by_a_corner], light, HAND) == [int(10 * 0.14 * 0.01 * 9.81 / a_fifth_nm), None]

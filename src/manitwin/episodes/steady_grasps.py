@@ -10,7 +10,7 @@ from manitwin.episodes.planning.problem import Grasp
 from manitwin.geometry.poses import transform_points
 from manitwin.geometry.ray_caster import RayCaster
 from manitwin.geometry.rigid_body import PlacedObject, RigidBody
-from manitwin.physics.grasp_filters import PAD_CELLS, pad_contacts
+from manitwin.physics.grasp_filters import MIN_CELLS, PAD_CELLS, pad_contacts
 from manitwin.physics.trial import GRAVITY_M_S2
 from manitwin.robots.grippers.gripper import Gripper
 from manitwin.robots.grippers.parallel import ParallelGripper
@@ -44,30 +44,26 @@ def bears_weight(grasp: Grasp, target: PlacedObject, gripper: Gripper) -> bool:
     return weight_torque_nm(grasp, target, gripper) <= torsion_limits_nm(gripper)[0]
 
 
-def by_largest_torque(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -> list[Grasp]:
-    """Return grasps of what is held any way up: those first in which its weight turns it least about the closing axis.
+def loads_any_way_up(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -> list[int | None]:
+    """Return how the weight of what may be turned any way up loads each grasp, the less the better; None: it is not borne.
 
-    By tenths of what two pads bear on a line, then those that touch broadly, in their order otherwise; of other grippers than
-    jaws in their order.
+    The largest torque of the weight about the closing axis, in tenths of what two pads bear on a line, divided by the share of
+    the pads that touches. It is borne as on a line where pads touch narrowly (``touch_narrowly``), as on a face else, and not
+    by pads that touch by the least that a grasp must: by an edge that is a few millimetres beside the fingers when they come.
+    0 of other grippers than jaws, of which nothing is known. Of 270 lifts, one in which things turned by more than 10 degrees
+    has a larger load than one in which they did not in 79 of 100 pairs, a larger torque in 72.
     """
-    order = largest_torques(grasps, body, gripper)
-    return [grasps[place] for place in sorted(range(len(grasps)), key=lambda place: order[place])]
-
-
-def largest_torques(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -> list[tuple[int, bool]]:
-    """Return of each grasp the torque of the weight about the closing axis, wherever that points, and whether it is narrow.
-
-    In tenths of what two pads bear on a line; 0 of other grippers than jaws. Narrow: see ``touch_narrowly``.
-    """
-    if not isinstance(gripper, ParallelGripper):
-        return [(0, False)] * len(grasps)
-    step_nm = torsion_limits_nm(gripper)[0] / 10
-    tip_m, found = np.array([[0.0, 0, gripper.tip_depth_m]]), []
-    for grasp, narrow in zip(grasps, touch_narrowly(grasps, body, gripper), strict=True):
+    if not isinstance(gripper, ParallelGripper) or not grasps:
+        return [0] * len(grasps)
+    line_nm, face_nm = torsion_limits_nm(gripper)
+    tip_m, found = np.array([[0.0, 0, gripper.tip_depth_m]]), list[int | None]()
+    for grasp, cells in zip(grasps, _cells(grasps, body, gripper), strict=True):
         pose = grasp.gripper_to_object
         away_m = body.center_of_mass_m - transform_points(pose, tip_m)[0]
-        lever_m = float(np.linalg.norm(np.cross(away_m, pose[:3, 0])))
-        found.append((int(GRAVITY_M_S2 * body.mass_kg * lever_m / step_nm), narrow))
+        torque_nm = GRAVITY_M_S2 * body.mass_kg * float(np.linalg.norm(np.cross(away_m, pose[:3, 0])))
+        limit_nm = line_nm if cells < BROAD_SHARE * PAD_CELLS else face_nm
+        borne = cells > MIN_CELLS and torque_nm <= limit_nm
+        found.append(int(10 * torque_nm / line_nm * PAD_CELLS / cells) if borne else None)
     return found
 
 
@@ -79,9 +75,13 @@ def touch_narrowly(grasps: Sequence[Grasp], body: RigidBody, gripper: Gripper) -
     """
     if not isinstance(gripper, ParallelGripper) or not grasps:
         return [False] * len(grasps)
+    return [bool(cells < BROAD_SHARE * PAD_CELLS) for cells in _cells(grasps, body, gripper)]
+
+
+def _cells(grasps: Sequence[Grasp], body: RigidBody, gripper: ParallelGripper) -> np.ndarray:
+    """Return by how many cells the pad touches that touches by fewer ``(N,)``."""
     poses = np.array([each.gripper_to_object for each in grasps])
-    contacts = pad_contacts(gripper, poses, RayCaster.of_hulls(body.hulls), body.center_of_mass_m)
-    return [bool(cells < BROAD_SHARE * PAD_CELLS) for cells in contacts.cells]
+    return pad_contacts(gripper, poses, RayCaster.of_hulls(body.hulls), body.center_of_mass_m).cells
 
 
 def torsion_limits_nm(gripper: ParallelGripper) -> tuple[float, float]:

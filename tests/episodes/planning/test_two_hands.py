@@ -66,6 +66,15 @@ def test_givers_beside_which_nothing_is_far_enough_are_left_out() -> None:
     assert hands().givers(replace(problem(), grasps=(GIVER, NEARER, FAR)))[0] is GIVER  # its middle is that of the bar
 
 
+def test_neither_hand_holds_by_a_corner_and_what_is_too_heavy_for_one_hand_is_not_handed_over() -> None:
+    corner = replace(FAR, grasp_id="corner", gripper_to_object=above([0, 0.153, 0.018], DOWN))
+    asked = replace(problem(), grasps=(GIVER, FAR, corner))
+    assert {each.grasp_id for each in hands().givers(asked)} == {"giver", "far"}
+    assert {held.grasp.grasp_id for held in hands().beside(asked, GIVER.gripper_to_object)} == {"far"}
+    heavy = box([0.03, 0.3, 0.03], 1.0, center_m=(0, 0, 0))  # its end weighs 1.2 Nm about the jaws
+    assert hands().givers(replace(problem(heavy), grasps=(GIVER, FAR))) == ()
+
+
 def placed(measured: np.ndarray) -> tuple[np.ndarray, Placement] | None:
     """Put the bar down, as it has come to be in the hand, whose open fingers are 7 mm above the table then."""
     asked = problem()

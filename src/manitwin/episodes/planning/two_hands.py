@@ -11,7 +11,7 @@ from manitwin.episodes.planning.arm_obstacles import ArmObstacles
 from manitwin.episodes.planning.arm_planning import ArmPlanning
 from manitwin.episodes.planning.problem import Grasp, Phase, PickPlaceProblem
 from manitwin.episodes.planning.put_down import Held
-from manitwin.episodes.steady_grasps import by_largest_torque, largest_torques
+from manitwin.episodes.steady_grasps import loads_any_way_up
 from manitwin.geometry.poses import inverse, transform_points
 
 APART_M, LEAST_APART_M = 0.06, 0.04  # of the pads of two hands: nearer, they have room where they come from two sides
@@ -32,18 +32,19 @@ class TwoHands:
         self._found: dict[bytes, tuple[Held, ...]] = {}
 
     def givers(self, problem: PickPlaceProblem) -> tuple[Grasp, ...]:
-        """Return the grasps that another one is apart from, those first that a quarter of them are well apart from.
+        """Return the grasps that bear the target any way up and that another such one is apart from.
 
-        Of these first those in which, and in some other one apart from them, the weight turns the target least.
+        Those first that a quarter of them are well apart from; of these those whose load, and that of some other one apart from
+        them, is least (``steady_grasps``).
         """
-        grasps, ranked = problem.grasps, []
-        torques = largest_torques(grasps, problem.target.body, self._gripper)
+        grasps, loads = self._bearing(problem)
+        ranked = []
         for place, grasp in enumerate(grasps):
             apart_m = self._apart_m(grasp.gripper_to_object, grasps)
-            others = [torques[other] for other in np.flatnonzero(apart_m >= LEAST_APART_M)]
+            others = [loads[other] for other in np.flatnonzero(apart_m >= LEAST_APART_M)]
             if others:
                 crowded = int((apart_m >= APART_M).sum()) < len(grasps) / 4
-                ranked.append((crowded, max(torques[place], min(others)), place))
+                ranked.append((crowded, max(loads[place], min(others)), place))
         return tuple(grasps[place] for *_, place in sorted(ranked))
 
     def turned(self, grasps: Sequence[Grasp], giver_to_object: np.ndarray) -> list[Held]:
@@ -53,7 +54,7 @@ class TwoHands:
         return [Held(each, each.gripper_to_object @ turn) for each in apart for turn in self._taker.candidates.turns]
 
     def beside(self, problem: PickPlaceProblem, giver_to_object: np.ndarray) -> tuple[Held, ...]:
-        """Return the second hand's grasps that it can approach past the open first hand, the least turned first."""
+        """Return the second hand's grasps that it can approach past the open first hand, the least loaded first."""
         if self._problem is not problem:
             self._problem, self._found = problem, {}
         key = giver_to_object.tobytes()
@@ -65,13 +66,20 @@ class TwoHands:
                 problem, target=target, goal_object_to_world=here, obstacles=hand, static_boxes=(), fixtures=()
             )
             world, before = self._taker.world_of(alone, here), self._taker.ends.before
-            grasps = by_largest_torque(problem.grasps, problem.target.body, self._gripper)
+            bearing, loads = self._bearing(problem)
+            grasps = [bearing[place] for place in sorted(range(len(bearing)), key=lambda place: loads[place])]
             self._found[key] = tuple(
                 held
                 for held in self.turned(grasps, giver_to_object)
                 if world.is_hand_free(Phase.APPROACH, held.gripper_to_object, before(held.gripper_to_object))
             )
         return self._found[key]
+
+    def _bearing(self, problem: PickPlaceProblem) -> tuple[list[Grasp], list[int]]:
+        """Return the grasps that bear the target any way up, and their loads."""
+        loads = loads_any_way_up(problem.grasps, problem.target.body, self._gripper)
+        both = [(grasp, load) for grasp, load in zip(problem.grasps, loads, strict=True) if load is not None]
+        return [grasp for grasp, _ in both], [load for _, load in both]
 
     def _apart_m(self, gripper_to_object: np.ndarray, others: Sequence[Grasp]) -> np.ndarray:
         """Return how far apart the pads are from those of other grasps ``(N,)``."""
