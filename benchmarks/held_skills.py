@@ -136,6 +136,7 @@ def main() -> None:
     parser.add_argument("--attempts", type=int, default=0, help="of a skill, over its twins in turn; instead of seeds")
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--controls", type=int, default=10)
+    parser.add_argument("--kinds", default="", help="only controls of these kinds, as empty,turned")
     parser.add_argument("--categories", default="", help="only twins of these")
     parser.add_argument("--robot", default="panda")
     asked = parser.parse_args()
@@ -148,7 +149,8 @@ def main() -> None:
         for twin in twins if asked.seeds and not asked.attempts else ():
             ran = [bench.attempt(name, twin, asked.first + seed) for seed in range(asked.seeds)]
             print(row(f"{name} {twin.category} {twin.twin_id[:4]}", ran), flush=True)
-        for kind in CONTROLS[name] if asked.controls else ():
+        kinds = [kind for kind in CONTROLS[name] if not asked.kinds or kind in asked.kinds.split(",")]
+        for kind in kinds if asked.controls else ():
             outcomes = bench.controls(name, kind, twins, asked.first, asked.controls)
             judged = sum(count for outcome, count in outcomes.items() if outcome in JUDGED)
             print(f"{name}, {kind}: {outcomes['kept']} of {judged} kept; {dict(outcomes)}", flush=True)

@@ -115,7 +115,10 @@ def test_a_grasp_does_not_bear_any_way_up_more_than_its_pads_do_on_what_they_tou
 
 
 def test_pads_that_touch_by_a_corner_alone_bear_nothing_however_light_it_is() -> None:
-    light = bar(0.01).body
-    by_a_row, by_a_corner = raised(held_at(0.14), 0.026), raised(held_at(0.153), 0.024)
-    a_fifth_nm = torsion_limits_nm(HAND)[0] / 5
-    assert loads_any_way_up([by_a_row, by_a_corner], light, HAND) == [int(10 * 0.14 * 0.01 * 9.81 / a_fifth_nm), None]
+    light, a_fifth_nm = bar(0.01).body, torsion_limits_nm(HAND)[0] / 5
+    by_a_row, by_a_column = raised(held_at(0.14), 0.026), raised(held_at(0.153), 0.024)
+    by_a_corner, beside = raised(held_at(0.146), 0.026), held_at(0.2)
+    loads = loads_any_way_up([by_a_row, by_a_column, by_a_corner, beside], light, HAND)
+    of_a_row = int(10 * 0.14 * 0.01 * 9.81 / a_fifth_nm)
+    of_a_column = int(10 * 0.153 * 0.01 * 9.81 / (a_fifth_nm * 2 / 3))
+    assert loads == [of_a_row, of_a_column, None, None]

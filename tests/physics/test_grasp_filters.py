@@ -100,7 +100,7 @@ def cloud(count: int, directions: np.ndarray, rng: np.random.Generator) -> np.nd
 
 def contacts(lever_m: np.ndarray, cells: np.ndarray) -> PadContacts:
     count = len(lever_m)
-    return PadContacts(np.full(count, 0.03), cells, np.zeros(count), np.ones(count), lever_m)
+    return PadContacts(np.full(count, 0.03), cells, np.full(count, 0.01), np.zeros(count), np.ones(count), lever_m)
 
 
 def test_selection_prefers_short_levers_and_large_contacts() -> None:

@@ -42,13 +42,15 @@ class PadContacts:
     """The contacts of both pads of N grasps with an object.
 
     ``width_m`` distance of the two contacts along the closing axis (inf where a pad meets nothing), ``cells`` the
-    smaller number of touching cells of the two pads, ``offset_m`` the distance of the two contacts' centres across the
-    closing axis, ``alignment`` the smaller mean cosine of surface normal and closing axis, ``lever_m`` the distance of
+    smaller number of touching cells of the two pads, ``from_end_m`` the distance of a contact's centre from the end of its pad
+    along the approach, the smaller of two, ``offset_m`` the distance of the two contacts' centres across the closing
+    axis, ``alignment`` the smaller mean cosine of surface normal and closing axis, ``lever_m`` the distance of
     the centre of mass from the line through the contacts.
     """
 
     width_m: np.ndarray
     cells: np.ndarray
+    from_end_m: np.ndarray
     offset_m: np.ndarray
     alignment: np.ndarray
     lever_m: np.ndarray
@@ -118,6 +120,9 @@ def _both_pads(
     return PadContacts(
         width_m=np.where(met, gripper.opening_m - plus.depth_m - minus.depth_m, np.inf),
         cells=np.minimum(plus.cells, minus.cells),
+        from_end_m=gripper.tip_depth_m
+        + gripper.pad_half_extents_m[1]
+        - np.maximum(plus.center_m[:, 1], minus.center_m[:, 1]),
         offset_m=np.linalg.norm(plus.center_m - minus.center_m, axis=1),
         alignment=np.minimum(plus.alignment, minus.alignment),
         lever_m=np.linalg.norm(np.cross(center_of_mass_m - line, rotation[:, :, 0]), axis=1),

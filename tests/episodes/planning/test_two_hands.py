@@ -67,7 +67,7 @@ def test_givers_beside_which_nothing_is_far_enough_are_left_out() -> None:
 
 
 def test_neither_hand_holds_by_a_corner_and_what_is_too_heavy_for_one_hand_is_not_handed_over() -> None:
-    corner = replace(FAR, grasp_id="corner", gripper_to_object=above([0, 0.153, 0.018], DOWN))
+    corner = replace(FAR, grasp_id="corner", gripper_to_object=above([0, 0.146, 0.02], DOWN))
     asked = replace(problem(), grasps=(GIVER, FAR, corner))
     assert {each.grasp_id for each in hands().givers(asked)} == {"giver", "far"}
     assert {held.grasp.grasp_id for held in hands().beside(asked, GIVER.gripper_to_object)} == {"far"}
@@ -93,3 +93,23 @@ def test_what_has_turned_in_the_hand_is_put_down_as_there_is_room(monkeypatch: p
     assert placed(turned) is not None
     monkeypatch.setattr(put_down, "goals_after_slip", lambda _, goal, *__: [goal])
     assert placed(turned) is None
+
+
+def test_as_a_last_resort_all_places_with_room_are_planned_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, taker = problem(), arms().taker
+    goals = [transform(None, np.array([0.75, y_m, 0.016])) for y_m in np.linspace(-0.15, 0.15, 7)]
+    held = Held(GIVER, GIVER.gripper_to_object)
+    at = PutDown(taker, arms().with_giver_at(asked, arms().arm.home), goals)
+    plan_place, tried = taker.plan_place, list[np.ndarray]()
+
+    def only_the_last(*given: object) -> Placement | None:
+        tried.append(given[4])  # type: ignore[arg-type]
+        return plan_place(*given) if given[4] is goals[-1] else None  # type: ignore[arg-type]
+
+    monkeypatch.setattr(taker, "plan_place", only_the_last)
+    where = arms().with_giver_at(asked, arms().arm.home), held, taker.arm.home, held.gripper_to_object
+    assert at.plan(*where) is None
+    assert len(tried) == put_down.MOST_PLANNED
+    found = at.plan(*where, put_down.PLACES)
+    assert found is not None
+    assert found[0] is goals[-1]

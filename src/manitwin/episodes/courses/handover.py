@@ -17,7 +17,7 @@ from manitwin.episodes.planning.held_knots import HeldPath
 from manitwin.episodes.planning.held_path import HeldPathPlanner
 from manitwin.episodes.planning.placement import Placement
 from manitwin.episodes.planning.problem import Grasp, Phase
-from manitwin.episodes.planning.put_down import Held, put_down_poses
+from manitwin.episodes.planning.put_down import MOST_PLANNED, PLACES, Held, put_down_poses
 from manitwin.episodes.planning.two_arms import HandoverPlan, Take, TwoArmPlanner
 from manitwin.geometry.poses import transform, transform_points
 from manitwin.geometry.rigid_body import PlacedObject
@@ -164,7 +164,7 @@ class HandoverCourse(Course):
                 self._bring_giver_home(taker_rad, take, execution)
                 self._giver_rad = execution.commanded_rad
                 execution.use(TAKER)
-            placement = self._placement(held, execution)
+            placement = self._placement(held, execution, PLACES)
         if placement is None:
             raise Ended("replan_failed")
         carry, lower, retreat = placement
@@ -189,10 +189,10 @@ class HandoverCourse(Course):
             execution.follow(home)
         execution.use(GIVER)
 
-    def _placement(self, held: Held, execution: Execution) -> Placement | None:
-        """Plan where to put the target down, and the way there, from where the second arm is."""
+    def _placement(self, held: Held, execution: Execution, most: int = MOST_PLANNED) -> Placement | None:
+        """Plan where to put the target down, of up to ``most`` places, and the way there, from where the second arm is."""
         asked = self._arms.with_giver_at(self.problem, self._giver_rad)
-        found = self._put_down.plan(asked, held, execution.commanded_rad, execution.gripper_to_object())
+        found = self._put_down.plan(asked, held, execution.commanded_rad, execution.gripper_to_object(), most)
         self.facts.replans["put_down" if found is not None else "put_down_failed"] += 1
         if found is None:
             return None

@@ -48,10 +48,18 @@ class PutDown:
         return self._found[key]
 
     def plan(
-        self, problem: PickPlaceProblem, held: Held, joints_rad: np.ndarray, gripper_to_object: np.ndarray
+        self,
+        problem: PickPlaceProblem,
+        held: Held,
+        joints_rad: np.ndarray,
+        gripper_to_object: np.ndarray,
+        most: int = MOST_PLANNED,
     ) -> tuple[np.ndarray, Placement] | None:
-        """Plan from where the arm is, with the pose in the hand ``(4, 4)`` that was measured: the goal and the way to it."""
-        for goal in islice(self._with_room(problem, held, gripper_to_object), MOST_PLANNED):
+        """Plan from where the arm is, with the pose in the hand ``(4, 4)`` that was measured: the goal and the way to it.
+
+        None: there is none to the first ``most`` places where the hand alone has room.
+        """
+        for goal in islice(self._with_room(problem, held, gripper_to_object), most):
             found = self._arm.plan_place(problem, held, joints_rad, gripper_to_object, goal, True)
             if found is not None:
                 return goal, found
