@@ -45,6 +45,14 @@ def test_a_button_on_the_underside_is_not_pressed() -> None:
     assert not SKILLS["press"].suits(under.pool, under.twin(0), None)
 
 
+def test_a_button_that_lies_on_the_table_has_no_way_to_be_pressed() -> None:
+    placed = SPOT.objects[0]
+    turned = placed.object_to_world @ transform(np.diag([1.0, -1, -1]), np.array([0, 0, 0.03]))
+    lying = replace(SPOT, objects=(replace(placed, object_to_world=turned),))
+    facts, _ = attempt(lying, goal_of("press", SPOT), ())
+    assert facts.outcome == "no_plan"
+
+
 def test_the_first_corner_of_a_tilted_hand_leads() -> None:
     corners = fingertip_corners(panda()[1].closed)
     assert np.ptp(corners, axis=0)[:2] == pytest.approx(

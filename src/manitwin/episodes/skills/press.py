@@ -44,10 +44,14 @@ class Press(HeldSkill):
         return Goal((Literal(self.predicate, target.name),), (Literal("undisturbed", target.name),))
 
     def task(self, scene: HeldScene) -> HeldTask:
-        """Return ways down to the place, the hand turned and tilted at random so that one corner of it comes first."""
+        """Return ways down to the place, the hand turned and tilted at random so that one corner of it comes first.
+
+        None of a thing that lies so that no such place looks upward: a scene's may, and what another step has laid down.
+        """
         target, rng = scene.target, scene.rng
         frame = pressed_frame(scene.frames[target.name], target.object_to_world)
-        assert frame is not None, "only things with a place that looks upward are pressed"
+        if frame is None:
+            return HeldTask((), empty=True)
         place = target.object_to_world @ frame.frame_to_object
         heights_m = np.array([*np.linspace(ABOVE_M, NEAR_M, FREE_KNOTS), 0.008, 0.004, 0.0, -BELOW_M])
         paths: list[HeldPath] = []
